@@ -1,4 +1,4 @@
-"""What all tests share: a seeded generator, no network, and how they are spread over processes."""
+"""Shared fixtures: a seeded generator, no network, distribution of tests over processes."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ LONG_FIRST: Final = (
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Several processes must not all compile the same at once: it is done for them before they start.
+    """Compile once before the worker processes start, so that they do not all compile the same code.
 
-    Where the tests are begun in the background of a shell, Ctrl-C is ignored, and by all that they start: not here.
+    A shell starts background jobs with Ctrl-C ignored, and their children inherit this; here it is restored.
     """
     if hasattr(config, "workerinput"):
         return
@@ -68,13 +68,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def rng() -> np.random.Generator:
-    """Random numbers that are the same in every run."""
+    """Random numbers that are equal in every run."""
     return np.random.default_rng(20121121)
 
 
 @pytest.fixture(autouse=True)
 def no_network(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A test that opens a connection to another machine fails."""
+    """Fail a test that connects to another machine."""
     connect = socket.socket.connect
 
     def only_here(self: socket.socket, address: Any) -> None:
@@ -87,7 +87,7 @@ def no_network(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """A browser without a window; skips, visibly, where there is none."""
+    """A browser without a window; skip the test if there is none."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright, of the extra `dev`")
     names = ("chromium", "chromium-browser", "google-chrome")
     found = next((path for name in names if (path := shutil.which(name))), None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def contrast(one: str, other: str) -> float:
-    """Ratio of two colours `#rrggbb`, 1 to 21; texts need 4.5, graphics 3."""
+    """Return the contrast ratio of two colours `#rrggbb`, 1 to 21; texts need 4.5, graphics 3."""
     lighter, darker = sorted((_luminance(one), _luminance(other)), reverse=True)
     return (lighter + 0.05) / (darker + 0.05)
 

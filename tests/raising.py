@@ -1,4 +1,4 @@
-"""What an error must say, apart from its words: where it is, which key, which value."""
+"""Checks of an error apart from its words: its place, its key, its value."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def raises(
     cause: type[BaseException] | None = None,
     **fields: Any,
 ) -> Iterator[pytest.ExceptionInfo[Any]]:
-    """The body raises an error whose attributes are these; `cause` is the class of what it came from."""
+    """Require that the body raises an error with these attributes; `cause` is the class of its cause."""
     with pytest.raises(error) as caught:
         yield caught
     assert {name: getattr(caught.value, name) for name in fields} == fields

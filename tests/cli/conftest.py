@@ -1,4 +1,4 @@
-"""What the tests of the command line share."""
+"""Shared fixtures of the command line tests."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COMPILING = "activesteer: compiling native code, which is kept for the next time
 
 
 class Told(NamedTuple):
-    """What a command said.
+    """Result of a command.
 
     Attributes:
         status: Exit status.
@@ -30,7 +30,7 @@ class Told(NamedTuple):
 
     @property
     def json(self) -> Any:
-        """Standard output as JSON, which it must be from the first character to the last."""
+        """Return standard output as JSON; it must be JSON from the first to the last character."""
 
         def refuse(word: str) -> None:
             pytest.fail(f"{word} is no JSON")
@@ -43,7 +43,7 @@ Call = Callable[..., Told]
 
 @pytest.fixture
 def call(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Call:
-    """Runs a command in an empty folder."""
+    """Run a command in an empty folder."""
     monkeypatch.chdir(tmp_path)
 
     def call(*words: object) -> Told:
@@ -58,7 +58,7 @@ def call(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest
 
 @pytest.fixture
 def controller(tmp_path: Path) -> Callable[..., str]:
-    """Writes a user's controller and returns what to give to `-c`."""
+    """Write a user's controller and return the argument of `-c`."""
 
     def write(body: str, name: str = "mine.py", cls: str = "Mine") -> str:
         (tmp_path / name).write_text(

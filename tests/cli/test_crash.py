@@ -1,4 +1,4 @@
-"""What is left when a run is ended from outside: killed, or by a disk that is full."""
+"""Recordings of runs that are ended from outside: killed, or stopped by a full disk."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def activesteer(folder: Path, *words: str, program: str = MAIN) -> subprocess.Co
 
 
 def stock_messages(path: Path) -> dict[str, int]:
-    """Log time [ns] of the last message of each topic that the reader of the `mcap` library finds."""
+    """Return the log time [ns] of the last message of each topic, as read by the `mcap` library."""
     topics: dict[int, str] = {}
     last: dict[str, int] = {}
     with path.open("rb") as stream:
@@ -66,7 +66,7 @@ KILLED_S = 3.001
 
 @pytest.fixture(scope="module")
 def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Recording of a run that was killed."""
+    """Return the recording of a killed run."""
     folder = tmp_path_factory.mktemp("killed")
     (folder / "mine.py").write_text(BODY)
     done = activesteer(folder, "run", "slalom", "-c", "mine.py:Mine", "--set", "settle_s=0", "-o", "run.mcap")

@@ -1,4 +1,4 @@
-"""What the command line says when something is wrong: one message, status 1, no traceback, nothing lost."""
+"""Errors of the command line: one message, status 1, no traceback, no lost file."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def test_controller_that_is_wrong_from_the_start_is_answered(call, controller):
 
 
 def test_car_that_diverges_keeps_what_was_recorded(call):
-    """Dampers that push with the motion feed energy into it, without end."""
+    """Dampers that push in the direction of motion add energy without end."""
     told = call(
         "run", "straight_line", "--set", "settle_s=0", "--set", "duration_s=3", "-o", "run.mcap",
         "--set", "dampers.front.force_N=" + json.dumps([5e8, 0.0, -5e8]),

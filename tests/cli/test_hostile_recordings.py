@@ -1,4 +1,4 @@
-"""Recordings that hold nonsense: they are refused when they are opened, or every command can handle them."""
+"""Recordings with nonsense values: opening refuses them, or every command handles them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NONSENSE: tuple[Any, ...] = (
 
 
 def thinned(recording: Recording, every: int = 50) -> Recording:
-    """Every so many rows of a run, which makes it small."""
+    """Return a run thinned to every n-th row."""
     poses = recording.poses
     few = slice(None, None, every)
     kept = Poses(poses.time_s[few], poses.names, poses.positions_m[few], poses.quaternions[few])
@@ -58,7 +58,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def use(path: Path) -> bool:
-    """Opens a file and does everything with it that can be done; whether it could be opened."""
+    """Open a file and use it in every way; return True if it opens."""
     try:
         recording = Recording.open(path, recover=True)
     except RecordingError:
@@ -83,7 +83,7 @@ def use(path: Path) -> bool:
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Where something could stand instead, in tables within tables; of a list the list, its first value, and all."""
+    """Yield the places of a tree where another value can stand: tables, lists with their first value, values."""
     if path:
         yield path
     if isinstance(value, Mapping):
@@ -94,7 +94,7 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def put(tree: Any, path: Sequence[Any], value: Any) -> Any:
-    """A copy of a tree with another value at a place; without that place where the value is `...`."""
+    """Return a copy of a tree with another value at a place; the value `...` removes the place."""
     tree = copy.deepcopy(tree)
     inner = tree
     for key in path[:-1]:
@@ -107,7 +107,7 @@ def put(tree: Any, path: Sequence[Any], value: Any) -> Any:
 
 
 def check_texts(driven: Recording, folder: Path, count: int, rng: np.random.Generator) -> None:
-    """Nonsense in the metadata of the run, and in what describes channels and bodies."""
+    """Try nonsense in the metadata of the run and in the descriptions of channels and bodies."""
     driven.save(folder / "sound.mcap")
     records: list[Any] = list(records_of(folder / "sound.mcap"))
     of_run, of_topics = (
@@ -136,7 +136,7 @@ def check_texts(driven: Recording, folder: Path, count: int, rng: np.random.Gene
 
 
 def odd_runs(driven: Recording, count: int, rng: np.random.Generator) -> Iterator[tuple[str, Recording]]:
-    """Runs with few rows, few channels, strange values, strange poses, of any kind of manoeuvre."""
+    """Yield runs with few rows, few channels, unusual values or poses, and all kinds of manoeuvres."""
     kinds = [*EVALUATIONS, "standstill"]
     names = [*SCENARIOS, "mine"]
     for _ in range(count):
@@ -179,7 +179,7 @@ def check_odd_runs(driven: Recording, folder: Path, count: int, rng: np.random.G
 
 
 def check_bytes(driven: Recording, folder: Path, count: int, rng: np.random.Generator) -> None:
-    """Bytes changed without a checksum over the file, and files cut anywhere."""
+    """Try files with changed bytes and no checksum, and files cut at any place."""
     driven.save(folder / "sound.mcap")
     data = write_records(folder / "sound.mcap", records_of(folder / "sound.mcap")).read_bytes()
     for _ in range(count):

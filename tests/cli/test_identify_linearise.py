@@ -13,7 +13,7 @@ from activesteer.resources import find_vehicle
 
 @pytest.fixture
 def own_vehicle(tmp_path):
-    """A copy of the compact's file, with another characteristic speed in it."""
+    """Return a copy of the compact's file with another characteristic speed."""
     text = find_vehicle("compact").read_text(encoding="utf-8")
     file = tmp_path / "own.toml"
     before, _, after = text.partition("characteristic_speed_kmh = ")

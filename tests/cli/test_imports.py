@@ -1,4 +1,4 @@
-"""What a command imports: help and lists answer at once, and only `replay` needs the viewer."""
+"""Imports of commands: help and lists answer quickly, and only `replay` needs the viewer."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ sys.exit(status)
 
 
 def call(folder: Path, refused: set[str], *calls: str) -> subprocess.CompletedProcess[str]:
-    """Call commands one after the other in one process in which some packages cannot be imported."""
+    """Call commands in sequence in one process where some packages cannot be imported."""
     return subprocess.run(
         [sys.executable, "-c", PROGRAM.format(refused=refused, calls=[words.split() for words in calls])],
         cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,

@@ -1,4 +1,4 @@
-"""`activesteer list`, `info` and `bench`, and the options of the program itself."""
+"""`activesteer list`, `info` and `bench`, and the options of the program."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ KEYS = {
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory) -> Path:
-    """A recording of 2.5 s, so of three blocks."""
+    """Return a recording of 2.5 s, which has three blocks."""
     path = tmp_path_factory.mktemp("run") / "run.mcap"
     settings = ("settle_s=0", "duration_s=2.5", "road.mu=0.7")
     words = [word for setting in settings for word in ("--set", setting)]
@@ -132,7 +132,7 @@ DIFFERENCES = {"estimator_lqr_us", "integrated_us", "mpc_us"}
 
 
 def test_bench_has_the_promised_keys_and_ratios(call, monkeypatch):
-    """With stages that are not driven: `make test` runs the whole benchmark."""
+    """The stages are replaced, because `make test` runs the whole benchmark."""
     times_us = itertools.count(20)
     monkeypatch.setattr(
         "activesteer.studies.benchmark._interleaved", lambda stages, _: {name: [next(times_us)] for name in stages}

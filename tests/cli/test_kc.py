@@ -13,7 +13,7 @@ from activesteer.cli import main
 
 @pytest.fixture(scope="module", autouse=True)
 def measured_once():
-    """The rig measures the compact once for all tests of its command."""
+    """Measure the compact once for all tests of the command."""
     with pytest.MonkeyPatch.context() as patch:
         once = functools.cache(lambda vehicle: rigs_measure(vehicle, {}))
         rigs_measure = rigs.kinematics_compliance

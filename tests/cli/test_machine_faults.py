@@ -1,4 +1,4 @@
-"""Faults of the machine: a full disk, a closed folder, no home, a kill, little memory; and runs that must repeat."""
+"""Machine faults (full disk, read-only folder, no home, kill, little memory), and repeatability of runs."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def program(
     before: tuple[str, ...] = (),
     environment: Mapping[str, str] | None = None,
 ) -> subprocess.CompletedProcess[str]:
-    """Run the program in a folder; no file that it writes may get larger than `limit` bytes."""
+    """Run the program in a folder with a size limit for its files [bytes]."""
     changed = dict(environment or {})
     # CPython 3.11 keeps byte code that it could write in part only, and is broken by it at the next import.
     changed |= {} if limit is None else {"PYTHONDONTWRITEBYTECODE": "1"}
@@ -147,7 +147,7 @@ def test_a_folder_that_may_not_be_written_is_one_error(tmp_path: Path, recording
 
 
 def unprivileged() -> tuple[str, ...]:
-    """Return the words before a command that take root's right to write everywhere; empty where we are not root."""
+    """Return the prefix of a command that drops root's right to write everywhere; empty without root."""
     if os.geteuid() != 0:
         return ()
     words = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")

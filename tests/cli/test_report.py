@@ -1,4 +1,4 @@
-"""`activesteer report`: a page of one's own runs."""
+"""`activesteer report`: a page of the user's runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM at many moments of many commands: how the program ends, and what it says is saved."""
+"""Ctrl-C and SIGTERM at many moments of many commands: exit of the program, and truth of its saved-file messages."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_signal_ends_every_command_at_any_moment(tmp_path, words, number, after_
 
 @pytest.mark.parametrize("swallowed", ["while True: pass", pytest.param("time.sleep(60.0)", marks=pytest.mark.slow)])
 def test_command_that_does_not_listen_is_ended_and_leaves_no_half_file(tmp_path, controller, swallowed):
-    """A user's own code may catch everything, or be busy elsewhere."""
+    """User code may catch all exceptions or be busy elsewhere."""
     body = f"""
         import contextlib, time
         from activesteer.errors import ParameterError
@@ -75,7 +75,7 @@ def test_command_that_does_not_listen_is_ended_and_leaves_no_half_file(tmp_path,
 
 
 def stopped(folder: Path, words: tuple[str, ...], number: signal.Signals, when: float | Path) -> None:
-    """Sends the signal as a terminal does, to all processes of the group, after a time [s] or when there is a file."""
+    """Send the signal to the whole process group, like a terminal, after a time [s] or when a file exists."""
     process = subprocess.Popen(
         [sys.executable, "-c", MAIN, *words],
         cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -120,7 +120,7 @@ def alive(group: int) -> bool:
 
 
 def is_true(saved: str, folder: Path) -> None:
-    """Compares what is said to be saved with what is there."""
+    """Compare the reported files with the files on disk."""
     there = {
         str(path.relative_to(folder)): path
         for path in folder.rglob("*")

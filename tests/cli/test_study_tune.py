@@ -1,4 +1,4 @@
-"""`activesteer study` and `tune`: what they print, how they are stopped, and that they go on."""
+"""`activesteer study` and `tune`: output, interruption, resuming."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Code of a user's own on the command line: what it prints, raises and imports."""
+"""User code on the command line: output, exceptions, imports."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The wheel holds all that a run needs: built, installed outside the checkout, and used from there."""
+"""The wheel contains all that a run needs: build it, install it outside the checkout, and run from there."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def call(*words: str | Path, cwd: Path) -> str:
-    """Run a program as a user's shell would: no PYTHONPATH, so that nothing leads back to the checkout."""
+    """Run a program like a user's shell: without PYTHONPATH, so that nothing refers to the checkout."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     done = subprocess.run(
         [str(word) for word in words], cwd=cwd, env=environment, capture_output=True, text=True, check=False
@@ -36,7 +36,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The `bin` folder of a new environment with the wheel in it."""
+    """Return the `bin` folder of a new environment with the wheel installed."""
     folder = tmp_path_factory.mktemp("environment")
     venv.create(folder, with_pip=False, symlinks=True)
     python = folder / "bin" / "python"

@@ -30,7 +30,7 @@ _COMMAND_OUTSIDE = re.compile(r"\s+(?:\$ )?(?:activesteer|python|pip|make) \S")
 
 @dataclass(frozen=True)
 class Block:
-    """What stands between two fences."""
+    """A fenced block."""
 
     line: int
     language: str
@@ -38,12 +38,12 @@ class Block:
 
     @property
     def file(self) -> str | None:
-        """The file that it is to become."""
+        """Name of the file that the block defines."""
         found = _FILE.match(self.text) if self.language in {"python", "toml"} else None
         return found[1] if found else None
 
     def commands(self) -> Iterator[Command]:
-        """The command lines, with what they print where that is shown."""
+        """The command lines, with their shown output."""
         shown = self.language == "console"
         lines = self.text.replace("\\\n", " ").splitlines()
         starts = [i for i, line in enumerate(lines) if line.startswith("$ ")] if shown else list(range(len(lines)))
@@ -72,7 +72,7 @@ class Command:
 
 
 def blocks(page: Path) -> list[Block]:
-    """All of a page; fails where a block has no language or an unknown one, or a command stands outside of one."""
+    """Return all blocks of a page; fail on a block without a known language, or on a command outside of a block."""
     found: list[Block] = []
     lines = page.read_text(encoding="utf-8").splitlines()
     start, fence, language = 0, "", ""
@@ -92,7 +92,7 @@ def blocks(page: Path) -> list[Block]:
 
 
 def same_output(shown: tuple[str, ...], printed: str) -> bool:
-    """Whether a program printed what a page shows."""
+    """Return True if a program printed the output that a page shows."""
     lines = [line for line in printed.splitlines() if line.strip()]
     parts: list[list[str]] = [[]]
     for line in (line for line in shown if line.strip()):

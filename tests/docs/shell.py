@@ -1,4 +1,4 @@
-"""Runs the command lines of a page, where its reader is."""
+"""Run the command lines of a page in the reader's folder."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ ORDINARY = frozenset({"mkdir", "cp", "mv", "ls", "cat", "sed", "python"})
 
 
 def run(command: Command) -> None:
-    """Runs a command line and compares what it prints with what is shown."""
+    """Run a command line and compare its output with the page."""
     printed = "".join(_run(part.strip()) for part in command.words.split("&&"))
     if command.output:
         assert same_output(command.output, printed), f"$ {command.words}\nprinted\n{printed}"
 
 
 def check(command: Command) -> None:
-    """Looks at a command line that is not run: the program's own parser must accept it."""
+    """Check with the program's own parser a command line that is not run."""
     for part in command.words.split("&&"):
         words = shlex.split(part)
         if words[0] == "activesteer":
@@ -63,7 +63,7 @@ def _run(line: str) -> str:
 
 
 def _activesteer(words: list[str]) -> str:
-    """In this process, where the kernels are loaded already."""
+    """Run the program in this process, where the kernels are already loaded."""
     target = Path(words.pop()) if len(words) > 1 and words[-2] == ">" else None
     if target is not None:
         words.pop()

@@ -1,4 +1,4 @@
-"""What runs the documents notices when they are wrong."""
+"""The runner of the documents notices errors in them."""
 
 from __future__ import annotations
 

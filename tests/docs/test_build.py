@@ -45,14 +45,14 @@ def test_pages_load_nothing_from_elsewhere(site: Path) -> None:
 
 
 def test_pages_for_the_disk_promise_no_search(site: Path) -> None:
-    """Browsers run none of its scripts there; `make site` has it."""
+    """Browsers run no scripts of local pages; `make site` has the search."""
     assert 'data-md-component="search"' not in (site / "index.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.render
 @pytest.mark.parametrize("page", ["chassis_control", "claims", "gallery", "manoeuvre_keys", "reference/vehicle"])
 def test_pages_are_no_wider_than_a_telephone(site: Path, browser: Browser, page: str) -> None:
-    """Wide tables and code scroll by themselves; the title, which comes in at the top, is cut."""
+    """Wide tables and code scroll by themselves; the title, which slides in at the top, is cut."""
     context = browser.new_context(**PHONE)
     shown = context.new_page()
     shown.goto((site / f"{page}.html").as_uri())

@@ -1,4 +1,4 @@
-"""What the documentation has to say something about, and what it may weigh."""
+"""Subjects that the documentation must cover, and its size limits."""
 
 from __future__ import annotations
 

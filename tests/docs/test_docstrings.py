@@ -1,4 +1,4 @@
-"""The examples in docstrings run, and what people use first has one."""
+"""The examples in docstrings run, and the main objects have one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PUBLIC = (
 
 
 def examples() -> dict[str, doctest.DocTest]:
-    """All examples, by the name of what they belong to."""
+    """Return all examples by the name of their object."""
     finder = doctest.DocTestFinder(exclude_empty=True)
     found = {}
     for file in sorted(PACKAGE.rglob("*.py")):

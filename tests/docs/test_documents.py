@@ -1,4 +1,4 @@
-"""README and docs do what they say: every block of code and every command is run; `blocks.py` has the convention."""
+"""README and docs are correct: every block of code and every command is run; see `blocks.py`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def with_blocks() -> list[Path]:
 
 @pytest.fixture(autouse=True)
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An empty folder, but for the examples that lie in a checkout."""
+    """An empty folder with the examples of a checkout."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
 
@@ -37,7 +37,7 @@ def with_slow_commands() -> list[Path]:
 
 
 def read(page: Path, *, slow: bool) -> None:
-    """Does what a reader does who follows a page from top to bottom, in the current folder."""
+    """Follow a page from top to bottom in the current folder."""
     namespace: dict[str, object] = {"__name__": "__main__"}
     for block in blocks(page):
         try:

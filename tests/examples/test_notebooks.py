@@ -19,7 +19,7 @@ FIRST_RUNS, LQR_DESIGN = (ROOT / "examples" / f"{name}.ipynb" for name in ("firs
 
 @pytest.fixture
 def kernel_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The kernel finds the package, and leaves nothing in the user's home."""
+    """Return an environment in which the kernel finds the package and writes nothing to the user's home."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])))
     for name in ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR"):
         folder = tmp_path / "jupyter" / name.lower()
@@ -30,13 +30,13 @@ def kernel_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def outputs(notebook: Any) -> list[dict[str, Any]]:
-    """What the cells show, in the order of the notebook: mime type -> content."""
+    """Return the outputs of the cells in order: mime type -> content."""
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     return [output["data"] for cell in cells for output in cell.outputs if "data" in output]
 
 
 def run(path: Path, folder: Path) -> Any:
-    """The notebook as it is after a run."""
+    """Return the notebook after a run."""
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     notebook = nbformat.read(path, as_version=4)
@@ -45,7 +45,7 @@ def run(path: Path, folder: Path) -> Any:
 
 
 def printed(notebook: Any) -> list[str]:
-    """What the cells print."""
+    """Return the printed output of the cells."""
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     return ["".join(output.text for output in cell.outputs if output.output_type == "stream") for cell in cells]
 
@@ -55,7 +55,7 @@ def test_every_notebook_is_tested() -> None:
 
 
 def test_first_runs_are_kept_without_outputs() -> None:
-    """They would be out of date with the next change of the car."""
+    """Stored outputs would be outdated by the next change of the car."""
     nbformat = pytest.importorskip("nbformat")
     notebook = nbformat.read(FIRST_RUNS, as_version=4)
     nbformat.validate(notebook)

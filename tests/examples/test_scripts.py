@@ -1,4 +1,4 @@
-"""The examples run as their first lines say, and show what they are there to show."""
+"""The examples run as their first lines say, and show their subject."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 
 
 def example(name: str) -> dict[str, Any]:
-    """What a script defines."""
+    """Return the names that a script defines."""
     return runpy.run_path(str(EXAMPLES / f"{name}.py"))
 
 

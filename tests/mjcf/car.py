@@ -1,4 +1,4 @@
-"""What the tests of the car's MJCF share: the contract of its names, and ways to load it."""
+"""Shared parts of the MJCF tests: the contract of names, and ways to load the car."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ SENSORS = (
 
 
 def car() -> mujoco.MjModel:
-    """The car as simulations load it."""
+    """Return the car as simulations load it."""
     return mujoco.MjModel.from_xml_path(str(FOLDER / "compact.xml"))
 
 
 def held_car() -> mujoco.MjModel:
-    """The car with its chassis welded to the world: the free joint is taken out, the keyframes with it."""
+    """Return the car with its chassis fixed to the world, without the free joint and the keyframes."""
     spec = mujoco.MjSpec.from_file(str(FOLDER / "compact.xml"))
     spec.delete(spec.joint("root"))
     for key in spec.keys:
@@ -67,12 +67,12 @@ def held_car() -> mujoco.MjModel:
 
 
 def names(model: mujoco.MjModel, kind: mujoco.mjtObj, count: int) -> list[str]:
-    """Names of all objects of one kind, in the order of the model."""
+    """Return the names of all objects of a kind, in the order of the model."""
     return [mujoco.mj_id2name(model, kind, i) for i in range(count)]
 
 
 def warnings(data: mujoco.MjData) -> int:
-    """How often MuJoCo warned about this simulation."""
+    """Return the number of MuJoCo warnings of this simulation."""
     return int(sum(warning.number for warning in data.warning))
 
 
@@ -102,12 +102,12 @@ def put_on_tyre_springs(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarra
 
 
 def weight_N(model: mujoco.MjModel) -> float:
-    """Weight of the whole car [N]."""
+    """Return the weight of the whole car [N]."""
     return float(model.body_mass.sum()) * GRAVITY_MPS2
 
 
 def wheel_angles_deg(model: mujoco.MjModel, data: mujoco.MjData, corner: str) -> tuple[float, float]:
-    """Steer angle [deg], positive to the left, and camber [deg], negative with the top inwards, of one wheel."""
+    """Return steer angle [deg], left positive, and camber [deg], top inwards negative, of a wheel."""
     axis = data.xmat[model.body(f"{corner}_wheel").id].reshape(3, 3)[:, 1]
     inwards = 1.0 if corner.endswith("l") else -1.0
     return float(np.degrees(np.arctan2(-axis[0], axis[1]))), float(-inwards * np.degrees(np.arcsin(axis[2])))

@@ -1,4 +1,4 @@
-"""What every car's MJCF must keep to, whoever drew it: mirrored sides, a standing scene, no warnings."""
+"""Requirements for every car's MJCF: mirrored sides, a standing scene, no warnings."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ SIDES = {"fl_": "fr_", "rl_": "rr_"}
 
 
 def on_the_right(name: str) -> str | None:
-    """Name of the mirror image of a left-hand object; None for everything else."""
+    """Return the name of the mirror image of a left-hand object; None for other objects."""
     return SIDES[name[:3]] + name[3:] if name[:3] in SIDES else None
 
 
 def inertia(model: mujoco.MjModel, body: int) -> np.ndarray:
-    """Inertia about the body's centre of mass in the body's axes [kg m2], shape (3, 3)."""
+    """Return the inertia about the body's centre of mass in the body's axes [kg m2], shape (3, 3)."""
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, model.body_iquat[body])
     axes = turn.reshape(3, 3)

@@ -1,4 +1,4 @@
-"""Right is left with y negated: a difference would make the car pull to one side."""
+"""The right side is the left side with y negated; any difference would pull the car to one side."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def model() -> mujoco.MjModel:
 
 
 def on_the_right(name: str) -> str | None:
-    """Name of the mirror image of a left-hand object; None for everything else."""
+    """Return the name of the mirror image of a left-hand object; None for other objects."""
     return SIDES[name[:2]] + name[2:] if name[:3] in {"fl_", "rl_"} else None
 
 
 def mirrored_quat(quat: np.ndarray) -> np.ndarray:
-    """The rotation seen in a mirror in the plane y = 0: rotations about x and z change sign."""
+    """Return a rotation mirrored in the plane y = 0: rotations about x and z change sign."""
     return quat * np.array([1.0, -1.0, 1.0, -1.0])
 
 

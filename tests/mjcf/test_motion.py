@@ -1,4 +1,4 @@
-"""The car's mechanism in motion, without tyre callback: static ride, steering signs, torque reaction, robustness."""
+"""Motion of the mechanism without tyre callback: static ride, steering signs, torque reaction, robustness."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The car's names, orders and frames: what loader, callback and recorder rely on."""
+"""Names, orders and frames of the car that loader, callback and recorder rely on."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ REAR_LINKS = ("spring_link", "toe_link", "camber_link", "trailing_lower", "trail
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a knuckle went: chassis axes."""
+    """Pose of a knuckle in chassis axes."""
 
     rotation: Array
     centre_m: Array
@@ -65,7 +65,7 @@ class RigidCorner:
         self.lengths = np.linalg.norm(self.outer - self.inner, axis=1)
 
     def moved(self, point_m: Array, unknown: Array) -> Array:
-        """Where a point of the knuckle went."""
+        """Return the displaced position of a point of the knuckle."""
         turn = Rotation.from_rotvec(unknown[:3]).as_matrix()
         return self.centre_m + unknown[3:] + (point_m - self.centre_m) @ turn.T
 
@@ -80,7 +80,7 @@ class RigidCorner:
         return np.array(rows)
 
     def solve(self, heights_m: Sequence[float] | Array) -> list[Pose]:
-        """Poses at heights of the wheel centre [m], chassis axes, each sought from the one before."""
+        """Return poses at heights of the wheel centre [m], chassis axes; each search starts from the previous pose."""
         unknown = np.zeros(6)
         poses = []
         for height in heights_m:
@@ -93,7 +93,7 @@ class RigidCorner:
         return poses
 
     def point(self, pose: Pose, point_m: Array) -> Array:
-        """Where a point of the knuckle, given in the design position, is in a pose."""
+        """Return the position in a pose of a point of the knuckle that is given in the design position."""
         return pose.centre_m + pose.rotation @ (point_m - self.centre_m)
 
 

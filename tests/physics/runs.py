@@ -1,4 +1,4 @@
-"""Runs that the physics tests share: every run is made once in a process."""
+"""Shared runs of the physics tests; each run is made once in a process."""
 
 from __future__ import annotations
 
@@ -32,30 +32,30 @@ def _run(maneuver: str, controller: str, overrides: tuple[tuple[str, Any], ...],
 def run(
     maneuver: str, controller: str = "none", *, timestep_s: float = DEFAULT_TIMESTEP_S, **overrides: Any
 ) -> Recording:
-    """A manoeuvre of the library; a double underscore in an override's name stands for a dot."""
+    """Return a manoeuvre of the library; a double underscore in the name of an override is a dot."""
     keys = tuple(sorted((key.replace("__", "."), value) for key, value in overrides.items()))
     return _run(maneuver, controller, keys, timestep_s)
 
 
 def step_steer(controller: str = "none", *, timestep_s: float = DEFAULT_TIMESTEP_S, side: float = 1.0) -> Recording:
-    """A step steer of known amplitude, to the left (side 1) or to the right (side -1)."""
+    """Return a step steer of known amplitude, to the left (side 1) or to the right (side -1)."""
     return run("step_steer", controller, timestep_s=timestep_s, steer__steering_wheel_deg=side * STEP_DEG)
 
 
 def step_steer_scenario() -> Scenario:
-    """The same, not yet run."""
+    """Return the same step steer, not yet run."""
     return resolve("step_steer", overrides={"steer.steering_wheel_deg": STEP_DEG})
 
 
 def in_the_corner(controller: str = "none", steps: int = 900) -> ClosedLoop:
-    """A step steer in its transient: 0.4 s after the steering wheel began to turn."""
+    """Return a step steer in its transient, 0.4 s after the beginning of steer."""
     simulation = ClosedLoop(step_steer_scenario(), controller)
     simulation.advance(steps)
     return simulation
 
 
 def assert_goes_on_bit_by_bit(overrides: dict[str, Any], save_at: int, back_after: int) -> None:
-    """A step steer with `ars`, saved at a step and put back some steps later, ends as if it had never been away."""
+    """A step steer with `ars`, saved at a step and restored some steps later, ends as without interruption."""
     whole = activesteer.simulate("step_steer", "ars", overrides=overrides)
     simulation = Simulation("step_steer", "ars", overrides=overrides)
     simulation.advance(save_at)
@@ -68,14 +68,14 @@ def assert_goes_on_bit_by_bit(overrides: dict[str, Any], save_at: int, back_afte
 
 
 def go_on(simulation: ClosedLoop, steps: int) -> NDArray[np.float64]:
-    """Every channel of the next steps, shape (steps, number of channels)."""
+    """Return all channels of the next steps, shape (steps, number of channels)."""
     recorder = Recorder(simulation.vehicle, steps)
     simulation.advance(steps, recorder)
     return recorder.result()[1]
 
 
 def assert_goes_on_from_its_state(simulation: ClosedLoop, steps: int, other: ClosedLoop | None = None) -> None:
-    """What follows a saved state follows it again, in the same simulation or in another one, to the last bit."""
+    """After restoring a state, the next steps are bit-identical, in the same simulation and in another one."""
     state = simulation.save_state()
     uninterrupted = go_on(simulation, steps)
     restored = simulation if other is None else other
@@ -84,21 +84,21 @@ def assert_goes_on_from_its_state(simulation: ClosedLoop, steps: int, other: Clo
 
 
 def car(maneuver: str = "standstill") -> Vehicle:
-    """The car in static ride."""
+    """Return the car in static ride."""
     scenario = resolve(maneuver)
     return scenario.car.on(scenario.maneuver.road)
 
 
 def mass_kg(vehicle: Vehicle) -> float:
-    """Mass of the whole car."""
+    """Return the mass of the whole car."""
     return float(vehicle.model.body_mass.sum())
 
 
 def corners(recording: Recording, quantity: str) -> NDArray[np.float64]:
-    """A quantity of all corners, shape (n, 4), order of `CORNERS`."""
+    """Return a quantity of all corners, shape (n, 4), order of `CORNERS`."""
     return np.stack([recording[f"{corner}_{quantity}"] for corner in CORNERS], axis=1)
 
 
 def last(recording: Recording, duration_s: float) -> NDArray[np.bool_]:
-    """Which rows belong to the end of a run, shape (n,)."""
+    """Return True for the rows at the end of a run, shape (n,)."""
     return recording.time_s > recording.time_s[-1] - duration_s

@@ -41,7 +41,7 @@ class StaticCorner:
         return name, ends[0], ends[1], rate, cubic, float(self.model.tendon_lengthspring[tendon, 0])
 
     def forces(self, x: Array, side_N: float) -> Array:
-        """Generalised forces on the knuckle, and on the seventh coordinate, shape (7,); the pad's load stays."""
+        """Return the generalised forces on the knuckle and the seventh coordinate, shape (7,), at constant pad load."""
         turn = Rotation.from_rotvec(x[3:6]).as_matrix()
         centre = self.centre + x[:3]
         force, moment, extra = np.zeros(3), np.zeros(3), 0.0
@@ -72,7 +72,7 @@ class StaticCorner:
         return np.concatenate([force, moment, [extra]])
 
     def _strut(self, centre: Array, turn: Array) -> tuple[Array, Array]:
-        """Force of the top mount on the knuckle: the spring along the strut, whatever it takes across it."""
+        """Return the force of the top mount on the knuckle: the spring force along the strut, any force across it."""
         top = self.data.xanchor[self.model.joint(f"{self.corner}_topmount").id]
         axis = turn @ self.data.xaxis[self.model.joint(f"{self.corner}_jounce").id]
         tendon = self.model.tendon(f"{self.corner}_spring").id
@@ -85,7 +85,7 @@ class StaticCorner:
         return spring * axis + 1e12 * (offset - along * axis), top
 
     def _column_Npm(self) -> float:
-        """Column and steering wheel servo in series, at the rack."""
+        """Return the stiffness of column and steering wheel servo in series, at the rack."""
         column = float(self.model.tendon_stiffness[self.model.tendon("steering_column").id])
         servo = float(self.model.actuator_gainprm[self.model.actuator("steering_wheel").id, 0]) / PINION_M**2
         return column * servo / (column + servo)
@@ -98,7 +98,7 @@ class StaticCorner:
         return float(self.model.actuator_gainprm[self.model.actuator(f"{self.corner}_steer").id, 0])
 
     def under_side_force(self) -> tuple[float, float, float]:
-        """Motion of the wheel centre [mm/kN] and changes of toe and camber [deg/kN] under a side force to the right."""
+        """Return wheel centre motion [mm/kN] and toe and camber changes [deg/kN] under a side force to the right."""
         step = 1e-6
         matrix = np.column_stack(
             [(self.forces(-step * unit, 0.0) - self.forces(step * unit, 0.0)) / (2.0 * step) for unit in np.eye(7)]

@@ -22,13 +22,13 @@ DRAG_NS2PM2 = 0.5 * PARAMETERS.aerodynamics.air_density_kgpm3 * PARAMETERS.aerod
 
 @functools.cache
 def rolling(mu: float = 1.0, pedal: float = 0.0) -> Recording:
-    """Coasting at 80 km/h, or braking from there without anti-lock system."""
+    """Return a run that coasts from 80 km/h, or brakes without anti-lock system."""
     table = COAST_OR_BRAKE | {"road": {"mu": mu}, "brake": {"time_s": [0.1, 0.3], "pedal": [0.0, pedal]}}
     return activesteer.simulate(table, overrides={"vehicle.brakes.abs": False})
 
 
 def forces_in_car_axes(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
-    """Sums of the tyre forces along and across the car, in the road plane [N], shape (n,) each."""
+    """Return the sums of the tyre forces along and across the car, in the road plane [N], shape (n,) each."""
     steer, fx, fy = (corners(recording, name) for name in ("steer_rad", "tyre_fx_N", "tyre_fy_N"))
     cos, sin = np.cos(steer), np.sin(steer)
     return (cos * fx - sin * fy).sum(axis=1), (sin * fx + cos * fy).sum(axis=1)
@@ -62,7 +62,7 @@ def test_longitudinal_forces_make_the_longitudinal_acceleration() -> None:
 
 
 def test_change_of_momentum_is_the_impulse_of_the_outer_forces() -> None:
-    """In the transient, from the engine's own momentum: nothing but tyres, drag and weight acts on the car."""
+    """In the transient, by the engine's momentum: only tyres, drag and weight act on the car."""
     simulation = in_the_corner("ars", 560)
     vehicle = simulation.vehicle
     model, data = vehicle.model, vehicle.data
@@ -91,7 +91,7 @@ def test_change_of_momentum_is_the_impulse_of_the_outer_forces() -> None:
 
 
 def test_load_transfer_carries_the_moment_of_the_lateral_acceleration() -> None:
-    """Moments about the road: m a_y h = sum of dFz times half the track, with the weight's shift by roll."""
+    """Moments about the road: m a_y h = sum of dFz times half the track, plus the shift of the weight by roll."""
     recording = step_steer()
     vehicle = car()
     model, data = vehicle.model, vehicle.data
@@ -146,7 +146,7 @@ def test_coasting_loses_what_drag_rolling_and_released_brakes_take() -> None:
 
 
 def locked(mu: float) -> tuple[float, float]:
-    """Deceleration over the gravitational one, and the share of their loads that the tyres use, wheels locked."""
+    """Return deceleration over gravity, and the utilised friction of the tyres with locked wheels."""
     recording = rolling(mu=mu, pedal=1.0)
     end = (recording.time_s > 1.5) & (recording.time_s < 2.3)
     assert np.abs(corners(recording, "wheel_speed_radps")[end]).max() < 0.5
@@ -171,7 +171,7 @@ def test_the_same_pedal_stops_the_car_in_proportion_to_the_friction() -> None:
 
 
 def test_no_tyre_uses_more_than_the_road_gives() -> None:
-    """The peak of the tyre file's curve, scaled by the friction, at the smallest load that occurs."""
+    """The limit is the peak of the tyre's curve, scaled by friction, at the smallest load of the run."""
     recording = rolling(mu=0.4, pedal=1.0)
     loads = corners(recording, "tyre_fz_N")
     used = np.hypot(corners(recording, "tyre_fx_N"), corners(recording, "tyre_fy_N")) / loads

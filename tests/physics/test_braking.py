@@ -1,4 +1,4 @@
-"""Full braking with and without the anti-lock system: what locks, how far it goes, where the energy goes, who turns."""
+"""Full braking with and without anti-lock system: locked wheels, stopping distance, energy, yaw."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _of_sedan(changes: tuple[tuple[str, Any], ...]) -> Recording:
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
 @pytest.mark.parametrize("changes", [{}, SLIPPERY, ICE])
 def test_no_wheel_locks_and_nine_tenths_of_the_friction_are_used(vehicle: str, changes: dict[str, Any]) -> None:
-    """Half of the sedan's brake torque is at the rear wheels, so that they run to their limit first."""
+    """Half of the sedan's brake torque acts at the rear wheels, so these reach their limit first."""
     found = stop_from_100(vehicle, changes).metrics
     assert found["wheel_slip_max"] < 0.5
     assert 0.9 <= found["braking_efficiency"] <= 1.0
@@ -65,7 +65,7 @@ def test_a_car_rocks_back_at_the_stop_by_its_suspension_and_tyres_alone(vehicle:
 
 
 def test_it_works_with_the_sensors_of_production_cars() -> None:
-    """Noisy pulse wheels, and an acceleration that is late and biased: less is used, and no wheel locks."""
+    """Noisy pulse wheels and a late, biased acceleration: less friction is used, and no wheel locks."""
     recording = from_100({"vehicle__sensors__preset": "production"})
     assert recording.metrics["braking_efficiency"] >= 0.88
     assert np.abs(corners(recording, "slip_ratio")[recording["speed_mps"] > 15.0 / 3.6]).max() < 0.5
@@ -94,7 +94,7 @@ def test_locked_wheels_slide_as_far_as_their_friction_says() -> None:
 
 
 def wheel_inertia_kgm2(vehicle: Vehicle) -> float:
-    """Inertia of a wheel about its axis, the clutch open."""
+    """Return the inertia of a wheel about its axis, with the clutch open."""
     spin = int(vehicle.model.joint("rl_spin").dofadr[0])
     product = np.empty(vehicle.model.nv)
     mujoco.mj_mulM(vehicle.model, vehicle.data, product, np.eye(vehicle.model.nv)[spin])
@@ -148,7 +148,7 @@ def coasting_with(brakes_Nm: tuple[float, float, float, float]) -> Recording:
 
 
 def test_a_braked_left_wheel_turns_the_car_left_by_its_lever() -> None:
-    """The single-track model with the moment of the force at half the track, in steady state."""
+    """Expected is the steady state of the single-track model with the moment of the force at half the track."""
     torque_Nm = 150.0
     left, right = coasting_with((torque_Nm, 0.0, torque_Nm, 0.0)), coasting_with((0.0, torque_Nm, 0.0, torque_Nm))
     np.testing.assert_allclose(left["yaw_rate_radps"], -right["yaw_rate_radps"], atol=1e-9)

@@ -1,4 +1,4 @@
-"""Controllers beyond the paper's, in the car, behind the sensors of production cars."""
+"""Controllers beyond the paper's in the car, with production sensors."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_braking_in_a_turn_does_not_make_the_estimator_steer_the_car_in():
 
 
 def test_steering_against_the_brakes_on_split_friction_shortens_the_way_without_leaving_the_line():
-    """In the mean of some seeds: with anti-lock brakes a way depends on the noise of the sensors by half a metre."""
+    """Mean over some seeds: with anti-lock brakes the stopping distance varies by 0.5 m with the sensor noise."""
     ways_m = np.empty((4, 2))
     for seed, way_m in enumerate(ways_m, start=1):
         esc, integrated = (

@@ -1,4 +1,4 @@
-"""Screws in the toe links, a motor on the column, sensors of a production car and faults, all at once."""
+"""Screws in the toe links, a motor on the column, production sensors and faults, all at once."""
 
 from __future__ import annotations
 

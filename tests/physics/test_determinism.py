@@ -1,4 +1,4 @@
-"""The callbacks are pure functions of the state: what was computed once comes out again, to the last bit."""
+"""The callbacks are pure functions of the state: repeated computations are bit-identical."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_two_runs_are_bit_identical(controller: str) -> None:
 
 @pytest.mark.parametrize("steps", [0, 600, 900])
 def test_forward_called_twice_changes_nothing(steps: int) -> None:
-    """At rest of the steering, in the steepest part of the response, and after it."""
+    """The instants have the steering at rest, the steepest part of the response, and the end of the response."""
     vehicle = in_the_corner("ars", steps).vehicle
     model, data = vehicle.model, vehicle.data
     mujoco.mj_forward(model, data)

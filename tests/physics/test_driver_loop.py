@@ -1,4 +1,4 @@
-"""Driver and car as one loop: whether they come to rest on a path, and whether the driver can drive.
+"""The loop of driver and car: convergence to a path, and human-like driving.
 
 The criteria of `typical` are those of docs/driver.md, which stood before his numbers.
 """

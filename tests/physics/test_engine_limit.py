@@ -1,4 +1,4 @@
-"""No manoeuvre takes more from the engine than it has, and the car performs as one of its power does."""
+"""No manoeuvre takes more from the engine than its limit, and the car's performance fits its power."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FULL_THROTTLE = {
 
 
 def assert_within_the_engine(recording: Recording, vehicle: str) -> None:
-    """Torque and power at the wheels, as recorded, never leave what the engine gives at that speed."""
+    """Recorded torque and power at the wheels stay within the engine's limits at each speed."""
     engine = resolve("standstill", vehicle).car.config.powertrain
     drive = Drive(engine)
     torques = np.stack([recording[f"{corner}_drive_torque_Nm"] for corner in CORNERS])

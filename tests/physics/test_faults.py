@@ -1,4 +1,4 @@
-"""What a fault does to the car: actuators that stick, run away or let go, sensors that lie."""
+"""Effects of faults on the car: actuators that stick, run away or fail free; wrong sensor signals."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STEP = {"steer.steering_wheel_deg": 36.5, "duration_s": 2.0, "settle_s": 0.5, "s
 
 
 class Weaves:
-    """A controller that steers both axles to and fro."""
+    """A controller that steers both axles alternately to both sides."""
 
     def step(self, command: Any, measurement: Any) -> ActuatorCommand:
         angle = 0.02 * np.sin(2.0 * np.pi * max(measurement.time_s, 0.0))
@@ -28,7 +28,7 @@ class Weaves:
 
 
 class Reads:
-    """A controller that asks for nothing and shows what it was told."""
+    """A controller that demands nothing and records its measurements."""
 
     def step(self, command: Any, measurement: Any) -> ActuatorCommand:
         return ActuatorCommand(yaw_rate_desired_radps=measurement.yaw_rate_radps, prediction_rad=measurement.ay_mps2)
@@ -190,7 +190,7 @@ def test_a_wheel_speed_sensor_is_one_of_four() -> None:
 
 
 def test_a_dead_wheel_speed_sensor_reaches_the_anti_lock_system_of_ideal_sensors_too() -> None:
-    """To it the wheel has locked: it takes the pressure away, and the car pulls to the other side."""
+    """For the control unit the wheel has locked: it lowers the pressure, and the car pulls to the other side."""
     stop: dict[str, Any] = {"speed_kmh": 60.0, "duration_s": 1.2}
     fault = {"fault": [fault_table(f"fl_wheel_speed_sensor:dropout@{AT_S}")]}
     good = activesteer.simulate("straight_braking", overrides=stop)

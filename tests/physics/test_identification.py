@@ -1,4 +1,4 @@
-"""Steady-state handling of the compact by ISO 4138, and whether its vehicle file still says what the car does."""
+"""Steady-state handling of the compact by ISO 4138, and agreement of its vehicle file with the car."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def full() -> Identification:
 
 @pytest.mark.parametrize("name", PARAMETERS)
 def test_stored_single_track_parameter_matches_the_car(name):
-    """Where this fails the car has changed: run `activesteer identify`."""
+    """If this fails, the car has changed: run `activesteer identify`."""
     stored = load_car("compact").config.single_track
     assert getattr(stored, name) == pytest.approx(getattr(single_track(), name), rel=0.01)
 
@@ -61,7 +61,7 @@ def test_circle_is_held_while_the_car_is_far_from_its_limit():
 
 
 def test_reference_angle_of_fmvss_126_is_that_of_the_hand_calculation():
-    """A = i_s (l / R + EG a_y) with R = v^2 / a_y, and by what the car lags behind the ramp; EG is of the circle."""
+    """A = i_s (l / R + EG a_y) with R = v^2 / a_y, plus the lag of the car behind the ramp; EG of the circle."""
     config, ay_mps2, speed_mps = load_car("compact").config, 0.3 * 9.81, 80.0 / 3.6
     wheelbase_m = config.single_track.cg_to_front_m + config.single_track.cg_to_rear_m
     gradient = run("constant_radius", duration_s=40.0).metrics["understeer_gradient_radpmps2"]

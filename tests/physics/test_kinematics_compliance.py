@@ -1,4 +1,4 @@
-"""The rig against solutions of its own problem that know nothing of it, and the car against what it was made to be."""
+"""The rig against independent solutions of its problem, and the car against its targets."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def is_link(name: str) -> bool:
 
 @functools.cache
 def stiff_vehicle() -> Vehicle:
-    """The car with links and steering column a hundred times stiffer."""
+    """Return the car with links and steering column a hundred times stiffer."""
     car = vehicle()
     for tendon in range(car.model.ntendon):
         if is_link(car.model.tendon(tendon).name):
@@ -96,7 +96,7 @@ def test_stiff_links_move_the_wheel_as_rigid_ones_do(corner: str) -> None:
 
 
 def test_the_rigid_solution_is_sensitive_to_what_it_checks() -> None:
-    """A hardpoint moved by 2 mm is seen: the agreement above is not that of two insensitive curves."""
+    """The tests above detect a hardpoint moved by 2 mm, so their curves are sensitive."""
     travel = stiff_travel()
     rigid = RigidCorner(travel.held.model, "fl")
     rigid.inner[2, 2] += 0.002
@@ -183,7 +183,7 @@ def test_left_and_right_mirror_each_other() -> None:
 
 
 def moved_hardpoint(folder: Path, file: str, site: str, axis: int, by_m: float) -> dict:
-    """The compact with one hardpoint of each side moved, the same way in x and z."""
+    """Return the compact with one hardpoint of each side moved equally in x and z."""
     source = models_dir() / "mjcf" / "compact"
     target = folder / "car"
     if not target.exists():
@@ -206,7 +206,7 @@ def moved_hardpoint(folder: Path, file: str, site: str, axis: int, by_m: float) 
 
 
 def bump_slopes(changed: dict) -> tuple[Array, Array]:
-    """Toe and camber of the left wheels [deg/m], front and rear, over +-15 mm of a changed car."""
+    """Return toe and camber of the left wheels of a changed car [deg/m], front and rear, over +-15 mm."""
     held = HeldCar(load_car(changed).on())
     axles = []
     for height in (-0.015, 0.015):
@@ -217,14 +217,14 @@ def bump_slopes(changed: dict) -> tuple[Array, Array]:
 
 
 def test_a_higher_tie_rod_end_at_the_rack_turns_the_wheel_in_in_bump(tmp_path: Path) -> None:
-    """Behind the axle, a rod that falls outwards pushes the wheel's rear edge out as it rises."""
+    """Behind the axle, a rod that slopes down outwards pushes the wheel's rear edge out in bump."""
     toe, _ = bump_slopes(moved_hardpoint(tmp_path, "steering.xml", "tie_rod_inner", 2, 0.03))
     assert toe[0] > 5.0
     assert compact()["front", "bump_steer"] < 0.0
 
 
 def test_an_upper_link_that_falls_inwards_gains_camber(tmp_path: Path) -> None:
-    """The outer end of an upper link that rises from the body swings inwards in bump, and the wheel's top with it."""
+    """The outer end of an upper link that rises outwards moves inwards in bump, together with the wheel's top."""
     design = compact()["rear", "bump_camber"]
     lower = moved_hardpoint(tmp_path, "rear_axle.xml", "camber_link_inner", 2, -0.05)
     assert bump_slopes(lower)[1][1] < design - 3.0
@@ -244,14 +244,14 @@ def test_forces_turn_wheels_the_way_they_push() -> None:
 
 
 def test_side_force_goes_to_the_body_at_the_roll_centre() -> None:
-    """By virtual work the height found from forces is the one found from the contact point's path."""
+    """By virtual work, the height from forces equals the height from the path of the contact point."""
     for axle in ("front", "rear"):
         by_path = compact()[axle, "roll_centre_height"]
         assert compact()[axle, "roll_centre_height_by_force"] == pytest.approx(by_path, abs=1.0)
 
 
 def support(corner: str) -> float:
-    """Forward per upward motion of the locked wheel's contact point, rigid links, around the standing car's height."""
+    """Return forward over upward motion of the locked wheel's contact point with rigid links, near static ride."""
     held = stiff_travel().held
     rigid = RigidCorner(held.model, corner)
     index = CORNERS.index(corner)
@@ -264,7 +264,7 @@ def support(corner: str) -> float:
 
 @pytest.mark.parametrize("corner", ["fl", "rl"])
 def test_longitudinal_force_lifts_by_the_slope_of_the_patchs_path(corner: str) -> None:
-    """Virtual work: at a fixed height, the pad's vertical force answers a longitudinal one by the slope of the path."""
+    """Virtual work: at fixed height, the vertical pad force responds to a longitudinal force by the path's slope."""
     held = HeldCar(stiff_vehicle())
     loads = []
     for force in (-500.0, 500.0):
@@ -284,7 +284,7 @@ def test_anti_dive_and_anti_lift_are_those_of_rigid_links() -> None:
 
 @pytest.mark.parametrize("axle", ["front", "rear"])
 def test_roll_stiffness_is_that_of_springs_and_bar(axle: str) -> None:
-    """t^2 / 2 x (wheel rate + 2 x bar x ratio^2): the bar is given per difference of travel at the damper."""
+    """t^2 / 2 x (wheel rate + 2 x bar x ratio^2): the bar's rate is per difference of damper travel."""
     result = compact()
     model = result.measured.vehicle.model
     bar = float(model.tendon_stiffness[model.tendon(f"{axle}_anti_roll_bar").id])
@@ -295,7 +295,7 @@ def test_roll_stiffness_is_that_of_springs_and_bar(axle: str) -> None:
 
 
 def test_steering_ratio_and_rack_belong_to_the_pinion() -> None:
-    """Rack per turn is the pinion's circumference but for the column's give; ratio times steer is the wheel's angle."""
+    """Rack per turn is the pinion's circumference minus column deflection; ratio x steer is the wheel angle."""
     result = compact()
     assert result["front", "rack_travel"] == pytest.approx(2e3 * math.pi * PINION_M, rel=0.01)
     sweep = result.curves["steering_rolling"]
@@ -315,7 +315,7 @@ def test_at_rest_the_wheels_lag_behind_the_steering_wheel() -> None:
 
 
 def test_steering_axes_are_those_of_the_hardpoints() -> None:
-    """In front the line through ball joint and top mount, at the rear the hinge."""
+    """At the front the line through ball joint and top mount, at the rear the hinge."""
     car = vehicle()
     result = compact()
     ball, top = hardpoint(car.model, "fl_lca_front_outer"), hardpoint(car.model, "fl_spring_inner")
@@ -333,7 +333,7 @@ def test_steering_axes_are_those_of_the_hardpoints() -> None:
 
 
 def test_bounce_and_pitch_are_those_of_the_plane_model_on_ride_rates() -> None:
-    """The two roots of a rigid body on two springs, which uses nothing of the linearisation."""
+    """Expected are the two frequencies of a rigid body on two springs, without the linearisation."""
     result = compact()
     rates = np.array([2e3 * result[axle, "ride_rate"] for axle in ("front", "rear")])
     arms = np.array([1.0, -1.0]) * result["car", "wheelbase"] * 1e-3
@@ -373,7 +373,7 @@ def test_roll_gradient_is_that_of_springs_and_roll_centres() -> None:
 
 
 def test_braking_pitch_is_that_of_load_transfer_and_anti_features() -> None:
-    """Load transfer m a h / l: on the tyres in full, on the springs less what the links carry (Gillespie, ch. 7)."""
+    """Load transfer m a h / l: fully on the tyres; on the springs without the part of the links (Gillespie, ch. 7)."""
     result = compact()
     transfer_N = result["car", "mass"] * GRAVITY_MPS2 * result["car", "cg_height"] / result["car", "wheelbase"]
     moved_m = 0.0
@@ -385,7 +385,7 @@ def test_braking_pitch_is_that_of_load_transfer_and_anti_features() -> None:
 
 
 def test_roll_understeer_follows_from_the_toe_of_both_wheels() -> None:
-    """In front toe-out in bump steers out of the turn, at the rear toe-in does: both understeer."""
+    """Toe-out in bump at the front and toe-in in bump at the rear both cause understeer."""
     result = compact()
     assert result["front", "roll_steer_outer"] < 0.0 < result["front", "roll_understeer"]
     assert result["rear", "roll_steer_outer"] > 0.0
@@ -394,7 +394,7 @@ def test_roll_understeer_follows_from_the_toe_of_both_wheels() -> None:
 
 @pytest.mark.parametrize(("axle", "first"), [("front", 0), ("rear", 2)])
 def test_a_side_force_behind_the_contact_point_is_a_force_and_a_moment(axle: str, first: int) -> None:
-    """30 mm of trail, applied as a moment on both wheels and not put together from two sweeps."""
+    """30 mm of trail as a moment on both wheels, not combined from two sweeps."""
     held = HeldCar(vehicle())
     force = np.array([0.0, -500.0, 0.0])
     toe = []

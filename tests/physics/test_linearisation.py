@@ -1,4 +1,4 @@
-"""The linear car against the full one that it was made from."""
+"""The linear car against the nonlinear car that it was derived from."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def system() -> control.StateSpace:
 
 @pytest.mark.parametrize("row", range(len(OUTPUTS)), ids=OUTPUTS)
 def test_frequency_response_is_that_of_a_sine_sweep_of_the_full_car(row):
-    """ISO 7401, 0.2 to 4 Hz, about 0.1 g: 5 % and 5 deg, with all its dry friction."""
+    """ISO 7401, 0.2 to 4 Hz, about 0.1 g: within 5 % and 5 deg, with all dry friction."""
     sweep = run("sine_sweep")
     assert np.abs(sweep["ay_mps2"]).max() == pytest.approx(TENTH_G_MPS2, rel=0.1)
     found = frequency_response(sweep, OUTPUTS[row], np.geomspace(0.2, 4.0, 40))

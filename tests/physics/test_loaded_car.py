@@ -1,4 +1,4 @@
-"""What controllers and driver believe of a loaded car: what the file says, or what driving it tells."""
+"""Assumptions of controllers and driver about a loaded car: from the file, or from driving."""
 
 from __future__ import annotations
 

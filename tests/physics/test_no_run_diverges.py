@@ -45,7 +45,7 @@ class Case(NamedTuple):
     timestep_s: float
 
     def table(self) -> dict[str, Any]:
-        """The manoeuvre, cut to some seconds; angles that would be searched for are given."""
+        """Return the manoeuvre, shortened to some seconds, with given angles instead of a search."""
         table = tomllib.loads(find_maneuver(self.maneuver).read_text(encoding="utf-8"))
         for steering in ("steer", "turn"):
             for key in LEFT_TO_SEARCHES:
@@ -69,7 +69,7 @@ class Case(NamedTuple):
         return table
 
     def drive(self) -> None:
-        """Runs it, and looks at every number that is recorded."""
+        """Run it and check every recorded number."""
         recording = activesteer.simulate(
             self.table(), vehicle=self.vehicle, controller=self.controller, timestep_s=self.timestep_s
         )
@@ -86,7 +86,7 @@ class Case(NamedTuple):
 
 
 def drawn(seed: int, count: int) -> list[Case]:
-    """A sample of all there is."""
+    """Return a sample of all combinations."""
     draw = random.Random(seed)
     return [
         Case(
@@ -124,7 +124,7 @@ def test_no_run_of_a_larger_sample_diverges(seed: int) -> None:
 
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
 def test_on_a_slope_of_ice_the_car_slides_back_as_a_block_would(vehicle: str) -> None:
-    """g (sin - mu cos) of the slope, when all wheels slide; wheels that still roll carry less, so it may be quicker."""
+    """The acceleration is g (sin - mu cos) if all wheels slide; wheels that still roll may increase it."""
     case = Case("straight_line", vehicle, "none", 30.0, 0.5, 0.05, 1e-3)
     recording = activesteer.simulate(case.table(), vehicle=vehicle)
     speed = recording["vx_mps"]

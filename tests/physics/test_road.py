@@ -1,4 +1,4 @@
-"""What differing friction does to the car: split braking, patches, and tyres at their limit."""
+"""Effects of varying friction: split braking, patches, and tyres at their limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A car with sensors: what is recorded of them, and what they leave as it is."""
+"""A car with sensors: their recorded signals, and quantities that they leave unchanged."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_recorded_noise_is_that_of_the_settings(vehicle: str) -> None:
 
 
 def test_sensors_lag_by_bandwidth_samples_and_delay(production: Recording) -> None:
-    """8 ms of a low-pass of 21 Hz, 5 ms of delay, 4.5 ms of holding samples of 10 ms."""
+    """Delays: 8 ms of a 21 Hz low-pass, 5 ms of delay, 4.5 ms by the sampling of 10 ms."""
     truth, said = production["yaw_rate_radps"], production["measured_yaw_rate_radps"]
     turning = slice(500, 1500)
     misfit = [np.std(said[turning] - np.roll(truth, lag)[turning]) for lag in range(40)]

@@ -1,4 +1,4 @@
-"""Signs after ISO 8855 and ISO-W, from what a left and a right turn do to the car."""
+"""Signs by ISO 8855 and ISO-W, from a left and a right turn."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Turn = tuple[float, Callable[[str], float], Recording]
 
 @pytest.fixture(scope="module", params=[1.0, -1.0], ids=["left", "right"])
 def turn(request: pytest.FixtureRequest) -> Turn:
-    """Sign of the turn, and the mean of every channel over the settled end of it."""
+    """Return the sign of the turn and the mean of each channel over the settled end of it."""
     side = request.param
     recording = step_steer(side=side)
     end = last(recording, 0.5)
@@ -77,7 +77,7 @@ def test_the_outer_wheels_turn_faster(turn: Turn) -> None:
 
 
 def test_sideslip_is_positive_just_after_a_left_step() -> None:
-    """The car moves to the side before it turns: at once, the centre of gravity goes with the front axle."""
+    """The car moves sideways before it yaws: the centre of gravity follows the front axle at once."""
     recording = step_steer()
     onset = (recording.time_s > 0.52) & (recording.time_s < 0.62)
     assert recording["sideslip_rad"][onset].max() > 1e-4

@@ -1,4 +1,4 @@
-"""The multibody car against the linear single-track model that its controllers carry, where both must agree."""
+"""The multibody car against the linear single-track model of its controllers, where both must agree."""
 
 from __future__ import annotations
 

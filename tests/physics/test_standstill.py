@@ -1,4 +1,4 @@
-"""Rest, and the way into and out of it: no creep, no chatter, no jump of a force."""
+"""Standstill, stopping and driving off: no creep, no chatter, no jump of a force."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ FORCES = ("tyre_fx_N", "tyre_fy_N", "tyre_fz_N")
 
 
 def largest_change_N(recording: Recording, rows: np.ndarray | slice = slice(None)) -> float:
-    """Largest change of a tyre force from one step to the next."""
+    """Return the largest change of a tyre force from one step to the next."""
     return max(float(np.abs(np.diff(corners(recording, force)[rows], axis=0)).max()) for force in FORCES)
 
 
 def distance_m(recording: Recording) -> float:
-    """Farthest that the centre of gravity gets from where it was."""
+    """Return the largest distance of the centre of gravity from its first position."""
     x, y = recording["x_m"], recording["y_m"]
     return float(np.hypot(x - x[0], y - y[0]).max())
 
@@ -30,7 +30,7 @@ def test_at_rest_the_car_does_not_creep() -> None:
 
 
 def test_at_rest_nothing_chatters() -> None:
-    """A force that sticks and slips would change by some per cent of the load from step to step."""
+    """A force with stick-slip would change by several per cent of the load from step to step."""
     recording = run("standstill")
     assert largest_change_N(recording) < 0.01
     assert np.abs(corners(recording, "wheel_speed_radps")).max() < 1e-4
@@ -54,7 +54,7 @@ def test_on_the_slope_the_tyres_carry_the_downhill_force() -> None:
 
 
 def test_without_brakes_the_car_rolls_down_the_slope() -> None:
-    """The counterpart of holding: nothing but the brakes may stop it."""
+    """The opposite of holding: without brakes nothing may stop the car."""
     recording = run("hill_hold", brake__pedal=(0.0,), duration_s=1.0)
     drag_N = 4 * 1.5 / 0.3 + 0.02 * 1430 * GRAVITY_MPS2
     least_mps2 = GRAVITY_MPS2 * np.sin(np.arctan(0.15)) - drag_N / 1430
@@ -80,7 +80,7 @@ def test_no_jump_of_a_tyre_force_between_rest_and_rest(timestep_s: float) -> Non
 
 
 def test_wheels_stop_and_stay_stopped() -> None:
-    """The body goes on swinging on springs and carcasses for a while; the wheels are held by the brakes."""
+    """The body continues to oscillate on springs and carcasses for a while; the brakes hold the wheels."""
     recording = run("drive_off_and_stop")
     stopped = int(np.flatnonzero(recording["vx_mps"][9000:] <= 0.0)[0]) + 9000
     turned_rad = np.cumsum(corners(recording, "wheel_speed_radps")[stopped + 500 :], axis=0) * 1e-3

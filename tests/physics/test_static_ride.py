@@ -1,4 +1,4 @@
-"""The standing car: it carries its weight, evenly left and right, and its stored position is an equilibrium."""
+"""The standing car: it carries its weight, equally left and right, and its keyframe is an equilibrium."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def standing() -> Vehicle:
 
 
 def accelerations(vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
-    """Linear [m/s2] and angular [rad/s2] acceleration of every body at rest, shape (nbody - 1, 3) each."""
+    """Return linear [m/s2] and angular [rad/s2] accelerations of all bodies at rest, shape (nbody - 1, 3) each."""
     model, data = vehicle.model, vehicle.data
     along, about = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     linear, angular = [], []
@@ -39,7 +39,7 @@ def test_left_carries_as_much_as_right() -> None:
 
 
 def test_front_axle_carries_its_share_of_the_weight(standing: Vehicle) -> None:
-    """Moments about the rear contact points: the load of the front axle follows from the position of the mass."""
+    """Moments about the rear contact points: the front axle load follows from the position of the mass."""
     model, data = standing.model, standing.data
     chassis = model.body("chassis").id
     front_m, rear_m = (float(data.xpos[model.body(f"{axle}l_wheel").id, 0]) for axle in "fr")
@@ -66,6 +66,6 @@ def test_no_body_accelerates_at_the_keyframe() -> None:
 
 
 def test_static_ride_is_the_design_position() -> None:
-    """Springs are laid out for it, so that hardpoints in the model file are those of the standing car."""
+    """The springs are designed for static ride, so the hardpoints of the model file are those of the standing car."""
     assert np.abs(corners(run("standstill"), "travel_m")).max() < 2e-3
     assert np.abs(run("standstill")["roll_rad"]).max() < 1e-9

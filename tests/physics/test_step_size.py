@@ -1,4 +1,4 @@
-"""The step of 1 ms is short enough: a quarter of it gives the same answer."""
+"""The step of 1 ms is short enough: a quarter of it gives the same result."""
 
 from __future__ import annotations
 

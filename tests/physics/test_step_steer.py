@@ -1,4 +1,4 @@
-"""The step steer is the paper's, and the same for all systems."""
+"""The step steer agrees with the paper and is the same for all systems."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tests.physics.runs import last, run
 
 
 def test_the_manoeuvre_is_the_paper_s() -> None:
-    """80 km/h, 0.4 g in the steady state of the control-free car, the steering wheel faster than 200 deg/s."""
+    """80 km/h, 0.4 g in the steady state of the car without control, steering wheel faster than 200 deg/s."""
     recording = run("step_steer")
     end = last(recording, 0.5)
     assert recording["ay_mps2"][end].mean() == pytest.approx(0.4 * GRAVITY_MPS2, rel=1e-3)

@@ -1,4 +1,4 @@
-"""The front superposition by a motor and a gear, its lock, and what the hands feel of it."""
+"""Front superposition by a motor and a gear, its lock, and the torque at the hands."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AT = 100
 
 
 class Asks:
-    """A controller that asks for 2 deg at the front wheels from 0.1 s on."""
+    """A controller that demands 2 deg at the front wheels from 0.1 s on."""
 
     def step(self, command: Any, measurement: Any) -> ActuatorCommand:
         asks = measurement.time_s >= 1e-3 * (AT - 1) - 1e-9
@@ -31,7 +31,7 @@ class Asks:
 
 
 class Sways:
-    """A controller that asks for 1 deg to and fro, once a second."""
+    """A controller that demands a sine of 1 deg at 1 Hz."""
 
     def step(self, command: Any, measurement: Any) -> ActuatorCommand:
         phase = 2.0 * math.pi * max(measurement.time_s, 0.0)
@@ -61,7 +61,7 @@ def test_it_gets_there_at_the_speed_of_its_motor(geared: Recording) -> None:
 
 
 def test_its_reaction_reaches_the_hands(geared: Recording) -> None:
-    """Steering wheel held: the hands hold what the column carries, less the assist's share."""
+    """With the steering wheel held, the hands carry the column torque minus the share of the assist."""
     hand = geared["hand_torque_Nm"]
     assert abs(hand[AT - 1]) < 0.05
     # The rack is pushed to the left by 2 deg of superposition; to hold the wheel against it the hands push left too.
@@ -117,7 +117,7 @@ def test_what_only_a_motor_has_is_an_error_at_the_servo() -> None:
 
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
 def test_the_hands_feel_no_steps_of_the_simulation_while_the_superposition_moves(vehicle: str) -> None:
-    """A demand of 1 Hz; what the hands feel beside it would be the engine's step on stiff parts."""
+    """A demand of 1 Hz; any other torque at the hands would come from the engine's step on stiff parts."""
     straight = {**STRAIGHT, "duration_s": 1.2}
     hand = activesteer.simulate("straight_line", Sways, vehicle, straight)["hand_torque_Nm"][100:]
     smooth = np.convolve(hand, np.full(21, 1.0 / 21.0), "valid")

@@ -1,4 +1,4 @@
-"""Left and right are the same car: nothing drifts, and the mirrored input has the mirrored response."""
+"""Left and right are equal: nothing drifts, and a mirrored input has a mirrored response."""
 
 from __future__ import annotations
 

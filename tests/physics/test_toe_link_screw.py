@@ -1,4 +1,4 @@
-"""Rear steering by screws in the toe links: what they reach, how fast, what they hold, and what they give."""
+"""Rear steering by screws in the toe links: range, rate, held load, compliance."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ AT = 100
 
 
 class Asks:
-    """A controller that asks for an angle from 0.1 s on."""
+    """A controller that demands an angle from 0.1 s on."""
 
     def __init__(self, angle_deg: float) -> None:
         self._angle_rad = math.radians(angle_deg)
@@ -49,7 +49,7 @@ def three_degrees() -> Recording:
 
 
 def arm_m(vehicle: str) -> float:
-    """Change of the toe link's length over that of the angle, about the design position [m/rad]."""
+    """Return the change of the toe link's length over the angle, at the design position [m/rad]."""
     model = load_car(vehicle, SCREW).on().model
     return float(toe_link_map(model, "rl", LINK[vehicle], math.radians(3.0)).travel_of_angle[0])
 

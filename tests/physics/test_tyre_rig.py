@@ -1,4 +1,4 @@
-"""The tyre in the engine: what acts on the wheel's body is what the formula says, in every quadrant and orientation."""
+"""The tyre in the engine: the forces on the wheel's body are those of the formula, in all quadrants and poses."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _tyre(name: str) -> TyreParameters:
 
 
 def _measured(forces: RigForces) -> np.ndarray:
-    """Force and moment in ISO-W axes: x along the heading in the road, z up."""
+    """Return force and moment in ISO-W axes: x along the heading in the road, z up."""
     return np.hstack([to_heading(vectors, -forces.heading_rad) for vectors in (forces.force_N, forces.moment_Nm)])
 
 
@@ -57,7 +57,7 @@ def _expected(forces: TyreForces, load_N: np.ndarray) -> np.ndarray:
 
 
 def _points(rng: np.random.Generator, count: int = POINTS) -> dict[str, np.ndarray]:
-    """Slips, camber and speed of both signs in all combinations, any heading, loads and speeds over their range."""
+    """Return slips, camber and speed of both signs in all combinations, with random headings, loads and speeds."""
     signs = np.array(np.meshgrid(*4 * [[-1.0, 1.0]])).reshape(4, 16)
     signs = np.tile(signs, (1, count // 16 + 1))[:, :count]
     return {
@@ -174,7 +174,7 @@ def test_the_right_tyre_is_the_left_one_in_a_mirror(rng) -> None:
 
 @pytest.mark.parametrize("name", ["compact_205_55R16", "synthetic_all_terms"])
 def test_a_symmetric_tyre_rolling_backwards_is_the_same_seen_from_the_other_end(name: str, rng) -> None:
-    """Turned by half a turn about the vertical, a symmetric wheel that rolls backwards rolls forwards."""
+    """A symmetric wheel that rolls backwards, rotated by 180 deg about the vertical, rolls forwards."""
     # RVY3 is the only other term: the published formula does not turn it round with the rolling direction.
     tyre = _tyre(name).with_values(**dict.fromkeys((*ASYMMETRIES, "RVY3"), 0.0))
     rig = TyreRig(tyre)

@@ -1,4 +1,4 @@
-"""The sedan against Project Chrono's: what `activesteer validate` compares, and what it would notice."""
+"""The sedan against Project Chrono's sedan: the comparisons of `activesteer validate`, and their sensitivity."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def result() -> Validation:
 
 
 def ours(run: str, timestep_s: float = 0.001) -> dict[str, np.ndarray]:
-    """Our columns of a run."""
+    """Return our columns of a run."""
     data = ReferenceData.load()
     recording = simulate(data.maneuver(run), vehicle=data.vehicle, timestep_s=timestep_s)
     return reference_columns(recording, data.point_from_cg_m)
@@ -60,7 +60,7 @@ def test_what_was_asked_for_is_compared(result: Validation) -> None:
 
 
 def test_agreement_is_much_closer_than_the_tolerances(result: Validation) -> None:
-    """So that a change for the worse is seen long before a tolerance is reached."""
+    """A deterioration is noticed long before a tolerance is reached."""
     errors = {(row.run, row.quantity): abs(row.error) for row in result.comparisons}
     for run in ("step_0p2g_L", "step_0p4g_L"):
         assert errors[run, "yaw_rate_steady"] < 0.003
@@ -136,7 +136,7 @@ def test_an_unknown_reference_names_those_that_exist(tmp_path) -> None:
 
 
 def test_toe_in_slows_the_coasting_car_by_what_its_side_forces_say(result: Validation) -> None:
-    """Side forces of toed-in wheels point backwards: sum of F_y sin(toe); else only slip shifts slow this car."""
+    """Side forces of toed-in wheels point backwards: sum of F_y sin(toe); otherwise only slip shifts slow this car."""
     run = result.runs["coast_80"]
     drag = sum(
         float((run[f"Fy_{c}"] * np.sin(run[f"delta_{c}"]) - run[f"Fx_{c}"]).mean()) for c in ("FL", "FR", "RL", "RR")

@@ -51,7 +51,7 @@ def case(request: pytest.FixtureRequest) -> tuple[TyreForces, dict[str, np.ndarr
 
 
 def _error(forces: TyreForces, table: dict[str, np.ndarray], ours: str, theirs: str) -> float:
-    """Greatest difference over the column's peak."""
+    """Return the largest difference over the peak of the column."""
     return float(np.abs(getattr(forces, ours) - table[theirs]).max() / np.abs(table[theirs]).max())
 
 

@@ -1,4 +1,4 @@
-"""Reads the reference tables and coefficient tables of `data/`."""
+"""Readers of the reference tables and coefficient tables of `data/`."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def _rows(name: str) -> list[list[str]]:
 
 
 def read_table(name: str) -> dict[str, np.ndarray]:
-    """The numeric columns of a table, by name; the first column, the kind of case, is left out."""
+    """Return the numeric columns of a table by name, without the first column, the kind of case."""
     header, *rows = _rows(name)
     values = np.array([[float(cell) for cell in row[1:]] for row in rows])
     return {column: values[:, place] for place, column in enumerate(header[1:])}
 
 
 def read_coefficients(name: str) -> dict[str, float]:
-    """Coefficients of a tyre, by key."""
+    """Return the coefficients of a tyre by key."""
     _, *rows = _rows(name)
     return {key: float(value) for key, value in rows}

@@ -1,4 +1,4 @@
-"""A viewer without a window, and drives of the three systems to look at."""
+"""A viewer without a window, and drives of the three systems."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NOTHING_DRAWS: Final = ("No graphics adapter was found", "Failed to get render 
 
 @pytest.fixture(scope="session")
 def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
-    """Skips, visibly, where there is nothing that could draw."""
+    """Skip the test if nothing can be drawn."""
     try:
         headless = Headless(tmp_path_factory.mktemp("viewer"))
     except ViewerDied as error:
@@ -32,12 +32,12 @@ def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
 
 @pytest.fixture(scope="session")
 def drives() -> dict[str, Recording]:
-    """A double lane change on a slippery road, so fast that the cars differ."""
+    """A double lane change on a slippery road, at a speed at which the cars differ."""
     scenario = resolve("double_lane_change_low_mu", overrides={"maneuver.speed_kmh": 95.0, "duration_s": 10.0})
     return {controller: run_scenario(scenario, controller) for controller in ("none", "ars", "afs")}
 
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where files and pictures go; `--basetemp` says where that is."""
+    """Folder for files and pictures; `--basetemp` sets it."""
     return tmp_path_factory.mktemp("pictures")

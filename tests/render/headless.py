@@ -1,4 +1,4 @@
-"""The rerun viewer without a window: what each view shows of a file, and what it complains about."""
+"""The rerun viewer without a window: the picture of each view of a file, and the viewer's complaints."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ TIMELINE = "time"
 
 
 class Picture(NamedTuple):
-    """What a view shows: red, green, blue of each pixel, and the warnings and errors that it reports."""
+    """Pixels of a view (red, green, blue) and the warnings and errors that the viewer reports."""
 
     pixels: NDArray[np.int16]
     reports: list[str]
 
 
 def viewer_binary() -> Path:
-    """The viewer itself: terminating the Python script `rerun` would leave it running."""
+    """Return the viewer's own program: terminating the Python script `rerun` would leave the program running."""
     spec = importlib.util.find_spec("rerun_cli")
     binary = Path(spec.origin).with_name("rerun") if spec and spec.origin else None
     if binary is None or not binary.exists():
@@ -38,7 +38,7 @@ def viewer_binary() -> Path:
 
 
 class ViewerDied(Exception):  # noqa: N818 - what happened, not a kind of error
-    """The viewer ended before it could be asked for anything."""
+    """The viewer ended before it could be queried."""
 
 
 class Headless:
@@ -78,7 +78,7 @@ class Headless:
                 return client
 
     def open(self, file: Path) -> None:
-        """Closes what is open and opens a file."""
+        """Close all recordings and open a file."""
         if self._client.get_state().recordings:
             self._client.close("all")
         self._started = time.monotonic()
@@ -98,10 +98,10 @@ class Headless:
             self._wait("the layout does not settle")
 
     def pictures(self, time_s: float, names: Collection[str]) -> dict[str, Picture]:
-        """What views show at an instant, by their names.
+        """Return the pictures of views at an instant, by the names of the views.
 
-        They must stand on pages that are open: the viewer lists the others too, but asking for a picture of one of
-        them makes it put a complaint over everything else.
+        The views must be on open pages. The viewer also lists the others, but asking for a picture of such a view makes
+        the viewer cover the window with a complaint.
         """
         client = self._client
         client.set_time(TIMELINE, duration=time_s, play_state="paused")
@@ -128,7 +128,7 @@ class Headless:
             self._wait("the picture does not settle")
 
     def _wait(self, problem: str) -> None:
-        """A little; each picture or file that took too long is an error."""
+        """Wait a little; raise an error for each picture or file that took too long."""
         if time.monotonic() > self._started + self._timeout_s:
             raise TimeoutError(f"{problem}: {self._log.read_text()[-500:]}")
         time.sleep(0.1)
@@ -145,7 +145,7 @@ class Headless:
 
 
 def save_pictures(pictures: Mapping[str, Picture], folder: Path) -> None:
-    """For a look at them."""
+    """Save the pictures for inspection."""
     for name, picture in pictures.items():
         file = "".join(letter if letter.isalnum() else "_" for letter in name)
         Image.fromarray(picture.pixels.astype(np.uint8)).save(folder / f"{file}.png")

@@ -1,4 +1,4 @@
-"""Films of drives: what is on the pictures, and that the files hold them. Skipped where nothing can be drawn."""
+"""Films of drives: their pictures, and the files. Skipped if nothing can be drawn."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def canvas() -> None:
 
 @pytest.fixture
 def picture(drives: dict[str, Recording], folder: Path) -> Callable[..., np.ndarray]:
-    """A picture of an instant, and a file of it for a look."""
+    """Return the picture of an instant, and save it for inspection."""
 
     def shoot(time_s: float, *names: str, **settings) -> np.ndarray:
         chosen = {name: drives[name] for name in names or ("afs",)}
@@ -143,7 +143,7 @@ def test_other_car_is_a_ghost_where_it_is(drives, folder):
 
 
 def steered(run: Recording, rear_deg: float) -> Recording:
-    """The same run with other angles of the rear wheels."""
+    """Return the same run with other rear wheel angles."""
     values = run.values.copy()
     for number, channel in enumerate(run.channels):
         if channel.name in {"rl_steer_rad", "rr_steer_rad"}:

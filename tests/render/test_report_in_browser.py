@@ -1,4 +1,4 @@
-"""The report as a person sees it: in a browser, on a desk, on a phone, on paper. Skipped where there is no browser."""
+"""The report in a browser: on a desktop, on a phone, on paper. Skipped if there is no browser."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def open_page(browser: Browser, report: Path) -> Iterator[Callable[..., Page]]:
-    """Opens the report; a message in the console, an error, or a request for anything else fails the test."""
+    """Open the report; a console message, an error, or a request for another resource fails the test."""
     wrong: list[str] = []
     contexts: list[Any] = []
 
@@ -114,7 +114,7 @@ def hover(page: Page, figure: Locator, share: float) -> None:
 
 
 def told(figure: Locator) -> list[str]:
-    """The instant and the values that a plot tells of it."""
+    """Return the instant and the values of a plot's read-out."""
     return re.findall(r"[\N{MINUS SIGN}\d.]+", figure.locator(".values").inner_text())
 
 

@@ -1,4 +1,4 @@
-"""What the viewer really shows: pictures of every view, drawn in software, looked at by colour and place."""
+"""Pictures of every view of the viewer, drawn in software and checked by colour and place."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ BESIDE = ("Course [m]", "Summary", *PLOTS)
 
 @pytest.fixture(scope="module")
 def alone(viewer: Headless, drives: Drives, folder: Path) -> dict[float, Pictures]:
-    """The page of a single run, at two instants."""
+    """Pictures of the page of a single run, at two instants."""
     save(runs_of({"ars": drives["ars"]}), folder / "alone.rrd")
     return _looked_at(
         viewer,
@@ -53,13 +53,13 @@ def alone(viewer: Headless, drives: Drives, folder: Path) -> dict[float, Picture
 
 @pytest.fixture(scope="module")
 def together(viewer: Headless, drives: Drives, folder: Path) -> Pictures:
-    """The page that compares."""
+    """Pictures of the comparison page."""
     save(runs_of(drives), folder / "together.rrd", Showing(compare=True))
     return _looked_at(viewer, folder / "together.rrd", (*CARS, _plan(drives), "Curves: runs", *BESIDE), (AT_S,))[AT_S]
 
 
 def _plan(drives: Drives) -> str:
-    """Name of the view of the wheel angles, which says how much they are enlarged."""
+    """Return the name of the view of the wheel angles, which contains their magnification."""
     return str(plan_view(runs_of(drives)).name)
 
 
@@ -77,25 +77,25 @@ def _looked_at(
 
 
 def like(pixels: NDArray[np.int16], colour: str | tuple[int, int, int], within: int = 40) -> NDArray[np.bool_]:
-    """Where a picture has about that colour."""
+    """Return True for the pixels of about that colour."""
     if isinstance(colour, str):
         colour = (int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:], 16))
     return np.abs(pixels - np.array(colour)).max(axis=-1) <= within
 
 
 def spread(mask: NDArray[np.bool_]) -> float:
-    """Share of the columns of a picture in which the colour occurs."""
+    """Return the proportion of the picture's columns in which the colour occurs."""
     return float(mask.any(axis=0).mean())
 
 
 def _shell(pixels: NDArray[np.int16]) -> NDArray[np.bool_]:
-    """Where the body is, in the colour of its system, lit and in the shade."""
+    """Return the pixels of the body in the colour of its system, lit or in shade."""
     red, green, blue = np.moveaxis(pixels, -1, 0)
     return (red > 60) & (red > 1.5 * green) & (green > 2 * blue - 10)
 
 
 def view(pictures: Pictures, start: str) -> NDArray[np.int16]:
-    """The picture of the view whose name begins like that."""
+    """Return the picture of the view whose name begins like this."""
     (name,) = [name for name in pictures if name.startswith(start)]
     return pictures[name].pixels
 
@@ -119,7 +119,7 @@ def test_the_car_is_seen_from_behind_on_its_road(alone: dict[float, Pictures]) -
 
 
 def test_the_camera_follows_the_car(alone: dict[float, Pictures]) -> None:
-    """120 m further on the car is in the same place of the picture, but not the road."""
+    """After 120 m the car is at the same place in the picture, and the road is not."""
     early, late = (alone[time_s][CARS[1]].pixels for time_s in (0.5, AT_S))
     tyres = [np.argwhere(like(pixels, (0, 0, 0), 25)) for pixels in (early, late)]
     assert np.abs(tyres[0].mean(axis=0) - tyres[1].mean(axis=0)).max() < 0.05 * early.shape[1]
@@ -202,7 +202,7 @@ def test_plan_and_names_of_the_curves_show_every_run_in_its_colour_from_left_to_
 
 
 def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drives, folder: Path) -> None:
-    """They stand on pages behind the first one."""
+    """These views are on pages behind the first one."""
     runs = runs_of({"ars": drives["ars"]})
     for page, plots in ((3, WHEELS), (4, links(runs[0]))):
         file = folder / f"page {page}.rrd"

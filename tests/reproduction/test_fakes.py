@@ -1,4 +1,4 @@
-"""No claim is taken in by fakes that the car itself has driven: other runs, controllers turned round or idle."""
+"""No claim accepts fakes driven by the car itself: other runs, and controllers with reversed or no action."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NOISE_RADPS, SAMPLE_STEPS = np.radians(0.1), 10
 
 
 class TurnedRound:
-    """A controller whose angles have the other sign."""
+    """A controller with angles of the opposite sign."""
 
     def __init__(self, system: str, setup: Any) -> None:
         self._inner = load_controller(system, setup)
@@ -41,7 +41,7 @@ class TurnedRound:
 
 
 def turned_round(system: str) -> Any:
-    """What makes one."""
+    """Return a factory of such a controller."""
 
     def make(setup: Any) -> TurnedRound:
         return TurnedRound(system, setup)
@@ -50,7 +50,7 @@ def turned_round(system: str) -> Any:
 
 
 class OnNoise:
-    """A controller with the gain of the paper that acts on the noise of a production yaw rate sensor alone."""
+    """A controller with the paper's gain that acts only on the noise of a production yaw rate sensor."""
 
     def __init__(self, system: str, setup: Any) -> None:
         self._gain_s = getattr(setup.gains, system).corrector.proportional_gain_s
@@ -66,12 +66,12 @@ class OnNoise:
 
 
 def cut(recording: Recording, end_s: float) -> Recording:
-    """What a run has recorded until it ends too early."""
+    """Return the recorded part of a run that ends too early."""
     return recording.at(np.flatnonzero(recording.time_s < end_s))
 
 
 def passed(claims: list[Claim], fake: Fake) -> list[Claim]:
-    """Those that ought to have rejected the fake."""
+    """Return the claims that should have rejected the fake."""
     return [claim for claim in claims if claim.passed and fake in claim.statement.rejects]
 
 

@@ -107,7 +107,7 @@ def test_another_car_manoeuvre_or_driver_has_none(runs: dict[str, dict[str, Reco
 
 
 def driven_again(pairs: list[tuple[int, str]]) -> list[tuple[list[Row], list[Row]]]:
-    """For each pair of sample and scenario the three runs as they are now and as they are stored."""
+    """Return the three runs of each pair of sample and scenario, as they are now and as they are stored."""
     plan = Plan(population_study(stored().samples, stored().seed))
     scenarios = [label for label, _ in plan.settings.maneuvers]
     found = []

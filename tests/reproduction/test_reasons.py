@@ -1,4 +1,4 @@
-"""Reasons that the guides give, of claims that fail, faults and brakes: without a reason it would be otherwise."""
+"""Reasons given in the guides for failed claims, faults and brakes: without the cause, the effect disappears."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_feedback_without_a_band_drives_a_reversed_actuator_away_straight_ahead(
 
 
 def test_on_split_friction_the_left_rear_wheel_leaves_most_of_what_the_sedan_could_have() -> None:
-    """Not the brakes, and not what the front wheel with grip is let off by for the driver."""
+    """The cause is neither the brakes nor the pressure reduction of the front wheel with grip."""
     limits = {"brakes.front_torque_Nm": 2600.0, "brakes.antilock.side_difference_rise_Paps": 8e6}
     nominal, *others = (
         simulate("split_mu_braking", vehicle="sedan", overrides=overrides)

@@ -1,4 +1,4 @@
-"""Five scenarios, three systems: every run is there, and every claim has the verdict that is published."""
+"""Five scenarios with three systems: every run exists, and every claim has its published verdict."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_claim_passes_unless_it_is_known_not_to(reproduced: Reproduction, numb
 
 
 def test_all_systems_are_driven_the_same_way(runs: Runs) -> None:
-    """The same driver, road and lanes; in the open-loop manoeuvres, the same steering wheel angle."""
+    """Driver, road and lanes are the same; in open-loop manoeuvres also the steering wheel angle."""
     for systems in runs.values():
         first = systems["none"].metadata
         for recording in systems.values():

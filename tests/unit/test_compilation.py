@@ -1,4 +1,4 @@
-"""Compiled code that is kept on disk belongs to the sources as they are now, wherever it is kept."""
+"""Compiled code on disk belongs to the present sources, in any folder."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ print(outer(2.0))
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
-    """A package whose compiled function calls another file's and uses a third one's constant."""
+    """Return a package whose compiled function calls a second file's function and uses a third file's constant."""
     folder = tmp_path / "sources" / "gearbox"
     (folder / "inner").mkdir(parents=True)
     (folder / "__init__.py").write_text("")
@@ -45,7 +45,7 @@ def package(tmp_path: Path) -> Path:
 
 
 def _run(code: str, sources: Path, **environment: str) -> tuple[str, str]:
-    """What a fresh interpreter prints and logs that finds the sources first."""
+    """Return the output and log of a new interpreter that finds the sources first."""
     found = {"PYTHONPATH": os.pathsep.join((str(sources), str(_PACKAGE.parent))), **environment}
     done = subprocess.run(
         [sys.executable, "-c", code],

@@ -1,4 +1,4 @@
-"""TOML tables into dataclasses: what is taken, and what is said about the rest."""
+"""TOML tables to dataclasses: accepted values, and errors for others."""
 
 from __future__ import annotations
 

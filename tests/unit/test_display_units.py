@@ -1,4 +1,4 @@
-"""How quantities are shown."""
+"""Display of quantities."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an error carries, and how much of it stands in its one line."""
+"""Content of an error, and the length of its single line."""
 
 from __future__ import annotations
 

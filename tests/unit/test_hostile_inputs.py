@@ -1,4 +1,4 @@
-"""Whatever is given as an input, what comes back is an error of ours, of one line and bounded length."""
+"""Every wrong input causes an error of the package, with one line of bounded length."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ VALUES: list[Any] = [
 
 
 def refused(call: Any, *, may_pass: bool = True) -> ActiveSteerError | None:
-    """The error of a call, which must be ours and short; None where it passed."""
+    """Return the error of a call, which must be ours and short; None if the call succeeds."""
     try:
         call()
     except ActiveSteerError as error:
@@ -47,7 +47,7 @@ def refused(call: Any, *, may_pass: bool = True) -> ActiveSteerError | None:
 
 
 def fuzzed(count: int, seed: int) -> int:
-    """Overrides of random keys by random values, alone and in pairs; how many were refused."""
+    """Set random keys to random values, alone and in pairs; return the number of refused overrides."""
     choose = random.Random(seed)
     keys = {name: key_paths(kind) for name, kind in KINDS.items()}
     vehicle_keys = key_paths(VehicleConfig)
@@ -81,7 +81,7 @@ def test_many_random_overrides_end_in_an_error_of_ours_or_in_a_scenario():
 
 
 def mangled(table: dict[str, Any], choose: random.Random) -> dict[str, Any]:
-    """A table in which a value, or a key, of some depth is another one."""
+    """Return a table with another value or key at some depth."""
     result = within = copy.deepcopy(table)
     while True:
         key = choose.choice(list(within)) if within else "x"

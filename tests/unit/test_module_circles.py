@@ -1,4 +1,4 @@
-"""Import-linter holds the floors of the package; here: inside a floor, too, no module leads back to itself."""
+"""No module imports itself through others inside a floor; import-linter checks only the order of the floors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_no_module_imports_itself_by_way_of_others():
 
 
 def _in_circles(imports: Mapping[str, set[str]]) -> set[str]:
-    """What is left when modules that import nothing more, and those that nothing more imports, are taken away."""
+    """Remove modules without further imports or importers, and return the rest."""
     left = {module: set(names) for module, names in imports.items()}
     while True:
         imported = set().union(*left.values())

@@ -1,4 +1,4 @@
-"""Pages: whatever stands in a recording or a reference stays text."""
+"""Pages: all content of a recording or a reference remains text."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_both_pages_have_one_frame_and_one_stylesheet():
 
 
 def test_every_text_can_be_read_on_every_page():
-    """They have one stylesheet: its colours by day and by night."""
+    """All pages have one stylesheet: its colours by day and by night."""
     pytest.importorskip("matplotlib")
     modes = [
         dict(re.findall(r"--(\w+): (#\w{6})", each))

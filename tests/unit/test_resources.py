@@ -13,7 +13,7 @@ from tests.raising import raises
 
 @pytest.fixture
 def checkout(tmp_path, monkeypatch) -> Path:
-    """A synthetic checkout with two manoeuvres and one vehicle."""
+    """Return a synthetic checkout with two manoeuvres and one vehicle."""
     for file in ("maneuvers/step_steer.toml", "maneuvers/slalom.toml", "models/vehicles/compact.toml"):
         path = tmp_path / file
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""How runs look that are shown together: order, colours, dashes."""
+"""Appearance of runs shown together: order, colours, dashes."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture
 def figures(monkeypatch):
-    """Every Figure that is saved, for looking at its curves; the file itself stays empty."""
+    """Return every Figure that is saved, to check its curves; the file stays empty."""
     figure_module = pytest.importorskip("matplotlib.figure")
     kept = []
 

@@ -1,4 +1,4 @@
-"""Three synthetic runs of each scenario for which all of its claims hold, as arguments of what makes them."""
+"""Three synthetic runs of each scenario for which all claims hold, as arguments of their makers."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ MAKERS = {
 
 
 def wider(share: float):
-    """The track of a lane change, wider or narrower."""
+    """Return the track of a lane change, wider or narrower."""
     return lambda x: share * offset_track(x)
 
 
 def good(scenario: str) -> Arguments:
-    """Arguments of three runs for which all claims hold, by system."""
+    """Return the arguments of three runs for which all claims hold, by system."""
     rear, front = {"rear_rad": 0.02}, {"superposition_rad": 0.02}
     return {
         "step_steer": {
@@ -61,20 +61,20 @@ def good(scenario: str) -> Arguments:
 
 
 def damped(time_s: np.ndarray) -> np.ndarray:
-    """A yaw rate that is quicker than the one without control, and overshoots less."""
+    """Return a yaw rate that is faster and overshoots less than without control."""
     return second_order(time_s, 10.0, 0.6)
 
 
 def runs_of(scenario: str, arguments: Arguments, **words: Any) -> dict[str, SyntheticRun]:
-    """Runs by system; the words go to all of them."""
+    """Return the runs by system; the keywords apply to all of them."""
     return {system: MAKERS[scenario](**own, **words) for system, own in arguments.items()}
 
 
 def check(scenario: str, arguments: Arguments, **words: Any) -> dict[str, Claim]:
-    """The claims about runs with these arguments, by number."""
+    """Return the claims for runs with these arguments, by number."""
     return {claim.id: claim for claim in SCENARIOS[scenario](runs_of(scenario, arguments, **words))}
 
 
 def failing(scenario: str, arguments: Arguments, **words: Any) -> list[str]:
-    """The numbers of those that fail."""
+    """Return the numbers of the claims that fail."""
     return [number for number, claim in check(scenario, arguments, **words).items() if not claim.passed]

@@ -1,4 +1,4 @@
-"""Recordings made of formulas, for the analysis alone."""
+"""Synthetic recordings from formulas, for tests of the analysis."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ VEHICLE: dict[str, Any] = {
 
 
 class SyntheticRun:
-    """A recording of arrays that were computed, not driven."""
+    """A recording of computed arrays, without a drive."""
 
     def __init__(self, time_s: np.ndarray, channels: Mapping[str, np.ndarray], kind: str = "step_steer") -> None:
         self.time_s = time_s
@@ -48,13 +48,13 @@ Response = Callable[[np.ndarray], np.ndarray]
 
 
 def first_order(time_s: np.ndarray, lag_s: float = 0.2) -> np.ndarray:
-    """Unit step response of a first-order lag, from t = 0 on."""
+    """Return the unit step response of a first-order lag from t = 0 on."""
     after_s = np.maximum(time_s, 0.0)
     return np.where(time_s >= 0.0, 1.0 - np.exp(-after_s / lag_s), 0.0)
 
 
 def second_order(time_s: np.ndarray, natural_radps: float = 9.0, damping: float = 0.5) -> np.ndarray:
-    """Unit step response of an underdamped second-order lag, from t = 0 on."""
+    """Return the unit step response of an underdamped second-order lag from t = 0 on."""
     after_s = np.maximum(time_s, 0.0)
     root = np.sqrt(1.0 - damping**2)
     decay = np.exp(-damping * natural_radps * after_s)
@@ -74,7 +74,7 @@ def step_steer(
     duration_s: float = 7.0,
     timestep_s: float = 0.001,
 ) -> SyntheticRun:
-    """A step steer to the left (side 1) or right (-1): everything steps at `STEP_S`, to the given final values."""
+    """Return a step steer to the left (side 1) or right (-1): signals step at `STEP_S` to the given final values."""
     time_s = np.arange(round(duration_s / timestep_s) + 1) * timestep_s
     since_s = time_s - STEP_S
     ramp = np.clip(since_s / RAMP_S + 0.5, 0.0, 1.0)
@@ -177,7 +177,7 @@ Track = Callable[[np.ndarray], np.ndarray]
 
 
 def offset_track(x_m: np.ndarray, offset_m: float = 3.5) -> np.ndarray:
-    """A track through the middle of `LANES`: to the left between 45 and 75 m, back between 100 and 125 m."""
+    """Return a track through the middle of `LANES`: to the left from 45 to 75 m, back from 100 to 125 m."""
     return np.interp(x_m, (45.0, 75.0, 100.0, 125.0), (0.0, offset_m, offset_m, 0.0))
 
 
@@ -271,7 +271,7 @@ SLALOM_CONES = tuple((40.0 + 30.0 * i, 0.0) for i in range(5))
 
 
 def slalom(amplitude_m: float = 1.5, **words: Any) -> SyntheticRun:
-    """A sine around `SLALOM_CONES`, the first one passed on its left."""
+    """Return a sine around `SLALOM_CONES` that passes left of the first cone."""
 
     def track(x_m: np.ndarray) -> np.ndarray:
         inside = np.clip((x_m - 25.0) / 15.0, 0.0, 1.0) * np.clip((175.0 - x_m) / 15.0, 0.0, 1.0)

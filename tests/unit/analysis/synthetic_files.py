@@ -1,4 +1,4 @@
-"""Recordings as they come from a file, made of the formulas in `synthetic`."""
+"""Recordings as read from a file, made of the formulas in `synthetic`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def recording_of(
 
 
 def step_steers() -> dict[str, Recording]:
-    """The three systems in a step steer, by file."""
+    """Return step steers of the three systems, by file."""
     runs = {
         "none": step_steer(),
         "ars": step_steer(yaw_radps=0.17, sideslip_rad=-0.012, rear_rad=-0.002),
@@ -52,7 +52,7 @@ def step_steers() -> dict[str, Recording]:
 
 
 def lane_changes() -> dict[str, Recording]:
-    """Two runs through cones, by file."""
+    """Return two runs through cones, by file."""
     cones = ((30.0, 1.2), (45.0, 1.2), (30.0, -1.2), (45.0, -1.2))
     maneuver = {"name": "cones", "title": "Through <cones> & lanes"}
     return {
@@ -62,5 +62,5 @@ def lane_changes() -> dict[str, Recording]:
 
 
 def sines() -> dict[str, Recording]:
-    """A sine with dwell, by file."""
+    """Return a sine with dwell, by file."""
     return {"sine.mcap": recording_of(sine_with_dwell())}

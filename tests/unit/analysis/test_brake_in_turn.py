@@ -1,4 +1,4 @@
-"""ISO 7975, with a car that follows a formula."""
+"""ISO 7975 with a car that follows a formula."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RADIUS_M, SPEED_MPS, BRAKE_S, DECELERATION_MPS2 = 100.0, 25.0, 1.0, 5.0
 
 
 def braking(side: float = 1.0, turn_in: float = 0.0, duration_s: float = 4.0, outside_m: float = 0.0) -> SyntheticRun:
-    """A car on a circle brakes at 1 s; its yaw rate then is above that of the circle by `turn_in` rad/s."""
+    """Return a car on a circle that brakes at 1 s; then its yaw rate exceeds that of the circle by `turn_in` rad/s."""
     time_s = np.arange(round(duration_s * 1000.0) + 1) * 0.001
     since_s = np.maximum(time_s - BRAKE_S, 0.0)
     speed = np.maximum(SPEED_MPS - DECELERATION_MPS2 * since_s, 0.0)

@@ -1,4 +1,4 @@
-"""Claims S1 to S5 pass where they hold and fail where they do not; what all claims have in common."""
+"""Claims S1 to S5 pass if they hold and fail if they do not; common properties of all claims."""
 
 from __future__ import annotations
 

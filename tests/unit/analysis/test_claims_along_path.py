@@ -1,4 +1,4 @@
-"""Claims L, Z and W pass where they hold and fail where they do not."""
+"""Claims L, Z and W pass if they hold and fail if they do not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""No claim is taken in by the fakes that its statement names, made from runs of which every claim holds."""
+"""No claim accepts the fakes in its statement, made from runs for which all claims hold."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def added(run: SyntheticRun, factor: float) -> dict[str, np.ndarray]:
 
 
 def reversed_run(none: SyntheticRun, run: SyntheticRun) -> SyntheticRun:
-    """What a system does to the car, and with which angles, turned round: as much worse as it was better."""
+    """Return the effect of a system on the car reversed, with its angles: as much worse as it was better."""
     moved = {
         name: values if len(values) != len(none.time_s) else 2.0 * none[name] - values
         for name, values in run.channels.items()
@@ -44,7 +44,7 @@ def reversed_run(none: SyntheticRun, run: SyntheticRun) -> SyntheticRun:
 
 
 def noise(run: SyntheticRun, *, beyond_the_band: bool) -> np.ndarray:
-    """Demand on noise alone: all the time, or to one side and in the manoeuvre, which takes the error to the band."""
+    """Return a demand of pure noise: permanent, or one-sided in the manoeuvre, which brings the error to the band."""
     rows = len(run.time_s)
     samples = np.random.default_rng(3).normal(0.0, NOISE_RAD, rows // HELD + 1)
     values = np.repeat(np.maximum(samples, 0.0) if beyond_the_band else samples, HELD)[:rows]
@@ -52,7 +52,7 @@ def noise(run: SyntheticRun, *, beyond_the_band: bool) -> np.ndarray:
 
 
 def on_noise(run: SyntheticRun, name: str, *, beyond_the_band: bool) -> SyntheticRun:
-    """The run, with a demand that is noise."""
+    """Return the run with a noise demand."""
     return copy_of(run, {f"{name}_demand_rad": noise(run, beyond_the_band=beyond_the_band)})
 
 

@@ -1,4 +1,4 @@
-"""Claims D1 to D5 pass where they hold and fail where they do not."""
+"""Claims D1 to D5 pass if they hold and fail if they do not."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_angles_that_are_opposite_for_less_than_nine_tenths_of_the_time_do_not_p
 
 
 def demands(rear, front) -> Claim:
-    """D4 of runs with these demanded angles, functions of the time since the reversal."""
+    """Return D4 for runs with these demanded angles, functions of the time since the reversal."""
     runs = runs_of(SCENARIO, good(SCENARIO))
     since_s = runs["ars"].time_s - REVERSAL_S
     runs["ars"].channels["rear_steer_demand_rad"] = rear(since_s)

@@ -1,4 +1,4 @@
-"""The paper's figures: which there are, what they show, and that they can be written."""
+"""The paper's figures: their list, their content, and their files."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def test_every_text_is_of_8_points_in_a_figure_as_wide_as_a_column_or_a_page(dra
 
 
 def unseen(figure):
-    """Labels of ticks that lie beyond the limits of their axis."""
+    """Return the labels of ticks beyond the limits of their axis."""
     return {
         label
         for axes in figure.findobj(Axes)

@@ -21,7 +21,7 @@ EG, ROLL, REAR = 0.0045, 0.009, 0.004
 def run(
     kind: str = "slowly_increasing_steer", side: float = 1.0, knee_mps2: float = 4.0, top_mps2: float = 8.0
 ) -> SyntheticRun:
-    """Lateral acceleration rises to its limit; above the knee, the steer angle grows faster than the line."""
+    """Lateral acceleration rises to its limit; above the knee, the steer angle rises faster than the line."""
     time_s = np.arange(40001) * 0.001
     ay = np.minimum(time_s / 35.0, 1.0) * top_mps2
     speed = np.full_like(ay, 22.0) if kind == "slowly_increasing_steer" else np.sqrt(np.maximum(ay, 0.01) * 100.0)

@@ -50,7 +50,7 @@ def test_a_body_just_inside_is_inside_and_just_outside_is_not(margin_m, inside, 
 @pytest.mark.parametrize("yaw_rad", [0.1, -0.1])
 @pytest.mark.parametrize(("end_m", "turns"), [(FRONT_OVERHANG_M, 1.0), (WHEELBASE_M + REAR_OVERHANG_M, -1.0)])
 def test_every_corner_counts(yaw_rad, end_m, turns):
-    """Moved aside until one end fits: the corner of the other end is beyond the lane by what is calculated by hand."""
+    """The body is shifted until one end fits; the other end oversteps the lane by the value calculated by hand."""
     sideways = math.sin(abs(yaw_rad)) * end_m + math.cos(yaw_rad) * HALF_M
     y_m = turns * math.copysign(0.5, yaw_rad)
     run = straight(y_m, lanes=(("lane", 30.0, 45.0, -2.0, 2.0),))

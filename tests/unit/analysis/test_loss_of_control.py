@@ -1,4 +1,4 @@
-"""When a car counts as lost."""
+"""Detection of loss of control."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The metrics are those of the manoeuvre's kind."""
+"""The metrics depend on the kind of the manoeuvre."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ FINITE = 5e-3
 
 
 def run(rng: np.random.Generator, noise: float = 0.0, length_s: float = 61.0) -> SyntheticRun:
-    """Steering from 0 to 6 Hz, and what the system makes of it: driven every 1 ms, kept every 20 ms, as in a study."""
+    """Return steering from 0 to 6 Hz and the response: computed every 1 ms, kept every 20 ms, as in a study."""
     time_s = np.arange(round(length_s / STEP_S)) * STEP_S
     low = signal.butter(6, 6.0, fs=1.0 / STEP_S, output="sos")
     wheel, other = (np.asarray(signal.sosfilt(low, rng.normal(0.0, 1.0, len(time_s)))) for _ in range(2))

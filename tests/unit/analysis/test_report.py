@@ -32,7 +32,7 @@ VOID = {"meta", "link", "br"}
 
 
 class Page(HTMLParser):
-    """Reads a page: its text, its links, and whether every element that is opened is closed in order."""
+    """Parser of a page: its text, its links, and the order of its opened and closed elements."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -378,7 +378,7 @@ def test_text_of_a_recording_cannot_become_markup():
 
 
 def test_no_text_of_a_recording_opens_anything_inside_the_data():
-    """`<!--<script>` keeps a browser from finding the end of the element, and every plot goes missing."""
+    """`<!--<script>` prevents a browser from finding the end of the element, and all plots are missing."""
     page = report_page({"a.mcap": recording_of(step_steer(), "x:<!--<script>")})
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
     assert found

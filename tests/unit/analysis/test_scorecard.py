@@ -1,4 +1,4 @@
-"""Verdicts, and the list of what is known not to come out."""
+"""Verdicts, and the list of claims known as not reproduced."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Smoothing, crossings and step responses against signals whose answer is known in closed form."""
+"""Smoothing, crossings and step responses of signals with solutions in closed form."""
 
 from __future__ import annotations
 

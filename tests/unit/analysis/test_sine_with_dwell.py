@@ -47,7 +47,7 @@ def test_ratios_count_from_the_completion_of_steer(side):
 
 
 def test_counting_from_the_beginning_would_give_another_ratio():
-    """The known mistake: 1.00 s after the beginning of steer the car is still in the first half or the dwell."""
+    """A common mistake: 1.00 s after the beginning of steer the car is still in the first half or the dwell."""
     run = sine_with_dwell(after_1000ms=0.30)
     mistaken = np.interp(SINE_BEGIN_S + 1.0, run.time_s, run["yaw_rate_radps"])
     peak = np.abs(run["yaw_rate_radps"]).max()

@@ -1,4 +1,4 @@
-"""What the analysis takes from the metadata of a recording."""
+"""Metadata of a recording that the analysis uses."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def three():
 
 @pytest.fixture
 def saved(monkeypatch, tmp_path):
-    """The Figure that was saved, for looking at its curves."""
+    """Return the saved Figure, to check its curves."""
     figure_module = pytest.importorskip("matplotlib.figure")
     figures = []
     save = figure_module.Figure.savefig

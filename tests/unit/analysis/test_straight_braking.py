@@ -1,4 +1,4 @@
-"""Metrics of braking on a made-up stop whose numbers are known."""
+"""Metrics of braking for a synthetic stop with known values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RADIUS_M = 0.3
 
 
 def stopping(*, slip: float = 0.1, until_s: float = 6.0, pedal: float = 1.0) -> SyntheticRun:
-    """Rolling for a second, then a constant deceleration to rest, one wheel with a slip of its own."""
+    """Return a stop: coasting for a second, then constant deceleration to rest, with another slip at one wheel."""
     time_s = np.arange(0.0, until_s, 0.001)
     braked_s = np.maximum(time_s - 1.0, 0.0)
     speed = np.maximum(SPEED_MPS - DECELERATION_MPS2 * braked_s, 0.0)

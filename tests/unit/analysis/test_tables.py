@@ -1,4 +1,4 @@
-"""The table of metrics: units for reading, one column a run."""
+"""The table of metrics: display units, one column for each run."""
 
 from __future__ import annotations
 

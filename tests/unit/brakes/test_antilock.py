@@ -1,4 +1,4 @@
-"""The phases of a wheel under anti-lock control, and what the control allows the wheels with regard to each other."""
+"""Phases of a wheel under anti-lock control, and the limits between the wheels."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BORNE_NM = 1000.0
 
 
 def braking(brakes: Brakes = CAR, *, phase: float = OFF, slip: float = 0.0, gain_mps2: float = 0.0) -> tuple[Any, Any]:
-    """Return setup and state of a car at 20 m/s whose front left wheel is in a phase; the others roll along."""
+    """Return setup and state of a car at 20 m/s whose front left wheel is in a phase; the other wheels roll freely."""
     setup, state = of(brakes)
     state.demand_Pa[:] = 5e6
     state.phase[0], state.borne_Nm[0], state.friction_Nm[0] = phase, BORNE_NM, BORNE_NM
@@ -39,7 +39,7 @@ def step(setup: Any, state: Any, count: int = 1) -> list[float]:
 
 
 def test_building_up_becomes_faster_with_time() -> None:
-    """By its first rate within each 0.25 s, as on a road that has become better."""
+    """The first rate applies within each 0.25 s, as on a road with rising friction."""
     setup, state = braking(phase=BUILD)
     limits = step(setup, state, 100)
     rises = [(later - sooner) / INTERVAL_S for sooner, later in pairwise(limits)]
@@ -84,7 +84,7 @@ def test_a_build_up_that_has_just_begun_needs_twice_the_slip() -> None:
 
 @pytest.mark.parametrize(("friction_Nm", "left_Nm"), [(1000.0, 900.0), (200.0, 200.0 - 10.0 / 0.3), (20.0, 0.0)])
 def test_a_released_wheel_keeps_what_lets_it_speed_up(friction_Nm: float, left_Nm: float) -> None:
-    """0.9 of the friction torque, or less where 10 m/s2 of 1 kg m2 at 0.3 m need more."""
+    """0.9 of the friction torque, or less if 10 m/s2 of 1 kg m2 at 0.3 m need more."""
     setup, state = braking(slip=0.2, gain_mps2=-30.0)
     state.friction_Nm[0] = friction_Nm
     assert step(setup, state) == [pytest.approx(left_Nm / PER_PRESSURE)]

@@ -1,4 +1,4 @@
-"""The control unit as a whole: which of its parts work, when it decides, and what limits its estimate of the speed."""
+"""The complete control unit: activity of its parts, decision instants, limits of its speed estimate."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROLLING_RADPS = np.full(4, 20.0 / RADIUS_M)
 def step(
     setup: Any, state: Any, speeds_radps: np.ndarray, pedal: float, drive_Nm: float = 0.0, count: int = 1
 ) -> float:
-    """Return the drive torque that is left after some steps."""
+    """Return the remaining drive torque after some steps."""
     left_Nm = drive_Nm
     for _ in range(count):
         left_Nm = step_brakes(setup, state, speeds_radps, 0.0, pedal, drive_Nm, np.zeros(4), 0.0)

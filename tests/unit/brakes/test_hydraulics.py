@@ -1,4 +1,4 @@
-"""Torque by pressure, how fast pressure comes and goes, and what a wheel gets of what is asked."""
+"""Torque over pressure, rates of pressure, and the torque of each wheel for a demand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NOTHING = np.zeros(4)
 
 
 def of(brakes: Brakes, timestep_s: float = 0.001) -> tuple[Any, Any]:
-    """Setup and state as compiled code sees them."""
+    """Return setup and state in the form of compiled code."""
     setup, state = brake_setup(brakes, timestep_s, [0.3] * 4, [0.5, 0.5, 0.0, 0.0], [1.0] * 4), np.zeros(1, BRAKE_STATE)
     reset(state, setup, 20.0)
     return setup.view(np.recarray)[0], state.view(np.recarray)[0]

@@ -1,4 +1,4 @@
-"""The control unit's estimate of the speed: wheels while they roll, the acceleration while they slip."""
+"""Speed estimate of the control unit: from the wheels while they roll, from the acceleration while they slip."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_rolling_it_is_the_speed_of_the_wheels_that_are_not_driven() -> None:
 
 @pytest.mark.parametrize("slope_mps2", [0.0, 1.45, -1.45])
 def test_with_all_wheels_locked_it_follows_the_deceleration_on_any_slope(slope_mps2: float) -> None:
-    """What gravity adds on a slope was learned before."""
+    """The effect of gravity on a slope was learned before."""
     setup, state = of(CAR)
     for _ in range(1000):
         follow_wheels(setup, state, np.full(4, 20.0 / 0.3))

@@ -1,4 +1,4 @@
-"""Traction control takes back drive torque and brakes the faster of two driven wheels."""
+"""Traction control reduces drive torque and brakes the faster of two driven wheels."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_wheels_that_roll_are_left_alone() -> None:
 
 
 def test_the_drive_torque_follows_the_excess_at_once_and_in_time() -> None:
-    """Allowed are 5 % and 0.6 m/s: 21.6 m/s, so that the excess is 1 m/s."""
+    """5 % and 0.6 m/s are allowed: 21.6 m/s, so the excess is 1 m/s."""
     setup, state = driving(22.6, 22.6, 20.0, 20.0)
     traction(setup, state, 1000.0, False)
     assert state.tcs_active == 1.0

@@ -1,4 +1,4 @@
-"""The bodies that cars are drawn with: whole, of the size of the car, and of the file that the tool writes."""
+"""Bodies for drawings: closed, of the size of the car, and equal to the tool's output file."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from tests.unit.playback.synthetic import circle
 
 
 def on(mu: float) -> Recording:
-    """The same car on a road on which it has that share of its forces."""
+    """Return the same car on a road where it uses that share of its forces."""
     run = circle(0.1)
     columns = [Channel(f"{corner}_mu", "-", "", "corners") for corner in CORNERS]
     values = np.column_stack([run.values, np.full((len(run), 4), mu)])

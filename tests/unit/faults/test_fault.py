@@ -1,4 +1,4 @@
-"""What may be written of a fault, and what is said to the rest."""
+"""Valid descriptions of a fault, and the errors for others."""
 
 from __future__ import annotations
 

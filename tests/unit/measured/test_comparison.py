@@ -1,4 +1,4 @@
-"""Measured beside simulated: shifts, corridors and verdicts of signals whose answer is known."""
+"""Measurement against simulation: shifts, corridors and verdicts of signals with known results."""
 
 from __future__ import annotations
 

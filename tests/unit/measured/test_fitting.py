@@ -1,4 +1,4 @@
-"""Parameters from recordings: known values come back within their intervals; what is wrong is said before driving."""
+"""Parameters from recordings: known values are inside their intervals; errors are reported before driving."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STUDY: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def truth() -> Recording:
-    """A step to either side with known parameters."""
+    """Return a step to either side with known parameters."""
     table = {
         "kind": "open_loop", "speed_kmh": 80.0, "duration_s": 1.6, "settle_s": 0.3, "hold_last": True,
         "steering": {"time_s": [0.1, 0.3, 0.7, 1.0], "steering_wheel_deg": [0.0, 40.0, 40.0, -40.0]},
@@ -38,7 +38,7 @@ def truth() -> Recording:
 
 
 def noisy(truth: Recording, path: Path, seed: int) -> None:
-    """What a data logger makes of it: channels every 10 ms with noise, of inputs a tenth of a degree and of a km/h."""
+    """Write the channels of a data logger, every 10 ms with noise; the inputs have 0.1 deg and 0.1 km/h of it."""
     rng = np.random.default_rng(seed)
     rows = slice(None, None, 10)
     noise = {"steering_wheel_rad": math.radians(0.1), "speed_mps": 0.1 / 3.6, **NOISE}

@@ -1,4 +1,4 @@
-"""Files of other programs become recordings: formats, units, signs, gaps, and what looks wrong in them."""
+"""Import of other programs' files: formats, units, signs, gaps, and questionable values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Least squares and intervals on models whose answer is known: how often intervals hold the truth, what cannot be."""
+"""Least squares and intervals for models with known solutions: coverage of the intervals, and impossible fits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FREE = np.array([True, True])
 
 
 def lag(place):
-    """Two channels of a first-order lag with gain: not linear in its time constant."""
+    """Return two channels of a first-order lag with gain, nonlinear in the time constant."""
     gain, time_s = 1.0 + place[0], 0.2 + place[1]
     rate = gain * (1.0 - np.exp(-TIME_S / time_s))
     return [20.0 * rate, 10.0 * np.gradient(rate, TIME_S)]
@@ -27,7 +27,7 @@ def answers(measured):
 
 
 def autoregressive(rng, alike):
-    """Noise of variance 1 of which neighbours are alike; its autocorrelation time is (1 + a)/(1 - a)."""
+    """Return correlated noise of variance 1; its autocorrelation time is (1 + a)/(1 - a)."""
     noise = np.empty(len(TIME_S))
     noise[0] = rng.standard_normal()
     for row, drive in enumerate(np.sqrt(1.0 - alike**2) * rng.standard_normal(len(noise) - 1), 1):

@@ -1,4 +1,4 @@
-"""A drive of the real car, for tests of files that other tools read."""
+"""A drive of the real car, for tests of files for other tools."""
 
 from __future__ import annotations
 

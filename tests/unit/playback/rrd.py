@@ -1,4 +1,4 @@
-"""Reads a .rrd file with rerun's own reader: what was sent, entity by entity."""
+"""Reader of a .rrd file with rerun's own reader: the logged data of each entity."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rerun.chunk import RrdReader
 
 
 class Rrd:
-    """Columns of every entity, by entity path and component."""
+    """Columns of each entity, by entity path and component."""
 
     def __init__(self, path: Path) -> None:
         reader = RrdReader(path)
@@ -19,7 +19,7 @@ class Rrd:
         self.entities = {str(chunk.entity_path) for chunk in self.chunks}
 
     def column(self, entity: str, component: str) -> list[Any]:
-        """The values of a component, one for each row."""
+        """Return the values of a component, one for each row."""
         found: list[Any] = []
         for chunk in self.chunks:
             batch = chunk.to_record_batch()
@@ -28,11 +28,11 @@ class Rrd:
         return found
 
     def numbers(self, entity: str, component: str) -> np.ndarray:
-        """The same as an array, shape (rows, instances, ...)."""
+        """Return the same values as an array, shape (rows, instances, ...)."""
         return np.array(self.column(entity, component), dtype=float)
 
     def time_s(self, entity: str) -> np.ndarray:
-        """Times of an entity's rows [s]."""
+        """Return the times of an entity's rows [s]."""
         found = [
             np.asarray(chunk.to_record_batch().column("time").to_numpy(zero_copy_only=False), "timedelta64[ns]")
             for chunk in self.chunks

@@ -1,4 +1,4 @@
-"""A synthetic car: a chassis and four wheels that drive a left-hand circle, one link and one spring at each wheel."""
+"""A synthetic car: a chassis and four wheels on a left-hand circle, one link and one spring at each wheel."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def scene() -> list[ScenePart]:
 
 
 def circle(duration_s: float = 3.0, metadata: Mapping[str, Any] | None = None, controller: str = "ars") -> Recording:
-    """One run, at 1 kHz, poses at 100 Hz."""
+    """Return one run at 1 kHz, with poses at 100 Hz."""
     time_s = np.arange(round(duration_s * 1000)) * 1e-3
     yaw = SPEED_MPS / RADIUS_M * time_s
     x, y = RADIUS_M * np.sin(yaw), RADIUS_M * (1.0 - np.cos(yaw))

@@ -1,4 +1,4 @@
-"""What a .rrd file holds, read back with rerun's reader."""
+"""Content of a .rrd file, read with rerun's reader."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def test_what_sensors_say_stands_in_the_plot_of_the_truth(tmp_path: Path) -> Non
 
 
 def test_an_angle_that_nobody_asked_for_is_not_plotted(tmp_path: Path) -> None:
-    """What the superposition hinge gives way under load is no added angle."""
+    """The elastic deflection of the superposition hinge is not an added angle."""
     rrd = saved(tmp_path, {"ars": circle()})
     assert "/ars/plots/rear_steer_rad" in rrd.entities
     assert "/ars/plots/superposition_rad" not in rrd.entities
@@ -287,7 +287,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 def test_twenty_seconds_take_less_than_15_MB(driven: Path, tmp_path: Path) -> None:
-    """The real car, its drive twice over."""
+    """Two drives of the real car."""
     once = Recording.open(driven)
     times = 2
     rows, sets = len(once), len(once.poses.time_s)

@@ -39,7 +39,7 @@ def test_a_part_reaches_from_one_point_to_the_other(rng: np.random.Generator, *,
 
 
 def test_a_part_straight_down_does_not_flip_over() -> None:
-    """The shortest turn from up to down has no definite axis: a coil would jump about."""
+    """The shortest rotation from up to down has no definite axis, so a coil could jump."""
     start = np.zeros((3, 3))
     end = np.array([(1e-4, 0.0, -1.0), (0.0, 0.0, -1.0), (-1e-4, 1e-4, -1.0)])
     _, _, turn = between(start, end)

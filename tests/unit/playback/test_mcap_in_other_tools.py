@@ -1,4 +1,4 @@
-"""The recording of a drive in tools that know nothing of this package: stock MCAP readers, Foxglove's terms, rerun."""
+"""The recording of a drive in tools that do not know this package: MCAP readers, Foxglove's rules, rerun."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ UNITS = {
 
 @pytest.fixture(scope="module")
 def messages(driven: Path) -> Messages:
-    """Log times [ns] and decoded messages of each topic."""
+    """Return log times [ns] and decoded messages of each topic."""
     topics: Messages = {}
     with driven.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
@@ -49,7 +49,7 @@ class Frames:
         return frame in self._of
 
     def to_world(self, frame: str) -> Callable[[Any], np.ndarray]:
-        """From points of a frame to points of the world, along the chain of parents."""
+        """Transform points of a frame to the world, along the chain of parents."""
         steps = []
         while frame != "world":
             transform = self._of[frame]
@@ -68,7 +68,7 @@ class Frames:
 
 
 def series(messages: Messages, group: str, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Time [s] and values of a signal, as a plot of `/state/GROUP.NAME` shows it."""
+    """Return time [s] and values of a signal, as in a plot of `/state/GROUP.NAME`."""
     rows = messages[f"/state/{group}"]
     return np.array([time for time, _ in rows]) / 1e9, np.array([getattr(row, name) for _, row in rows])
 
@@ -125,7 +125,7 @@ def test_every_solid_is_locked_to_a_frame_that_moves(messages: Messages) -> None
 
 
 def test_the_ends_of_the_links_are_where_the_bodies_are(messages: Messages) -> None:
-    """What a link's entity says in its metadata; its length changes by what bushings and steering give."""
+    """Metadata of a link's entity; its length changes by the deflection of bushings and by steering."""
     ((_, scene),) = messages["/scene"]
     tables = [json.loads(pair.value) for entity in scene.entities for pair in entity.metadata]
     links = {table["name"]: table for table in tables}

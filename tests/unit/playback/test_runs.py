@@ -1,4 +1,4 @@
-"""Names, order, colours, and which samples are shown."""
+"""Names, order, colours and samples of shown runs."""
 
 from __future__ import annotations
 

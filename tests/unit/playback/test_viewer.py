@@ -1,4 +1,4 @@
-"""The viewer's window, the browser's page, and what is said where there is neither."""
+"""The viewer's window, the browser's page, and the messages if neither is available."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_the_command_writes_a_file(file: Path, tmp_path: Path, capsys: pytest.Ca
 
 
 def test_the_viewer_says_nothing_of_its_own(tmp_path: Path) -> None:
-    """It warns of application ids that it has to change; names of manoeuvres and files are free."""
+    """The viewer warns of application ids that it has to change; names of manoeuvres and files are free."""
     circle(0.1, {"maneuver": {"name": "an: odd/name, ü", "title": "Odd"}}).save(tmp_path / "run.mcap")
     code = "import sys; from activesteer.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", code, "replay", "run.mcap", "--save", "out.rrd"]
@@ -115,7 +115,7 @@ def test_without_a_display_the_error_says_so(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def _runs_viewer(process: psutil.Process) -> bool:
-    """Whether it is the viewer; another child may just have ended, and is then no programme any more."""
+    """Return True for the viewer; another child may have ended just now and then has no program."""
     try:
         return Path(process.exe()) == viewer_binary()
     except psutil.NoSuchProcess:

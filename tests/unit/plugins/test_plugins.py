@@ -1,4 +1,4 @@
-"""Controllers and drivers of the user's own: as files with parameters, classes, objects and factories."""
+"""User controllers and drivers: files with parameters, classes, objects and factories."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SHORT = {"settle_s": 0.05, "duration_s": 0.3, "steer.start_s": 0.05, "steer.stee
 
 
 class Counting:
-    """Its angle grows from step to step, so that a state carried over would show."""
+    """A controller whose angle grows with each step, so a carried-over state would be visible."""
 
     def __init__(self, gain: float = 1.0, offset_rad: float = 0.0) -> None:
         self.gain, self.offset_rad, self.count = gain, offset_rad, 0
@@ -312,7 +312,7 @@ def test_source_and_parameters_are_recorded():
 
 
 class Robot:
-    """Steers by time, as the sensors tell it, and brakes."""
+    """A driver that steers over the time of the sensors, and brakes."""
 
     def __init__(self, angle_rad: float = 0.5) -> None:
         self.angle_rad = angle_rad

@@ -1,4 +1,4 @@
-"""A small synthetic recording: two seconds at 100 Hz, three groups that are interleaved in the table."""
+"""A small synthetic recording: two seconds at 100 Hz, three groups with interleaved columns."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def recording(channels: list[Channel], rng: np.random.Generator) -> Recording:
 
 @pytest.fixture
 def mcap_file(recording: Recording, tmp_path: Path) -> Path:
-    """The recording, written in four blocks of half a second."""
+    """Write the recording in four blocks of half a second."""
     path = tmp_path / "run.mcap"
     poses = recording.poses
     with McapWriter(
@@ -73,13 +73,13 @@ def mcap_file(recording: Recording, tmp_path: Path) -> Path:
 
 
 def blocks() -> Iterator[tuple[slice, slice]]:
-    """Rows and sets of poses of each block."""
+    """Yield rows and sets of poses of each block."""
     for start in range(0, 200, BLOCK_ROWS):
         yield slice(start, start + BLOCK_ROWS), slice(start // 5, (start + BLOCK_ROWS) // 5)
 
 
 def assert_same(one: Recording, other: Recording) -> None:
-    """Everything is equal: channels with 32 bit to their precision, the rest exactly."""
+    """Require equality of everything: 32-bit channels to their precision, the rest exactly."""
     assert one.channels == other.channels
     assert np.array_equal(one.time_s, other.time_s)
     for channel in one.channels:

@@ -1,4 +1,4 @@
-"""MCAP files record by record, for files that no writer of ours would write."""
+"""MCAP files record by record, for files that our writer cannot produce."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mcap.writer import MCAP0_MAGIC
 
 
 def records_of(path: Path) -> list[McapRecord]:
-    """All records of the data section, chunks whole, without the index of messages."""
+    """Return all records of the data section, with whole chunks, without the message index."""
     found: list[McapRecord] = []
     with path.open("rb") as stream:
         for record in StreamReader(stream, emit_chunks=True).records:
@@ -26,13 +26,13 @@ def records_of(path: Path) -> list[McapRecord]:
 
 
 def write_records(path: Path, records: Iterable[McapRecord]) -> Path:
-    """A file of these records, ended properly, without checksums."""
+    """Return a file of these records with a proper end, without checksums."""
     path.write_bytes(MCAP0_MAGIC + encoded([*records, DataEnd(0), Footer(0, 0, 0)]) + MCAP0_MAGIC)
     return path
 
 
 def encoded(records: Sequence[McapRecord]) -> bytes:
-    """The bytes of records."""
+    """Return the bytes of records."""
     builder = RecordBuilder()
     for record in records:
         record.write(builder)
@@ -40,7 +40,7 @@ def encoded(records: Sequence[McapRecord]) -> bytes:
 
 
 def chunk(data: bytes, compression: str = "zstd", size: int | None = None) -> Chunk:
-    """A chunk of these bytes, which may declare another size."""
+    """Return a chunk of these bytes, which may declare another size."""
     packed = zstandard.ZstdCompressor().compress(data) if compression == "zstd" else data
     return Chunk(
         compression=compression,
@@ -53,5 +53,5 @@ def chunk(data: bytes, compression: str = "zstd", size: int | None = None) -> Ch
 
 
 def message(channel_id: int, data: bytes = b"", time_ns: int = 0) -> Message:
-    """A message."""
+    """Return a message."""
     return Message(channel_id=channel_id, log_time=time_ns, data=data, publish_time=time_ns, sequence=0)

@@ -15,7 +15,7 @@ from tests.unit.recording.conftest import BLOCK_ROWS, assert_same
 
 
 def chunk_ends(path: Path) -> list[int]:
-    """Byte offset of the end of each chunk with rows."""
+    """Return the byte offset of the end of each chunk with rows."""
     with path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary is not None
@@ -106,7 +106,7 @@ def test_damage_outside_the_blocks_is_found_too(mcap_file: Path) -> None:
 
 
 def mutations(data: bytes, count: int, rng: np.random.Generator) -> Iterator[bytes]:
-    """Bytes changed, ranges zeroed, removed or doubled."""
+    """Yield files with changed bytes, and ranges set to zero, removed or doubled."""
     for _ in range(count):
         start = int(rng.integers(len(data)))
         stop = start + int(rng.integers(1, 20))
@@ -125,7 +125,7 @@ def mutations(data: bytes, count: int, rng: np.random.Generator) -> Iterator[byt
 
 
 def check_mutations(recording: Recording, path: Path, count: int, rng: np.random.Generator) -> None:
-    """A changed file is refused, or gives exactly what was recorded; cut short as well, never another exception."""
+    """A changed or shortened file is refused or gives exactly the recorded data; no other exception occurs."""
     data = path.read_bytes()
     changed = path.with_name("changed.mcap")
     refused = 0

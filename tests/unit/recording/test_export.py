@@ -1,4 +1,4 @@
-"""What other programs get: the same numbers, with names and units."""
+"""Exports for other programs: the same numbers, with names and units."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.raising import raises
 
 
 def in_the_file(recording: Recording, name: str) -> np.ndarray:
-    """A channel as an MCAP file has it."""
+    """Return a channel as stored in an MCAP file."""
     return recording[name].astype(np.float32 if recording.channels[name].single else np.float64)
 
 

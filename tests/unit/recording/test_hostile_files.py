@@ -1,4 +1,4 @@
-"""Files made to fill memory or time, or to look like recordings: refused, in bounded time and memory."""
+"""Files made to fill memory or time, or to look like recordings: refused with bounded time and memory."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ EMPTY_MESSAGES = 300_000
 
 
 def described(records: list[McapRecord]) -> list[McapRecord]:
-    """The records before the first rows."""
+    """Return the records before the first rows."""
     return [record for record in records if not isinstance(record, Chunk)]
 
 
 def declaring(size: int, compression: str = "zstd") -> Chunk:
-    """A chunk that says it holds so many bytes of zeros, and does."""
+    """Return a chunk that declares and contains so many zero bytes."""
     if compression == "zstd":
         # Zeros of any length cost next to nothing; a mebibyte stands for them.
         return chunk(bytes(2**20), size=size)
@@ -142,7 +142,7 @@ except RecordingError as error:
 
 
 def test_bomb_takes_little_memory(mcap_file: Path, tmp_path: Path) -> None:
-    """Zeros without end, in chunks that are each within the limits; the process may have a gibibyte."""
+    """Endless zeros, in chunks that are each within the limits; the process has one GiB."""
     bombs = [chunk(bytes(2**16))] * 5000
     path = write_records(tmp_path / "bomb.mcap", [*described(records_of(mcap_file)), *bombs])
     used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # of this process: only shown where the test fails
@@ -178,7 +178,7 @@ def test_file_that_is_gone_at_the_end_is_an_error(tmp_path: Path, instead: bytes
 
 @pytest.fixture
 def long_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every file is too long for memory, and a channel is read at a time."""
+    """Each file is too large for memory, so one channel is read at a time."""
     monkeypatch.setattr("activesteer.recording.reader.MAX_LOADED_VALUES", 0)
     monkeypatch.setattr("activesteer.recording.rows._READ_BYTES", 1)
 

@@ -60,7 +60,7 @@ def test_without_poses_scene_and_rows(channels: list[Channel], tmp_path: Path) -
 
 
 def test_without_channels_it_opens_too(tmp_path: Path) -> None:
-    """Its only chunk is empty: without channels there is nothing that a row could be written as."""
+    """Its only chunk is empty, because rows without channels cannot be written."""
     Recording([], np.arange(2) / 20.0, np.empty((2, 0))).save(tmp_path / "nothing.mcap")
     assert len(Recording.open(tmp_path / "nothing.mcap").channels) == 0
 

@@ -1,4 +1,4 @@
-"""Other people's readers find everything without our package."""
+"""Readers of other projects find everything without this package."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.unit.recording.conftest import blocks
 
 
 def decoded(path: Path) -> dict[str, list[tuple[int, Any]]]:
-    """Log times and messages of each topic."""
+    """Return log times and messages of each topic."""
     factory = pytest.importorskip("mcap_protobuf.decoder").DecoderFactory()
     topics: dict[str, list[tuple[int, Any]]] = {}
     with path.open("rb") as stream:
@@ -97,7 +97,7 @@ def test_units_meanings_metadata_and_attachments_are_within_reach(recording: Rec
 
 
 def test_the_index_leads_to_every_message(recording: Recording, mcap_file: Path) -> None:
-    """Statistics and message index, as Foxglove uses them to jump to a time."""
+    """Statistics and message index, which Foxglove uses to jump to a time."""
     with mcap_file.open("rb") as stream:
         summary = make_reader(stream).get_summary()
         assert summary is not None

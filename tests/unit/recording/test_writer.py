@@ -205,7 +205,7 @@ def test_a_file_that_cannot_be_begun_is_not_left_behind(tmp_path: Path) -> None:
 def test_a_disk_that_fills_up_ends_the_recording_with_what_was_saved(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator
 ) -> None:
-    """The file size is limited for this process, so that the third block or so no longer fits."""
+    """The file size of this process is limited so that about the third block no longer fits."""
     resource = pytest.importorskip("resource")
     path = tmp_path / "run.mcap"
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

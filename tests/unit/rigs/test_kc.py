@@ -135,7 +135,7 @@ def test_every_target_of_the_compact_has_a_source() -> None:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_steering_axis_is_found_from_two_poses(side: float) -> None:
-    """A wheel is turned about a known line."""
+    """The wheel rotates about a known line."""
     direction = np.array([-math.tan(0.12), -side * math.tan(0.2), 1.0])
     direction /= np.linalg.norm(direction)
     ground = np.array([0.03, side * 0.70, 0.0])

@@ -1,4 +1,4 @@
-"""Course and outline of the car, as a recording holds them."""
+"""Course and outline of the car, as stored in a recording."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from tests.raising import raises
 
 
 def arc(radius_m: float, degrees: float, points: int = 60) -> Path:
-    """A turn about (0, radius), from the origin."""
+    """Return a turn about (0, radius), from the origin."""
     angle = np.radians(np.linspace(0.0, degrees, points)) * math.copysign(1.0, radius_m)
     return Path.through(radius_m * np.sin(angle), radius_m * (1.0 - np.cos(angle)))
 

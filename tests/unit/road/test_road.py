@@ -1,4 +1,4 @@
-"""What a road may be."""
+"""Valid and invalid roads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of the table [controllers] each controller reads, and settings that none of those that drive would read."""
+"""The part of the table [controllers] that each controller reads, and settings that no driven controller reads."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LIMIT = {"controllers.ars.limit_deg": 2.0}
 
 
 class Asked:
-    """Gains that note which of them are looked at."""
+    """Gains that record which of them are read."""
 
     def __init__(self, gains: ControllerParameters) -> None:
         self.gains, self.names = gains, set()

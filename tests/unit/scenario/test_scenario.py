@@ -1,4 +1,4 @@
-"""Manoeuvre, vehicle and overrides put together, and a run made again from its own recording."""
+"""Combination of manoeuvre, vehicle and overrides, and repetition of a run from its own recording."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SHORT = {"duration_s": 0.2, "settle_s": 0.0, "steer.start_s": 0.05, "steer.steer
 
 @pytest.fixture
 def vehicle(tmp_path):
-    """A vehicle file like the shipped one, with changes."""
+    """Return a vehicle file like the shipped one, with changes."""
 
     def write(*changes: tuple[str, str]) -> Path:
         text = find_vehicle("compact").read_text()

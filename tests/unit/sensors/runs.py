@@ -1,4 +1,4 @@
-"""Sensors that are shown a given truth, without a car."""
+"""Sensors with a given truth, without a car."""
 
 from __future__ import annotations
 
@@ -39,21 +39,21 @@ def _shown(chains, memory, wheel_radii_m, timestep_s, truth, said):
 
 
 def block(timestep_s: float = 0.001, **tables: Any) -> SensorBlock:
-    """Sensors as a vehicle file describes them, in a car that stands."""
+    """Return sensors by the description of a vehicle file, in a standing car."""
     made = SensorBlock(build(Sensors, tables, Source("test")), timestep_s)
     made.reset(STANDING)
     return made
 
 
 def shown(sensors: SensorBlock, truth: Values, timestep_s: float = 0.001, radii_m: Values | None = None) -> Values:
-    """What they say of a truth, both of shape (n, 15)."""
+    """Return the measurements of a truth, both of shape (n, 15)."""
     said = np.empty_like(truth)
     _shown(sensors.chains, sensors.memory, np.zeros(4) if radii_m is None else radii_m, timestep_s, truth, said)
     return said
 
 
 def said_of(name: str, truth: ArrayLike, steps: int = 0, timestep_s: float = 0.001, **table: Any) -> Values:
-    """What one sensor says of what it is shown, shape (n,); all others are ideal."""
+    """Return the measurements of one sensor, shape (n,); all others are ideal."""
     signal: Any = np.full(steps, truth) if steps else np.asarray(truth)
     rows = np.zeros((len(signal), 15))
     rows[:, PLACES[name]] = signal

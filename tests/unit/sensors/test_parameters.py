@@ -1,4 +1,4 @@
-"""The table [sensors]: presets, single values, and what is refused."""
+"""The table [sensors]: presets, single values, and refused values."""
 
 from __future__ import annotations
 

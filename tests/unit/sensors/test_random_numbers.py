@@ -1,4 +1,4 @@
-"""The random numbers of the sensors, and a pulse wheel that begins to turn."""
+"""Random numbers of the sensors, and a pulse wheel that starts to turn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sensor adds to the truth has the statistics that its table asks for."""
+"""The errors of a sensor have the statistics of its table."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_pulse_wheel_that_swings_over_an_edge_never_says_more_than_it_swings():
 
 
 def test_pulse_wheel_answers_with_the_mean_speed_since_the_sample_before():
-    """Under constant acceleration it lags by half a sample, and by the edges' age."""
+    """Under constant acceleration the signal lags by half a sample and the age of the edges."""
     time_s = np.arange(3000) * 0.001
     said = said_of("wheel_speed", 60.0 + 20.0 * time_s, teeth=48, sample_time_s=0.01)
     at_samples = np.arange(500, 3000, 10)

@@ -1,4 +1,4 @@
-"""The steering wheel angle that a manoeuvre asks to be found, against what is measured otherwise."""
+"""The searched steering wheel angle of a manoeuvre, against independent measurements."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def dwell_deg(factor: float = 1.0, **overrides: Any) -> float:
 
 @functools.cache
 def expected_deg() -> float:
-    """A from the understeer gradient: ratio times (wheelbase over radius, and characteristic speed's share of it)."""
+    """A from the understeer gradient: ratio times (wheelbase over radius, and the part of the characteristic speed)."""
     scenario = resolve("sine_with_dwell")
     car, speed = single_track_of(linear_tests("compact"), run_scenario), scenario.maneuver.speed_mps
     assert car.characteristic_speed_mps is not None

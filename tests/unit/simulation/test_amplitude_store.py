@@ -1,4 +1,4 @@
-"""A steering wheel angle that was found is kept with everything that decides it, and a cache can do no harm."""
+"""A found steering wheel angle is stored under all inputs that determine it, and a damaged cache does no harm."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ANGLE_RAD = 0.1 + 0.2
 
 @pytest.fixture(autouse=True)
 def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """An empty cache of one's own, and a process that remembers nothing."""
+    """An empty cache of its own, and a process that has stored nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     forget(monkeypatch)
     return tmp_path / "cache" / "activesteer" / "amplitudes"
@@ -42,7 +42,7 @@ def forget(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of the manoeuvres that were searched for since."""
+    """Names of the manoeuvres searched since."""
     made: list[str] = []
 
     def counted(find: Any) -> Any:
@@ -58,7 +58,7 @@ def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def angle(overrides: dict[str, Any] | None = None, vehicle: Any = "compact", timestep_s: float = 1e-3) -> str:
-    """The angle of a step steer, every bit of it."""
+    """Return the angle of a step steer, all bits."""
     maneuver: Any = prepared(resolve("step_steer", vehicle, SHORT | (overrides or {})), timestep_s).maneuver
     return maneuver.steer.steering_wheel_rad.hex()
 
@@ -135,7 +135,7 @@ def test_what_decides_is_searched_for_anew(searches, change):
 
 @pytest.fixture
 def own_car(tmp_path: Path) -> Path:
-    """A copy of a car, tyres and all, in a folder."""
+    """Return a copy of a car, including tyres, in a folder."""
     place = tmp_path / "own"
     shutil.copytree(models_dir() / "mjcf" / "compact", place / "compact")
     for tyre in (models_dir() / "tyres").glob("*.tir"):

@@ -1,4 +1,4 @@
-"""What viewers are told of the car's looks, against the engine."""
+"""Appearance of the car for viewers, against the engine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def model() -> mujoco.MjModel:
 
 
 def moved(model: mujoco.MjModel, rng: np.random.Generator) -> mujoco.MjData:
-    """The car somewhere else, steered, its wheels in bump."""
+    """Return the car at another place, steered, with its wheels in bump."""
     data = mujoco.MjData(model)
     mujoco.mj_integratePos(model, data.qpos, rng.normal(scale=0.02, size=model.nv), 1.0)
     mujoco.mj_forward(model, data)

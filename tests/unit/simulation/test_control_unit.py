@@ -1,4 +1,4 @@
-"""The control unit: rate, bus, what a controller is told."""
+"""The control unit: rate, bus, and the information for a controller."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STEP = {"steer.steering_wheel_deg": STEP_DEG}
 
 
 class Counting:
-    """Asks for the number of its calls, in tenths of a thousandth of a radian."""
+    """A controller that demands the number of its calls, times 1e-4 rad."""
 
     def __init__(self, setup: Any = None) -> None:
         self.calls = 0

@@ -1,4 +1,4 @@
-"""Copies of a simulation are independent of it and continue as it does, to the last bit."""
+"""Copies of a simulation are independent and continue bit-identically."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def driven(run: str = "steering", steps: int = 1200, **more: Any) -> Simulation:
 
 
 def assert_same_end(first: Simulation, second: Simulation) -> None:
-    """Both go to their ends the same way."""
+    """Both runs continue identically to their ends."""
     for simulation in (first, second):
         simulation.run()
     recordings = first.recording(), second.recording()

@@ -1,4 +1,4 @@
-"""A drive at the pace of a clock, in front of a stand-in for the viewer."""
+"""A drive at the pace of a clock, with a substitute for the viewer."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from activesteer.simulation.live_view import FRAME_S, Pacer, drive, scene_for
 
 
 class Clock:
-    """Time that passes when somebody sleeps or works."""
+    """Time that advances by sleep and work."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
@@ -33,7 +33,7 @@ class Clock:
 
 
 class Viewer:
-    """Takes `work_s` to draw, and is closed after some pictures."""
+    """A view that takes `work_s` to draw and is closed after some pictures."""
 
     def __init__(self, stage, clock: Clock, work_s: float = 0.002, pictures: int = 10**9) -> None:
         self.cam = mujoco.MjvCamera()

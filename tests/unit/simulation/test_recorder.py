@@ -202,7 +202,7 @@ def test_run_too_long_for_memory_gives_what_its_file_holds(tmp_path, monkeypatch
     [(0, "rl_tyre_mz_Nm"), (2**25, "rl_tyre_mz_Nm"), (2**25, "rl_spring_force_N"), (2**25, "fr_camber_rad")],
 )
 def test_recorded_value_that_no_file_can_hold_ends_the_run_with_its_name(tmp_path, monkeypatch, keep_values, channel):
-    """The state alone may stay finite for a whole run while a tyre records nonsense."""
+    """The state may remain finite for a whole run while a tyre records nan."""
     scenario = resolve("step_steer", overrides=KEYS)
     monkeypatch.setattr("activesteer.simulation.simulation.MAX_KEPT_VALUES", keep_values)
     take, taken, model = ChannelMap.take, [0], simulation().vehicle.model

@@ -1,4 +1,4 @@
-"""A run that is stepped by hand: the same as `simulate`, with states to go back to and commands from outside."""
+"""A run stepped by hand: equal to `simulate`, with saved states and external commands."""
 
 from __future__ import annotations
 

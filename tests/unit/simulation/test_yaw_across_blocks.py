@@ -1,4 +1,4 @@
-"""The yaw angle of a car that turns round several times is continuous over the blocks of its recording."""
+"""The yaw angle of a car that turns several times is continuous over the blocks of its recording."""
 
 from __future__ import annotations
 

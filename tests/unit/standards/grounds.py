@@ -1,4 +1,4 @@
-"""A proving ground whose runs are written down."""
+"""A proving ground with prescribed runs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float] | str | Run]
 
 @dataclass
 class WrittenGround:
-    """Gives what a test writes, and keeps what was asked for."""
+    """A proving ground that returns prescribed runs and records the requests."""
 
     driven: Driven
     vehicle: FileOrTable = "compact"

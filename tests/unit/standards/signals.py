@@ -1,4 +1,4 @@
-"""Runs whose channels are written down."""
+"""Runs with prescribed channels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FMVSS 126: amplitudes of the series, limits, and the verdict on runs whose answer is known."""
+"""FMVSS 126: amplitudes of the series, limits, and the verdict on runs with known results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""ISO 3888-2: the search for the highest clean entry speed, and where the throttle is released."""
+"""ISO 3888-2: the search for the highest clean entry speed, and the place of throttle release."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_faster_clean_run_counts_although_a_slower_one_is_not_clean():
 
 
 def test_one_clean_line_is_enough_and_a_car_that_tips_over_is_a_row():
-    """Clean up to 52 km/h, and only with a margin of 0.15 m; at 80 km/h the car tips over."""
+    """Clean up to 52 km/h and only with a margin of 0.15 m; at 80 km/h the car rolls over."""
 
     def driven(_: str, case: Mapping[str, Any]) -> Mapping[str, float] | str:
         if case["speed_kmh"] == 80.0:

@@ -1,4 +1,4 @@
-"""Test methods: their metrics on signals whose answer is known, and that they never say pass."""
+"""Test methods: metrics of signals with known results; a method without limits never passes a car."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_every_standard_says_what_it_is():
 
 
 class RampGround:
-    """A car whose lateral acceleration lags behind the steering wheel by nothing."""
+    """A car whose lateral acceleration follows the steering wheel without lag."""
 
     def __init__(self, gain_mps2prad: float) -> None:
         self._gain = gain_mps2prad
@@ -124,7 +124,7 @@ def test_frequencies_with_weak_coherence_are_said():
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_understeer_of_a_held_steering_wheel(side):
-    """Constant angle: the curvature falls as the speed rises, l k = delta - EG ay."""
+    """Constant angle: the curvature decreases as the speed rises, l k = delta - EG ay."""
     car, gradient, speed = CarGeometry(1.0, 1.6, 16.0), 0.004, 4.0 + 0.4 * times(40.0)
     steer = 2.6 / 40.0
     curvature = steer / (car.wheelbase_m + gradient * speed**2)

@@ -1,4 +1,4 @@
-"""The page of a test: everything in it, nothing fetched, what a name holds stays text."""
+"""The page of a test: complete, without external resources, and with markup in names escaped."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ SPEED_MPS = 10.0 / 3.6
 
 
 def spiral(tightest_m: float, force_N: float, side: float = 1.0) -> Run:
-    """The curvature rises steadily for 4 s, and the force at the rim with it, to that at the end."""
+    """Return a spiral: the curvature and the force at the rim rise steadily for 4 s to their final values."""
     rising = np.clip(times(5.0) - 0.5, 0.0, 4.0) / 4.0
     return run_of({
         "yaw_rate_radps": side * SPEED_MPS / tightest_m * rising, "speed_mps": np.full_like(rising, SPEED_MPS),
@@ -31,7 +31,7 @@ def spiral(tightest_m: float, force_N: float, side: float = 1.0) -> Run:
 
 
 class SpiralGround(WrittenGround):
-    """A car whose steering effort and whose faults are written down."""
+    """A car with prescribed steering effort and faults."""
 
     def __init__(self, tightest_m: float = 9.0, force_N: float = 100.0) -> None:
         super().__init__(lambda _, case: spiral(tightest_m, force_N, math.copysign(1.0, case["steer.rate_degps"])))
@@ -43,7 +43,7 @@ class SpiralGround(WrittenGround):
 
 
 def test_force_until_the_radius_of_a_known_spiral():
-    """1/12 m of 1/9 m is reached after 3 s of 4, and with it 75 of 100 N."""
+    """1/12 m of 1/9 m is reached after 3 of 4 s, with 75 of 100 N."""
     found = reached(spiral(9.0, 100.0, -1.0), 12.0)
     assert found.time_s == pytest.approx(3.0, abs=0.02)
     assert found.effort_N == pytest.approx(75.0, abs=0.5)
@@ -65,7 +65,7 @@ def test_intact_and_without_power_assist_to_both_sides():
     ("force_N", "steering"), [(200.1, ["intact"] * 2), (700.0, ["intact"] * 2 + ["power_assist_failed"] * 2)]
 )
 def test_more_than_the_effort_that_is_allowed_fails(force_N, steering):
-    """To 12 m are three quarters of the force at 9 m needed, to 20 m 9 / 20 of it."""
+    """A radius of 12 m needs three quarters of the force at 9 m, 20 m needs 9 / 20 of it."""
     found = STANDARD.examine(SpiralGround(force_N=force_N))
     assert found.passed is False
     assert [row["steering"] for row in found.values["efforts"] if not row["pass"]] == steering

@@ -1,4 +1,4 @@
-"""Runs that take a tenth of a second, for tests of what is around them."""
+"""Runs of a tenth of a second, for tests of the code around runs."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ class Fails(Kills):
 
 
 def write_controller(folder: Path, kills_at: float, once: str = "") -> str:
-    """A file with controllers that end badly at a steering ratio; returns its path."""
+    """Return a file with controllers that fail at a steering ratio."""
     path = folder / "bad.py"
     path.write_text(CONTROLLER.format(kills_at=kills_at, once=once), encoding="utf-8")
     return str(path)
 
 
 def short_study(*values: float, key: str = "road.mu", **more: Any) -> dict[str, Any]:
-    """A study of short runs over the friction of the road, or another key."""
+    """Return a study of short runs over the friction of the road, or another key."""
     return {"maneuvers": [MANEUVER], "factors": {key: {"grid": list(values)}}, **more}

@@ -1,4 +1,4 @@
-"""The benchmark of the manoeuvres notices every key metric that drifts, appears or vanishes."""
+"""The benchmark of the manoeuvres detects each key metric that drifts, appears or vanishes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.raising import raises
 
 
 def driven(**changed: float) -> Benchmark:
-    """A slalom whose key metrics are all 2, but for the changed ones."""
+    """Return a slalom whose key metrics are all 2, except for the changed ones."""
     metrics = {metric.name: 2.0 for metric in EVALUATIONS["slalom"].key_metrics} | changed
     return Benchmark([BenchmarkRun("slalom", "slalom", "ars", 10.0, 0.25, metrics)], {"slalom": 0.5}, 400_000_000)
 

@@ -1,4 +1,4 @@
-"""Confidence intervals of proportions and the verdicts that they allow."""
+"""Confidence intervals of proportions and the resulting verdicts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The single-track model against eqs. 1 to 5 of Dorsch 2012, worked out by hand and against each other."""
+"""The single-track model against eqs. 1 to 5 of Dorsch 2012, calculated by hand and against each other."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_matrices_are_those_of_equations_1_and_2(car):
 
 
 def test_matrices_follow_from_newton_and_euler(car, rng):
-    """Forces and moments of the two axles, summed without the paper's equations."""
+    """Expected are the forces and moments of the two axles, summed without the paper's equations."""
     speed_mps = 30.0
     a, b = car.matrices(speed_mps)
     for yaw_rate, sideslip, front, rear in 0.1 * rng.standard_normal((20, 4)):
@@ -155,7 +155,7 @@ def test_rear_wheels_turn_against_the_front_ones_when_slow_and_with_them_when_fa
 
 
 def test_predicted_angle_is_first_against_the_front_one_at_every_speed(car):
-    """What a step of the front wheels asks of the rear ones at once: K_H T_z / T_1 = -C_V / C_H."""
+    """Initial rear angle for a step of the front wheels: K_H T_z / T_1 = -C_V / C_H."""
     for speed_mps in SPEEDS_MPS:
         _, lead_s, lag_s = car.rear_prediction(speed_mps)
         assert lead_s / lag_s == pytest.approx(-0.75, rel=1e-14)

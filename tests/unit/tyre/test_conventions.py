@@ -1,4 +1,4 @@
-"""What a tyre file leaves to the program that reads it: what each convention changes."""
+"""Conventions that a tyre file leaves to the reading program: the effect of each."""
 
 from __future__ import annotations
 

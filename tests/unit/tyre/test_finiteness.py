@@ -1,4 +1,4 @@
-"""A tyre that is not finite inside its own ranges is refused when it is read."""
+"""Reading refuses a tyre that is not finite inside its own ranges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tyres that the unit tests share."""
+"""The shared tyres of the unit tests."""
 
 from __future__ import annotations
 
@@ -19,5 +19,5 @@ def tyre(name: str = "compact_205_55R16") -> TyreParameters:
 
 
 def differing(one: np.record, other: np.record) -> list[str]:
-    """Fields in which two tyres differ for the kernels."""
+    """Return the fields in which two tyres differ for the kernels."""
     return [name for name in TYRE_RECORD.names or () if one[name] != other[name]]

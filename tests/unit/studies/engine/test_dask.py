@@ -1,4 +1,4 @@
-"""Studies on a Dask cluster: a scheduler and two workers, each a process of its own."""
+"""Studies on a Dask cluster: a scheduler and two workers in processes of their own."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def _free_port() -> int:
 
 
 class FakeClient:
-    """A cluster of one worker that says which versions it has; it does nothing."""
+    """A cluster of one worker that reports its versions and does nothing else."""
 
     def __init__(self, **worker: str) -> None:
         packages = {"python": "3.11.7.final.0", "distributed": "2026.1.0", "dask": "2026.1.0"}
@@ -201,7 +201,7 @@ def test_ten_thousand_tasks_come_back_each_once(jobs):
 
 
 class Threads(ThreadPoolExecutor):
-    """A worker of a cluster that was started with four threads."""
+    """A cluster's worker with four threads."""
 
     in_flight = 8
 

@@ -1,4 +1,4 @@
-"""The factor that an outcome depends on most."""
+"""The factor with the largest influence on an outcome."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Designs: which combinations of values are driven."""
+"""Designs: the driven combinations of values."""
 
 from __future__ import annotations
 

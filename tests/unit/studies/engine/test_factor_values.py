@@ -1,4 +1,4 @@
-"""Factors that are relative to what the files say, or belong to some manoeuvres only."""
+"""Factors relative to the values of the files, and factors of some manoeuvres only."""
 
 from __future__ import annotations
 

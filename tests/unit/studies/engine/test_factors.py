@@ -1,4 +1,4 @@
-"""Factors: what their tables may say, and the values that they take."""
+"""Factors: valid tables, and their values."""
 
 from __future__ import annotations
 

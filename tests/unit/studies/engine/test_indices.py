@@ -1,4 +1,4 @@
-"""Indices of a metric that is known as a function of its factors."""
+"""Indices of a metric that is a known function of its factors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FACTORS = [WIDE, NARROW, IDLE]
 
 
 def found(kind, samples, factors=FACTORS, rows=None):
-    """Name and value of each index of 3 wide + narrow, by factor."""
+    """Return name and value of each index of 3 wide + narrow, by factor."""
     columns = {key: values[:rows] for key, values in draw(factors, kind, samples, 1).columns.items()}
     values = 3.0 * np.array(columns["wide"]) + np.array(columns["narrow"])
     return {(index.factor, index.name): index.value for index in indices(kind, factors, columns, values)}

@@ -1,4 +1,4 @@
-"""Columns of results: their types, and what becomes of parts whose types differ."""
+"""Columns of results: their types, and parts with different types."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run's identity sees."""
+"""Inputs that change the identity of a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Studies as a whole: the same result however they run, and what becomes of what goes wrong."""
+"""Complete studies: the same result for each way to run them, and the handling of errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Study files: read, checked, written again."""
+"""Study files: reading, checks, writing."""
 
 from __future__ import annotations
 

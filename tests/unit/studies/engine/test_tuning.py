@@ -1,4 +1,4 @@
-"""Searches: the best set is found, kept, and gone on with."""
+"""Searches: the best set is found, stored, and the search resumes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The linear loop of driver and car against a plant whose loop can be worked out by hand."""
+"""The linear loop of driver and car, with a plant whose loop is known by hand."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ STEP_S = 1e-3
 
 
 def ideal_car() -> LinearCar:
-    """A car that yaws at once, without sideslip: the path offset is the double integral of the steering wheel angle."""
+    """Return a car that yaws at once without sideslip; path offset is the double integral of steer angle."""
     b = np.zeros((1, len(INPUTS)))
     b[0, 0] = YAW_GAIN_1PS / RATIO
     c = np.zeros((len(OUTPUTS), 1))
@@ -37,7 +37,7 @@ def ideal_car() -> LinearCar:
 
 
 def loop(delay_s: float = 0.0, lag_s: float = 0.0) -> DriverLoop:
-    """A driver without a picture of car, arms and delay, who sees the path at the car and a second ahead."""
+    """Return a driver without model of car, arms and delay, who sees the path at the car and a second ahead."""
     far = BY_HEADING / SPEED_MPS
     path = np.zeros(101)
     path[0], path[100] = BY_OFFSET_RADPM - far, far
@@ -47,7 +47,7 @@ def loop(delay_s: float = 0.0, lag_s: float = 0.0) -> DriverLoop:
 
 
 def by_hand() -> tuple[float, float, float, float]:
-    """Crossover and margin of L = (k2 s + k1 v) g / s^2; damping and frequency of s^2 + k2 g s + k1 g v."""
+    """Return crossover and margin of L = (k2 s + k1 v) g / s^2; damping and frequency of s^2 + k2 g s + k1 g v."""
     by_offset, by_heading = 0.02 * YAW_GAIN_1PS * SPEED_MPS, 0.5 * YAW_GAIN_1PS
     squared = (by_heading**2 + math.sqrt(by_heading**4 + 4.0 * by_offset**2)) / 2.0
     crossover = math.sqrt(squared)

@@ -1,4 +1,4 @@
-"""What is made of an identification: table, JSON, vehicle file, and the single-track model beside a run."""
+"""Results of an identification: table, JSON, vehicle file, and the single-track model beside a run."""
 
 from __future__ import annotations
 

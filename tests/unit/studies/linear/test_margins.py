@@ -1,4 +1,4 @@
-"""Margins of loops that can be worked out by hand, and of the parts that a loop is put together from."""
+"""Margins of loops that are known by hand, and of the parts of a loop."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_unstable_loop_has_no_margins():
 
 
 def turning_car() -> LinearCar:
-    """A car whose yaw rate is the integral of the rear angle, turned round: x[k+1] = x[k] - h g u[k]."""
+    """Return a car whose yaw rate is the negative integral of the rear angle: x[k+1] = x[k] - h g u[k]."""
     b = np.zeros((1, len(INPUTS)))
     b[0, 1] = -STEP_S * GAIN_1PS
     c = np.zeros((len(OUTPUTS), 1))
@@ -83,7 +83,7 @@ def loop_with_bus_delay(delay_s: float):
 
 
 def largest_root(steps: int) -> float:
-    """Size of the largest root of z^(n+1) - z^n + h g = 0: the loop as a difference equation, delayed by n steps."""
+    """Return the size of the largest root of z^(n+1) - z^n + h g = 0, the loop with a delay of n steps."""
     polynomial = np.zeros(steps + 2)
     polynomial[0], polynomial[1], polynomial[-1] = 1.0, -1.0, polynomial[-1] + STEP_S * GAIN_1PS
     return float(np.abs(np.roots(polynomial)).max())
@@ -106,7 +106,7 @@ def test_a_delay_of_both_demands_meets_two_loops_that_do_not_know_of_each_other_
 
 @pytest.mark.parametrize("preset", ["ideal", "production"])
 def test_the_bus_may_delay_both_demands_by_less_than_their_margin_in_a_run_and_no_more(preset):
-    """`lqr` at 100 km/h after 1 deg of steering wheel: what the margin says is what the full car does."""
+    """`lqr` at 100 km/h after 1 deg of steering wheel: the margin agrees with the behaviour of the full car."""
     sensors = {"sensors.preset": preset}
     both = next(m for m in loop_margins(["lqr"], speeds_kmh=[100.0], overrides=sensors) if m.loop == BOTH)
     steering = {"time_s": [0.0, 0.5, 0.6, 0.8, 0.9], "steering_wheel_deg": [0.0, 0.0, 1.0, 1.0, 0.0]}
@@ -155,7 +155,7 @@ def test_answer_to_pulses_is_that_of_the_linear_form(name):
 
 
 class TakesEverySecond:
-    """As an estimator does that takes each sample of a slow sensor once."""
+    """Like an estimator that uses each sample of a slow sensor once."""
 
     calls, angle_rad = 0, 0.0
 

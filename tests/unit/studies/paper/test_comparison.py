@@ -1,4 +1,4 @@
-"""Controllers side by side: every run in a file of its own, every metric in the table, a picture of some."""
+"""Comparison of controllers: a file for each run, all metrics in the table, a picture of some."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Controllers over a population: the same samples for all, what is counted of them, and what is said of it."""
+"""Controllers over a population: the same samples for all, their counts, and their description."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SPIN_RAD = 1.0
 
 
 def made_up(**peaks: list[float | None]) -> Population:
-    """The peaks of the sideslip in samples of a sine with dwell [rad]; None where the run did not come to its end."""
+    """Peaks of the sideslip in samples of a sine with dwell [rad]; None if the run did not finish."""
     planned = comparison_study(tuple(peaks), 8)
     samples = planned.samples()[0]
     rows = [
@@ -115,7 +115,7 @@ def test_without_what_the_others_are_compared_with_nothing_is_driven():
 
 @pytest.fixture
 def only_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The quickest scenario alone, in which driver and lanes change nothing."""
+    """Only the fastest scenario, in which driver and lanes have no effect."""
     study = comparison_study
 
     def shortened(*given: Any) -> StudyFile:

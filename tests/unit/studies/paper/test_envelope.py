@@ -1,4 +1,4 @@
-"""Entry speeds by bisection, and the map that checks what bisection assumes."""
+"""Entry speeds by bisection, and the map that checks the assumption of the bisection."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LANES = LINES["lane_change"]
 
 
 def entry_speed(monkeypatch: pytest.MonkeyPatch, most_kmh: float) -> float | None:
-    """What bisection finds where the car keeps to the lanes up to a speed."""
+    """Return the result of the bisection for a car that stays in the lanes up to a speed."""
 
     def drive(scenario: Any, _controller: str) -> Any:
         return SimpleNamespace(metrics={"stays_in_lanes": float(3.6 * scenario.maneuver.speed_mps <= most_kmh)})
@@ -61,7 +61,7 @@ def row(controller: str, speed: float, line: float, kept: bool) -> dict[str, Any
 
 
 def made() -> Envelope:
-    """At 60 km/h all get through; at 70 the systems; at 80 ars alone; at 90 nobody; at 100 afs again."""
+    """At 60 km/h all cars pass; at 70 the systems; at 80 only ars; at 90 none; at 100 afs again."""
     kept = {60.0: ("none", "ars", "afs"), 70.0: ("ars", "afs"), 80.0: ("ars",), 90.0: (), 100.0: ("afs",)}
     rows = [row(name, speed, 0.1, name in kept[speed]) for speed in kept for name in ("none", "ars", "afs")]
     entries = [

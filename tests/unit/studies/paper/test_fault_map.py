@@ -1,4 +1,4 @@
-"""The fault map: what must come out of it by symmetry, by the limits, and by what a fault does."""
+"""The fault map: symmetry, limits, and the effects of faults."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_straight_ahead_left_and_right_mirror_and_a_stuck_actuator_does_nothing(
 
 
 def test_the_tolerated_time_keeps_the_limits_and_a_little_more_breaks_them(made: FaultMap) -> None:
-    """The run with the fault of that length, made by hand through the public interface."""
+    """The run with a fault of that length is driven through the public interface."""
     import activesteer  # noqa: PLC0415
 
     tolerant_s = made.rows[0]["fault_tolerant_time_s"]
@@ -50,7 +50,7 @@ def test_the_tolerated_time_keeps_the_limits_and_a_little_more_breaks_them(made:
     table = path_of("straight", 100.0 / 3.6, 3.0)
 
     def used(length_s: float) -> float:
-        """The greatest share of a limit."""
+        """Return the largest proportion of a limit."""
         fault = {"part": "rear", "kind": "runaway", "side": "left", "start_s": 1.0, "end_s": 1.0 + length_s}
         run = activesteer.simulate(table, "ars", overrides={"fault": [fault]})
         yaw_rate, ay = (np.abs(run[name]).max() for name in ("yaw_rate_radps", "ay_mps2"))

@@ -1,4 +1,4 @@
-"""The population: with two samples as a whole, and what is counted of more."""
+"""The population: complete with two samples, and the counts of more samples."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RESULTS = "results.parquet"
 
 
 class Nominal:
-    """A claim as far as `summarise` looks at it."""
+    """A claim with the parts that `summarise` reads."""
 
     def __init__(self, number: str, passed: bool) -> None:
         self.id, self.passed = number, passed
@@ -40,7 +40,7 @@ def nominal(**passed: bool) -> list[Claim]:
 
 
 def shortened(samples: int) -> StudyFile:
-    """The population with the quickest of its scenarios."""
+    """Return the population with its fastest scenario."""
     table = population_study(samples).to_table()
     table["maneuvers"] = ["step_steer"]
     table["factors"] = {
@@ -88,7 +88,7 @@ def test_fewer_samples_are_the_first_of_more() -> None:
 
 
 def made_up(planned: StudyFile, outcomes: dict[str, list[tuple[float | None, float]]]) -> pa.Table:
-    """Runs of a slalom: by system, of each sample the peak of the sideslip [rad] and the number of missed cones."""
+    """Return slalom runs from the peak sideslip [rad] and the number of missed cones of each sample, by system."""
     rows = []
     samples = planned.samples()[0]
     for sample in range(len(outcomes["none"])):

@@ -153,7 +153,7 @@ def test_a_right_hand_file_mounted_left_is_mirrored() -> None:
 
 
 def _mutated(data: bytes, chance: random.Random) -> bytes:
-    """One file after some random edits of bytes, lines and numbers."""
+    """Return a file after some random edits of bytes, lines and numbers."""
     pieces = bytearray(data)
     for _ in range(chance.randint(1, 8)):
         place = chance.randrange(len(pieces) + 1)
@@ -200,7 +200,7 @@ WHOLE_FILES = (MINIMAL.encode(), (TYRES / "compact_205_55R16.tir").read_bytes()[
 
 
 def _is_read(damaged: bytes) -> bool:
-    """Whether a damaged file is read, then to finite numbers; nothing but `TyreFileError` may refuse it."""
+    """Return True if a damaged file is read, with finite numbers; only `TyreFileError` may refuse it."""
     try:
         record = tir_from_text(damaged.decode("latin-1"), FILE).record
     except TyreFileError:

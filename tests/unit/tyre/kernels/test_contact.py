@@ -19,7 +19,7 @@ LOAD_N = 4000.0
 
 
 def _contact(**changes: Any) -> WheelForces:
-    """An upright wheel of the compact, rolling along x."""
+    """Return an upright wheel of the compact, rolling along x."""
     inputs: dict[str, Any] = {
         "p": tyre().record, "mu": 1.0, "pressure_Pa": 230e3, "low_speed_mps": LOW_SPEED_MPS,
         "low_speed_damping_Nspm": DAMPING_NSPM, "timestep_s": STEP_S, "centre_height_m": 0.295,
@@ -32,12 +32,12 @@ def _contact(**changes: Any) -> WheelForces:
 
 
 def _standing_height_m(rig: TyreRig, load_N: float = LOAD_N) -> float:
-    """Height at which a wheel at rest carries a load, where neither speed nor forces stiffen or soften it."""
+    """Return the height at which a wheel at rest carries a load, with no effect of speed or force on stiffness."""
     return float(rig.formula.evaluate(load_N, 0.0, 0.0, vx_mps=0.0).loaded_radius_m)
 
 
 def _moved(rig: TyreRig, velocity_mps: np.ndarray, **more: Any) -> RigForces:
-    """A wheel that does not spin, dragged over the road from rest."""
+    """Drag a wheel that does not spin over the road from rest."""
     rig.reset()
     time = np.arange(len(velocity_mps)) * rig.timestep_s
     return rig.transient(time, velocity_mps, 0.0, more.pop("height_m", _standing_height_m(rig)), **more)
@@ -129,7 +129,7 @@ def test_a_tyre_dragged_from_rest_pulls_against_its_sliding(mu: float, angle_deg
 
 
 def _pushed(share_of_friction: float, direction: tuple[float, float], seconds: float) -> np.ndarray:
-    """Displacement [m] along the push of a quarter car on a wheel that is locked, every millisecond."""
+    """Return the displacement of a quarter car on a locked wheel along the push [m], every millisecond."""
     rig = TyreRig(tyre())
     height, mass = _standing_height_m(rig), LOAD_N / 9.81
     push = share_of_friction * LOAD_N * np.asarray(direction)
@@ -173,7 +173,7 @@ def test_no_closed_path_at_rest_gives_energy(amplitude_m: float, phase_rad: floa
 
 
 def _largest_jump_N(steps: int, **state: float) -> float:
-    """Greatest change of any force between neighbouring speeds from reverse to beyond the low speed."""
+    """Return the largest change of a force between neighbouring speeds, from reverse to beyond the low speed."""
     speeds = np.linspace(-1.5 * LOW_SPEED_MPS, 1.5 * LOW_SPEED_MPS, steps)
     forces = [
         _contact(velocity_x_mps=float(v), spin_y_radps=float(v) / 0.3 + 0.2, velocity_y_mps=0.05, **state)[:6]
@@ -195,7 +195,7 @@ def test_forces_are_continuous_in_speed_through_standstill_and_the_low_speed() -
 
 
 def _ramp(timestep_s: float) -> RigForces:
-    """Stop and reversal, 5 m/s to -5 m/s in 2 s, at a small slip angle, the wheel free rolling."""
+    """Return a stop and reversal, 5 m/s to -5 m/s in 2 s, at a small slip angle with a free-rolling wheel."""
     rig = TyreRig(tyre(), timestep_s=timestep_s)
     time = np.arange(round(2.0 / timestep_s)) * timestep_s
     speed = 5.0 - 5.0 * time

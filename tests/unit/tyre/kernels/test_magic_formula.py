@@ -61,7 +61,7 @@ def test_the_other_side_is_the_mirror_image(name: str, rng: np.random.Generator)
 
 @pytest.mark.parametrize("mu", [1.0, 0.4, 0.1])
 def test_the_resultant_stays_within_the_friction_on_every_road(compact: MagicFormula, mu: float) -> None:
-    """Within 7 percent of the longitudinal peak: what the two weights, fitted each on its own, leave."""
+    """Within 7 % of the longitudinal peak, the error of two separately fitted weights."""
     kappa, alpha = np.meshgrid(np.linspace(-1, 1, 401), np.linspace(-1, 1, 401))
     forces = compact.evaluate(4000.0, mu * kappa, mu * alpha, road_friction=mu)
     assert np.hypot(forces.fx_N, forces.fy_N).max() < 1.07 * 1.03 * mu * 4000.0
@@ -104,7 +104,7 @@ def test_slip_stiffness_is_the_slope_at_the_origin_of_the_curve() -> None:
 
 
 def test_forces_are_continuous_in_every_input(rng: np.random.Generator) -> None:
-    """Between neighbours of a fine walk the forces may not jump: limits, low load and standstill included."""
+    """The forces may not jump between neighbouring points, including limits, low load and standstill."""
     formula = MagicFormula(tyre("synthetic_all_terms"))
     start = np.array([4000.0, 0.05, 0.05, 0.02, 230e3, 10.0])
     reach = {0: (-50, 12000), 1: (-2, 2), 2: (-1.55, 1.55), 3: (-0.3, 0.3), 4: (5e3, 1.2e6), 5: (-3, 3)}
@@ -118,7 +118,7 @@ def test_forces_are_continuous_in_every_input(rng: np.random.Generator) -> None:
 
 
 def test_slip_forces_stay_at_standstill(compact: MagicFormula) -> None:
-    """At rest slip is the deflection of the carcass: what holds a parked car on a slope may not fade."""
+    """At rest slip is the deflection of the carcass, and the force that holds a parked car on a slope may not fade."""
     moving, resting = compact.evaluate(4000.0, 0.02, 0.02, vx_mps=[10.0, 0.0]).fx_N
     assert resting == pytest.approx(moving, rel=0.02)
     assert compact.evaluate(4000.0, 0.0, 0.02, vx_mps=0.0).mz_Nm == pytest.approx(0.0, abs=3.0)

@@ -1,4 +1,4 @@
-"""Relaxation lengths of both versions of the formula, against their equations written down a second time."""
+"""Relaxation lengths of both versions of the formula, against a second implementation of their equations."""
 
 from __future__ import annotations
 
