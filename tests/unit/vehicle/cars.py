@@ -1,4 +1,4 @@
-"""Cars for the unit tests: as they are, lifted off the road, and with a changed model file."""
+"""Cars for the unit tests: as shipped, lifted off the road, and with a changed model file."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from activesteer.vehicle import force_block as fb
 
 
 def standing(overrides: Mapping[str, Any] | None = None) -> Vehicle:
-    """The car in static ride."""
+    """Return the car in static ride."""
     return load_car(overrides=overrides).on()
 
 
 def floating(overrides: Mapping[str, Any] | None = None) -> Vehicle:
-    """The car a metre above the road, without weight and at rest, its springs in balance with nothing to carry."""
+    """Return the car a metre above the road, without weight and at rest, with unloaded springs in equilibrium."""
     vehicle = standing(overrides)
     model, data = vehicle.model, vehicle.data
     model.opt.gravity[:] = 0.0
@@ -37,7 +37,7 @@ def floating(overrides: Mapping[str, Any] | None = None) -> Vehicle:
 
 
 def changed_model(folder: Path, file: str, old: str, new: str) -> Path:
-    """A copy of the car's model in which one text is replaced; its main file."""
+    """Copy the car's model with one text replaced; return its main file."""
     source = load_car().mjcf
     target = folder / "model"
     shutil.copytree(source.parent, target)
@@ -50,7 +50,7 @@ def changed_model(folder: Path, file: str, old: str, new: str) -> Path:
 
 
 def record(vehicle: Vehicle, corner: str, field: str) -> float:
-    """What the callback left for the recorder, of one wheel."""
+    """Return the values of one wheel that the callback provides for the recorder."""
     return float(vehicle.data.userdata[fb.output_slot(CORNERS.index(corner), field)])
 
 

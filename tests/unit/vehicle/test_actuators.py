@@ -1,4 +1,4 @@
-"""Steering servos, brakes and drive: lag, limits, holding and slipping, and what each torque reacts on."""
+"""Steering servos, brakes and drive: lag, limits, holding and slipping, and the reaction of each torque."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_the_wheel_s_hinge_follows_its_servo(name: str) -> None:
 @pytest.mark.parametrize("name", ["rl_steer", "rr_steer"])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_rear_hinges_stop_at_three_degrees(name: str, side: float) -> None:
-    """Demanded to go further, and pushed by as much as the servo can give, over a tenth of a second."""
+    """Demanded beyond the angle and pushed with the full force of the servo, for a tenth of a second."""
     vehicle = floating()
     vehicle.data.ctrl[actuator(vehicle, name)] = side * 0.2
     largest = 0.0
@@ -143,7 +143,7 @@ def test_a_controller_does_not_drive_while_the_clutch_is_open() -> None:
 
 
 def push(vehicle: Vehicle, corner: str, torque_Nm: float, steps: int) -> float:
-    """Pushes a wheel round for some steps; its speed then [rad/s]."""
+    """Turn a wheel by a torque for some steps; return its speed [rad/s]."""
     vehicle.data.qfrc_applied[dof(vehicle, f"{corner}_spin")] = torque_Nm
     step(vehicle, steps)
     return float(vehicle.data.qvel[dof(vehicle, f"{corner}_spin")])
@@ -207,7 +207,7 @@ def test_tyres_in_the_air_lose_their_deflection() -> None:
 
 
 def generalised(vehicle: Vehicle, name: str) -> np.ndarray:
-    """Generalised forces of 100 Nm of an actuator, shape (nv,)."""
+    """Return the generalised forces of 100 Nm of an actuator, shape (nv,)."""
     vehicle.data.ctrl[actuator(vehicle, name)] = 100.0
     mujoco.mj_forward(vehicle.model, vehicle.data)
     return vehicle.data.qfrc_actuator.copy()
@@ -215,7 +215,7 @@ def generalised(vehicle: Vehicle, name: str) -> np.ndarray:
 
 @pytest.mark.parametrize("corner", CORNERS)
 def test_drive_torque_reacts_on_the_chassis(corner: str) -> None:
-    """The half-shaft bypasses the suspension: its joints carry the torque, the car as a whole gains nothing."""
+    """The half-shaft bypasses the suspension: its joints carry the torque, and no net torque acts on the car."""
     vehicle = floating()
     torques = WheelTorques(tuple(100.0 * (each == corner) for each in CORNERS), (0.0,) * 4)  # type: ignore[arg-type]
     before = vehicle.data.qpos.copy()
@@ -275,7 +275,7 @@ def test_torques_given_wheel_by_wheel_arrive_at_once_and_unlimited() -> None:
 
 
 def test_engine_turns_with_the_wheels_that_it_drives_while_the_clutch_is_closed() -> None:
-    """In the air: a torque from outside speeds up wheels and engine; the rear ones carry no engine."""
+    """In the air, an external torque accelerates wheels and engine; the rear wheels drive no engine."""
     vehicle = floating({"powertrain.inertia_kgm2": 3.0})
     data, rest = vehicle.data, vehicle.save_state()
 

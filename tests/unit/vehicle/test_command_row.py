@@ -1,4 +1,4 @@
-"""The fields of a message are the one description of it: rows, channels and native code follow from them."""
+"""The fields of a message are its only description: rows, channels and native code follow from them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from activesteer.vehicle.estimate_row import ESTIMATE_CHANNELS
 
 
 def distinct(kind: type[Any], first: float = 1.0) -> Any:
-    """A message whose numbers are first, first + 1 ..., by the order of its fields."""
+    """Return a message whose numbers are first, first + 1, ... in the order of its fields."""
     values, members = iter(np.arange(first, first + 100.0).tolist()), []
     for width in widths_of(kind):
         members.append(
@@ -43,7 +43,7 @@ def distinct(kind: type[Any], first: float = 1.0) -> Any:
 
 
 def by_name(message: Any) -> dict[str, float]:
-    """Numbers of a message by name, found by the names of its fields alone."""
+    """Return the numbers of a message by name, from the names of its fields alone."""
     found = {}
     for name, value in message._asdict().items():
         if isinstance(value, tuple):
@@ -71,7 +71,7 @@ def test_what_only_the_recording_needs_is_not_carried_out():
 
 
 class Extended(NamedTuple):
-    """A command as a version with more fields might have it."""
+    """A command of a version with more fields."""
 
     first: float
     wheels: Annotated[PerWheel, Recorded("Nm", "torque")]

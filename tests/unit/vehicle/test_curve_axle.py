@@ -1,4 +1,4 @@
-"""Axles of curves: their forces are slopes of an energy, both sides alike, and as stiff as they are asked to be."""
+"""Axles of curves: their forces derive from an energy, both sides are equal, and their stiffness is the given one."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ JOINTS = ("x", "y", "z", "toe", "camber", "caster")
 
 @pytest.fixture(scope="module")
 def guided(tmp_path_factory: pytest.TempPathFactory) -> Car:
-    """The compact with curves for links."""
+    """Return the compact with curves instead of links."""
     folder = tmp_path_factory.mktemp("kc")
     result = kinematics_compliance("compact")
     write_tables(result, folder)
@@ -36,12 +36,12 @@ def guided(tmp_path_factory: pytest.TempPathFactory) -> Car:
 
 
 def strange(guided: Car) -> Vehicle:
-    """The same with curves that bend in every coordinate; far from any standing car."""
+    """Return the same car with curves that bend in every coordinate, far from any real car."""
     return dataclasses.replace(guided, config=dataclasses.replace(guided.config, curves=other_curves())).on()
 
 
 def suspension_forces(vehicle: Vehicle, qpos: Array) -> Array:
-    """Passive forces at rest without those of the road."""
+    """Return the passive forces at rest without those of the road."""
     model, data = vehicle.model, mujoco.MjData(vehicle.model)
     data.qpos[:] = qpos
     data.qpos[2] += 1.0
@@ -93,7 +93,7 @@ def test_left_and_right_are_mirror_images(guided: Car, rng: np.random.Generator)
 
 
 def test_the_rig_finds_the_measured_curves(guided: Car) -> None:
-    """Over the whole travel within 0.01 deg and 0.1 mm, over forces as well as five numbers can say it."""
+    """Over the whole travel within 0.01 deg and 0.1 mm; over forces as well as five numbers can describe it."""
     before, after = kinematics_compliance("compact"), kinematics_compliance(Path(guided.mjcf).with_suffix(".toml"))
     sweeps = [result.curves["parallel_travel"] for result in (before, after)]
     for angle in ("toe_rad", "camber_rad"):
@@ -121,7 +121,7 @@ def test_a_guided_car_drives_as_the_one_it_was_measured_on(guided: Car) -> None:
 
 
 def test_half_a_step_changes_nothing(guided: Car) -> None:
-    """The stiff part is implicit in the engine, what bends of the curves is not: together they do not feel the step."""
+    """The stiff part is implicit in the engine, the curvature is not; together they do not depend on the step."""
     file = Path(guided.mjcf).with_suffix(".toml")
     changes = {"steer.steering_wheel_deg": 90.0, "duration_s": 2.0}
     rolls = [simulate("step_steer", "none", file, changes, timestep_s=step)["roll_rad"] for step in (1e-3, 5e-4)]
@@ -144,7 +144,7 @@ def test_the_state_is_complete(guided: Car) -> None:
 
 
 def test_modes_of_guided_wheels_have_the_names_of_wheels() -> None:
-    """As a car of links: no joint of a corner is left to speak for itself."""
+    """As in a car of links, no joint of a corner acts independently."""
     modes = linear_car("tesla_model_s", 20.0).modes()
     parts = {part for mode in modes for part in mode.participation}
     assert {"front wheel camber", "rear wheel camber", "front wheel steer", "rear wheel fore-aft"} <= parts

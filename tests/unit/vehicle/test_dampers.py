@@ -1,4 +1,4 @@
-"""Damper curves: the force that is applied is the one of the vehicle file, rebound and bump apart."""
+"""Damper curves: the applied force is that of the vehicle file, separately for rebound and bump."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def car() -> Vehicle:
 
 
 def force_at(vehicle: Vehicle, corner: str, compression_mps: float) -> float:
-    """Force of a damper that is compressed at a speed [N], positive where it pushes apart."""
+    """Return the force of a damper compressed at a speed [N], positive in compression."""
     model, data = vehicle.model, vehicle.data
     joint = f"{corner}_jounce" if corner.startswith("f") else f"{corner}_z"
     dof = model.joint(joint).dofadr[0]

@@ -21,7 +21,7 @@ INERTIA = int(mujoco.mjtWarning.mjWARN_INERTIA)
 
 
 def _compare(model: mujoco.MjModel, ours: mujoco.MjData, rng: np.random.Generator, steps: int = 1) -> bool:
-    """Step a state by the plan and by the engine; return whether the direct solution stepped."""
+    """Step a state by the plan and by the engine; return True if the direct solution stepped."""
     engine = mujoco.MjData(model)
     mujoco.mj_copyData(engine, model, ours)
     inputs = rng.normal(size=(steps, model.nu))
@@ -167,7 +167,7 @@ def test_a_limit_that_is_set_at_run_time_acts() -> None:
 
 
 def test_the_watch_holds_all_that_the_decision_reads() -> None:
-    """And the tables too; sizes and the tree of joints cannot change."""
+    """The tables can change too; sizes and the tree of joints cannot."""
     read: set[str] = set()
 
     class Reader:
@@ -209,7 +209,7 @@ def test_an_indefinite_matrix_ends_the_run() -> None:
 
 
 def test_an_indefinite_matrix_that_the_engine_does_not_see_is_counted_too() -> None:
-    """The armature is negative, and its stiff servo hides that from the diagonal that the engine factorises."""
+    """The armature is negative, and its stiff servo hides this from the diagonal that the engine factorises."""
     vehicle = standing()
     dof = int(vehicle.model.jnt_dofadr[vehicle.model.joint("rl_steer").id])
     vehicle.model.dof_armature[dof] = -10.0

@@ -1,4 +1,4 @@
-"""A run that goes wrong ends with a clear error, and what was recorded before is kept, in memory and on disk."""
+"""A failing run ends with a clear error; the data recorded before are kept, in memory and on disk."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def engine_s_log_goes_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
 
 @pytest.fixture
 def spoil(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Vehicle], None]], None]:
-    """Makes the next run's state wrong at one instant, once the manoeuvre is under way."""
+    """Corrupt the state of the next run at one instant, after the manoeuvre has started."""
 
     def install(change: Callable[[Vehicle], None]) -> None:
         step, rebase = Vehicle.step, Vehicle.rebase
@@ -113,7 +113,7 @@ def test_what_was_recorded_is_on_disk_and_opens(
 def test_no_row_after_the_failure_looks_like_a_car_that_drives_on(
     spoil: Callable[[Callable[[Vehicle], None]], None],
 ) -> None:
-    """The engine may not put a broken state back to its start and go on."""
+    """The engine may not reset a broken state and continue."""
     spoil(not_a_number)
     with pytest.raises(SimulationDiverged) as caught:
         good_run()
@@ -150,7 +150,7 @@ def test_without_a_fault_nothing_is_reported() -> None:
     ],
 )
 def test_command_that_is_no_number_ends_the_run_with_its_name(block, field, name, monkeypatch):
-    """Built-in blocks' commands are not looked at one by one: what is carried out has to show it."""
+    """Commands of built-in blocks are not checked one by one; the applied command must show the error."""
     step = block.step
 
     def spoiled(self: Any, *inputs: Any) -> Any:

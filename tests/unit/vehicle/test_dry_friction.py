@@ -1,4 +1,4 @@
-"""Dry friction of seals and rack: it holds, slips, loses energy, and is smoothed by a road that shakes it."""
+"""Dry friction of seals and rack: it holds, slips, dissipates energy, and is smoothed by a vibrating road."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NO_FRICTION = {"friction.front_damper_N": 0.0, "friction.rear_damper_N": 0.0, "f
 
 
 def follow(speed_mps: np.ndarray, vibration_mps: float = 0.0, timestep_s: float = 1e-3) -> np.ndarray:
-    """Deflection over time, in units of the one at which the seal slips."""
+    """Return the deflection over time, in units of the deflection at which the seal slips."""
     w, result = 0.0, []
     for v in speed_mps:
         w += timestep_s * friction_rate(w, float(v), vibration_mps, SLIP_M, timestep_s)
@@ -111,7 +111,7 @@ def test_friction_of_a_damper_acts_against_its_motion(corner: str, side: float) 
 
 
 def heave(vehicle: Vehicle, force_N: float) -> float:
-    """How far the standing car sinks under a slowly applied force on its body [m]."""
+    """Return the settlement of the standing car under a slowly applied force on its body [m]."""
     before = float(vehicle.data.qpos[2])
     for index in range(3000):
         vehicle.data.qfrc_applied[2] = -force_N * min(1.0, index / 1000)
@@ -120,7 +120,7 @@ def heave(vehicle: Vehicle, force_N: float) -> float:
 
 
 def test_the_standing_car_rides_on_its_tyres_until_the_seals_slip() -> None:
-    """A light push meets stuck dampers, a strong one the springs."""
+    """A light push acts against stuck dampers, a strong push against the springs."""
     tyres_only, springs = heave(standing(), 20.0) / 20.0, heave(standing(NO_FRICTION), 20.0) / 20.0
     assert springs > 1.0 / 100e3
     assert tyres_only < 0.45 * springs
@@ -128,7 +128,7 @@ def test_the_standing_car_rides_on_its_tyres_until_the_seals_slip() -> None:
 
 
 def turn(vehicle: Vehicle, target_rad: float) -> float:
-    """The rack after the steering wheel has been turned slowly to an angle [m]."""
+    """Return the rack position after the steering wheel has been turned slowly to an angle [m]."""
     start = float(vehicle.data.joint("steering_wheel").qpos[0])
     for index in range(2500):
         share = 0.5 - 0.5 * math.cos(math.pi * min(1.0, index / 2000))

@@ -1,4 +1,4 @@
-"""Where MuJoCo keeps its arrays: measured, confirmed on the car itself, and an error where it cannot be found."""
+"""Addresses of MuJoCo's arrays: measured, confirmed on the car, and an error if they cannot be found."""
 
 from __future__ import annotations
 

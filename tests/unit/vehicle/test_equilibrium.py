@@ -1,4 +1,4 @@
-"""The search for static ride: it finds the balance, leaves what it must, and says where there is none."""
+"""The search for static ride: it finds the equilibrium, keeps fixed coordinates, and reports a missing equilibrium."""
 
 from __future__ import annotations
 

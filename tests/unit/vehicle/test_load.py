@@ -1,4 +1,4 @@
-"""The loaded car: what its scales, its springs and its centre of gravity say, against a calculation by hand."""
+"""The loaded car: wheel loads, spring travel and centre of gravity against a calculation by hand."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def car(overrides: dict[str, Any] | None = None, vehicle: str = "compact") -> Ve
 
 
 def carried(vehicle: Vehicle, overrides: dict[str, Any]) -> list[tuple[float, np.ndarray]]:
-    """Masses and where they are in the design position, as the documentation says."""
+    """Masses and their places in the design position, as documented."""
     load = {key.removeprefix("load."): value for key, value in overrides.items()}
     dimensions = vehicle.dimensions()
     rear_m = -float(dimensions["wheelbase_m"]) + float(_design(vehicle, "fl")[0])  # type: ignore[arg-type]
@@ -52,7 +52,7 @@ def _design(vehicle: Vehicle, corner: str) -> np.ndarray:
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
 @pytest.mark.parametrize("name", LOADS)
 def test_wheel_loads_are_those_of_a_calculation_by_hand(name: str, vehicle: str) -> None:
-    """Sum of forces, and of moments about both axes of the road, from masses and places alone, to 1 N."""
+    """Sums of forces and of moments about both axes of the road, from masses and places alone, to 1 N."""
     overrides = LOADS[name]
     empty, loaded = car(vehicle=vehicle), car(overrides, vehicle)
     bare = mass_properties(empty.model)

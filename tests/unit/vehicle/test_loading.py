@@ -1,4 +1,4 @@
-"""What a model file may get wrong: each gives a ModelError with the file and the name that is missing."""
+"""Errors in a model file: each gives a ModelError with the file and the missing name."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_a_missing_file_is_an_error_that_names_it(tmp_path: Path) -> None:
 
 
 def test_an_unchanged_copy_loads(tmp_path: Path) -> None:
-    """The counterpart: it is the change that fails above."""
+    """Without the change above the model loads, so the change causes the failure."""
     path = changed_model(tmp_path, "compact.xml", 'model="compact"', 'model="copy"')
     vehicle = dataclasses.replace(load_car(), mjcf=path).on()
     assert vehicle.model.nv > 30

@@ -1,4 +1,4 @@
-"""Modes of small systems that are known."""
+"""Modes of small systems with known solutions."""
 
 from __future__ import annotations
 

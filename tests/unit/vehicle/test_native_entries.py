@@ -1,4 +1,4 @@
-"""Entries into native code refuse whatever would make it read or write where it must not."""
+"""Entries into native code refuse all arguments that would cause an invalid read or write."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WRONG = (
 
 
 class Sub(ActuatorCommand):
-    """A class of a user's own that inherits from a message."""
+    """A user's class that inherits from a message."""
 
 
 @cache
@@ -40,7 +40,7 @@ def rolling() -> Vehicle:
 
 
 def of_any_length(rng: random.Random, kind: type[Any]) -> Any:
-    """A tuple that claims to be a message, mostly of a wrong length or with wrong fields."""
+    """Return a tuple that claims to be a message, mostly with a wrong length or wrong fields."""
     members: list[Any] = list(kind(*[0.0] * len(kind._fields)) if kind is Estimate else kind())
     for _ in range(rng.randint(0, 3)):
         members[rng.randrange(len(members))] = rng.choice((*WRONG, *NUMBERS))
@@ -126,7 +126,7 @@ def test_an_estimate_of_another_form_is_not_recorded(estimate: Any) -> None:
 
 
 def arrays_but(own: Any) -> list[Any]:
-    """Arrays that are nearly of the needed form, and other things."""
+    """Return arrays of almost the needed form, and other objects."""
     rows, columns = own.shape
     return [
         None, 3, "inputs", own.tolist(), own[0], own[:, :0], own.astype(np.float32), own.astype(complex),

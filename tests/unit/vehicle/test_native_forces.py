@@ -1,4 +1,4 @@
-"""The native callbacks: what they record is what they apply, and they leave other models alone."""
+"""The native callbacks: they apply the forces that they record, and do not change other models."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def callbacks_as_before() -> Iterator[None]:
 
 
 def applied(vehicle: Vehicle) -> np.ndarray:
-    """Generalised forces of the callback alone, shape (nv,)."""
+    """Return the generalised forces of the callback alone, shape (nv,)."""
     model, data = vehicle.model, vehicle.data
     install_native_forces()
     mujoco.mj_forward(model, data)
@@ -51,7 +51,7 @@ FORCES_AND_MOMENTS = ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm")
 
 
 def wheel_wrench(vehicle: Vehicle, corner: str) -> np.ndarray:
-    """Generalised forces of one tyre, by the engine, from its recorded forces at its contact point, shape (nv,)."""
+    """Return the engine's generalised forces of one tyre, from its recorded forces at the contact, shape (nv,)."""
     model, data = vehicle.model, vehicle.data
     body = model.body(f"{corner}_wheel").id
     axis = data.xmat[body].reshape(3, 3)[:, 1]
@@ -72,7 +72,7 @@ def wheel_wrench(vehicle: Vehicle, corner: str) -> np.ndarray:
 
 
 def lift(vehicle: Vehicle, corner: str) -> None:
-    """Takes one wheel off the road by its suspension travel."""
+    """Lift one wheel off the road by its suspension travel."""
     joint = f"{corner}_jounce" if corner.startswith("f") else f"{corner}_z"
     vehicle.data.qpos[vehicle.model.joint(joint).qposadr[0]] += 0.4
 
@@ -148,7 +148,7 @@ def test_a_lifted_wheel_feels_nothing() -> None:
 
 
 def foreign(numbers: str = "1 2 3") -> mujoco.MjModel:
-    """Somebody else's model, with what ours has too: custom numbers, user data, an actuator with user dynamics."""
+    """Another project's model with features of ours: custom numbers, user data, an actuator with user dynamics."""
     return mujoco.MjModel.from_xml_string(f"""
     <mujoco>
       <size nuserdata="64"/>
@@ -233,7 +233,7 @@ def test_removing_leaves_a_foreign_callback() -> None:
 
 
 def test_without_the_callback_nothing_carries_the_car() -> None:
-    """The counterpart of all the above: it is the callback that makes the forces."""
+    """The opposite of all tests above: the callback causes the forces."""
     vehicle = standing()
     remove_native_forces()
     model, data = vehicle.model, vehicle.data

@@ -36,7 +36,7 @@ def _pair(
 
 
 def _drive(ours: Vehicle, engine: Vehicle, steps: int, steer_rad: float = 1.0) -> None:
-    """Weaves with one by our step, and with the other by the engine's with the same inputs."""
+    """Weave with one car by our step, and with the other by the engine's step with the same inputs."""
     for step in range(steps):
         angle_rad = steer_rad * np.sin(2.0 * np.pi * 0.01 * step)
         ours.step(DriverCommand(angle_rad, 200.0, 0.2), ActuatorCommand(0.02 * angle_rad, 0.01))
@@ -46,7 +46,7 @@ def _drive(ours: Vehicle, engine: Vehicle, steps: int, steer_rad: float = 1.0) -
 
 @pytest.mark.parametrize("name", CARS)
 def test_a_weaving_car_goes_where_the_engine_takes_it(name: str) -> None:
-    """With the third-order stops, rubber that stiffens, dry friction, and servos: everything that the cars have."""
+    """With third-order stops, rubber that hardens, dry friction, and servos: all features of the cars."""
     ours, engine = _pair(name)
     assert not handed_over(ours.model)
     _drive(ours, engine, 150)
@@ -56,7 +56,7 @@ def test_a_weaving_car_goes_where_the_engine_takes_it(name: str) -> None:
 
 
 def test_the_engine_s_iteration_converges_to_what_we_find() -> None:
-    """So the tolerance of its solver is what parts them, and nothing else."""
+    """Only the tolerance of the engine's solver causes the difference."""
     errors = []
     for tolerance in (1e-4, 1e-6, 1e-8):
         ours, engine = _pair("sedan")
@@ -88,7 +88,7 @@ def test_hands_that_give_way_are_no_spring(held_Nm: float) -> None:
 
 
 def test_at_a_stop_of_the_rack_the_engine_steps() -> None:
-    """Bit for bit what it does; and off the stop again, ours goes on."""
+    """At the stop the steps are bit-identical; after it, the direct solution continues."""
     ours, engine = _pair("compact", speed_mps=2.0)
     joint = ours.model.joint("rack").id
     place = ours.model.jnt_qposadr[joint]
@@ -146,7 +146,7 @@ def test_what_changes_in_the_model_counts_at_once() -> None:
 
 
 def test_the_factor_of_a_car_is_hardly_larger_than_its_mass_matrix() -> None:
-    """That is why it is worth its while; without an order that fits, all degrees of freedom would meet."""
+    """This makes the direct solution fast; without a suitable order, all degrees of freedom would be coupled."""
     for name in CARS:
         vehicle = load_car(name).on()
         entries = ImplicitPlan(vehicle.model, vehicle.data).plan["n_factor"][0]

@@ -1,4 +1,4 @@
-"""The native step does what the engine's own interface does, and says when something is wrong."""
+"""The native step has the result of the engine's own interface, and reports errors."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_cars_step_in_threads_as_they_do_alone() -> None:
 
 
 def test_a_step_lets_other_threads_run() -> None:
-    """Python does not make a thread hand on its lock here: the other one gets in only where a step lets it."""
+    """Python does not have to switch threads here: the other thread runs only if a step releases the lock."""
     cars, start, order = [_rolling(), _rolling()], threading.Barrier(2), []
 
     def drive(index: int) -> None:

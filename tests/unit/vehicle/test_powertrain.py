@@ -1,4 +1,4 @@
-"""What the engine gives at the wheels, over their speed."""
+"""Torque and power of the engine at the wheels, over their speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which friction a wheel feels, where it touches the road, and how much of the friction it uses."""
+"""Friction of the road under each wheel, and its utilisation."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LEFT, RIGHT = (0, 2), (1, 3)
 
 
 def rolling(road: Road) -> Vehicle:
-    """The car at 20 m/s where a recording starts: its centre of gravity at the origin."""
+    """Return the car at 20 m/s at the start of a recording: its centre of gravity is at the origin."""
     vehicle = load_car().on(road)
     vehicle.start(20.0)
     return vehicle

@@ -16,14 +16,14 @@ from activesteer.video.encoder import ffmpeg
 
 
 class Decoded(NamedTuple):
-    """What an MP4 holds: its description in the words of ffmpeg, and its pictures, shape (n, height, width, 3)."""
+    """Content of an MP4: ffmpeg's description, and the pictures, shape (n, height, width, 3)."""
 
     about: str
     pictures: NDArray[np.uint8]
 
 
 def need_ffmpeg() -> None:
-    """Skips, visibly, where there is none."""
+    """Skip the test without ffmpeg."""
     try:
         ffmpeg()
     except PlaybackError as error:

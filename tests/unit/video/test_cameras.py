@@ -14,7 +14,7 @@ from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, circle
 
 
 def eye(name: str, time_s: float, corner: str = "fl") -> tuple[np.ndarray, np.ndarray]:
-    """Where the camera is, and where it looks."""
+    """Return position and target of the camera."""
     camera = mujoco.MjvCamera()
     view(name, Track(circle(), "circle"), corner).aim(camera, time_s)
     azimuth, elevation = math.radians(camera.azimuth), math.radians(camera.elevation)
@@ -25,7 +25,7 @@ def eye(name: str, time_s: float, corner: str = "fl") -> tuple[np.ndarray, np.nd
 
 
 def local(point: np.ndarray, time_s: float) -> np.ndarray:
-    """A point of the world, as the car sees it."""
+    """Return a point of the world in axes of the car."""
     yaw = SPEED_MPS / RADIUS_M * time_s
     x, y = point[0] - RADIUS_M * math.sin(yaw), point[1] - RADIUS_M * (1.0 - math.cos(yaw))
     return np.array([math.cos(yaw) * x + math.sin(yaw) * y, -math.sin(yaw) * x + math.cos(yaw) * y, point[2]])

@@ -29,7 +29,7 @@ def drawn(
 
 
 def changed(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Rows and columns where two pictures differ."""
+    """Return the rows and columns where two pictures differ."""
     return np.argwhere((one != other).any(axis=2))
 
 
@@ -59,7 +59,7 @@ def test_each_value_is_seen(change):
 
 
 def wedges(rear_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the wedges at the rear wheels of the plan."""
+    """Return the rows and columns of the wedges at the rear wheels of the plan."""
     steer = dict.fromkeys(CHANNELS, 0.0)
     straight = drawn(recording(**steer))
     turned = drawn(recording(**(steer | dict.fromkeys(CHANNELS[2:], math.radians(rear_deg)))))

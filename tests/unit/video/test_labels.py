@@ -12,7 +12,7 @@ SIZE = (640, 480)
 
 @pytest.fixture
 def scene() -> mujoco.MjvScene:
-    """Seen from 10 m above the origin, x to the right and y up."""
+    """A view from 10 m above the origin, x to the right and y up."""
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -1,4 +1,4 @@
-"""What is said where nothing can be drawn; that something can be is tested with the marker `render`."""
+"""Messages if nothing can be drawn; tests with the marker `render` draw."""
 
 from __future__ import annotations
 

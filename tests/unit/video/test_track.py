@@ -16,7 +16,7 @@ CHANNEL = [Channel("x_m", "m", "", "vehicle")]
 
 
 def turning(angle_rad: np.ndarray, interval_s: float = 0.01) -> Recording:
-    """A chassis that stands and turns."""
+    """Return a chassis that stands and turns."""
     time_s = np.asarray(np.arange(len(angle_rad)) * interval_s, np.float64)
     turn = np.stack([np.cos(angle_rad / 2), 0 * angle_rad, 0 * angle_rad, np.sin(angle_rad / 2)], axis=1)
     poses = Poses(time_s, ("chassis",), np.zeros((len(time_s), 1, 3)), turn[:, None])
