@@ -10,8 +10,18 @@ import pytest
 
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation import advance
-from activesteer.estimation.kalman_filter import begin, predict
-from activesteer.estimation.records import FRICTION, LATERAL_SPEED, MEMORY, N_STATES, SAID, YAW_RATE, known_of
+from activesteer.estimation.kalman_filter import begin, correct, predict
+from activesteer.estimation.records import (
+    AY_OFFSET,
+    FRICTION,
+    LATERAL_SPEED,
+    MEMORY,
+    N_STATES,
+    RATE_OFFSET,
+    SAID,
+    YAW_RATE,
+    known_of,
+)
 from activesteer.estimation.speed_filter import brush_slip
 from activesteer.estimation.two_track_model import follow
 from activesteer.estimation.wheels import read_wheels
@@ -191,3 +201,12 @@ def test_the_way_to_the_present_is_as_long_as_the_sample_is_old(known, memory, s
     # In steps of 4 ms at most, which differ little from a single one.
     assert moved == pytest.approx(expected, rel=0.05, abs=1e-9)
     assert (calls > 0) == (abs(moved) > 1e-3)
+
+
+def test_lateral_acceleration_says_nothing_of_the_offset_of_the_yaw_rate_sensor(known, memory, setup):
+    tyres, deaf = np.array([tyre.force_N for tyre in setup.estimation.tyres]), known.copy()
+    deaf["rate_variance_rad2ps2"] = 1e12
+    memory["speed_mps"] = 20.0
+    correct(deaf, tyres, memory, 0.0, 2.0, 0.01)
+    assert memory.state[AY_OFFSET] > 1e-4
+    assert memory.state[RATE_OFFSET] == pytest.approx(0.0, abs=1e-12)
