@@ -58,7 +58,7 @@ class Better(StrEnum):
 
 
 class Form(StrEnum):
-    """How the value of a metric is written."""
+    """Written form of a metric's value."""
 
     NUMBER = "number"
     COUNT = "count"
@@ -103,7 +103,7 @@ class Metric(NamedTuple):
 
     @property
     def whole(self) -> bool:
-        """Whether its value is a whole number, or yes (1) or no (0)."""
+        """True if the value is a whole number, or yes (1) or no (0)."""
         return self.form is not Form.NUMBER
 
     def text(self, value: float) -> str:

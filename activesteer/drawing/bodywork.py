@@ -60,7 +60,7 @@ class Panel(NamedTuple):
 
     @property
     def shell(self) -> bool:
-        """Whether the surface belongs to the body, which hides the parts below it, and not to a wheel."""
+        """True if the surface belongs to the body, which hides the parts below it, and not to a wheel."""
         return not self.body.endswith("_wheel")
 
 

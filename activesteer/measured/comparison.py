@@ -102,7 +102,7 @@ class Compared(NamedTuple):
 
     @property
     def inside(self) -> bool:
-        """Whether enough samples are inside."""
+        """True if enough samples are inside."""
         return self.share_inside >= SHARE_NEEDED
 
     def to_json(self) -> dict[str, Any]:
@@ -134,7 +134,7 @@ class Comparison(NamedTuple):
 
     @property
     def inside(self) -> bool:
-        """Whether every channel is inside."""
+        """True if every channel is inside."""
         return all(quantity.inside for quantity in self.quantities)
 
     def to_json(self) -> dict[str, Any]:

@@ -40,7 +40,7 @@ class Parameter(NamedTuple):
 
     @property
     def at_end(self) -> bool:
-        """Whether the value is at an end of its range, and so has no interval."""
+        """True if the value is at an end of its range, and so has no interval."""
         return math.isnan(self.half_width)
 
     @property

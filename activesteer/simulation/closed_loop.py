@@ -41,7 +41,7 @@ class OneAtATime:
     """A context that a second caller cannot enter while the first is inside."""
 
     def __init__(self) -> None:
-        """Nobody is inside."""
+        """Make a context that nobody has entered."""
         self._lock = threading.Lock()
 
     def __enter__(self) -> None:
@@ -76,7 +76,7 @@ class ClosedLoop(Uncopyable):
         motion: Present position and motion of the car.
         commands: Last commands of driver and controller.
         step_count: Steps of the manoeuvre driven so far.
-        in_use: Context of whoever drives the loop.
+        in_use: Context that refuses a second caller while the loop is driven.
     """
 
     def __init__(

@@ -73,7 +73,7 @@ class DrawnRun(NamedTuple):
 
     @property
     def lost(self) -> bool:
-        """Whether the car spins."""
+        """Return True if the car spins."""
         return bool(np.abs(self.recording["sideslip_rad"]).max() > LOST_SIDESLIP_RAD)
 
 

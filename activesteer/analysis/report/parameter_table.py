@@ -23,7 +23,7 @@ class Row(NamedTuple):
 
     @property
     def differs(self) -> bool:
-        """Whether the runs differ in this parameter."""
+        """True if the runs differ in this parameter."""
         return len(self.values) > 1
 
 
