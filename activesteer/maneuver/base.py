@@ -93,6 +93,11 @@ class Maneuver(ABC):
         return None
 
     @property
+    def ground(self) -> Road:
+        """The road as the car drives on it: its friction laid along the path of the course if it follows that path."""
+        return self.road.laid(self.course)
+
+    @property
     def search(self) -> Search | None:
         """Search that must be driven before the manoeuvre can be run; None if all values are known."""
         return None

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from activesteer.config import Source, build
-from activesteer.errors import nearest_names, shown
+from activesteer.errors import ManeuverError, nearest_names, shown
 from activesteer.faults import check_faults
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
@@ -69,4 +69,8 @@ def build_maneuver(table: Mapping[str, Any], source: Source) -> Maneuver:
     """
     maneuver = build(maneuver_class(table, source), table, source)
     check_faults(maneuver.fault, maneuver.duration_s, source.fail)
+    try:
+        _ = maneuver.ground
+    except ManeuverError as reason:
+        raise source.placed((), reason) from reason
     return maneuver

@@ -91,7 +91,7 @@ class _Problem:
         held = _SPEED_HOLD if is_driver_file(study.driver) else {}
         known = {key: value for key, value in held.items() if key not in study.keys} | study.overrides
         first = resolve(open_loop_of(recordings[0], names[0]), study.vehicles[0], known, study.driver)
-        car = first.car.on(first.maneuver.road, study.timestep_s)
+        car = first.car.on(first.maneuver.ground, study.timestep_s)
         self._noise = noise_of(study, table, [channel.name for channel in car.channels.channels])
         self._measured = [
             measured_of(recording, name, study, table, self._noise)

@@ -78,12 +78,13 @@ def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
     along = [[(low_x, y, 0.005), (high_x, y, 0.005)] for y in np.arange(low_y, high_y + 1.0, _TILE_M)]
     stream.log(f"{ROAD}/grid", rr.LineStrips3D(across + along, colors=[_MARKING], radii=[0.03]), static=True)
     road = road_of(runs[0].recording.metadata)
-    for index, area in enumerate(road.areas()):
-        shown = area.clipped(low_x, high_x, low_y, high_y)
-        if shown is not None:
-            colour = _SLIPPERY if area.mu < road.mu else _GRIPPY if area.mu > road.mu else _ASPHALT
-            surface = _plane(*shown[:4], 0.002 + 0.0005 * index, colour)
-            stream.log(f"{ROAD}/patch_{index}_mu_{round(100 * area.mu)}_percent", surface, static=True)
+    pieces, areas = road.pieces(low_x, high_x, low_y, high_y), road.areas()
+    for index in sorted({piece.area for piece in pieces}):
+        quads = np.array([piece.corners_m for piece in pieces if piece.area == index])
+        mu = [piece.mu for piece in pieces if piece.area == index]
+        colour = _SLIPPERY if min(mu) < road.mu else _GRIPPY if max(mu) > road.mu else _ASPHALT
+        surface = _quadrangles(quads, 0.002 + 0.0005 * index, colour)
+        stream.log(f"{ROAD}/patch_{index}_mu_{round(100 * areas[index].mu)}_percent", surface, static=True)
 
 
 def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
@@ -205,8 +206,18 @@ def _points(radius: float) -> Any:
 
 
 def _plane(low_x: float, high_x: float, low_y: float, high_y: float, z: float, colour: tuple[int, int, int]) -> Any:
-    corners = [(low_x, low_y, z), (high_x, low_y, z), (high_x, high_y, z), (low_x, high_y, z)]
-    return rr.Mesh3D(vertex_positions=corners, triangle_indices=[(0, 1, 2), (0, 2, 3)], albedo_factor=[*colour, 255])
+    return _quadrangles(np.array([[(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)]]), z, colour)
+
+
+def _quadrangles(corners: Array, z: float, colour: tuple[int, int, int]) -> Any:
+    """Return quadrangles at a height as one mesh; corners of shape (n, 4, 2)."""
+    flat = corners.reshape(-1, 2)
+    triangles = 4 * np.arange(len(corners))[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
+    return rr.Mesh3D(
+        vertex_positions=np.column_stack([flat, np.full(len(flat), z)]),
+        triangle_indices=triangles.reshape(-1, 3),
+        albedo_factor=[*colour, 255],
+    )
 
 
 def _cones(places: Array) -> Any:

@@ -1,25 +1,38 @@
 """The road that the manoeuvre sets and the vehicle drives on.
 
-A road is plane. Its friction may differ from place to place, in the world axes of the recording: x along the track from
-the initial position of the centre of gravity, y to the left. For a wheel, the friction at its contact point counts.
-While the car settles before the recording, it rolls on `mu` alone.
+A road is plane. Its friction may differ from place to place. Places are given in the world axes of the recording, x
+along the track from the initial position of the centre of gravity, y to the left; or, with `along = "path"`, by the
+distance along the path of the manoeuvre's course and the side of that path. For a wheel, the friction at its contact
+point counts. While the car settles before the recording, it rolls on `mu` alone.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Final, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
+
+import numpy as np
 
 from activesteer.config import Range, Source, build
+from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, RecordingError, nearest_names
-from activesteer.road.recorded import table_of
+from activesteer.road.course import Course, course_of
+from activesteer.road.path import Path
+from activesteer.road.recorded import fail, table_of
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 
 _SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
 """Name of a side -> its right and left border [m]."""
+_SLICES: Final = 20
+"""Pieces in which a patch with changing friction is drawn."""
+_SLICE_M: Final = 2.0
+"""Length of the pieces in which a patch along a path is drawn [m], at most `_MAX_SLICES` of them."""
+_MAX_SLICES: Final = 200
+_SHOWN_BESIDE_M: Final = 4.0
+"""Width to either side of the path in which its friction is drawn [m]; it counts further out too."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +40,15 @@ class RoadPatch:
     """A stretch of the track with its own friction; keys of a table [[road.patches]]."""
 
     start_m: float
-    """Start along x, included [m]."""
+    """Start along x or along the path, see `along`; included [m]."""
     end_m: float
-    """End along x, not included [m]."""
+    """End along x or along the path, not included [m]."""
     mu: Friction
     """Friction relative to that in the tyre files [-]."""
     side: str = "both"
-    """`both`, `left` (y > 0) or `right` (y <= 0)."""
+    """`both`, `left` (y > 0, or left of the path) or `right` (y <= 0)."""
+    mu_end: Friction | None = None
+    """Friction at the end [-], linear from `mu` at the start. Default: `mu` throughout."""
 
     def __post_init__(self) -> None:
         """Check the place.
@@ -50,19 +65,42 @@ class RoadPatch:
 
 
 class Area(NamedTuple):
-    """A rectangle of the road: x from start (included) to end, y from right to left border (included) [m]."""
+    """A rectangle of the road: x from start (included) to end, y from right to left border (included) [m].
+
+    Its friction is `mu` at the start and changes by `slope_1pm` per metre. On a road along a path, x is the distance
+    along the path and y the distance to its left.
+    """
 
     start_m: float
     end_m: float
     right_m: float
     left_m: float
     mu: float
+    slope_1pm: float = 0.0
 
     def clipped(self, start_m: float, end_m: float, right_m: float, left_m: float) -> Area | None:
         """Return its part within a rectangle [m]; None if they do not overlap."""
         start, end = max(self.start_m, start_m), min(self.end_m, end_m)
         right, left = max(self.right_m, right_m), min(self.left_m, left_m)
-        return Area(start, end, right, left, self.mu) if start < end and right < left else None
+        if not (start < end and right < left):
+            return None
+        mu = self.mu + self.slope_1pm * (start - self.start_m) if self.slope_1pm else self.mu
+        return Area(start, end, right, left, mu, self.slope_1pm)
+
+
+class Piece(NamedTuple):
+    """A quadrangle of an area, to be drawn.
+
+    Attributes:
+        area: Index of the area.
+        mu: Friction in its middle [-].
+        corners_m: World x and y of its corners: right and left edge at its start and end, anticlockwise [m], shape
+            (4, 2).
+    """
+
+    area: int
+    mu: float
+    corners_m: Array
 
 
 @dataclass(frozen=True)
@@ -81,20 +119,100 @@ class Road:
     """Friction where y <= 0 [-]; default `mu`."""
     patches: tuple[RoadPatch, ...] = ()
     """Stretches with their own friction; where two overlap, the later one counts."""
+    along: Literal["x", "path"] = "x"
+    """What patches and sides follow: `x`, the world's x axis, or `path`, the path of the manoeuvre's course."""
+
+    def __post_init__(self) -> None:
+        """Check that something follows the path.
+
+        Raises:
+            ManeuverError: nothing does.
+        """
+        if self.along == "path" and not self.patches and self.mu_left is None and self.mu_right is None:
+            raise ManeuverError("'path' has no effect without patches, mu_left or mu_right", key="along")
+
+    def laid(self, course: Course | None) -> Road:
+        """Return the road as the car drives on it: with the path of the course if its friction follows that path.
+
+        Raises:
+            ManeuverError: the friction follows the path, and the manoeuvre has none.
+        """
+        if self.along == "x":
+            return self
+        if course is None:
+            raise ManeuverError(
+                "is 'path', but this manoeuvre sets the steering wheel and has no path; use 'x'", key="road.along"
+            )
+        return LaidRoad(*(getattr(self, field.name) for field in fields(Road)), path=course.path)
 
     def areas(self) -> tuple[Area, ...]:
         """Return the areas whose friction is not `mu`; where areas overlap, the later one counts."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
         split = [Area(-math.inf, math.inf, *_SIDES[side], mu) for side, mu in sides if mu is not None]
-        return (*split, *(Area(it.start_m, it.end_m, *_SIDES[it.side], it.mu) for it in self.patches))
+        return (*split, *(Area(it.start_m, it.end_m, *_SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
+
+    def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
+        """Return quadrangles that show the areas within a rectangle of the world [m]; later ones hide earlier ones."""
+        shown = (area.clipped(start_m, end_m, right_m, left_m) for area in self.areas())
+        return [
+            piece
+            for index, area in enumerate(shown)
+            if area is not None
+            for piece in _sliced(index, area, 1 if area.slope_1pm == 0.0 else _SLICES, lambda x, y: (x, y))
+        ]
+
+
+def _sliced(index: int, area: Area, slices: int, place: Callable[[Array, Array], tuple[Array, Array]]) -> list[Piece]:
+    """Cut an area into slices; `place` turns its x and y into those of the world."""
+    stations = np.linspace(area.start_m, area.end_m, slices + 1)
+    edges = [np.column_stack(place(stations, np.full(slices + 1, y))) for y in (area.right_m, area.left_m)]
+    corners = np.stack([edges[0][:-1], edges[0][1:], edges[1][1:], edges[1][:-1]], axis=1)
+    middles = 0.5 * (stations[1:] + stations[:-1]) - area.start_m
+    return [
+        Piece(index, area.mu + area.slope_1pm * x if area.slope_1pm else area.mu, quad)
+        for x, quad in zip(middles.tolist(), corners, strict=True)
+    ]
+
+
+def _slope(patch: RoadPatch) -> float:
+    return 0.0 if patch.mu_end is None else (patch.mu_end - patch.mu) / (patch.end_m - patch.start_m)
+
+
+@dataclass(frozen=True)
+class LaidRoad(Road):
+    """A road whose friction follows a path."""
+
+    path: Path | None = None
+    """The path of the course."""
+
+    def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
+        """Return quadrangles along the path; the rectangle does not matter. See the base class."""
+        path, found = self.path, []
+        assert path is not None
+
+        def place(s: Array, n: Array) -> tuple[Array, Array]:
+            x, y, heading = (np.interp(s, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
+            return x - n * np.sin(heading), y + n * np.cos(heading)
+
+        for index, area in enumerate(self.areas()):
+            shown = area.clipped(0.0, path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
+            if shown is not None:
+                slices = min(_MAX_SLICES, math.ceil((shown.end_m - shown.start_m) / _SLICE_M))
+                found += _sliced(index, shown, slices, place)
+        return found
 
 
 def road_of(metadata: Mapping[str, Any]) -> Road:
-    """Return the road of a recorded run; a default road if it was not recorded.
+    """Return the road of a recorded run, laid along its course; a default road if it was not recorded.
 
     Raises:
         RecordingError: a recorded key is unknown, missing, of the wrong type or out of range.
     """
     maneuver = table_of(metadata.get("maneuver", {}), "maneuver")
     table = table_of(maneuver.get("road", {}), "maneuver.road")
-    return build(Road, table, Source("the metadata of the recording", error=RecordingError), ("maneuver", "road"))
+    road = build(Road, table, Source("the metadata of the recording", error=RecordingError), ("maneuver", "road"))
+    if road.along == "x":
+        return road
+    if (course := course_of(metadata)) is None:
+        raise fail("maneuver.road.along", "is 'path', but the recording has no course")
+    return road.laid(course)

@@ -114,7 +114,7 @@ def resolve(
     made_from = {**files, **csv_files, **car.files, **who.files}
     built = build_maneuver(table, source)
     if is_recording(maneuver):
-        built = build_maneuver(led(table, car.on(built.road).steering_lag_s), source)
+        built = build_maneuver(led(table, car.on(built.ground).steering_lag_s), source)
     return Scenario(_with_speed_in_title(built, of_file), car, who, changes, made_from)
 
 

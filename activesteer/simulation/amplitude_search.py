@@ -75,7 +75,7 @@ def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
     The compiled model includes the content of all model and tyre files, the road and the step. Controllers have no
     influence, because the car is driven without control.
     """
-    model = scenario.car.on(scenario.maneuver.road, timestep_s).model
+    model = scenario.car.on(scenario.maneuver.ground, timestep_s).model
     compiled_model = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, compiled_model)
     parts = {

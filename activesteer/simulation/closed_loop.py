@@ -99,7 +99,7 @@ class ClosedLoop(Uncopyable):
             SimulationDiverged: the car does not settle.
         """
         self.maneuver = maneuver = scenario.maneuver
-        self.vehicle = vehicle = scenario.car.on(maneuver.road, timestep_s)
+        self.vehicle = vehicle = scenario.car.on(maneuver.ground, timestep_s)
         vehicle.limit_hands(scenario.driver.parameters.steering_torque_limit_Nm)
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
         self.driver: Driver = scenario.driver.plugin.make(self.driver_setup)

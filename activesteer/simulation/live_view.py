@@ -124,7 +124,7 @@ def scene_for(simulation: ClosedLoop, maneuver: Maneuver, *, cutaway: bool = Fal
     vehicle = simulation.vehicle
     size = Footprint.from_table(vehicle.dimensions())
     car = Car(scene_of(vehicle.model), vehicle.body_names, size=size, shell_opacity=CUTAWAY if cutaway else 1.0)
-    return RenderScene([car], maneuver.course, maneuver.road)
+    return RenderScene([car], maneuver.course, maneuver.ground)
 
 
 def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pacer) -> DriveResult:

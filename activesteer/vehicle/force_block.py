@@ -70,9 +70,13 @@ KIND_LINK, KIND_SCREW, KIND_MOTOR = 6.0, 7.0, 8.0
 IN_ORDER: Final = {"scale": 1.0, "offset": -0.0}
 """Values for an actuator without a fault; adding -0.0 changes nothing, not even the sign of a zero."""
 
-AREA: Final = _record("start_m", "end_m", "right_m", "left_m", "mu")
-"""An area of the road with its own friction: a rectangle in world axes; where areas overlap, the later one counts.
-Areas count while the header's `areas_felt` is 1, which `Vehicle.rebase` sets, since the road has no origin before."""
+AREA: Final = _record("start_m", "end_m", "right_m", "left_m", "mu", "slope_1pm")
+"""An area of the road with its own friction (`activesteer.road.road.Area`): a rectangle in world axes, or along the
+path where there is one; where areas overlap, the later one counts. Areas count while the header's `areas_felt` is 1,
+which `Vehicle.rebase` sets, since the road has no origin before."""
+
+PATH_GRID: Final = _record("x0_m", "y0_m", "cell_m", "columns", "rows", "spacing_m")
+"""Head of the grid of the path that the friction follows (`PathGrid`); points and cells have sections of their own."""
 
 LINK: Final = _record(
     "tendon", "rest_m", "stiffness_Npm", "backlash_m", "act", "screw_act", "sign", "userdata",
@@ -105,8 +109,9 @@ CURVE_TABLE: Final = _record("start_m", "per_m", "intervals", "count")
 """Head of a table of curves; the curves follow as cubics on even intervals."""
 
 _SECTIONS: Final[Mapping[str, Any]] = {
-    "wheels": WHEEL, "tyres": TYRE_RECORD, "dampers": DAMPER, "actuators": ACTUATOR, "areas": AREA, "links": LINK,
-    "screws": SCREW, "curve_axle_wheels": CURVE_AXLE_WHEEL, "curves": np.float64,
+    "wheels": WHEEL, "tyres": TYRE_RECORD, "dampers": DAMPER, "actuators": ACTUATOR, "areas": AREA,
+    "path_grids": PATH_GRID, "path_points": np.float64, "path_cells": np.float64, "links": LINK, "screws": SCREW,
+    "curve_axle_wheels": CURVE_AXLE_WHEEL, "curves": np.float64,
 }  # fmt: skip
 HEADER: Final = _record(
     "n_dofs", "n_bodies", "n_userdata", "n_activations", "n_controls", "n_tendons", "n_tendon_jacobian",

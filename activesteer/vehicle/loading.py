@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError
-from activesteer.road.road import Road
+from activesteer.road.path_coordinates import PathGrid
+from activesteer.road.road import LaidRoad, Road
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.curve_axle_model import curve_axle_records, fit_curve_axles
@@ -173,6 +174,9 @@ def _force_block(
         "dampers": [_damper(model, corner, parameters) for corner in CORNERS],
         "areas": [np.array([area], fb.AREA) for area in road.areas()],
     }
+    if isinstance(road, LaidRoad) and road.path is not None:
+        *head, sections["path_points"], sections["path_cells"] = ([part] for part in PathGrid.of(road.path))
+        sections["path_grids"] = [np.array([tuple(number for (number,) in head)], fb.PATH_GRID)]
     sections["curve_axle_wheels"], sections["curves"] = curve_axle_records(model, parameters.curves)
     places: dict[str, tuple[float, int]] = {}
     if parameters.rear_actuator.is_screw:

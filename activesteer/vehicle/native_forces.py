@@ -17,6 +17,7 @@ from numba import carray, types
 
 from activesteer.compilation import compiled_callback, inlined
 from activesteer.errors import ModelError
+from activesteer.road.path_coordinates import along_path
 from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
@@ -33,6 +34,7 @@ _tyres_at: Final = records_at(TYRE_RECORD)
 _dampers_at: Final = records_at(fb.DAMPER)
 _actuators_at: Final = records_at(fb.ACTUATOR)
 _areas_at: Final = records_at(fb.AREA)
+_path_grids_at: Final = records_at(fb.PATH_GRID)
 _outputs_at: Final = records_at(fb.WHEEL_OUTPUT)
 
 
@@ -74,10 +76,17 @@ def _road_mu(block, header, mu, x, y):
     if header.areas_felt == 0.0:
         return mu
     areas = _areas_at(block, header.areas, header.n_areas)
+    if header.n_path_grids != 0.0:
+        grid = _path_grids_at(block, header.path_grids, 1)[0]
+        points = carray(f64_pointer(block + 8 * int(header.path_points)), (int(header.n_path_points),))
+        cells = carray(f64_pointer(block + 8 * int(header.path_cells)), (int(header.n_path_cells),))
+        x, y = along_path(
+            x, y, grid.x0_m, grid.y0_m, grid.cell_m, grid.columns, grid.rows, grid.spacing_m, points, cells
+        )
     for index in range(areas.size - 1, -1, -1):
         area = areas[index]
         if area.start_m <= x < area.end_m and area.right_m < y <= area.left_m:
-            return area.mu
+            return area.mu if area.slope_1pm == 0.0 else area.mu + area.slope_1pm * (x - area.start_m)
     return mu
 
 

@@ -30,8 +30,8 @@ _DASH_M: Final = 1.5
 _GAP_M: Final = 2.5
 _FAR_M: Final = 2000.0
 """Distance from the origin up to which patches of other friction are drawn [m]."""
-_MAX_AREAS, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
-"""Largest numbers of patches, lanes, cones and dashes drawn: a scene holds a limited number of solids."""
+_MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
+"""Largest numbers of pieces of patches, lanes, cones and dashes drawn: a scene holds a limited number of solids."""
 
 
 def add_road(spec: mujoco.MjSpec, road: Road) -> None:
@@ -73,11 +73,11 @@ def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
         spec: The model.
         road: The road.
     """
-    for index, area in enumerate(road.areas()[:_MAX_AREAS]):
-        shown = area.clipped(-_FAR_M, _FAR_M, -_FAR_M, _FAR_M)
-        if shown is not None:
-            start, end, right, left, mu = shown
-            _box(spec, (start, end), (right, left), 0.004 + 0.0005 * index, (*_colour(mu), 1.0))
+    for piece in road.pieces(-_FAR_M, _FAR_M, -_FAR_M, _FAR_M)[:_MAX_PIECES]:
+        start, end = piece.corners_m[[0, 3]].mean(axis=0), piece.corners_m[1:3].mean(axis=0)
+        width = np.linalg.norm(piece.corners_m[[0, 1]].mean(axis=0) - piece.corners_m[2:].mean(axis=0))
+        height = 0.004 + 0.0005 * piece.area
+        _beam(spec, (*start, *end), float(width), height, (*_colour(piece.mu), 1.0))
 
 
 def add_course(spec: mujoco.MjSpec, course: Course) -> None:
@@ -104,16 +104,7 @@ def _add_path(spec: mujoco.MjSpec, path: Path) -> None:
     for start in starts:
         ends = start, start + _DASH_M
         (x0, x1), (y0, y1) = np.interp(ends, along, x), np.interp(ends, along, y)
-        half = 0.5 * np.arctan2(y1 - y0, x1 - x0)
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=(0.5 * float(np.hypot(x1 - x0, y1 - y0)), 0.05, 0.01),
-            pos=(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0),
-            quat=(np.cos(half), 0.0, 0.0, np.sin(half)),
-            rgba=_PATH,
-            contype=0,
-            conaffinity=0,
-        )
+        _beam(spec, (x0, y0, x1, y1), 0.1, 0.01, _PATH)
 
 
 def _add_cones(spec: mujoco.MjSpec, cones: np.ndarray) -> None:
@@ -147,16 +138,27 @@ def _add_cones(spec: mujoco.MjSpec, cones: np.ndarray) -> None:
 
 
 def _box(
+    spec: mujoco.MjSpec, x: tuple[float, float], y: tuple[float, float], height: float, rgba: tuple[float, ...]
+) -> None:
+    middle = 0.5 * (y[0] + y[1])
+    _beam(spec, (x[0], middle, x[1], middle), y[1] - y[0], height, rgba)
+
+
+def _beam(
     spec: mujoco.MjSpec,
-    x: tuple[float, float],
-    y: tuple[float, float],
+    ends: tuple[float, float, float, float],
+    width: float,
     height: float,
     rgba: tuple[float, ...],
 ) -> None:
+    """Add a flat box from one place on the road to another."""
+    x0, y0, x1, y1 = ends
+    half = 0.5 * np.arctan2(y1 - y0, x1 - x0)
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=(0.5 * (x[1] - x[0]), 0.5 * (y[1] - y[0]), height),
-        pos=(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]), 0.0),
+        size=(0.5 * float(np.hypot(x1 - x0, y1 - y0)), 0.5 * width, height),
+        pos=(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0),
+        quat=(np.cos(half), 0.0, 0.0, np.sin(half)),
         rgba=rgba,
         contype=0,
         conaffinity=0,

@@ -199,7 +199,7 @@ def _check_curves(study: StudyFile, scenario: Scenario) -> None:
     """Check that every channel in `curves` is recorded."""
     if not study.curves:
         return
-    known = [channel.name for channel in scenario.car.on(scenario.maneuver.road).channels.channels]
+    known = [channel.name for channel in scenario.car.on(scenario.maneuver.ground).channels.channels]
     for name in study.curves:
         if name not in known:
             raise study.source.fail(

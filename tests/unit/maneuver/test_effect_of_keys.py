@@ -17,8 +17,12 @@ from activesteer.scenario import resolve
 
 LABELS = ("kind", "name", "title", "steering_csv", "drive_csv", "path.csv")
 """Keys that name things."""
-WITHOUT_EFFECT = {("hill_hold", "drive"), ("parking", "drive"), ("slalom", "vehicle_width_m")}
-"""The drive is off while the brake is pressed; a slalom's cones must be passed, but do not depend on the width."""
+WITHOUT_EFFECT = {
+    ("hill_hold", "drive"), ("parking", "drive"), ("slalom", "vehicle_width_m"), ("split_mu_braking", "road.along"),
+    ("mu_jump", "road.along"),
+}  # fmt: skip
+"""The drive is off while the brake is pressed; a slalom's cones must be passed, but do not depend on the width; a
+straight path is the world's x axis."""
 NUMBERS = (0.0, 0.05, 0.3, 0.7, 1.0, 1.7, 3.1, 5.0, 12.0, 33.0, 61.0)
 
 

@@ -142,7 +142,7 @@ def test_a_damaged_road_is_refused(road: object):
 def test_areas_are_clipped_to_what_is_shown():
     road = Road(0.9, mu_left=0.3)
     (left,) = road.areas()
-    assert left.clipped(-5.0, 10.0, -3.0, 4.0) == (-5.0, 10.0, 0.0, 4.0, 0.3)
+    assert left.clipped(-5.0, 10.0, -3.0, 4.0) == (-5.0, 10.0, 0.0, 4.0, 0.3, 0.0)
     assert left.clipped(-5.0, 10.0, -3.0, 0.0) is None
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 import pytest
 
 from activesteer.conventions import CORNERS
+from activesteer.road.course import Course
+from activesteer.road.path import Path
 from activesteer.road.road import Road, RoadPatch
 from activesteer.scenario import load_car
 from activesteer.tyre.kernels.magic_formula import steady_state
@@ -121,3 +125,20 @@ def test_friction_use_is_that_of_the_formula_s_own_peaks(mu: float, rng: np.rand
         use = record(vehicle, corner, "friction_utilisation")
         assert use > 0.02
         assert use == pytest.approx(np.hypot(fx / (mu_x * load), fy / (mu_y * load)), rel=0.02)
+
+
+def test_along_a_path_friction_follows_the_distance_and_the_side_of_the_path() -> None:
+    path = Path.through([0.0, 20.0, 40.0, 60.0], [0.0, 20.0, 40.0, 60.0])  # 45 deg to the left
+    patches = (RoadPatch(20.0, 40.0, 0.8, mu_end=0.4), RoadPatch(50.0, 60.0, 0.3, side="left"))
+    vehicle = rolling(Road(0.9, patches=patches, along="path").laid(Course(path)))
+    vehicle.rebase()
+    assert frictions(vehicle) == [0.9] * 4
+    move(vehicle, 30.0 * math.sqrt(0.5), 30.0 * math.sqrt(0.5))
+    ramp = frictions(vehicle)
+    contact = [(record(vehicle, corner, "contact_x_m"), record(vehicle, corner, "contact_y_m")) for corner in CORNERS]
+    along = [math.sqrt(0.5) * (x + y) for x, y in contact]
+    assert ramp == pytest.approx([0.8 - 0.02 * (s - 20.0) for s in along], abs=1e-6)
+    move(vehicle, 25.0 * math.sqrt(0.5), 25.0 * math.sqrt(0.5))
+    left_of_path = [y > x for x, y in ((x + 25.0, y + 25.0) for x, y in contact)]
+    assert frictions(vehicle) == [0.3 if left else 0.9 for left in left_of_path]
+    assert any(left_of_path)
