@@ -74,8 +74,12 @@ def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
         road: The road.
     """
     for piece in road.pieces(-_FAR_M, _FAR_M, -_FAR_M, _FAR_M)[:_MAX_PIECES]:
-        start, end = piece.corners_m[[0, 3]].mean(axis=0), piece.corners_m[1:3].mean(axis=0)
-        width = np.linalg.norm(piece.corners_m[[0, 1]].mean(axis=0) - piece.corners_m[2:].mean(axis=0))
+        right, left = piece.corners_m[[0, 1]], piece.corners_m[[3, 2]]
+        width, middle = np.linalg.norm(left.mean(axis=0) - right.mean(axis=0)), 0.5 * (left + right)
+        # On a bend the longer edge counts, so that no gap opens on the outside.
+        longer = max(np.linalg.norm(edge[1] - edge[0]) for edge in (left, right))
+        along = 0.5 * longer * (middle[1] - middle[0]) / np.linalg.norm(middle[1] - middle[0])
+        start, end = middle.mean(axis=0) - along, middle.mean(axis=0) + along
         height = 0.004 + 0.0005 * piece.area
         _beam(spec, (*start, *end), float(width), height, (*_colour(piece.mu), 1.0))
 
