@@ -175,8 +175,9 @@ def _force_block(
         "areas": [np.array([area], fb.AREA) for area in road.areas()],
     }
     if isinstance(road, LaidRoad) and road.path is not None:
-        *head, sections["path_points"], sections["path_cells"] = ([part] for part in PathGrid.of(road.path))
-        sections["path_grids"] = [np.array([tuple(number for (number,) in head)], fb.PATH_GRID)]
+        grid = PathGrid.of(road.path)
+        sections["path_points"], sections["path_cells"] = [grid.points], [grid.cells]
+        sections["path_grids"] = [np.array([grid[:6]], fb.PATH_GRID)]
     sections["curve_axle_wheels"], sections["curves"] = curve_axle_records(model, parameters.curves)
     places: dict[str, tuple[float, int]] = {}
     if parameters.rear_actuator.is_screw:

@@ -69,7 +69,9 @@ def test_on_a_second_lap_the_first_lap_s_distance_counts() -> None:
 def test_a_ramp_is_linear_and_drawn_in_steps() -> None:
     road = Road(0.9, patches=(RoadPatch(10.0, 30.0, 0.9, mu_end=0.5),))
     (area,) = road.areas()
-    assert area.clipped(20.0, 30.0, -1.0, 1.0).mu == pytest.approx(0.7)
+    clipped = area.clipped(20.0, 30.0, -1.0, 1.0)
+    assert clipped is not None
+    assert clipped.mu == pytest.approx(0.7)
     pieces = road.pieces(-100.0, 100.0, -5.0, 5.0)
     assert [pieces[0].mu, pieces[-1].mu] == pytest.approx([0.89, 0.51])
 
