@@ -98,7 +98,7 @@ class _Problem:
             for recording, name in zip(recordings, names, strict=True)
         ]
         maneuvers = [
-            led(open_loop_of(recording, measured.name, measured.begin_s), car.steering_lag_s)
+            led(open_loop_of(recording, measured.name), car.steering_lag_s)
             for recording, measured in zip(recordings, self._measured, strict=True)
         ]
         self._study = replace(study, maneuvers=tuple(maneuvers), overrides=known)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -42,8 +43,6 @@ _OWN_UNITS: Final = {
 }  # fmt: skip
 _MOST_REPEATED: Final = 5
 """Number of repeated column names that are listed."""
-_LATEST_S: Final = 1e6
-"""Later times are calendar times, and are shifted to zero in a recording [s]."""
 
 
 class Import(NamedTuple):
@@ -101,7 +100,10 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
     signals = {
         name: _signal(name, _si_unit(name, table), source, shared, chosen, path) for name, source in sources.items()
     }
-    grid_s, shift_s = _grid(signals, chosen, path, notes)
+    grid_s, step_s = _grid(signals, chosen, path)
+    start_s = float(grid_s[0])
+    if start_s != 0.0:
+        notes.append(f"the time begins at {start_s:.12g} s in the file and at 0 here")
     values = {}
     for name, signal in signals.items():
         bridged = gaps(signal, _bridge_s(chosen, signal), float(grid_s[0]), float(grid_s[-1]))
@@ -116,17 +118,20 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
         if chosen.axes == "sae_j670" and name in TURNED_IN_SAE:
             values[name] = -values[name]
     taken = {name: _words(source) for name, source in sources.items()}
-    notes += suspicions(values, float(grid_s[1] - grid_s[0]))
-    time_s = grid_s - shift_s
+    notes += suspicions(values, step_s)
+    time_s = np.arange(len(grid_s)) * step_s
     derived = with_motion(time_s, values)
     channels = [_channel(name, table, taken) for name in derived]
     metadata: dict[str, Any] = {
         "maneuver": {"name": path.stem, "kind": chosen.kind, "title": chosen.title or f"measured: {path.name}"},
         "vehicle": {"name": "measured"},
         "controller": "measured",
-        "measured": {"file": path.name, "columns": taken, "axes": chosen.axes, "notes": notes, "shown_as": vehicle},
+        "measured": {
+            "file": path.name, "columns": taken, "axes": chosen.axes, "notes": notes, "shown_as": vehicle,
+            "time_offset_s": start_s,
+        },
         "versions": {"activesteer": __version__},
-    }
+    }  # fmt: skip
     attachments = {} if map_path is None else {map_path.name: map_path.read_bytes()}
     recording = Recording(
         channels, time_s, np.column_stack(list(derived.values())), metadata=metadata, attachments=attachments,
@@ -290,12 +295,13 @@ def _bridge_s(chosen: MeasurementMap, signal: Samples) -> float:
     return max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal.time_s))))
 
 
-def _grid(signals: Mapping[str, Samples], chosen: MeasurementMap, path: Path, notes: list[str]) -> tuple[Array, float]:
-    """Return times at which all signals exist, with the step of the fastest signal, and the time that becomes zero."""
+def _grid(signals: Mapping[str, Samples], chosen: MeasurementMap, path: Path) -> tuple[Array, float]:
+    """Return times of the file at which all signals exist, and their step: that of the fastest signal."""
     start = max(float(signal.time_s[0]) for signal in signals.values())
     end = min(float(signal.time_s[-1]) for signal in signals.values())
     step = chosen.step_s or min(float(np.median(np.diff(signal.time_s))) for signal in signals.values())
-    step = round(step, 9)
+    # A calendar time of 1.7e9 s resolves 0.2 us; the step is rounded to what the clock resolves.
+    step = round(step, min(9, math.floor(-math.log10(8.0 * np.spacing(max(abs(start), abs(end), 1e-9))))))
     if step <= 0.0 or end - start < step:
         raise RecordingError(
             f"the signals have no common time: the last starts at {start:g} s, the first ends at {end:g} s",
@@ -304,11 +310,7 @@ def _grid(signals: Mapping[str, Samples], chosen: MeasurementMap, path: Path, no
     count = int((end - start) / step + 1e-6) + 1
     if count > MAX_ROWS:
         raise RecordingError(f"{count} rows of {step:g} s, at most {MAX_ROWS} are allowed", file=path.name)
-    shift = 0.0
-    if start < 0.0 or start > _LATEST_S:
-        shift = start
-        notes.append(f"the time begins at {start:g} s in the file and at 0 here")
-    return np.minimum(start + np.arange(count) * step, end), shift
+    return np.minimum(start + np.arange(count) * step, end), step
 
 
 def _channel(name: str, table: Mapping[str, Channel], taken: Mapping[str, str]) -> Channel:

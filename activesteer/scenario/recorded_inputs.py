@@ -44,16 +44,15 @@ def led(table: dict[str, Any], lag_s: float) -> dict[str, Any]:
     return table | {"steering": steering | {"time_s": [time_s - lag_s for time_s in steering["time_s"]]}}
 
 
-def open_loop_of(recording: Recording, name: str, begin_s: float = 0.0) -> dict[str, Any]:
+def open_loop_of(recording: Recording, name: str) -> dict[str, Any]:
     """Return the manoeuvre with the steering wheel angle, or rack travel, and the speed of a recording.
 
-    The manoeuvre has the time axis of the recording, from zero to its end; before the first row the first values hold.
+    The manoeuvre starts at the first row of the recording and has its length.
     A recorded brake pedal (`brake_pedal`, 0 to 1) is pressed again; meanwhile the speed is not held.
 
     Args:
         recording: Recording with `steering_wheel_rad` or `rack_m`, and `speed_mps` or `vx_mps`.
         name: Name of the manoeuvre.
-        begin_s: Time of the recording that is zero in the manoeuvre [s].
 
     Returns:
         The table of the manoeuvre, for `resolve`.
@@ -64,7 +63,7 @@ def open_loop_of(recording: Recording, name: str, begin_s: float = 0.0) -> dict[
     if len(recording) < 2:
         raise RecordingError(f"{name}: {len(recording)} rows are too few to drive", value=len(recording))
     rows = np.arange(0, len(recording), max(1, math.ceil(len(recording) / _LONGEST)))
-    time_s = (recording.time_s[rows] - begin_s).tolist()
+    time_s = (recording.time_s[rows] - recording.time_s[0]).tolist()
 
     def values(*names: str) -> tuple[str, list[float]] | None:
         found = next((channel for channel in names if channel in recording), None)

@@ -42,19 +42,21 @@ def test_what_is_unusual_in_a_file_is_said_on_standard_error(call, tmp_path):
         assert "furlong" not in told.out or more
 
 
-def test_a_run_written_in_degrees_50_ms_late_comes_back_and_is_driven_again(call, tmp_path, truth):
-    columns = [truth.time_s + 0.05, *(np.degrees(truth[name]) for name in NAMES.values()), truth["ay_mps2"],
+def test_a_run_in_degrees_by_the_clock_of_a_logger_50_ms_late_comes_back_and_is_driven_again(call, tmp_path, truth):
+    columns = [1234.5 + truth.time_s, *(np.degrees(truth[name]) for name in NAMES.values()), truth["ay_mps2"],
                3.6 * truth["speed_mps"]]  # fmt: skip
     header = ";".join(["t [s]", *NAMES, "ay [m/s2]", "v [km/h]"])
-    rows = [";".join(f"{value:.9g}".replace(".", ",") for value in row) for row in np.column_stack(columns)]
+    rows = [";".join(f"{value:.9g}".replace(".", ",") for value in row) for row in np.column_stack(columns)[50:]]
     (tmp_path / "a.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
     truth.save("simulated.mcap")
 
     told = call("import", "a.csv", "--json")
-    assert (told.status, told.json["notes"]) == (0, [])
+    assert (told.status, told.json["notes"]) == (0, ["the time begins at 1234.55 s in the file and at 0 here"])
+    measured = activesteer.Recording.open(tmp_path / "a.mcap")
+    assert measured.metadata["measured"]["time_offset_s"] == pytest.approx(1234.55)
     told = call("compare", "a.mcap", "simulated.mcap", "-o", "a.html", "--json")
     assert told.status == 0
-    assert told.json["time_shift_s"] == pytest.approx(0.05, abs=1e-4)
+    assert told.json["time_shift_s"] == pytest.approx(-0.05, abs=1e-4)
     assert told.json["inside"] is True
     channels = {each["channel"]: each for each in told.json["quantities"]}
     assert set(channels) == {*NAMES.values(), "ay_mps2", "speed_mps"}
@@ -65,6 +67,8 @@ def test_a_run_written_in_degrees_50_ms_late_comes_back_and_is_driven_again(call
 
     assert call("run", "a.mcap", "-o", "again.mcap", "--set", "settle_s=0.5").status == 0
     told = call("compare", "a.mcap", "again.mcap", "--json")
+    again = activesteer.Recording.open(tmp_path / "again.mcap")
+    assert again.time_s[-1] == pytest.approx(truth.time_s[-1] - 0.05, abs=0.002)
     # The steering wheel stands where it was recorded, though it follows any demand 2 ms later.
     assert told.json["time_shift_s"] == pytest.approx(0.0, abs=1e-4)
     assert told.status == 0

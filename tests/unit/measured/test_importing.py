@@ -17,6 +17,8 @@ from activesteer.measured.importing import import_file
 from activesteer.measured.plausibility import suspicions
 from activesteer.playback.runs import runs_of
 from activesteer.recording import Recording
+from activesteer.scenario.recorded_inputs import open_loop_of
+from activesteer.signals import Channel
 from tests.raising import raises
 
 TIME_S = np.arange(0.0, 4.0, 0.01)
@@ -27,7 +29,7 @@ AY_MPS2 = SPEED_MPS * RATE_RADPS
 
 
 def write(path: Path, names: str, columns: list[np.ndarray], separator: str = ",", *, comma: bool = False) -> Path:
-    lines = [names, *(separator.join(f"{value:.9g}" for value in row) for row in np.column_stack(columns))]
+    lines = [names, *(separator.join(f"{value:.14g}" for value in row) for row in np.column_stack(columns))]
     text = "\n".join(lines[1:])
     path.write_text(f"{names}\n{text.replace('.', ',') if comma else text}\n", encoding="utf-8")
     return path
@@ -208,6 +210,27 @@ def test_mdf_channels_have_times_of_their_own(tmp_path):
     np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS[: len(recording)], atol=1e-9)
 
 
+@pytest.mark.parametrize("clock_s", [1234.5, 1.7e9, -3.0])
+def test_the_clock_of_the_logger_is_set_to_zero_and_kept_in_the_metadata(tmp_path, clock_s):
+    path = write(tmp_path / "a.csv", "t,steering_wheel_rad,yaw_rate_radps,speed_mps",
+                 [clock_s + TIME_S, 0.1 * RATE_RADPS, RATE_RADPS, SPEED_MPS])  # fmt: skip
+    found = import_file(path)
+    np.testing.assert_allclose(found.recording.time_s, TIME_S, atol=1e-12)
+    np.testing.assert_allclose(found.recording["yaw_rate_radps"], RATE_RADPS, atol=1e-5)
+    assert found.recording.metadata["measured"]["time_offset_s"] == clock_s
+    assert any("begins at" in note for note in found.notes)
+    assert open_loop_of(found.recording, "a")["duration_s"] == pytest.approx(TIME_S[-1])
+
+
+def test_a_recording_that_does_not_start_at_zero_is_driven_from_its_first_row():
+    signals = {"steering_wheel_rad": 0.1 * RATE_RADPS, "speed_mps": 0.0 * TIME_S + 20.0}
+    channels = [Channel(name, "", "", "measured") for name in signals]
+    late = Recording(channels, 1234.5 + TIME_S, np.column_stack(list(signals.values())))
+    table = open_loop_of(late, "late")
+    assert table["steering"]["time_s"][0] == 0.0
+    assert table["duration_s"] == pytest.approx(TIME_S[-1])
+
+
 def test_a_map_gives_units_signs_offsets_and_the_axes_of_sae(tmp_path):
     path = write(tmp_path / "a.csv", "t,p,q,b", [TIME_S, -np.degrees(RATE_RADPS), -AY_MPS2 + 0.3, 0.1 + 0.0 * TIME_S])
     (tmp_path / "map.toml").write_text(
@@ -217,7 +240,7 @@ def test_a_map_gives_units_signs_offsets_and_the_axes_of_sae(tmp_path):
         'roll_rad = { column = "b", unit = "rad", zero_until_s = 2.0 }\n'
     )
     recording = import_file(path, tmp_path / "map.toml").recording
-    assert (recording.time_s[0], recording.time_s[-1], len(recording)) == (1.0, 3.0, 101)
+    assert (recording.time_s[0], recording.time_s[-1], len(recording)) == (0.0, 2.0, 101)
     # Averaged over a step of 20 ms, a sine of 0.5 Hz loses 0.02 %.
     np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS[100:301:2], atol=3e-4)
     np.testing.assert_allclose(recording["ay_mps2"], AY_MPS2[100:301:2], atol=6e-3)
