@@ -119,7 +119,7 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
             values[name] = -values[name]
     taken = {name: _words(source) for name, source in sources.items()}
     notes += suspicions(values, step_s)
-    time_s = np.arange(len(grid_s)) * step_s
+    time_s: Array = np.arange(len(grid_s), dtype=np.float64) * step_s
     derived = with_motion(time_s, values)
     channels = [_channel(name, table, taken) for name in derived]
     metadata: dict[str, Any] = {
