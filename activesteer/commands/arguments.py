@@ -255,7 +255,9 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
     faults = {"fault": [fault_table(text) for text in options.faults]} if options.faults else {}
     overrides = overrides_of(options, faults)
-    return resolve(options.maneuver, options.vehicle, overrides, options.driver)
+    given = getattr(options, "controller", None) or ()
+    controllers = [given] if isinstance(given, str) else given
+    return resolve(options.maneuver, options.vehicle, overrides, options.driver, controllers)
 
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:

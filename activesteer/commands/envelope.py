@@ -50,13 +50,14 @@ def _envelope(options: argparse.Namespace) -> int:
 
     overrides, drivers = overrides_of(options), options.driver or (DEFAULT_DRIVER,)
     lines_m = options.lines_m or []
-    _check(options, overrides, drivers[0], given_lines=bool(lines_m))
+    controllers = options.controller or ["none", "ars", "afs"]
+    _check(options, overrides, drivers[0], controllers, given_lines=bool(lines_m))
     found = []
     for maneuver in options.maneuvers:
         with ProgressBar(f"envelope of {maneuver}", quiet=options.json) as bar:
             made = envelope(
                 maneuver,
-                options.controller or ("none", "ars", "afs"),
+                controllers,
                 options.vehicle,
                 overrides,
                 drivers=drivers,
@@ -75,12 +76,19 @@ def _envelope(options: argparse.Namespace) -> int:
     return 0
 
 
-def _check(options: argparse.Namespace, overrides: Mapping[str, Any], driver: Any, *, given_lines: bool) -> None:
+def _check(
+    options: argparse.Namespace,
+    overrides: Mapping[str, Any],
+    driver: Any,
+    controllers: Sequence[str],
+    *,
+    given_lines: bool,
+) -> None:
     """Check all manoeuvres before the first one is driven, which takes minutes."""
     from activesteer.scenario import resolve
     from activesteer.studies.paper.envelope import line_of
 
-    scenarios = [resolve(maneuver, options.vehicle, overrides, driver) for maneuver in options.maneuvers]
+    scenarios = [resolve(maneuver, options.vehicle, overrides, driver, controllers) for maneuver in options.maneuvers]
     keys = list(dict.fromkeys(line_of(scenario).key for scenario in scenarios))
     if given_lines and len(keys) > 1:
         raise ParameterError(

@@ -39,7 +39,7 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
     from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
-    from activesteer.scenario import check_gains, describe
+    from activesteer.scenario import check_gains
     from activesteer.simulation.preparation import prepared
     from activesteer.simulation.runner import run_scenario
 
@@ -53,7 +53,7 @@ def _run(options: argparse.Namespace) -> int:
     scenario = prepared(scenario)
     if not options.replace:
         for controller, path in zip(controllers, paths, strict=True):
-            _check_settings(path, describe(scenario) | {"controller": controller.name})
+            _check_settings(path, _settings(scenario, controller))
     recordings = {}
     for controller, path in zip(controllers, paths, strict=True):
         label = controller.label
@@ -125,6 +125,14 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
     for path in paths:
         check_target(path)
     return paths
+
+
+def _settings(scenario: Any, controller: Plugin) -> dict[str, Any]:
+    """Return the settings of a run as its recording holds them."""
+    from activesteer.scenario import describe
+
+    values = controller.parameters_with(scenario.own)
+    return describe(scenario) | {"controller": controller.name, "controller_parameters": values}
 
 
 def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:

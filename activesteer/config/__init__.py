@@ -25,7 +25,7 @@ from activesteer.config.keys import (
 from activesteer.config.merging import check_overruled, merged
 from activesteer.config.source import Range, Source
 from activesteer.config.toml import parse_value, read_toml, toml_text, toml_value
-from activesteer.config.values import build, checked_number, to_table
+from activesteer.config.values import build, checked_number, convert, to_table
 
 __all__ = [
     "Range",
@@ -33,6 +33,7 @@ __all__ = [
     "build",
     "check_overruled",
     "checked_number",
+    "convert",
     "dataclass_in",
     "element_of",
     "field_in_unit",

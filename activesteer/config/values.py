@@ -43,7 +43,7 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
         if name in values:
             first = next(other for other in table if field_in_unit(other, fields)[0] == name)
             raise source.fail(where, f"{first} and {key} are the same key in two units; give one of them")
-        values[name] = _convert(hints[name], raw, factor, source, where, _default_of(fields[name]))
+        values[name] = convert(hints[name], raw, factor, source, where, _default_of(fields[name]))
     for name, field in fields.items():
         if name in values or field.default is not dataclasses.MISSING:
             continue
@@ -66,8 +66,20 @@ def _default_of(field: dataclasses.Field[Any]) -> Any:
     return None if field.default is dataclasses.MISSING else field.default
 
 
-def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str], base: Any = None) -> Any:
-    """Check a value against its type hint and convert it."""
+def convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str], base: Any = None) -> Any:
+    """Check a value against its type hint and convert it.
+
+    Args:
+        hint: Type, possibly `Annotated` with its range; `Any` allows every value.
+        raw: The value.
+        factor: Factor from the unit of the value to SI.
+        source: Source of the value, for error messages.
+        path: Path of names to the value.
+        base: Object whose values fill missing keys; see `build`.
+
+    Raises:
+        ActiveSteerError: the value is wrong.
+    """
     limits = Range()
     if typing.get_origin(hint) is typing.Annotated:
         hint, *notes = typing.get_args(hint)
@@ -75,8 +87,9 @@ def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         if raw is None:
             return None
-        hint = next(option for option in typing.get_args(hint) if option is not type(None))
-        return _convert(typing.Annotated[hint, limits], raw, factor, source, path, base)
+        options = [option for option in typing.get_args(hint) if option is not type(None)]
+        hint = type(raw) if type(raw) in options else options[0]
+        return convert(typing.Annotated[hint, limits], raw, factor, source, path, base)
     origin = typing.get_origin(hint)
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         if not isinstance(raw, Mapping):
@@ -86,7 +99,7 @@ def _convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[
         if not isinstance(raw, Mapping):
             raise source.fail(path, f"{shown(raw)} is no table", raw)
         item = typing.get_args(hint)[1]
-        return {key: _convert(item, value, 1.0, source, (*path, str(key))) for key, value in raw.items()}
+        return {key: convert(item, value, 1.0, source, (*path, str(key))) for key, value in raw.items()}
     if origin is tuple:
         return _elements(hint, raw, factor, limits, source, path)
     return _scalar(hint, raw, factor, limits, source, path)
@@ -101,9 +114,9 @@ def _elements(
         wanted = "no list of numbers" if element is None else f"no list; tables [[{'.'.join(path)}]] are needed"
         raise source.fail(path, f"{shown(raw)} is {wanted}", raw)
     if element is not None:
-        return tuple(_convert(element, value, 1.0, source, (*path, str(number))) for number, value in enumerate(raw))
+        return tuple(convert(element, value, 1.0, source, (*path, str(number))) for number, value in enumerate(raw))
     item = typing.Annotated[typing.get_args(hint)[0], limits]
-    return tuple(_convert(item, value, factor, source, path) for value in raw)
+    return tuple(convert(item, value, factor, source, path) for value in raw)
 
 
 def _word(words: Sequence[str], raw: Any, source: Source, path: Sequence[str]) -> str:
@@ -114,6 +127,8 @@ def _word(words: Sequence[str], raw: Any, source: Source, path: Sequence[str]) -
 
 
 def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, path: Sequence[str]) -> Any:
+    if hint is Any:
+        return raw
     if typing.get_origin(hint) is typing.Literal:
         return _word(typing.get_args(hint), raw, source, path)
     wanted = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}[hint]

@@ -3,6 +3,7 @@
 from activesteer.controllers.find import (
     CONTROLLER,
     Controller,
+    declared_parameters,
     find_controller,
     is_variant,
     keys_read,
@@ -28,6 +29,7 @@ __all__ = [
     "RearSteer",
     "SingleTrack",
     "SingleTrackParameters",
+    "declared_parameters",
     "find_controller",
     "is_variant",
     "keys_read",

@@ -7,13 +7,13 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from activesteer.config import Range
+from activesteer.config import Range, field_path, leaf_keys
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.registry import WITHOUT_FILE
 from activesteer.controllers.variant import read_variant
 from activesteer.errors import ControllerError, shown
-from activesteer.plugins import Kind, Plugin, find
+from activesteer.plugins import Declared, Kind, Plugin, declared_in, find
 from activesteer.resources import list_controller_variants
 from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
 
@@ -85,6 +85,7 @@ def _are_torques(torques: Any) -> bool:
 
 CONTROLLER: Final = _ControllerKind(
     word="controller",
+    table="controllers",
     example="my_file.py:MyController",
     inputs="command, measurement",
     built_in=WITHOUT_FILE,
@@ -98,6 +99,7 @@ CONTROLLER: Final = _ControllerKind(
     error=ControllerError,
     unchecked=("brake_torque_demand_Nm", "estimate"),
     data=list_controller_variants,
+    reserved=tuple(field.name for field in fields(ControllerParameters)),
 )
 """Rules that all controllers follow."""
 
@@ -140,6 +142,26 @@ def keys_read(given: Any) -> frozenset[str]:
     if not plugin.ours:
         return frozenset(field.name for field in fields(ControllerParameters))
     return frozenset(plugin.origin.reads) | (frozenset() if plugin.origin is NoControl else _UNIT_READS)
+
+
+def declared_parameters(given: Any, gains: ControllerParameters | None = None) -> dict[str, Declared]:
+    """Return the parameters of any controller that overrides can set: key -> default, unit, range and type.
+
+    Args:
+        given: See `find_controller`.
+        gains: The table [controllers] of a vehicle file, for the values of a built-in controller.
+
+    Returns:
+        Dotted keys in SI, such as `controllers.ars.limit_rad` or `controllers.YawBeta.k_beta`; no gains that a variant,
+        or text behind a `?`, has fixed.
+    """
+    plugin, table = find_controller(given), f"{CONTROLLER.table}."
+    if not plugin.ours:
+        own = plugin.declared.items()
+        return {f"{table}{plugin.key}.{name}": each for name, each in own if name not in plugin.parameters}
+    fixed = {table + ".".join(field_path(ControllerParameters, path)) for path in leaf_keys(plugin.parameters)}
+    found = declared_in(gains or ControllerParameters(), keys_read(plugin), table)
+    return {key: each for key, each in found.items() if key not in fixed}
 
 
 def load_controller(given: Any, setup: ControllerSetup) -> Controller:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from activesteer.config import Range
 from activesteer.controllers.file_gains import (
@@ -144,6 +145,7 @@ class ControllerSetup:
         timestep_s: Time between two calls [s].
         overridden: Dotted keys of the gains that were overridden for this run.
         estimation: The car as an estimator knows it; None if its file has no table [two_track].
+        own: Overrides of the parameters of users' controllers: class -> name -> value.
     """
 
     single_track: SingleTrackParameters
@@ -152,6 +154,7 @@ class ControllerSetup:
     timestep_s: float
     overridden: frozenset[str] = frozenset()
     estimation: EstimatorSetup | None = None
+    own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
 
     def estimator(self) -> Estimator:
         """Make an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 from activesteer.driver.parameters import DriverParameters
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
@@ -62,6 +63,7 @@ class DriverSetup:
         drive: Engine and gearbox.
         wheel_radius_m: Radius that relates the speed of the driven wheels to the speed of the car [m].
         timestep_s: Time between two steps [s].
+        own: Overrides of the parameters of a user's driver: class -> name -> value.
     """
 
     single_track: SingleTrackParameters
@@ -72,3 +74,4 @@ class DriverSetup:
     drive: Drive
     wheel_radius_m: float
     timestep_s: float
+    own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

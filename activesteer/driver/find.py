@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
 from activesteer.config import Range
 from activesteer.driver.base import DriverSetup
 from activesteer.driver.human import HumanDriver
+from activesteer.driver.parameters import DriverParameters
 from activesteer.errors import DriverError, shown
 from activesteer.plugins import Kind, Plugin, find
 from activesteer.resources import list_drivers
@@ -47,6 +48,7 @@ class _DriverKind(Kind):
 
 DRIVER: Final = _DriverKind(
     word="driver",
+    table="driver",
     example="my_file.py:MyDriver",
     inputs="setpoint, measurement, motion",
     built_in={},
@@ -61,6 +63,7 @@ DRIVER: Final = _DriverKind(
     error=DriverError,
     unchecked=("wheel_torques",),
     data=list_drivers,
+    reserved=tuple(field.name for field in fields(DriverParameters)),
 )
 """Rules that all drivers follow."""
 

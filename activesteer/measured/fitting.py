@@ -26,7 +26,7 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_settings import Settings, prepare
+from activesteer.studies.engine.run_settings import Settings, prepare, scenario_of
 from activesteer.studies.engine.study_file import StudyFile
 from activesteer.studies.engine.task_queue import TaskQueue
 from activesteer.studies.engine.workers import Workers, workers_for
@@ -90,7 +90,8 @@ class _Problem:
         names = [label_of(path) for path in study.maneuvers]
         held = _SPEED_HOLD if is_driver_file(study.driver) else {}
         known = {key: value for key, value in held.items() if key not in study.keys} | study.overrides
-        first = resolve(open_loop_of(recordings[0], names[0]), study.vehicles[0], known, study.driver)
+        inputs = open_loop_of(recordings[0], names[0])
+        first = resolve(inputs, study.vehicles[0], known, study.driver, study.controllers)
         car = first.car.on(first.maneuver.ground, study.timestep_s)
         self._noise = noise_of(study, table, [channel.name for channel in car.channels.channels])
         self._measured = [
@@ -226,7 +227,7 @@ def drive(
         channels: Names of the channels.
     """
     try:
-        scenario = resolve(settings.maneuvers[recording][1], settings.vehicles[0][1], overrides, settings.driver)
+        scenario = scenario_of(settings, recording, 0, overrides)
         run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.timestep_s)
     except ActiveSteerError as error:
         return str(error)
@@ -240,7 +241,7 @@ def _start(factor: Factor, table: FitTable, scenario: Any, study: StudyFile) -> 
     if factor.nominal:
         here: Any = 1.0 if factor.nominal == "times" else 0.0
     else:
-        here = value_of(scenario, factor.key)
+        here = value_of(scenario, factor.key, study.controllers)
     if isinstance(here, (int, float)) and not isinstance(here, bool) and factor.low <= here <= factor.high:
         return float(here)
     return 0.5 * (factor.low + factor.high)

@@ -30,6 +30,7 @@ class Kind:
 
     Attributes:
         word: Name of the kind, such as `controller`.
+        table: Table of the keys of its parameters, such as `controllers`.
         example: Form of a block in a file, such as `my_file.py:MyController`.
         inputs: Arguments of the method `step`, as text.
         built_in: Name -> class of the blocks in the package.
@@ -38,9 +39,11 @@ class Kind:
         error: Error class of this kind.
         unchecked: Fields of the result that are not plain numbers.
         data: Function that returns the names of the blocks that are data files of the package.
+        reserved: Keys of the table that no block of a user may have as its name.
     """
 
     word: str
+    table: str
     example: str
     inputs: str
     built_in: Mapping[str, Any]
@@ -49,6 +52,7 @@ class Kind:
     error: type[ActiveSteerError]
     unchecked: tuple[str, ...] = ()
     data: Callable[[], list[str]] = list
+    reserved: tuple[str, ...] = ()
     _places: tuple[tuple[int, float, float], ...] = field(init=False)
     _unlimited: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
 

@@ -8,17 +8,17 @@ import inspect
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from activesteer.errors import nearest_names, shown
+from activesteer.config import Source, field_in_unit
+from activesteer.errors import ParameterError, nearest_names, shown
+from activesteer.plugins.declared import SETUP, Declared, declared_by, has_argument, read_values, takes_any
 from activesteer.plugins.file import from_file, is_user_module
 from activesteer.plugins.kind import Kind, in_one_line
 
 _PLAIN: Final = (bool, int, float, str)
-_SETUP: Final = "setup"
-"""Name of the argument that gets the properties of the car."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,71 @@ class Plugin:
     def uses_truth(self) -> bool:
         """Flag by which a block requests the truth: its attribute of this name."""
         return bool(getattr(self.origin, "uses_truth", False))
+
+    @property
+    def key(self) -> str:
+        """Name of the class or function, which its parameters have in keys."""
+        about = getattr(self.origin, "func", self.origin)
+        return getattr(about, "__name__", type(about).__name__)
+
+    @functools.cached_property
+    def declared(self) -> dict[str, Declared]:
+        """Parameters of a user's block: name -> declaration; an object has none, because it is made already.
+
+        Raises:
+            ActiveSteerError: of the kind's type: the declaration is wrong.
+        """
+        if self.ours or is_instance(self.origin):
+            return {}
+        try:
+            return declared_by(self.origin)
+        except (TypeError, ValueError) as reason:
+            raise self.kind.fail(self.name, str(reason)) from reason
+
+    def own_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Check overrides of the parameters and return them by the names of the arguments.
+
+        Args:
+            values: Name -> value.
+
+        Raises:
+            ParameterError: a parameter does not exist, is given behind the `?` too, or a value is wrong.
+        """
+        path = (self.kind.table, self.key)
+        source = Source("", overridden=frozenset({".".join(path)}))
+        if is_instance(self.origin):
+            raise source.fail(
+                path, "is an object, which is made already; give its class, or set the object's attribute"
+            )
+        found = read_values(self.declared, values, source, path)
+        for name in found:
+            if name in self.parameters:
+                raise source.fail((*path, name), f"is given in {self.name} too; leave one out", found[name])
+        return found
+
+    def value_of(self, parameter: str, own: Mapping[str, Mapping[str, Any]]) -> Any:
+        """Return the value of a declared parameter in the unit of its name; see `parameters_with`.
+
+        Raises:
+            ParameterError: there is no such parameter.
+        """
+        name, factor = field_in_unit(parameter, self.declared)
+        if name is None:
+            problem = f"there is no such parameter; {nearest_names(parameter, self.declared)}"
+            raise ParameterError(problem, key=f"{self.kind.table}.{self.key}.{parameter}")
+        value = own.get(self.key, {}).get(name, self.parameters.get(name, self.declared[name].default))
+        return value / factor if factor != 1.0 else value
+
+    def parameters_with(self, own: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+        """Return the values of all parameters as far as a recording can hold them, those of a user with defaults.
+
+        Args:
+            own: Overrides: class -> name -> value.
+        """
+        if self.ours:
+            return dict(self.parameters)
+        defaults = {name: each.default for name, each in self.declared.items()}
+        return _plain({**defaults, **self.parameters, **own.get(self.key, {})})
 
     def make(self, setup: Any) -> Any:
         """Create the block in its original state: nothing is carried over from one run to the next.
@@ -89,10 +154,11 @@ class Plugin:
     def _created(self, setup: Any) -> Any:
         if is_instance(self.origin):
             return copy.deepcopy(self.origin)
+        parameters = {**self.parameters, **getattr(setup, "own", {}).get(self.key, {})}
         if hasattr(self.origin, "from_vehicle"):
-            return self.origin.from_vehicle(setup, **self.parameters)
-        given = {_SETUP: setup} if _SETUP in _arguments(self.origin) else {}
-        return self.origin(**self.parameters, **given)
+            return self.origin.from_vehicle(setup, **parameters)
+        given = {SETUP: setup} if has_argument(self.origin, SETUP) else {}
+        return self.origin(**parameters, **given)
 
 
 class Watched:
@@ -161,16 +227,26 @@ def find(given: Any, kind: Kind) -> Plugin:
     if isinstance(given, str):
         if given in kind.built_in:
             return Plugin(kind, given, given, kind.built_in[given], {}, {}, ours=True)
-        origin, parameters, files = from_file(given, kind)
-        _check_parameters(origin, parameters, given, kind)
-        label = "-".join([given.partition("?")[0].rpartition(":")[2], *(f"{k}={v}" for k, v in parameters.items())])
-        return Plugin(kind, given, re.sub(r"[^\w=.+-]+", "_", label), origin, parameters, files)
+        origin, written, files = from_file(given, kind)
+        label = "-".join([given.partition("?")[0].rpartition(":")[2], *(f"{k}={v}" for k, v in written.items())])
+        found = Plugin(kind, given, re.sub(r"[^\w=.+-]+", "_", label), origin, {}, files)
+        if not takes_any(origin):
+            written = read_values(found.declared, written, Source("", error=kind.error), (kind.table, found.key))
+        return _allowed(replace(found, parameters=written))
     if not is_instance(given) and not callable(given):
         names = ", ".join(kind.names())
         needed = f"a name ({names}), a file ({kind.example}), a class, an object with the method step({kind.inputs})"
         problem = f"is {shown(given)}; {needed}, or a function that returns one is needed"
         raise kind.fail("", problem, given, tuple(kind.names()))
     return _from_object(given, kind)
+
+
+def _allowed(plugin: Plugin) -> Plugin:
+    """Refuse a class with the name of a built-in block, or of a table of its keys."""
+    if plugin.key in (reserved := (*plugin.kind.names(), *plugin.kind.reserved)):
+        problem = f"a {plugin.kind.word} of your own cannot have the name {plugin.key!r}; rename it"
+        raise plugin.kind.fail(plugin.name, problem, plugin.key, reserved)
+    return plugin
 
 
 def is_instance(given: Any) -> bool:
@@ -195,31 +271,9 @@ def _from_object(given: Any, kind: Kind) -> Plugin:
     name = f"{next(iter(files))}:{label}" if files else label
     if isinstance(given, type) and not callable(getattr(given, "step", None)):
         raise kind.fail(name, f"{label} has no method step({kind.inputs})", given)
-    return Plugin(kind, name, label, origin, parameters, files)
+    return _allowed(Plugin(kind, name, label, origin, parameters, files))
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
     """Select the values that can be recorded."""
     return {key: value for key, value in values.items() if isinstance(value, _PLAIN) and not key.startswith("_")}
-
-
-def _arguments(maker: Any) -> dict[str, inspect.Parameter]:
-    try:
-        return dict(inspect.signature(maker).parameters)
-    except (TypeError, ValueError):  # some functions written in C
-        return {}
-
-
-def _check_parameters(origin: Any, parameters: Mapping[str, Any], name: str, kind: Kind) -> None:
-    if is_instance(origin):
-        known = []
-    elif hasattr(origin, "from_vehicle"):
-        known = list(_arguments(origin.from_vehicle).values())[1:]
-    else:
-        known = [argument for key, argument in _arguments(origin).items() if key != _SETUP]
-    names = [
-        argument.name for argument in known if argument.kind in (argument.POSITIONAL_OR_KEYWORD, argument.KEYWORD_ONLY)
-    ]
-    for key in () if any(argument.kind is argument.VAR_KEYWORD for argument in known) else parameters:
-        if key not in names:
-            raise kind.fail(name, f"there is no parameter {key!r}; {nearest_names(key, names)}", key, tuple(names))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from activesteer.config import build, to_table
@@ -23,18 +23,20 @@ class ChosenDriver:
         plugin: Plugin that creates the driver.
         parameters: The driver file; for a user's code the file of the default driver, which the code can read.
         files: Name -> content of all files, to be kept with a recording.
+        own: Overrides of the parameters of a user's code: class -> name -> value.
     """
 
     plugin: Plugin
     parameters: DriverParameters
     files: Mapping[str, bytes]
+    own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def to_table(self) -> dict[str, Any]:
         """Return the table that is recorded: the driver file, or the parameters of a user's code."""
         table = to_table(self.parameters)
         if self.plugin.ours:
             return table
-        return {"name": self.plugin.name, "parameters": dict(self.plugin.parameters), "setup": table}
+        return {"name": self.plugin.name, "parameters": self.plugin.parameters_with(self.own), "setup": table}
 
     def for_searches(self) -> ChosenDriver:
         """Return the driver of searches before a run: the package's code, which follows the setpoint."""
@@ -55,5 +57,10 @@ def driver_with(given: Any, overrides: list[Override]) -> ChosenDriver:
     """
     plugin, is_file = find_driver(given), is_driver_file(given)
     table, source, _, files = read_table(given if is_file else DEFAULT_DRIVER, "driver", find_driver_file, DriverError)
-    table, source = applied(DriverParameters, table, source, overrides)
-    return ChosenDriver(plugin, build(DriverParameters, table, source), files if is_file else {**files, **plugin.files})
+    of_code = {} if is_file else {one.path[1:]: one for one in overrides if one.path[0] == plugin.key and one.path[1:]}
+    table, source = applied(DriverParameters, table, source, [one for one in overrides if one not in of_code.values()])
+    parameters = build(DriverParameters, table, source)
+    if is_file:
+        return ChosenDriver(plugin, parameters, files)
+    values = plugin.own_values({".".join(path): one.value for path, one in of_code.items()}) if of_code else {}
+    return ChosenDriver(plugin, parameters, {**files, **plugin.files}, {plugin.key: values} if values else {})

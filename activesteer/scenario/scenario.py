@@ -13,12 +13,14 @@ from activesteer.controllers import ControllerSetup
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
 from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
+from activesteer.plugins import Plugin
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.driver import ChosenDriver, driver_with
 from activesteer.scenario.estimation import estimator_setup
 from activesteer.scenario.gains import gain_paths
 from activesteer.scenario.overrides import Override, applied, plain
+from activesteer.scenario.own_parameters import own_controllers, own_path, own_values
 from activesteer.scenario.recorded_inputs import is_recording, led, recorded_inputs
 from activesteer.vehicle.powertrain import Drive
 
@@ -33,6 +35,7 @@ class Scenario:
         driver: The driver.
         overrides: Changes of their files.
         files: Name -> content of all files, to be kept with the recording.
+        own: Overrides of the parameters of users' controllers: class -> name -> value.
     """
 
     maneuver: Maneuver
@@ -40,12 +43,14 @@ class Scenario:
     driver: ChosenDriver
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
+    own: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
         """Return the properties of the car that controllers may know."""
         car, replaced = self.car.config, frozenset(map(".".join, gain_paths(self.overrides).values()))
         return ControllerSetup(
-            car.single_track, car.controllers, car.steering.ratio, timestep_s, replaced, estimator_setup(self.car)
+            car.single_track, car.controllers, car.steering.ratio, timestep_s, replaced, estimator_setup(self.car),
+            self.own,
         )  # fmt: skip
 
     def driver_setup(
@@ -55,7 +60,7 @@ class Scenario:
         car = self.car.config
         return DriverSetup(
             car.single_track, self.driver.parameters, car.steering.ratio, car.steering.steering_wheel_limit_rad,
-            rack_per_steering_wheel_m, Drive(car.powertrain), wheel_radius_m, timestep_s,
+            rack_per_steering_wheel_m, Drive(car.powertrain), wheel_radius_m, timestep_s, self.driver.own,
         )  # fmt: skip
 
 
@@ -67,6 +72,7 @@ def resolve(
     vehicle: FileOrTable = "compact",
     overrides: Mapping[str, Any] | None = None,
     driver: Any = DEFAULT_DRIVER,
+    controllers: Sequence[Any] = (),
 ) -> Scenario:
     """Read and check all inputs of a run.
 
@@ -74,8 +80,10 @@ def resolve(
         maneuver: Name, path, or table of a manoeuvre; or path of a recording (`.mcap`), whose inputs are driven.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, such as `speed_kmh`, `road.mu` or `controllers.ars.limit_deg`. Start the key
-            with `maneuver.` or `vehicle.` if both have it, and with `driver.` for keys of the driver.
+            with `maneuver.` or `vehicle.` if both have it, and with `driver.` for keys of the driver. Parameters of
+            your own code have keys such as `controllers.YawBeta.k_beta` and `driver.Cautious.preview_s`.
         driver: Name, path or table of a driver, or your own code; see `find_driver`.
+        controllers: Controllers whose parameters `overrides` may set, as for `simulate`; needed for your own code only.
 
     Raises:
         ManeuverError: the manoeuvre is not found or wrong.
@@ -100,9 +108,10 @@ def resolve(
         # A given table may come from a recording, which holds both an input and the value derived from it.
         check_overruled(kind, table, source, leaf_keys(table))
     changes = plain(overrides)
-    sorted_out: dict[str, list[Override]] = {part: [] for part in _PARTS}
+    sorted_out: dict[str, list[Override]] = {part: [] for part in (*_PARTS, "controllers")}
+    owned = own_controllers(controllers) if any(map(own_path, changes)) else {}
     for key, value in changes.items():
-        part, path = _which_part(key, kind)
+        part, path = _which_part(key, kind, owned)
         sorted_out[part].append(Override(key, tuple(path), value))
     of_file = table
     table, source = applied(kind, table, source, sorted_out["maneuver"])
@@ -111,11 +120,12 @@ def resolve(
         table = {"vehicle_width_m": car.config.width_m, **table}
     table, csv_files = kind.filled_from_csv(table, folder, source)
     who = driver_with(driver, sorted_out["driver"])
+    own = own_values({one.given: one.value for one in sorted_out["controllers"]}, owned)
     made_from = {**files, **csv_files, **car.files, **who.files}
     built = build_maneuver(table, source)
     if is_recording(maneuver):
         built = build_maneuver(led(table, car.on(built.ground).steering_lag_s), source)
-    return Scenario(_with_speed_in_title(built, of_file), car, who, changes, made_from)
+    return Scenario(_with_speed_in_title(built, of_file), car, who, changes, made_from, own)
 
 
 def _with_speed_in_title(built: Maneuver, of_file: Mapping[str, Any]) -> Maneuver:
@@ -140,6 +150,7 @@ def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequenc
     """
     for key, value in overrides.items():
         part, path = _which_part(key, type(scenario.maneuver))
+        part = "vehicle" if part == "controllers" else part
         if part not in parts and path[0] != "road":
             allowed, word = [*parts, "road"], {"maneuver": "manoeuvre"}.get(part, part)
             raise ParameterError(
@@ -148,9 +159,17 @@ def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequenc
             )  # fmt: skip
 
 
-def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
-    """Return the part that an override changes (manoeuvre, vehicle or driver), and the key inside it."""
+def _which_part(
+    key: str, kind: type[Maneuver], owned: Mapping[str, Sequence[Plugin]] | None = None
+) -> tuple[str, list[str]]:
+    """Return the part that an override changes (a name of `_PARTS`, or a user's controllers), and the key inside it.
+
+    Without `owned`, the users' controllers by their names, a parameter of a user's controller is not checked.
+    """
     first, *rest = key.split(".")
+    own = own_path(key)
+    if own is not None and (owned is None or own[0] in owned):
+        return "controllers", [*own]
     if first in _PARTS and rest:
         return first, rest
     paths = {"maneuver": key_paths(kind), "vehicle": key_paths(VehicleConfig)}
@@ -169,18 +188,23 @@ def _which_part(key: str, kind: type[Maneuver]) -> tuple[str, list[str]]:
         )
     known = [f"{part}.{path}" for part in paths for path in paths[part]] + paths["maneuver"] + paths["vehicle"]
     known += [f"driver.{path}" for path in key_paths(DriverParameters)]
+    for name, (plugin, *_) in (owned or {}).items():
+        known += [f"controllers.{name}.{parameter}" for parameter in plugin.declared]
     help_ = key_hint(kind, key) or key_hint(VehicleConfig, key) or nearest_names(key, known)
+    if own is not None and not owned:
+        help_ += f" A parameter of your own class {own[0]} needs this class as a controller"
     raise ParameterError(
         f"neither manoeuvre nor vehicle nor driver has such a key; {help_}", key=key, allowed=known, overridden=True
     )
 
 
-def value_of(scenario: Scenario, key: str) -> Any:
+def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> Any:
     """Return the value of a key of the manoeuvre, the vehicle or the driver.
 
     Args:
         scenario: The scenario.
         key: Dotted key, as for the overrides of `resolve`.
+        controllers: Controllers, as for `resolve`.
 
     Returns:
         The value; a number in the unit of the key.
@@ -189,9 +213,14 @@ def value_of(scenario: Scenario, key: str) -> Any:
         ParameterError: there is no such key, or a part of it has no value.
     """
     part, path = _which_part(key, type(scenario.maneuver))
-    value: Any = {"maneuver": scenario.maneuver, "vehicle": scenario.car.config, "driver": scenario.driver.parameters}[
-        part
-    ]
+    if part == "controllers":
+        if path[0] not in (owned := own_controllers(controllers)):
+            raise ParameterError("no controller here has such a parameter", key=key)
+        return owned[path[0]][0].value_of(path[1], scenario.own)
+    who = scenario.driver
+    if part == "driver" and not who.plugin.ours and path[0] == who.plugin.key and path[1:]:
+        return who.plugin.value_of(".".join(path[1:]), who.own)
+    value: Any = {"maneuver": scenario.maneuver, "vehicle": scenario.car.config, "driver": who.parameters}[part]
     factor = 1.0
     for name in path:
         if isinstance(value, tuple) and name.isdigit() and int(name) < len(value):
@@ -212,4 +241,5 @@ def describe(scenario: Scenario) -> dict[str, Any]:
         "vehicle": to_table(scenario.car.config),
         "driver": scenario.driver.to_table(),
         "overrides": dict(scenario.overrides),
+        **({"controllers": scenario.own} if scenario.own else {}),
     }

@@ -41,7 +41,7 @@ class RunContext(NamedTuple):
         """Return the context of a run of a scenario, before the run."""
         metadata = {
             "controller": controller.name,
-            **({"controller_parameters": dict(controller.parameters)} if controller.parameters else {}),
+            **({"controller_parameters": values} if (values := controller.parameters_with(scenario.own)) else {}),
             **describe(scenario),
             **about(controller, scenario.car.config.controllers, vehicle.timestep_s),
             "car": vehicle.dimensions(),

@@ -106,7 +106,7 @@ class Simulation:
         """
         self._controller = controller = find_controller(controller)
         if not isinstance(maneuver, Scenario):
-            maneuver = resolve(maneuver, vehicle, overrides, driver)
+            maneuver = resolve(maneuver, vehicle, overrides, driver, [controller])
         elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:
             raise ParameterError(
                 "a Scenario already includes vehicle, driver and overrides", key="vehicle, overrides, driver"

@@ -11,7 +11,7 @@ from typing import Any
 
 from activesteer.errors import ParameterError
 from activesteer.files import file_word, json_text, make_folder, write_text
-from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve, unread_gains
+from activesteer.scenario import FileOrTable, check_gains, check_parts, read_by, resolve
 from activesteer.standards.catalogue import standard_of
 from activesteer.standards.proving_ground import ProvingGround
 from activesteer.standards.standard import Findings, NoResult, Standard
@@ -94,7 +94,7 @@ def examine(
     standard = standard_of(name)
     driver = standard.driver if driver is None else driver
     given = dict(overrides or {})
-    check_parts(given, resolve("straight_line", vehicle, given, driver), ("vehicle", "driver"))
+    check_parts(given, resolve("straight_line", vehicle, given, driver, controllers), ("vehicle", "driver"))
     check_gains(given, controllers)
     found = {}
     with workers_for(jobs, scheduler=scheduler) as workers:
@@ -106,9 +106,8 @@ def examine(
                 if progress is not None:
                     progress(label, series, done, total)
 
-            unread = unread_gains(given, [controller])  # another controller reads them
-            own = {key: value for key, value in given.items() if key not in unread}
-            ground = ProvingGround(standard.name, vehicle, driver, controller, own, folder, workers, tell)
+            read = read_by(given, controller)
+            ground = ProvingGround(standard.name, vehicle, driver, controller, read, folder, workers, tell)
             try:
                 found[label] = standard.examine(ground)
             except NoResult as reason:

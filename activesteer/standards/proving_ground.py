@@ -44,7 +44,8 @@ class ProvingGround:
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
         """See `Ground`."""
-        return resolve(maneuver, self.vehicle, {**(overrides or {}), **self.overrides}, self.driver)
+        changes = {**(overrides or {}), **self.overrides}
+        return resolve(maneuver, self.vehicle, changes, self.driver, [self.controller])
 
     def drive(
         self,

@@ -92,9 +92,10 @@ class FactorValues:
         if place not in self._nominal:
             study = self.study
             label = label_of(study.maneuvers[maneuver])
-            scenario = resolve(study.maneuvers[maneuver], study.vehicles[vehicle], study.overrides, study.driver)
+            items = study.maneuvers[maneuver], study.vehicles[vehicle]
+            scenario = resolve(*items, study.overrides, study.driver, study.controllers)
             relative = {
-                key: value_of(scenario, key)
+                key: value_of(scenario, key, study.controllers)
                 for key, factor in self._factors.items()
                 if factor.nominal and (not factor.maneuvers or label in factor.maneuvers)
             }

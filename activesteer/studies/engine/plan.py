@@ -170,7 +170,8 @@ def _resolved(
     study, (maneuver, vehicle) = factor_values.study, place
     items = study.maneuvers[maneuver], study.vehicles[vehicle]
     try:
-        return resolve(*items, study.overrides | factor_values.overrides(*place, sample), study.driver)
+        overrides = study.overrides | factor_values.overrides(*place, sample)
+        return resolve(*items, overrides, study.driver, study.controllers)
     except ActiveSteerError as error:
         error.add_note(f"in {label_of(items[0])} with {label_of(items[1])}" + (f", factor {key}" if key else ""))
         raise

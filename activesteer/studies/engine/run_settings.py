@@ -97,7 +97,10 @@ def present_inputs(settings: Settings) -> dict[str, str]:
 
 def scenario_of(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> Scenario:
     """Return the scenario for these indices of manoeuvre and vehicle."""
-    return resolve(settings.maneuvers[maneuver][1], settings.vehicles[vehicle][1], overrides, settings.driver)
+    controllers = [controller for _, controller in settings.controllers]
+    return resolve(
+        settings.maneuvers[maneuver][1], settings.vehicles[vehicle][1], overrides, settings.driver, controllers
+    )
 
 
 def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> str:

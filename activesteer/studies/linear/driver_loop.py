@@ -254,7 +254,7 @@ def driver_loops(
         DriverError: the driver is a user's own class, which has no linear form.
         ActiveSteerError: an input is wrong.
     """
-    scenario = resolve("straight_line", vehicle, overrides, driver)
+    scenario = resolve("straight_line", vehicle, overrides, driver, controllers)
     check_gains(overrides or {}, controllers)
     if not scenario.driver.plugin.ours:
         raise DriverError(f"{scenario.driver.plugin.name} is code; only a driver file has a linear form", value=driver)

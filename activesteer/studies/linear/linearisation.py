@@ -195,13 +195,18 @@ def linear_car(
 
 
 def linear_cars(
-    vehicle: FileOrTable, speeds_mps: Sequence[float], overrides: Mapping[str, Any] | None = None
+    vehicle: FileOrTable,
+    speeds_mps: Sequence[float],
+    overrides: Mapping[str, Any] | None = None,
+    controllers: Sequence[Any] = (),
 ) -> list[LinearCar]:
-    """Return the car linearised at several speeds; see `linearise`."""
-    return [_linearised(vehicle, float(speed), overrides) for speed in speeds_mps]
+    """Return the car linearised at several speeds; see `linearise`. Overrides may set parameters of controllers."""
+    return [_linearised(vehicle, float(speed), overrides, controllers) for speed in speeds_mps]
 
 
-def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, Any] | None) -> LinearCar:
+def _linearised(
+    vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, Any] | None, controllers: Sequence[Any]
+) -> LinearCar:
     if not MIN_SPEED_MPS <= speed_mps < math.inf:
         raise ParameterError(
             f"is {speed_mps:g} m/s; needed are {MIN_SPEED_MPS:g} m/s ({3.6 * MIN_SPEED_MPS:g} km/h) at least",
@@ -213,7 +218,7 @@ def _linearised(vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, 
         "kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0, "settle_s": _SETTLE_S,
     }  # fmt: skip
     sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
-    scenario = resolve(straight, vehicle, sliding)
+    scenario = resolve(straight, vehicle, sliding, controllers=controllers)
     check_parts(overrides or {}, scenario, ("vehicle",))
     config = scenario.car.config
     smooth = replace(

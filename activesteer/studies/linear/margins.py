@@ -279,8 +279,8 @@ def margins_of_cars(
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
     for overrides in cars:
         found: list[LoopMargins] = []
-        for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides):
-            scenario = resolve(straight_on(car.speed_mps), vehicle, overrides)
+        for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides, controllers):
+            scenario = resolve(straight_on(car.speed_mps), vehicle, overrides, controllers=controllers)
             for number, plugin in enumerate(plugins):
                 unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
                 setup = _fully_active(scenario.controller_setup(unit_s))

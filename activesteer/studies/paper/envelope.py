@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, StudyError
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
+from activesteer.scenario import FileOrTable, Scenario, check_gains, read_by, resolve
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.plan import label_of
 from activesteer.studies.engine.run_task import Status
@@ -228,7 +228,7 @@ def envelope(
         ActiveSteerError: an input is wrong, the manoeuvre has no lanes and no cones, or a run failed.
     """
     given = dict(overrides or {})
-    scenario = resolve(maneuver, vehicle, given, drivers[0])
+    scenario = resolve(maneuver, vehicle, given, drivers[0], controllers)
     check_gains(given, controllers)
     line = line_of(scenario)
     nominal_kmh = 3.6 * scenario.maneuver.speed_mps
@@ -249,7 +249,7 @@ def envelope(
         for (driver, controller), speed in zip(pairs, found, strict=True)
     ]
     factors = {"speed_kmh": {"grid": list(speeds)}, line.key: {"grid": list(lines)}}
-    duration_s = _duration_s(maneuver, vehicle, given, min(speeds))
+    duration_s = _duration_s(scenario, min(speeds))
     rows: list[dict[str, Any]] = []
     for driver in drivers:
         tell = report(f"map of {label_of(driver)}")
@@ -272,8 +272,8 @@ def envelope(
     return Envelope(scenario.maneuver.name, line, nominal, entry_speeds, rows)
 
 
-def _duration_s(maneuver: FileOrTable, vehicle: FileOrTable, overrides: Mapping[str, Any], speed_kmh: float) -> float:
-    course = resolve(maneuver, vehicle, overrides).maneuver.course
+def _duration_s(scenario: Scenario, speed_kmh: float) -> float:
+    course = scenario.maneuver.course
     assert course is not None, "kinds of LINES have a course"
     assert course.last_gate_x_m is not None, "and it has gates"
     return round(3.6 * course.last_gate_x_m / speed_kmh + _AFTER_S, 2)
@@ -317,12 +317,14 @@ def entry_speed(
     Raises:
         ActiveSteerError: an input is wrong.
     """
+    read = read_by(overrides, controller)
+    base = resolve(maneuver, vehicle, read, driver, [controller])
 
     def keeps(speed_kmh: float) -> bool:
-        duration_s = _duration_s(maneuver, vehicle, overrides, speed_kmh)
-        changes = {**overrides, "speed_kmh": speed_kmh, "duration_s": duration_s}
+        changes = {**read, "speed_kmh": speed_kmh, "duration_s": _duration_s(base, speed_kmh)}
         try:
-            return line.kept(run_scenario(resolve(maneuver, vehicle, changes, driver), controller).metrics)
+            scenario = resolve(maneuver, vehicle, changes, driver, [controller])
+            return line.kept(run_scenario(scenario, controller).metrics)
         except ActiveSteerError as error:
             if error.recording is None:  # nothing was driven: an input is wrong
                 raise

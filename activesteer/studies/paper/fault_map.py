@@ -157,7 +157,7 @@ def _cell(
     """Drive all faults at one speed in one situation."""
     begin_s = SITUATIONS[situation].fault_s(speed_kmh / 3.6)
     table = path_of(situation, speed_kmh / 3.6, begin_s + limits.window_s)
-    scenario = resolve(table, vehicle, overrides, driver)
+    scenario = resolve(table, vehicle, overrides, driver, [controller])
     check_parts(overrides, scenario, ("vehicle", "driver"))
     width_m = scenario.car.config.width_m
     if limits.lateral_offset_m is None:

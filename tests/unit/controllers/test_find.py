@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import textwrap
 from pathlib import Path
 
@@ -15,10 +16,12 @@ from activesteer.controllers import (
     FrontSuperposition,
     NoControl,
     RearSteer,
+    declared_parameters,
     find_controller,
     load_controller,
 )
 from activesteer.errors import ControllerError
+from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
@@ -250,3 +253,16 @@ def test_controllers_are_told_what_sensors_measure_and_nothing_else():
         "wheel_torques",
         "parking_brake",
     }
+
+
+def test_parameters_of_every_controller_are_declared_alike():
+    for name in CONTROLLER.names():
+        declared = declared_parameters(name).items()
+        resolve("straight_line", overrides={key: each.default for key, each in declared if each.default is not None})
+    ars, tuned = declared_parameters("ars"), declared_parameters("ars_tuned")
+    limit = ars["controllers.ars.limit_rad"]
+    assert limit[:3] == (pytest.approx(math.radians(3.0)), "rad", Range(0.0, math.radians(10.0)))
+    assert ars.keys() - tuned.keys() == {
+        "controllers.ars.prediction_gain", "controllers.ars.corrector.deadband_start_radps",
+        "controllers.ars.corrector.deadband_end_radps",
+    }  # fmt: skip

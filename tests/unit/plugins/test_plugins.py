@@ -17,8 +17,8 @@ from activesteer import ActuatorCommand, DriverCommand, simulate
 from activesteer.config import Range
 from activesteer.controllers import find_controller
 from activesteer.driver import find_driver
-from activesteer.errors import ControllerError, DriverError
-from activesteer.scenario import resolve
+from activesteer.errors import ControllerError, DriverError, ParameterError
+from activesteer.scenario import resolve, value_of
 from activesteer.signals import WheelTorques, new_message
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
@@ -114,7 +114,7 @@ def test_object_used_twice_carries_nothing_over():
         ("?gain=-0.5&side=right", {"gain": -0.5, "side": "right"}),
         ('?side="a&b"', {"side": "a&b"}),
         ("?side=a:b&gain=1e-3", {"side": "a:b", "gain": 1e-3}),
-        ("?limits=[1, 2]&gain=true", {"limits": [1, 2], "gain": True}),
+        ("?limits=[1, 2]&gain=3", {"limits": [1, 2], "gain": 3}),
     ],
 )
 def test_parameters_of_a_file_are_typed_as_in_toml(gains, query, parameters):
@@ -413,3 +413,97 @@ def test_torques_of_the_wheels_are_checked():
 def test_unknown_driver_is_answered():
     with raises(DriverError, value="typicle", allowed=("expert", "novice", "typical")):
         find_driver("typicle")
+
+
+YAW_BETA = """
+    from typing import Annotated
+    from activesteer.config import Range
+
+
+    class YawBeta:
+        PARAMETERS = {"k_beta": {"unit": "rad/rad", "range": (0.0, 3.0)}}
+
+        def __init__(self, setup, k_beta=0.4, k_yaw: float = 0.1, limit_rad: Annotated[float, Range(0.0, 0.1)] = 0.05):
+            self.values = k_beta, k_yaw, limit_rad
+
+        def step(self, command, measurement):
+            return ActuatorCommand(0.001 * self.values[0])
+    """
+
+
+def test_declared_parameters_have_name_default_unit_and_range(write):
+    declared = find_controller(f"{write(YAW_BETA)}:YawBeta").declared
+    assert [(name, each.default, each.unit) for name, each in declared.items()] == [
+        ("k_beta", 0.4, "rad/rad"), ("k_yaw", 0.1, ""), ("limit_rad", 0.05, "rad"),
+    ]  # fmt: skip
+    assert [each.limits for each in declared.values()] == [Range(0.0, 3.0), Range(), Range(0.0, 0.1)]
+
+
+def test_key_of_a_parameter_means_the_same_as_the_question_mark(write):
+    given, changed = f"{write(YAW_BETA)}:YawBeta", {"controllers.YawBeta.k_beta": 2, "controllers.YawBeta.limit_deg": 3}
+    scenario = resolve("straight_line", overrides=changed, controllers=["none", given])
+    made = find_controller(given).make(scenario.controller_setup(0.001)).inner
+    asked = find_controller(f"{given}?k_beta=2&limit_deg=3").make(setup()).inner
+    assert made.values == asked.values == (2.0, 0.1, pytest.approx(math.radians(3.0)))
+    assert value_of(scenario, "controllers.YawBeta.limit_deg", [given]) == pytest.approx(3.0)
+    assert value_of(scenario, "controllers.YawBeta.k_yaw", [given]) == 0.1
+    recording = simulate("step_steer", given, overrides={**SHORT, **changed})
+    assert recording.metadata["controller_parameters"]["k_beta"] == 2
+    assert recording["rear_steer_demand_rad"][-1] == pytest.approx(0.002)
+
+
+@pytest.mark.parametrize(
+    ("query", "key", "value"),
+    [
+        ("", "controllers.YawBeta.k_bta", 1.0),
+        ("", "controllers.YawBeta.k_beta", 5.0),
+        ("", "controllers.YawBeta.k_yaw", "fast"),
+        ("?k_beta=1", "controllers.YawBeta.k_beta", 2.0),
+        ("", "controllers.YawBta.k_beta", None),
+        ("", "controllers.arz.limit_deg", None),
+    ],
+)
+def test_wrong_key_of_an_own_parameter_is_answered(write, query, key, value):
+    with raises(ParameterError, key=key):
+        simulate("step_steer", f"{write(YAW_BETA)}:YawBeta{query}", overrides={key: value})
+
+
+def test_own_parameter_needs_its_controller(write):
+    changed = {"controllers.YawBeta.k_beta": 1.0}
+    with raises(ParameterError, key="controllers.YawBeta.k_beta"):
+        simulate("step_steer", "ars", overrides=changed)
+    with raises(ParameterError, key="controllers.Counting"):
+        simulate("step_steer", Counting(), overrides={"controllers.Counting.gain": 2.0})
+
+
+@pytest.mark.parametrize("name", ["lqr", "estimator", "ars_tuned"])
+def test_class_with_the_name_of_a_built_in_controller_is_refused(write, name):
+    with raises(ControllerError, value=name):
+        find_controller(f"{write(YAW_BETA.replace('YawBeta', name))}:{name}")
+
+
+def test_wrong_declaration_is_answered(write):
+    path = write(YAW_BETA.replace('"k_beta": {', '"k_bta": {'))
+    with raises(ControllerError):
+        find_controller(f"{path}:YawBeta")
+
+
+def test_parameter_of_an_own_driver_is_a_key_too(write):
+    path = write(
+        """
+        class Holds:
+            def __init__(self, angle_rad=0.1):
+                self.angle_rad = angle_rad
+
+            def step(self, setpoint, measurement, motion):
+                return DriverCommand(steering_wheel_demand_rad=self.angle_rad, gear=0)
+        """
+    )
+    changed = {"driver.Holds.angle_deg": 20, "driver.preview_s": 1.1}
+    scenario = resolve("straight_line", overrides=changed, driver=f"{path}:Holds")
+    assert value_of(scenario, "driver.Holds.angle_deg") == pytest.approx(20.0)
+    assert scenario.driver.parameters.preview_s == 1.1
+    run = simulate("straight_line", driver=f"{path}:Holds", overrides={**changed, "duration_s": 0.2})
+    assert run["steering_wheel_demand_rad"][-1] == pytest.approx(math.radians(20.0))
+    with raises(ParameterError):
+        resolve("straight_line", overrides={"driver.Holds.angl_deg": 20}, driver=f"{path}:Holds")
