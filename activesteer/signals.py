@@ -260,6 +260,8 @@ class Estimate(NamedTuple):
 
 NO_BRAKES: Final = (0.0, 0.0, 0.0, 0.0)
 """No brake torque at any wheel [Nm]."""
+NO_TORQUES: Final = (0.0, 0.0, 0.0, 0.0)
+"""No additional drive torque at any wheel [Nm]."""
 
 
 class ActuatorCommand(NamedTuple):
@@ -279,6 +281,9 @@ class ActuatorCommand(NamedTuple):
         estimate: Estimated motion of the car, if the controller uses an estimator.
         side_difference_Pa: Additional difference of the brake pressure between left and right that the anti-lock
             system may allow, because the controller steers against the yaw moment [Pa].
+        wheel_torque_demand_Nm: Drive torques at the wheels in addition to the driver's demand, forward positive, order
+            of `CORNERS` [Nm]. Motors carry them out within their limits. Where an open differential drives both wheels
+            of an axle, only the sum of the two torques counts; an engine gets the sum of all wheels that it drives.
     """
 
     rear_steer_demand_rad: Annotated[float, Recorded("rad", "rear angle demand of the controller")] = 0.0
@@ -299,6 +304,7 @@ class ActuatorCommand(NamedTuple):
     side_difference_Pa: Annotated[
         float, Recorded("Pa", "additional brake pressure difference between the sides that the controller allows")
     ] = 0.0
+    wheel_torque_demand_Nm: Annotated[PerWheel, Recorded("Nm", "drive torque that the controller adds")] = NO_TORQUES
 
 
 def steering(
@@ -307,5 +313,17 @@ def steering(
     """Return the `ActuatorCommand` of a controller that only steers, from the first six fields."""
     return new_message(
         ActuatorCommand,
-        (rear_rad, front_rad, desired_radps, prediction_rad, correction_rad, limited, NO_BRAKES, 0.0, None, 0.0),
+        (
+            rear_rad,
+            front_rad,
+            desired_radps,
+            prediction_rad,
+            correction_rad,
+            limited,
+            NO_BRAKES,
+            0.0,
+            None,
+            0.0,
+            NO_TORQUES,
+        ),
     )

@@ -15,7 +15,7 @@ from activesteer.controllers.variant import read_variant
 from activesteer.errors import ControllerError, shown
 from activesteer.plugins import Declared, Kind, Plugin, declared_in, find
 from activesteer.resources import list_controller_variants
-from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
+from activesteer.signals import NO_BRAKES, NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement
 
 
 class Controller(Protocol):
@@ -48,25 +48,32 @@ _MAX_ANGLE_RAD: Final = 1.0
 
 _MAX_TORQUE_NM: Final = 1e5
 """Largest torque of a command: more than any brake or engine has [N m]."""
+_OF_WHEELS: Final = ("brake_torque_demand_Nm", "wheel_torque_demand_Nm")
+"""Fields of a command with a torque for each wheel."""
 _MAX_PRESSURE_PA: Final = 1e8
 """Largest pressure difference of a command: more than any brake gets [Pa]."""
 
 
 @dataclass(frozen=True)
 class _ControllerKind(Kind):
-    """Controllers, whose brake torques are four numbers in one field."""
+    """Controllers, whose torques of the wheels are four numbers in one field."""
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> ActuatorCommand:
         """Return a command whose other fields are checked too; see the base class."""
-        torques = command.brake_torque_demand_Nm
-        if torques is not NO_BRAKES and not _are_torques(torques):
-            needed = f"four finite torques of at most {_MAX_TORQUE_NM:g} Nm, fl fr rl rr, are needed"
-            raise self.fail(name, f"{said} brake_torque_demand_Nm = {shown(torques)}; {needed}", torques)
+        for field in _OF_WHEELS:
+            torques = getattr(command, field)
+            if torques is NO_BRAKES or torques is NO_TORQUES:
+                continue
+            if not _are_torques(torques):
+                needed = f"four finite torques of at most {_MAX_TORQUE_NM:g} Nm, fl fr rl rr, are needed"
+                raise self.fail(name, f"{said} {field} = {shown(torques)}; {needed}", torques)
+            # A list or an array is allowed, but the native step takes a tuple.
+            if not isinstance(torques, tuple):
+                command = command._replace(**{field: tuple(torques)})
         if command.estimate is not None and not _is_estimate(command.estimate):
             problem = f"{said} estimate = {shown(command.estimate)}; an activesteer.Estimate is needed"
             raise self.fail(name, problem, command.estimate, Estimate)
-        # A list or an array is allowed, but the native step takes a tuple.
-        return command if isinstance(torques, tuple) else command._replace(brake_torque_demand_Nm=tuple(torques))
+        return command
 
 
 def _is_estimate(given: Any) -> bool:
@@ -97,7 +104,7 @@ CONTROLLER: Final = _ControllerKind(
         "side_difference_Pa": Range(0.0, _MAX_PRESSURE_PA),
     },
     error=ControllerError,
-    unchecked=("brake_torque_demand_Nm", "estimate"),
+    unchecked=(*_OF_WHEELS, "estimate"),
     data=list_controller_variants,
     reserved=tuple(field.name for field in fields(ControllerParameters)),
 )

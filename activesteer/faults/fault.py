@@ -28,8 +28,8 @@ class Actuator(NamedTuple):
     by_ratio: bool = False
 
     @property
-    def is_brake(self) -> bool:
-        """True for a brake: its demand is a torque, and it has one stop only."""
+    def has_torque(self) -> bool:
+        """True for a brake or a motor: its demand is a torque, and it has one stop only."""
         return self.unit == "Nm"
 
 
@@ -61,20 +61,23 @@ def _sensors() -> dict[str, Sensor]:
     return found
 
 
+MOTOR: Final = "motor_"
+"""Beginning of the parts that are electric motors; their places follow."""
 ACTUATORS: Final = {
     "rear": Actuator(("rl_steer", "rr_steer")),
     "rear_left": Actuator(("rl_steer",)),
     "rear_right": Actuator(("rr_steer",)),
     "superposition": Actuator(("superposition",), by_ratio=True),
     **{f"{corner}_brake": Actuator((f"{corner}_brake",), "Nm") for corner in CORNERS},
+    **{f"{MOTOR}{place}": Actuator((f"{MOTOR}{place}",), "Nm") for place in ("front", "rear", *CORNERS)},
 }
 """Part -> its actuators."""
 SENSORS: Final = _sensors()
 """Part -> its signal."""
 
 KINDS: Final = {
-    "stuck": "an actuator stays where it is, a brake at its torque, a sensor at its last reading",
-    "runaway": "an actuator runs to its stop, a brake to its strength, a sensor reads the end of its range",
+    "stuck": "an actuator stays where it is, a brake or motor at its torque, a sensor at its last reading",
+    "runaway": "an actuator runs to its stop, brake and motor to their strength, a sensor reads the end of its range",
     "float": "a steering actuator is cut from its drive and moves freely",
     "offset": "the demand of an actuator, or the reading of a sensor, has an offset",
     "reversed": "demand or reading has the opposite sign",
@@ -91,8 +94,8 @@ class Fault:
     """A fault of one part."""
 
     part: str
-    """Faulty part: `rear`, `rear_left`, `rear_right`, `superposition`, `fl_brake` and the other brakes, or a sensor
-    such as `yaw_rate_sensor`."""
+    """Faulty part: `rear`, `rear_left`, `rear_right`, `superposition`, `fl_brake` and the other brakes, an electric
+    motor (`motor_front`, `motor_rear`, `motor_rl` ...), or a sensor such as `yaw_rate_sensor`."""
     kind: str
     """Effect: `stuck`, `runaway`, `float`, `offset`, `reversed`, `delayed` or `dropout`."""
     start_s: Annotated[float, Range(0.0)]
@@ -111,7 +114,7 @@ class Fault:
     size_mps2: float | None = None
     """The same for an acceleration sensor [m/s2]."""
     size_Nm: float | None = None
-    """Offset of a brake [N m]."""
+    """Offset of a brake, or of a motor at its wheels [N m]."""
     size_Pa: float | None = None
     """The same for a brake pressure sensor [Pa]."""
     delay_s: Annotated[float, Range(0.001, 10.0)] | None = None
@@ -142,10 +145,9 @@ class Fault:
             raise ManeuverError(
                 "a sensor cannot move freely; use dropout for a broken wire", key="kind", value=self.kind
             )
-        if self.kind in ("float", "reversed") and self._is_brake:
-            raise ManeuverError(
-                "a brake cannot float or be reversed; use dropout to leave it open", key="kind", value=self.kind
-            )
+        if (self.kind == "float" and self._has_torque) or (self.kind == "reversed" and self._is_brake):
+            problem = "a brake cannot float or be reversed, and a motor cannot float; use dropout to leave it open"
+            raise ManeuverError(problem, key="kind", value=self.kind)
         if self.end_s is not None and self.end_s <= self.start_s:
             raise ManeuverError(
                 f"is {self.end_s:g} s; the fault begins at {self.start_s:g} s (start_s)", key="end_s", value=self.end_s
@@ -169,14 +171,18 @@ class Fault:
         if self.kind == "delayed":
             return "delay_s"
         if self.kind == "runaway" and self.part in ACTUATORS:
-            return None if self._is_brake else "side"
+            return None if self._has_torque else "side"
         if self.kind in ("offset", "runaway"):
             return f"size_{(ACTUATORS.get(self.part) or SENSORS[self.part]).unit}"
         return None
 
     @property
+    def _has_torque(self) -> bool:
+        return self.part in ACTUATORS and ACTUATORS[self.part].has_torque
+
+    @property
     def _is_brake(self) -> bool:
-        return self.part in ACTUATORS and ACTUATORS[self.part].is_brake
+        return self._has_torque and not self.part.startswith(MOTOR)
 
     @property
     def size(self) -> float:

@@ -60,7 +60,7 @@ class Scenario:
         car = self.car.config
         return DriverSetup(
             car.single_track, self.driver.parameters, car.steering.ratio, car.steering.steering_wheel_limit_rad,
-            rack_per_steering_wheel_m, Drive(car.powertrain), wheel_radius_m, timestep_s, self.driver.own,
+            rack_per_steering_wheel_m, Drive(car.drive), wheel_radius_m, timestep_s, self.driver.own,
         )  # fmt: skip
 
 

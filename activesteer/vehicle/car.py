@@ -18,6 +18,7 @@ from activesteer.road.road import Road
 from activesteer.sensors import SensorBlock
 from activesteer.sensors.block import speed_radii
 from activesteer.signals import (
+    NO_TORQUES,
     ActuatorCommand,
     DriverCommand,
     Estimate,
@@ -36,6 +37,7 @@ from activesteer.vehicle.equilibrium import static_ride
 from activesteer.vehicle.estimate_row import write_estimate
 from activesteer.vehicle.implicit_plan import ImplicitPlan, drop_metric
 from activesteer.vehicle.loading import load_model
+from activesteer.vehicle.motor_records import ENERGY, ElectricDrive
 from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.parameters import VehicleParameters
@@ -95,7 +97,8 @@ class Vehicle(Uncopyable):
             self._brake_setup, self._brake_state = np.zeros(1, BRAKE_SETUP), np.zeros(1, BRAKE_STATE)
             self._brake_row = self._brake_state.view(np.float64)
             measured = np.empty(0) if self._sensors is None else self._sensors.outputs
-            self.rows = RecordedArrays(self.model, self.data, measured, self._brake_row)
+            self._electric = ElectricDrive.of(parameters.motors, parameters.battery, timestep_s)
+            self.rows = RecordedArrays(self.model, self.data, measured, self._brake_row, self._electric.state)
             self._estimate_memory: memoryview | None = None
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
@@ -115,13 +118,14 @@ class Vehicle(Uncopyable):
         root = model.joint(find(model, mujoco.mjtObj.mjOBJ_JOINT, "root"))
         if root.qposadr[0] or root.dofadr[0]:
             raise ModelError("the free joint 'root' of the chassis must be the first joint of the model")
-        self._wheels = WheelSet(model, data, self.parameters.powertrain)
+        self._wheels = WheelSet(model, data, self.parameters)
         self.actuators = ActuatorRecords(model)
         ratio, brakes = self.parameters.steering.ratio, (self._brake_setup, self._brake_state)
         self._implicit = ImplicitPlan(model, data)
         self._bindings = bind_step(
-            model, data, self._implicit.plan, self.rows.live(), self._wheels.torques, ratio, self._sensors, brakes
-        )
+            model, data, self._implicit.plan, self.rows.live(), self._wheels.torques, ratio, self._sensors, brakes,
+            self._electric,
+        )  # fmt: skip
         self._address = self._bindings.ctypes.data
         self._tape: Tape | None = None
         self._tape_address = self._bindings["tape"]
@@ -159,6 +163,7 @@ class Vehicle(Uncopyable):
         data.qvel[self._wheels.spins] = speed_mps / self._wheels.heights_m()
         data.time = time_s
         reset(self._brake_state, self._brake_setup, speed_mps)
+        self._electric.state[:] = 0.0
         mujoco.mj_forward(self.model, data)
         drop_metric(self.model, data)
         if self._sensors is not None:
@@ -186,6 +191,7 @@ class Vehicle(Uncopyable):
         data.qpos[0], data.qpos[1] = cos * x + sin * y, -sin * x + cos * y
         turn_chassis_back(data, half)
         data.time = 0.0
+        self._electric.state[ENERGY : ENERGY + 1] = 0.0
         self._forces["areas_felt"] = 1.0
         mujoco.mj_forward(self.model, data)
         drop_metric(self.model, data)
@@ -215,6 +221,8 @@ class Vehicle(Uncopyable):
         try:
             if self._estimate_memory is not None and (estimate := actuator_command.estimate) is not None:
                 write_estimate(self._estimate_memory, 0, *estimate)
+            if (added := actuator_command.wheel_torque_demand_Nm) is not NO_TORQUES:
+                self._wheels.check_driven(added)
             torques = driver_command.wheel_torques
             gear = driver_command.gear if torques is None else CLUTCH_OPEN
             if gear != self._gear:
@@ -342,7 +350,7 @@ class Vehicle(Uncopyable):
         self.channels.add_estimate()
 
     def save_state(self) -> NDArray[np.float64]:
-        """Return the complete state of engine, brakes, sensors and gear, from which a run continues bit-identically."""
+        """Return the state of engine, brakes, motors, sensors and gear, from which a run continues bit-identically."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
         return np.concatenate((state, *self._memory(), (self._gear,)))
@@ -364,9 +372,9 @@ class Vehicle(Uncopyable):
         self._engage(state[-1])
 
     def _memory(self) -> list[NDArray[np.float64]]:
-        """Memory apart from the engine's state: brakes, sensors, the estimate, and the engine's present sensor data."""
+        """Memory apart from the engine's state: brakes, motors, sensors, estimate, the engine's present sensor data."""
         sensors = [] if self._sensors is None else [self._sensors.memory]
-        return [self._brake_row, self.data.sensordata, self.rows.estimate, *sensors]
+        return [self._brake_row, self._electric.state, self.data.sensordata, self.rows.estimate, *sensors]
 
     def adopt_model(self, model: mujoco.MjModel) -> None:
         """Take over all numbers of another model of the same car, such as a mass changed at run time.
@@ -395,6 +403,11 @@ class Vehicle(Uncopyable):
     def brakes(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """`BRAKE_SETUP` and `BRAKE_STATE` of the car, shape (1,) each, as views to read."""
         return self._brake_setup, self._brake_state
+
+    @property
+    def electric(self) -> ElectricDrive:
+        """Motors and battery, as views to read; a fault changes `motors`."""
+        return self._electric
 
     @property
     def sensors(self) -> SensorBlock | None:

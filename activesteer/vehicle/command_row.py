@@ -52,6 +52,8 @@ CARRIED_OUT: Final = tuple(name for name, number in _NUMBERS.items() if number.r
 """Names of the numbers that the car acts on; the others are for the recording only."""
 BRAKES: Final = COMMANDS.index("fl_brake_torque_demand_Nm")
 """Place of the brake torque of the first wheel in a row."""
+TORQUES: Final = COMMANDS.index("fl_wheel_torque_demand_Nm")
+"""Place of the additional drive torque of the first wheel in a row."""
 DRIVER_COMMAND, ACTUATOR_COMMAND = native_type(DriverCommand), native_type(ActuatorCommand)
 """The commands as compiled code takes them from Python."""
 _SIZE_DRIVER: Final = 8 * len(numbers_of(DriverCommand))

@@ -16,9 +16,10 @@ import mujoco
 from numpy.typing import NDArray
 
 from activesteer.errors import ManeuverError
-from activesteer.faults import ACTUATORS, ANGLE_SENSOR, SENSORS, Fault
+from activesteer.faults import ACTUATORS, ANGLE_SENSOR, MOTOR, SENSORS, Fault
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.vehicle.car import Vehicle
+from activesteer.vehicle.motor_records import FULL_TORQUE_NM, HEALTHY
 from activesteer.vehicle.named_parts import find
 
 Step = Callable[[DriverCommand, ActuatorCommand], tuple[Measurement, Motion]]
@@ -55,7 +56,7 @@ class Faults:
             ManeuverError: this car does not have one of the parts.
         """
         self._vehicle = vehicle
-        self._acting: list[_ActuatorFault | _SensorFault] = []
+        self._acting: list[_ActuatorFault | _MotorFault | _SensorFault] = []
         vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
         for fault in faults:
             if fault.part in SENSORS:
@@ -65,7 +66,8 @@ class Faults:
                 if fault.part in ("rear_left", "rear_right") and vehicle.parameters.rear_actuator.is_central:
                     problem = "is no part of this car, whose rear_actuator.arrangement is 'central'; rear is"
                     raise ManeuverError(f"{fault.part!r} {problem}", key="part", value=fault.part, allowed=["rear"])
-                self._acting += [_ActuatorFault(fault, name, vehicle) for name in members]
+                kind = _MotorFault if fault.part.startswith(MOTOR) else _ActuatorFault
+                self._acting += [kind(fault, name, vehicle) for name in members]
 
     def stretches(self, first: int, last: int) -> Iterator[Stretch]:
         """Divide a range of steps where a fault begins or ends.
@@ -113,9 +115,9 @@ class Faults:
         for acting, memory in zip(self._acting, copy.deepcopy(state), strict=True):
             acting.memory = memory
 
-    def _watched(self, watching: Sequence[_ActuatorFault | _SensorFault], begin: int) -> Step:
+    def _watched(self, watching: Sequence[_ActuatorFault | _MotorFault | _SensorFault], begin: int) -> Step:
         vehicle = self._vehicle
-        delays = [acting for acting in watching if isinstance(acting, _ActuatorFault)]
+        delays = [acting for acting in watching if not isinstance(acting, _SensorFault)]
         sensors = [(acting, acting.begins <= begin) for acting in watching if isinstance(acting, _SensorFault)]
 
         def step(driver_command: DriverCommand, actuator_command: ActuatorCommand) -> tuple[Measurement, Motion]:
@@ -174,7 +176,7 @@ class _ActuatorFault:
         elif len(self._screw) == 2 and kind == "float":
             # The nut is off its thread and moves freely between the end stops.
             self._screw[0]["backlash_m"] = 4.0 * self._screw[1]["stop_m"]
-        elif kind == "stuck" and ACTUATORS[self.fault.part].is_brake:
+        elif kind == "stuck" and ACTUATORS[self.fault.part].has_torque:
             if not self.memory:
                 self.memory.append(float(self._ctrl[self._index]))
             record["scale"], record["offset"] = 0.0, self.memory[0]
@@ -212,6 +214,54 @@ class _ActuatorFault:
     def after_step(self) -> None:
         """Keep the demand."""
         self.memory.append(float(self._ctrl[self._index]))
+
+
+class _MotorFault:
+    """A fault of an electric motor; attributes as those of `_ActuatorFault`."""
+
+    def __init__(self, fault: Fault, name: str, vehicle: Vehicle) -> None:
+        places = [place for place, _ in vehicle.parameters.motors]
+        if (place := name.removeprefix(MOTOR)) not in places:
+            motors = [MOTOR + each for each in places]
+            problem = f"is no part of this car, which has {', '.join(motors) or 'no electric motor ([motors])'}"
+            raise ManeuverError(f"{name!r} {problem}", key="part", value=fault.part, allowed=motors)
+        number = places.index(place)
+        self.fault = fault
+        self._record = vehicle.electric.motors[number : number + 1]
+        self._state = vehicle.electric.states[number : number + 1]
+        self.begins, self.ends = _steps(fault, vehicle.timestep_s)
+        self.watches = fault.delay_s is not None
+        delay = round((fault.delay_s or 0.0) / vehicle.timestep_s)
+        self.listens = self.begins - delay
+        self.memory: deque[float] = deque(maxlen=max(1, delay))
+
+    def engage(self) -> None:
+        """Activate the fault."""
+        record, kind = self._record, self.fault.kind
+        if kind == "stuck":
+            record["stuck"] = 1.0
+        elif kind == "offset":
+            record["offset"] = self.fault.size
+        else:
+            record["scale"] = -1.0 if kind == "reversed" else 0.0
+            record["offset"] = FULL_TORQUE_NM if kind == "runaway" else 0.0
+
+    def release(self) -> None:
+        """Restore the motor as built."""
+        for name, value in HEALTHY.items():
+            self._record[name] = value
+
+    def recover(self) -> None:
+        """Do nothing: the torque returns to its demand with its lag and rate."""
+
+    def before_step(self) -> None:
+        """Give the motor the delayed demand."""
+        if self._record["scale"] == 0.0:
+            self._record["offset"] = self.memory[0] if self.memory else self._state["demand_Nm"]
+
+    def after_step(self) -> None:
+        """Keep the demand."""
+        self.memory.append(float(self._state["demand_Nm"][0]))
 
 
 class _SensorFault:

@@ -58,12 +58,12 @@ compression, forces positive when they push apart."""
 
 ACTUATOR: Final = _record(
     "kind", "act", "low", "high", "scale", "offset", "lag_s", "rate_limit", "userdata", "stiffness", "drive_fraction",
-    "dof", "tendon", "vibration", "wound_limit", "record",
+    "dof", "tendon", "vibration", "wound_limit", "record", "motor",
 )  # fmt: skip
 """An actuator, in the model's order: its `KIND`, and the fields of that kind. `low` and `high` bound its command;
 `scale` and `offset` change the command, see `IN_ORDER`; the callback writes the rate of a tyre's state to `userdata`; a
 brake or friction acts on `dof` or `tendon`, the other one is negative; `record` is the place among `links` or
-`screws`."""
+`screws`; `motor` is 1 for the drive of a wheel that has a motor."""
 KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION, KIND_DRIVE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 """Kinds of actuators; `KIND_NONE` has no dynamics of ours."""
 KIND_LINK, KIND_SCREW, KIND_MOTOR = 6.0, 7.0, 8.0

@@ -101,6 +101,8 @@ def _compile(
             fit_motor(spec)
         fit_curve_axles(spec, parameters.curves)
         _fit_actuators(spec, parameters)
+        for corner in CORNERS:
+            spec.joint(f"{corner}_spin").armature += parameters.motors.inertia_kgm2(corner)
         apply_load(spec, parameters)
         block = _force_block(spec.compile(), parameters, tyres, road)
         start = sum(len(numeric.data) for numeric in spec.numerics)
@@ -156,12 +158,14 @@ def _force_block(
 ) -> NDArray[np.float64]:
     chassis = find(model, mujoco.mjtObj.mjOBJ_BODY, "chassis")
     aero, powertrain = parameters.aerodynamics, parameters.powertrain
+    share = parameters.engine_share
     header = fb.new_header(model, chassis, chain_to(model, chassis))
     header["drag_Ns2pm2"] = 0.5 * aero.air_density_kgpm3 * aero.drag_area_m2
     header["aero_point_m"] = _triple(aero.pressure_point_m)
-    header["engine_torque_Nm"], header["engine_power_W"] = powertrain.max_torque_Nm, powertrain.max_power_W
+    header["engine_torque_Nm"] = (share or 1.0) * powertrain.max_torque_Nm
+    header["engine_power_W"] = (share or 1.0) * powertrain.max_power_W
     header["engine_limit_radps"] = powertrain.max_wheel_speed_radps
-    header["engine_drag_Nm"], header["gear"] = powertrain.engine_brake_torque_Nm, CLUTCH_OPEN
+    header["engine_drag_Nm"], header["gear"] = share * powertrain.engine_brake_torque_Nm, CLUTCH_OPEN
     header["screw_sensors"], header["n_screw_sensors"] = sensor_range(model)
     for name in ("rack_friction", *(f"{corner}_damper_friction" for corner in CORNERS)):
         if _friction(name, parameters)[0] > 0.0:
@@ -227,7 +231,7 @@ def _wheel(
         low_speed_mps=fitment.low_speed_mps,
         low_speed_damping_Nspm=fitment.low_speed_damping_Nspm,
         spin_dof=int(model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_spin")]),
-        drive_fraction=parameters.powertrain.wheel_fractions[CORNERS.index(corner)],
+        drive_fraction=parameters.engine_fractions[CORNERS.index(corner)],
         chain_length=len(chain),
         chain=chain,
     )
@@ -277,8 +281,9 @@ def _dynamics(model: mujoco.MjModel, index: int, name: str, parameters: VehicleP
     if state in SLIP_RATES:
         return {"kind": fb.KIND_SLIP, "userdata": fb.output_slot(CORNERS.index(corner), SLIP_RATES[state])}
     if state == "drive":
-        fraction = parameters.powertrain.wheel_fractions[CORNERS.index(corner)]
-        return {"kind": fb.KIND_DRIVE, "drive_fraction": fraction, "lag_s": parameters.powertrain.lag_s}
+        fraction = parameters.engine_fractions[CORNERS.index(corner)]
+        motor, lag_s = float(parameters.motors.at(corner) is not None), parameters.powertrain.lag_s
+        return {"kind": fb.KIND_DRIVE, "drive_fraction": fraction, "lag_s": lag_s, "motor": motor}
     if name.endswith("_brake"):
         brakes = parameters.brakes
         rear_Nm = max(brakes.rear_torque_Nm, brakes.parking_torque_Nm)

@@ -26,12 +26,14 @@ from activesteer.vehicle.command_row import (
     BRAKES,
     COMMAND_ROW,
     DRIVER_COMMAND,
+    TORQUES,
     write_commands,
 )
 from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
 from activesteer.vehicle.native_memory import f64_pointer, pointer_to
+from activesteer.vehicle.native_motors import step_motors
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.step_bindings import N_SOURCES, N_WARNINGS, STEP_BINDINGS, TAPE
+from activesteer.vehicle.step_bindings import ENGINE, MOTOR, N_SOURCES, N_WARNINGS, STEP_BINDINGS, TAPE
 
 FASTEST_MPS: Final = 200.0
 """No car of this package drives faster; a run with a higher speed, or a speed that is NaN, has diverged [m/s]."""
@@ -139,6 +141,16 @@ def _record(bindings, tape):
     tape.room -= 1
 
 
+@inlined
+def _with_grip(setup, state, wheel, torque_Nm):
+    """Return a controller's torque at a wheel as traction control leaves it: less for a wheel that spins or locks."""
+    if setup.tcs == 0.0 or torque_Nm == 0.0:
+        return torque_Nm
+    faster_mps = state.wheel_mps[wheel] - state.reference_mps
+    excess_mps = (faster_mps if torque_Nm > 0.0 else -faster_mps) - setup.slip * abs(state.reference_mps)
+    return torque_Nm * min(max(2.0 - excess_mps / setup.spin_mps, 0.0), 1.0)
+
+
 _SENSED: Final = types.Tuple([types.boolean, native_type(Measurement), native_type(Motion)])
 
 
@@ -182,9 +194,13 @@ def step(bindings_address, driver_command, actuator_command, torques_set):
     ctrl[bindings.superposition] = commands.superposition_demand_rad * bindings.ratio
     ctrl[bindings.rear_left] = commands.rear_steer_demand_rad
     ctrl[bindings.rear_right] = commands.rear_steer_demand_rad
+    added_Nm = carray(f64_pointer(commands_address), (TORQUES + _N_WHEELS,))[TORQUES:]
     drive_torque_Nm = 0.0
     if commands.gear != CLUTCH_OPEN:
         drive_torque_Nm = commands.drive_torque_demand_Nm + commands.drive_torque_change_Nm
+        for wheel in range(_N_WHEELS):
+            if bindings.driven_by[wheel] == ENGINE:
+                drive_torque_Nm += added_Nm[wheel]
     setup = carray(_setup_pointer(bindings.brake_setup), (1,))[0]
     state = carray(_state_pointer(bindings.brake_state), (1,))[0]
     sensors = carray(f64_pointer(bindings.sensordata), (bindings.sizes[0],))
@@ -202,6 +218,15 @@ def step(bindings_address, driver_command, actuator_command, torques_set):
             ctrl[bindings.drives[wheel]] = bindings.drive_fractions[wheel] * drive_torque_Nm + 0.0
             ctrl[bindings.brakes[wheel]] = commands.parking_brake * setup.parking_torque_Nm[wheel]
         ctrl[bindings.brakes[wheel]] += setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
+    if bindings.n_motors != 0:
+        if not torques_set and commands.gear != CLUTCH_OPEN:
+            for wheel in range(_N_WHEELS):
+                if bindings.driven_by[wheel] == MOTOR:
+                    ctrl[bindings.drives[wheel]] += _with_grip(setup, state, wheel, added_Nm[wheel])
+        step_motors(
+            bindings.motors, bindings.n_motors, bindings.battery, bindings.electric_state, ctrl, bindings.drives,
+            carray(f64_pointer(bindings.qvel), (bindings.n_dofs,)), bindings.spins, bindings.timestep_s, torques_set,
+        )  # fmt: skip
     advance(carray(implicit_plan_pointer(bindings.implicit), (1,))[0])
     sane, truth, motion = _sense(bindings)
     if bindings.tape != 0 and sane:

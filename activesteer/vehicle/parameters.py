@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, ClassVar, Final
 
@@ -13,6 +13,7 @@ from activesteer.sensors.parameters import Sensors
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle.axle_curves import Curves
+from activesteer.vehicle.electric_drive import Battery, Motors
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS
 from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle.superposition_actuator import SuperpositionActuator
@@ -115,7 +116,10 @@ class Friction:
 
 @dataclass(frozen=True)
 class Powertrain:
-    """Engine, gearbox and differentials: torque at the driven wheels and its distribution; see `powertrain`."""
+    """Engine, gearbox and differentials: torque at the driven wheels and its distribution; see `powertrain`.
+
+    On axles with motors the torques and the power are the limits of the driver's demand, which motors carry out.
+    """
 
     front_fraction: Fraction
     """Fraction of the drive torque at the front axle; each axle's part is split evenly [-]."""
@@ -287,15 +291,28 @@ class VehicleParameters:
     """Sensors; default ideal."""
     load: Load = Load()
     """Load; default none."""
+    motors: Motors = Motors()
+    """Electric motors; default none."""
+    battery: Battery = Battery()
+    """Battery of the motors; default without limits."""
     factors: Factors = Factors()
     """Factors; default 1."""
 
     def __post_init__(self) -> None:
-        """Refuse a factor without effect.
+        """Refuse keys without effect.
 
         Raises:
-            ParameterError: there is a factor on the lag of servos but no servo.
+            ParameterError: there is a factor on the lag of servos but no servo, a battery without a motor, or an
+                inertia or lag of an engine that drives no wheel.
         """
+        if self.battery != Battery() and not list(self.motors):
+            raise ParameterError("has no effect on a car without [motors]", key="battery")
+        engine = self.powertrain
+        if not any(self.engine_fractions):
+            for key, place in (("inertia_kgm2", "rotor_inertia_kgm2"), ("lag_s", "lag_s")):
+                if getattr(engine, key) != getattr(Powertrain, key):
+                    problem = f"has no effect: motors drive all driven wheels; motors.*.{place} is theirs"
+                    raise ParameterError(problem, key=f"powertrain.{key}", value=getattr(engine, key))
         lag = self.factors.servo_lag
         if lag != 1.0 and self.rear_actuator.is_screw and self.superposition_actuator.is_geared:
             raise ParameterError(
@@ -303,3 +320,28 @@ class VehicleParameters:
                 key="factors.servo_lag",
                 value=lag,
             )
+
+    @property
+    def engine_fractions(self) -> tuple[float, float, float, float]:
+        """Fraction of the engine's torque at each wheel [-], order of `CORNERS`; all 0 without an engine."""
+        share = self.engine_share or 1.0
+        front, _, rear, _ = self.powertrain.wheel_fractions
+        front, rear = (0.0 if self.motors.on(ax) else part / share for ax, part in (("front", front), ("rear", rear)))
+        return front, front, rear, rear
+
+    @property
+    def engine_share(self) -> float:
+        """Part of the driver's demand that the engine carries out and not the motors [-]."""
+        front = self.powertrain.front_fraction
+        return 1.0 - sum(part for axle, part in (("front", front), ("rear", 1.0 - front)) if self.motors.on(axle))
+
+    @property
+    def drive(self) -> Powertrain:
+        """The powertrain as its driver knows it: with limits that the motors of each axle can carry out."""
+        engine, (front, _, rear, _) = self.powertrain, self.powertrain.wheel_fractions
+        torques_Nm, powers_W = [engine.max_torque_Nm], [engine.max_power_W]
+        for axle, fraction in (("front", 2.0 * front), ("rear", 2.0 * rear)):
+            if fraction > 0.0 and (motors := self.motors.on(axle)):
+                torques_Nm.append(sum(motor.wheel_torque_Nm for motor in motors) / fraction)
+                powers_W.append(sum(motor.power_W for motor in motors) / fraction)
+        return replace(engine, max_torque_Nm=min(torques_Nm), max_power_W=min(powers_W))

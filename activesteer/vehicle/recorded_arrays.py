@@ -17,14 +17,16 @@ def engine_arrays(data: mujoco.MjData) -> dict[str, Array]:
 
 
 class RecordedArrays:
-    """The engine's arrays, the last commands, the measurement, the state of the brakes, and the estimate.
+    """The engine's arrays, the last commands, the measurement, the states of brakes and motors, and the estimate.
 
     Attributes:
         commands: Last commands of driver and controller, as `write_commands` leaves them.
         estimate: Fields of an `Estimate`; empty if none is recorded.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, measured: Array, brakes: Array) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, measured: Array, brakes: Array, electric: Array
+    ) -> None:
         """Collect the arrays of a car.
 
         Args:
@@ -32,9 +34,10 @@ class RecordedArrays:
             data: Its state.
             measured: Outputs of the sensors; empty with ideal sensors.
             brakes: A `BRAKE_STATE` as numbers.
+            electric: State of an `ElectricDrive`.
         """
         self._model, self._data = model, data
-        self._measured, self._brakes = measured, brakes
+        self._measured, self._brakes, self._electric = measured, brakes, electric
         self.commands: Array = np.zeros(len(COMMANDS))
         self.estimate: Array = np.empty(0)
 
@@ -68,5 +71,6 @@ class RecordedArrays:
             commands=commands,
             measured=self._measured,
             brakes=self._brakes,
+            electric=self._electric,
             estimate=self.estimate,
         )

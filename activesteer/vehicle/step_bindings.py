@@ -13,12 +13,15 @@ from activesteer.conventions import CORNERS
 from activesteer.sensors.block import SensorBlock
 from activesteer.vehicle.channels.raw_rows import RawRows
 from activesteer.vehicle.engine_layout import engine_layout
+from activesteer.vehicle.motor_records import ElectricDrive
 from activesteer.vehicle.named_parts import find, sensor_columns
 
 N_SOURCES: Final = len(RawRows._fields)
 """Number of arrays that a row is copied from."""
 N_WARNINGS: Final = len(mujoco.mjtWarning.__members__) - 1
 _N_WHEELS: Final = len(CORNERS)
+NOTHING, ENGINE, MOTOR = 0, 1, 2
+"""Sources of a wheel's drive torque."""
 
 
 class Wheels(NamedTuple):
@@ -27,12 +30,16 @@ class Wheels(NamedTuple):
     Attributes:
         drives: Places of the drive torques in `ctrl`.
         brakes: Places of the brake torques in `ctrl`.
-        drive_fractions: Fraction of the drive torque that each wheel gets.
+        drive_fractions: Fraction of the driver's demand that each wheel gets.
+        driven_by: `ENGINE`, `MOTOR` or `NOTHING` for each wheel.
+        spins: Their degrees of freedom of rotation.
     """
 
     drives: Sequence[int]
     brakes: Sequence[int]
     drive_fractions: Sequence[float]
+    driven_by: Sequence[int]
+    spins: Sequence[int]
 
 
 _INPUTS: Final = {
@@ -49,7 +56,7 @@ _SENSORS: Final = {
 """Name of a sensor in the step -> its name in the model; bound by its first place in `sensordata`."""
 _ADDRESSES: Final = (
     "implicit", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "positions", "quaternions",
-    "n_bodies", "brake_setup", "brake_state", "tape",
+    "n_bodies", "brake_setup", "brake_state", "tape", "n_motors", "motors", "battery", "electric_state",
 )  # fmt: skip
 STEP_BINDINGS: Final = np.dtype(
     (
@@ -57,7 +64,7 @@ STEP_BINDINGS: Final = np.dtype(
         [
             *((name, np.intp) for name in (*_ADDRESSES, *_INPUTS, *_SENSORS)),
             ("ratio", np.float64),
-            *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes")),
+            *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes", "driven_by", "spins")),
             ("drive_fractions", np.float64, (_N_WHEELS,)),
             *((name, np.intp) for name in ("n_sensors", "sensors", "sensor_memory", "sensor_memory_size")),
             ("timestep_s", np.float64),
@@ -102,6 +109,7 @@ def bind_step(
     ratio: float,
     sensors: SensorBlock | None,
     brakes: tuple[NDArray[Any], NDArray[Any]],
+    electric: ElectricDrive,
 ) -> NDArray[Any]:
     """Look up all addresses and indices.
 
@@ -114,6 +122,7 @@ def bind_step(
         ratio: Overall steering ratio.
         sensors: Sensors between the truth and the measurement; None for ideal sensors.
         brakes: `BRAKE_SETUP` and `BRAKE_STATE`.
+        electric: Motors and battery.
 
     Returns:
         The bindings, shape (1,), at a fixed address, without a tape.
@@ -136,6 +145,10 @@ def bind_step(
         "n_bodies": model.nbody - 1,
         "brake_setup": brakes[0].ctypes.data,
         "brake_state": brakes[1].ctypes.data,
+        "n_motors": len(electric.motors),
+        "motors": electric.motors.ctypes.data,
+        "battery": electric.battery.ctypes.data,
+        "electric_state": electric.state.ctypes.data,
         **{name: find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) for name, actuator in _INPUTS.items()},
         **{name: sensor_columns(model, sensor).start for name, sensor in _SENSORS.items()},
     }

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import mujoco
 import numpy as np
 
 from activesteer.conventions import CORNERS, Array
+from activesteer.errors import ParameterError
 from activesteer.signals import WheelTorques
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.named_parts import find
-from activesteer.vehicle.parameters import Powertrain
+from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.step_bindings import Wheels
+from activesteer.vehicle.step_bindings import ENGINE, MOTOR, NOTHING, Wheels
 
 _CALIBRATED_AT_MPS: Final = 20.0
 """Speed at which the rolling radii are taken that turn wheel speeds into the speed of the car [m/s]."""
@@ -29,13 +31,13 @@ class WheelSet:
         spins: Their degrees of freedom of rotation.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, powertrain: Powertrain) -> None:
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, parameters: VehicleParameters) -> None:
         """Look the wheels up.
 
         Args:
             model: The car.
             data: Its state.
-            powertrain: The drive.
+            parameters: Contents of the vehicle file.
 
         Raises:
             ModelError: the model lacks a part of a wheel.
@@ -44,21 +46,43 @@ class WheelSet:
         def found(kind: mujoco.mjtObj, ending: str) -> list[int]:
             return [find(model, kind, corner + ending) for corner in CORNERS]
 
-        self._model, self._data, self._ctrl, self._powertrain = model, data, data.ctrl, powertrain
+        self._model, self._data, self._ctrl = model, data, data.ctrl
+        self._engine_kgm2 = [parameters.powertrain.inertia_kgm2 * part for part in parameters.engine_fractions]
+        driven_by = [
+            MOTOR if parameters.motors.at(corner) else ENGINE if fraction > 0.0 else NOTHING
+            for corner, fraction in zip(CORNERS, parameters.engine_fractions, strict=True)
+        ]
+        self._driven = [corner for corner, source in zip(CORNERS, driven_by, strict=True) if source != NOTHING]
+        self.spins: list[int] = model.jnt_dofadr[found(mujoco.mjtObj.mjOBJ_JOINT, "_spin")].tolist()
         self.torques = Wheels(
             found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_drive"),
             found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_brake"),
-            powertrain.wheel_fractions,
+            parameters.powertrain.wheel_fractions,
+            driven_by,
+            self.spins,
         )
-        self.spins: list[int] = model.jnt_dofadr[found(mujoco.mjtObj.mjOBJ_JOINT, "_spin")].tolist()
         self._bodies = found(mujoco.mjtObj.mjOBJ_BODY, "_wheel")
         self._armature_kgm2: list[float] = model.dof_armature[self.spins].tolist()
 
     def engage(self, gear: float) -> None:
         """Couple the engine to the driven wheels, each of which then carries its part of the inertia, or free them."""
-        inertia_kgm2 = 0.0 if gear == CLUTCH_OPEN else self._powertrain.inertia_kgm2
-        for dof, own, fraction in zip(self.spins, self._armature_kgm2, self._powertrain.wheel_fractions, strict=True):
-            self._model.dof_armature[dof] = own + fraction * inertia_kgm2
+        for dof, own, engine in zip(self.spins, self._armature_kgm2, self._engine_kgm2, strict=True):
+            self._model.dof_armature[dof] = own + (0.0 if gear == CLUTCH_OPEN else engine)
+
+    def check_driven(self, torques_Nm: Sequence[float]) -> None:
+        """Check that no torque is demanded of a wheel without a drive.
+
+        Raises:
+            ParameterError: one is.
+        """
+        for corner, torque in zip(CORNERS, torques_Nm, strict=True):
+            if torque != 0.0 and corner not in self._driven:
+                raise ParameterError(
+                    f"demands {torque:g} N m at {corner}, which nothing drives; driven are {', '.join(self._driven)}, "
+                    "and [motors] in the vehicle file can drive any wheel",
+                    key="wheel_torque_demand_Nm",
+                    value=torque,
+                )
 
     def apply(self, torques: WheelTorques) -> None:
         """Set the torques of single wheels, at once and without the limits of the engine."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import mujoco
 import numpy as np
 
 from activesteer.vehicle.channels.raw_rows import Actuator, Column, Signal, sensor, signal
+from activesteer.vehicle.electric_drive import Motors
 from activesteer.vehicle.named_parts import is_there
 from activesteer.vehicle.superposition_actuator import MOTOR, NAME
 from activesteer.vehicle.toe_link_screws import SCREW
@@ -50,6 +52,29 @@ def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
             (flag, "", "1 at a limit of angle, speed, torque or supply of the motor", limited),
         ):
             yield signal("vehicle", f"{name}_{what}", unit, f"{meaning} {words}", values)
+
+
+def electric_signals(motors: Motors) -> Iterator[Signal]:
+    """Yield the signals of electric motors on wheels or axles, and of their battery."""
+    if not list(motors):
+        return
+    place = itertools.count()
+    for name, unit, meaning in (
+        ("power_W", "W", "power at the terminals of the battery, positive when it gives power"),
+        ("energy_J", "J", "energy that the battery has given since the start"),
+        ("limited", "", "1 while a limit of the battery reduces the torques"),
+    ):
+        yield signal("vehicle", f"battery_{name}", unit, meaning, Column("electric", next(place)))
+    for motor, _ in motors:
+        for name, unit, meaning in (
+            ("torque_Nm", "Nm", "torque at its wheels together, forward positive"),
+            ("difference_Nm", "Nm", "torque of the right wheel less that of the left one"),
+            ("demand_Nm", "Nm", "torque demand at its wheels together"),
+            ("power_W", "W", "electric power, positive when it drives"),
+            ("limited", "", "1 while a limit of speed, torque, power or battery acts"),
+        ):
+            column = Column("electric", next(place))
+            yield signal("vehicle", f"motor_{motor}_{name}", unit, f"{meaning}, motor {motor}", column)
 
 
 def _has_motor(model: mujoco.MjModel, name: str) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.sensors.block import MEASURED
-from activesteer.vehicle.channels.actuators import actuator_signals, motor_signals
+from activesteer.vehicle.channels.actuators import actuator_signals, electric_signals, motor_signals
 from activesteer.vehicle.channels.car_motion import MOTION_CHANNELS, CarMotion, motion_copied, motion_inputs
 from activesteer.vehicle.channels.corners import brake_signals, corner_signals
 from activesteer.vehicle.channels.links import link_signals
@@ -69,6 +69,7 @@ class ChannelMap:
                 if number.recorded is not None
             ),
             *brake_signals(),
+            *electric_signals(parameters.motors),
             signal(
                 "vehicle", "active_faults", "", "number of active faults of actuators and sensors",
                 Column("userdata", model.nuserdata - 1),

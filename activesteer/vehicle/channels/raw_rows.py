@@ -28,6 +28,8 @@ class RawRows(NamedTuple):
     """Measurement on which driver and controller based their commands; empty with ideal sensors."""
     brakes: Array
     """A `BRAKE_STATE`."""
+    electric: Array
+    """State of an `ElectricDrive`; empty without motors."""
     estimate: Array
     """Fields of an `Estimate`; empty without an estimator."""
 

@@ -74,6 +74,8 @@ def test_commands_are_recorded_as_they_were_given():
         "prediction_rad": 0.004, "correction_rad": -0.014, "controller_saturated": 1.0,
         "fl_brake_torque_demand_Nm": 10.0, "fr_brake_torque_demand_Nm": 20.0, "rl_brake_torque_demand_Nm": 30.0,
         "rr_brake_torque_demand_Nm": 40.0, "drive_torque_change_Nm": -50.0, "side_difference_Pa": 0.0,
+        "fl_wheel_torque_demand_Nm": 0.0, "fr_wheel_torque_demand_Nm": 0.0, "rl_wheel_torque_demand_Nm": 0.0,
+        "rr_wheel_torque_demand_Nm": 0.0,
     }  # fmt: skip
     assert {channel.name for channel in recorder.channels if channel.group == "control"} == set(given)
     assert {name: column(recorder, name)[0] for name in given} == given
