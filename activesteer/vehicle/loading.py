@@ -102,7 +102,8 @@ def _compile(
         fit_curve_axles(spec, parameters.curves)
         _fit_actuators(spec, parameters)
         for corner in CORNERS:
-            spec.joint(f"{corner}_spin").armature += parameters.motors.inertia_kgm2(corner)
+            if inertia_kgm2 := parameters.motors.inertia_kgm2(corner):
+                spec.joint(f"{corner}_spin").armature += inertia_kgm2
         apply_load(spec, parameters)
         block = _force_block(spec.compile(), parameters, tyres, road)
         start = sum(len(numeric.data) for numeric in spec.numerics)
