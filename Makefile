@@ -8,7 +8,7 @@ READY := $(VENV)/.ready-demo
 READY_DEV := $(VENV)/.ready-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all pytest pictures lint mutants format docs site wheel clean clean-kernels clean-amplitudes
+.PHONY: help demo test test-all pytest pictures lint mutants format docs site fmus wheel clean clean-kernels clean-amplitudes
 
 help:  ## what there is
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
@@ -51,6 +51,9 @@ docs: $(READY_DEV)  ## build the documentation, in build/docs; a warning is an e
 
 site: $(READY_DEV)  ## the same for a server, with search, in build/site; SITE_URL=https://... is where it will stand
 	HOSTED=true SITE_URL="$(SITE_URL)" NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir build/site
+
+fmus: $(READY)  ## build the example FMUs in build/fmus; needs a C compiler
+	$(BIN)/python examples/fmu/build.py build/fmus
 
 wheel: $(READY_DEV)  ## build dist/*.whl
 	$(BIN)/python -m build --wheel --no-isolation

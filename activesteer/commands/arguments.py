@@ -145,7 +145,9 @@ def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: s
         several: Whether the option may be repeated. `options.controller` then is a list, or None for the default.
         default: Default in words, for the help.
     """
-    words = "none, ars, afs or another of `activesteer list`, a variant's file, or my_file.py:MyController?gain=2"
+    words = (
+        "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
+    )
     parser.add_argument(
         "-c", "--controller", metavar="CONTROLLER",
         action="append" if several else "store", default=None if several else "none",
@@ -161,7 +163,8 @@ def add_driver(parser: argparse.ArgumentParser, default: str = "", *, several: b
         default: Default in words; `options.driver` is None by default then.
         several: Whether the option may be repeated. `options.driver` then is a list, or None.
     """
-    words = f"novice, typical, expert, a driver file, or my_file.py:MyDriver{'; may be repeated' if several else ''}"
+    more = "; may be repeated" if several else ""
+    words = f"novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu{more}"
     parser.add_argument(
         "--driver", action="append" if several else "store", default=None if default or several else DEFAULT_DRIVER,
         metavar="DRIVER", help=f"{words} (default: {default or DEFAULT_DRIVER})",

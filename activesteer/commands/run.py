@@ -29,6 +29,10 @@ def add_to(commands: Any) -> None:
     add_output(run, "FILE_OR_DIR", "a file *.mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
     run.add_argument("--replace", action="store_true", help="replace recordings of other settings")
     run.add_argument("--all", action="store_true", help="print all metrics, not only the key metrics of the manoeuvre")
+    run.add_argument(
+        "--isolate", type=float, nargs="?", const=5.0, metavar="SECONDS",
+        help="run each FMU in a process of its own, in which it may crash, or hang for this time (default: 5 s)",
+    )  # fmt: skip
     run.add_argument("--plot", action="store_true", help="also draw the runs: PNG and PDF")
     add_json(run)
     run.set_defaults(action=_run)
@@ -39,11 +43,13 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
     from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
+    from activesteer.coupling.fmu import isolated
     from activesteer.scenario import check_gains
     from activesteer.simulation.preparation import prepared
     from activesteer.simulation.runner import run_scenario
 
-    controllers = [find_controller(name) for name in options.controller or ["none"]]
+    options.driver = isolated(options.driver, options.isolate)
+    controllers = [find_controller(isolated(name, options.isolate)) for name in options.controller or ["none"]]
     scenario = scenario_of(options)
     # Check all controllers before the first run.
     for controller in controllers:

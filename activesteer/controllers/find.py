@@ -12,6 +12,7 @@ from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.registry import WITHOUT_FILE
 from activesteer.controllers.variant import read_variant
+from activesteer.coupling.fmu import find_fmu, is_fmu
 from activesteer.errors import ControllerError, shown
 from activesteer.plugins import Declared, Kind, Plugin, declared_in, find
 from activesteer.resources import list_controller_variants
@@ -124,7 +125,7 @@ def find_controller(given: Any) -> Plugin:
     if is_variant(given):
         variant = read_variant(given)
         return Plugin(CONTROLLER, variant.name, variant.name, variant, variant.gains, variant.files, ours=True)
-    return find(given, CONTROLLER)
+    return find_fmu(given, CONTROLLER) if is_fmu(given) else find(given, CONTROLLER)
 
 
 def is_variant(given: Any) -> bool:

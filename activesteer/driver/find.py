@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.config import Range
+from activesteer.coupling.fmu import find_fmu, is_fmu
 from activesteer.driver.base import DriverSetup
 from activesteer.driver.human import HumanDriver
 from activesteer.driver.parameters import DriverParameters
@@ -64,6 +65,7 @@ DRIVER: Final = _DriverKind(
     unchecked=("wheel_torques",),
     data=list_drivers,
     reserved=tuple(field.name for field in fields(DriverParameters)),
+    completes=True,
 )
 """Rules that all drivers follow."""
 
@@ -79,7 +81,7 @@ def find_driver(given: Any) -> Plugin:
         DriverError: there is no such driver.
     """
     if not is_driver_file(given):
-        return find(given, DRIVER)
+        return find_fmu(given, DRIVER) if is_fmu(given) else find(given, DRIVER)
     name = str(given.get("name", "driver")) if isinstance(given, Mapping) else Path(given).stem
     return Plugin(DRIVER, name, name, HumanDriver, {}, {}, ours=True)
 

@@ -91,7 +91,7 @@ def from_file(text: str, kind: Kind) -> FromFile:
             form["name"],
             own,
         )
-    return FromFile(origin, _parameters(form["parameters"] or "", fail), files)
+    return FromFile(origin, parse_parameters(form["parameters"] or "", fail), files)
 
 
 def is_user_module(name: str) -> bool:
@@ -193,7 +193,7 @@ def _imported_from(folder: Path, source: bytes) -> list[Path]:
     return files
 
 
-def _parameters(text: str, fail: Any) -> dict[str, Any]:
+def parse_parameters(text: str, fail: Any) -> dict[str, Any]:
     """Parse `gain=2&side="left"`. The text is split only where a name follows, so that a value can contain `&`."""
     parameters: dict[str, Any] = {}
     for part in re.split(r"&(?=[A-Za-z_]\w*=)", text) if text else ():

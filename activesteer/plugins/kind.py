@@ -40,6 +40,7 @@ class Kind:
         unchecked: Fields of the result that are not plain numbers.
         data: Function that returns the names of the blocks that are data files of the package.
         reserved: Keys of the table that no block of a user may have as its name.
+        completes: Whether `completed` fills in fields.
     """
 
     word: str
@@ -53,6 +54,7 @@ class Kind:
     unchecked: tuple[str, ...] = ()
     data: Callable[[], list[str]] = list
     reserved: tuple[str, ...] = ()
+    completes: bool = False
     _places: tuple[tuple[int, float, float], ...] = field(init=False)
     _unlimited: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
 

@@ -133,6 +133,8 @@ class Plugin:
         kind, origin = self.kind, self.origin
         if self.ours:
             return origin.from_vehicle(setup)
+        if getattr(origin, "checks_itself", False):
+            return self._created(setup)
         try:
             block = self._created(setup)
             has_step = callable(getattr(block, "step", None))
@@ -232,7 +234,7 @@ def find(given: Any, kind: Kind) -> Plugin:
         found = Plugin(kind, given, re.sub(r"[^\w=.+-]+", "_", label), origin, {}, files)
         if not takes_any(origin):
             written = read_values(found.declared, written, Source("", error=kind.error), (kind.table, found.key))
-        return _allowed(replace(found, parameters=written))
+        return allowed(replace(found, parameters=written))
     if not is_instance(given) and not callable(given):
         names = ", ".join(kind.names())
         needed = f"a name ({names}), a file ({kind.example}), a class, an object with the method step({kind.inputs})"
@@ -241,8 +243,8 @@ def find(given: Any, kind: Kind) -> Plugin:
     return _from_object(given, kind)
 
 
-def _allowed(plugin: Plugin) -> Plugin:
-    """Refuse a class with the name of a built-in block, or of a table of its keys."""
+def allowed(plugin: Plugin) -> Plugin:
+    """Return a plugin, but refuse a class with the name of a built-in block, or of a table of its keys."""
     if plugin.key in (reserved := (*plugin.kind.names(), *plugin.kind.reserved)):
         problem = f"a {plugin.kind.word} of your own cannot have the name {plugin.key!r}; rename it"
         raise plugin.kind.fail(plugin.name, problem, plugin.key, reserved)
@@ -271,7 +273,7 @@ def _from_object(given: Any, kind: Kind) -> Plugin:
     name = f"{next(iter(files))}:{label}" if files else label
     if isinstance(given, type) and not callable(getattr(given, "step", None)):
         raise kind.fail(name, f"{label} has no method step({kind.inputs})", given)
-    return _allowed(Plugin(kind, name, label, origin, parameters, files))
+    return allowed(Plugin(kind, name, label, origin, parameters, files))
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,14 +11,15 @@ from pathlib import Path
 from typing import Any, Final
 
 import activesteer
-from activesteer.controllers import is_variant, read_variant
+from activesteer.controllers import find_controller, is_variant, read_variant
+from activesteer.coupling.fmu import is_fmu
 from activesteer.plugins.file import source_of
 from activesteer.scenario import Scenario, describe
 from activesteer.version import __version__
 
 _DECIDING: Final = (
-    "config", "conventions.py", "signals.py", "theory", "road", "maneuver", "driver", "controllers", "estimation",
-    "tyre", "brakes", "sensors", "faults", "vehicle", "scenario", "simulation", "analysis",
+    "config", "conventions.py", "coupling", "signals.py", "theory", "road", "maneuver", "driver", "controllers",
+    "estimation", "tyre", "brakes", "sensors", "faults", "vehicle", "scenario", "simulation", "analysis",
 )  # fmt: skip
 """Parts of the package that a result depends on."""
 
@@ -71,7 +72,10 @@ def files_digest(scenario: Scenario) -> str:
 def controller_digest(controller: str) -> str:
     """Return the hash of a controller: its name, its parameters, and the source of a user's own controller."""
     path, _, name = controller.partition(":")
-    source = read_variant(controller).files if is_variant(controller) else source_of(controller)
+    if is_fmu(controller):
+        source: Any = {"fmu": find_controller(controller).origin.files}
+    else:
+        source = read_variant(controller).files if is_variant(controller) else source_of(controller)
     return digest({"name": f"{Path(path).name}:{name}", "source": source})
 
 

@@ -1,0 +1,5 @@
+"""FMUs for co-simulation, FMI 2.0 and 3.0, as controllers and drivers."""
+
+from activesteer.coupling.fmu.plugin import find_fmu, is_fmu, isolated
+
+__all__ = ["find_fmu", "is_fmu", "isolated"]

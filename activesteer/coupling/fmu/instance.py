@@ -1,0 +1,459 @@
+"""An instance of an FMU, called by function pointers, in this process or in one of its own.
+
+This file imports nothing of the package: run as a program, it is the process that an isolated instance lives in.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import json
+import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import weakref
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from typing import Any, Final, NamedTuple, Protocol
+
+_WARNING: Final = 1
+_FATAL: Final = 4
+_STATUS: Final = {2: "discard", 3: "error", 4: "fatal", 5: "pending"}
+_P, _I, _D, _N, _B, _S = (
+    ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_size_t, ctypes.c_bool, ctypes.c_char_p,
+)  # fmt: skip
+_MAX_STATE_BYTES: Final = 1 << 30
+_MAX_LOG: Final = 300
+START_LIMIT_S: Final = 30.0
+"""Least time that an isolated FMU gets to load and initialise [s]."""
+
+
+class FmuFault(Exception):  # noqa: N818 - a fault of the FMU
+    """An FMU failed: what it did, in words."""
+
+
+class Group(NamedTuple):
+    """Variables of one type, which one call sets or gets.
+
+    Attributes:
+        kind: Type in the names of FMI's functions.
+        form: Format of `struct` of an element.
+        references: Value references.
+        size: Number of elements of all variables together.
+    """
+
+    kind: str
+    form: str
+    references: list[int]
+    size: int
+
+
+class Spec(NamedTuple):
+    """Everything that an instance is made from.
+
+    Attributes:
+        library: Path of the shared library.
+        version: 2 or 3.
+        token: GUID or instantiation token.
+        resources: Path of the resources.
+        step_s: Time between two steps [s].
+        inputs: Inputs, group by group.
+        outputs: Outputs, group by group.
+        parameters: Parameters that differ from their start values, group by group, with their values.
+        name: Name of the instance.
+    """
+
+    library: str
+    version: int
+    token: str
+    resources: str
+    step_s: float
+    inputs: list[Group]
+    outputs: list[Group]
+    parameters: list[tuple[Group, list[float]]]
+    name: str
+
+
+class Instance(Protocol):
+    """An instance in this process or in another one. A saved state is a number."""
+
+    def step(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Set the inputs, advance by one step, and return the outputs."""
+        ...
+
+    def save(self) -> int:
+        """Save the state."""
+        ...
+
+    def restore(self, state: int) -> None:
+        """Return to a saved state."""
+        ...
+
+    def forget(self, state: int) -> None:
+        """Free a saved state."""
+        ...
+
+    def serialise(self, state: int) -> bytes:
+        """Return a saved state as bytes."""
+        ...
+
+    def deserialise(self, content: bytes) -> int:
+        """Return the saved state that bytes hold."""
+        ...
+
+    def close(self) -> None:
+        """Free the instance."""
+        ...
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = [("logger", _P), ("allocate", _P), ("free", _P), ("finished", _P), ("environment", _P)]
+
+
+class _Buffer:
+    """Memory of a group: references and elements at fixed addresses."""
+
+    def __init__(self, group: Group) -> None:
+        self._references = (ctypes.c_uint32 * len(group.references))(*group.references)
+        form = struct.Struct(f"={group.size}{group.form}")
+        self._pack, self.unpack = form.pack_into, form.unpack_from
+        self.memory, self.size = ctypes.create_string_buffer(max(1, form.size)), group.size
+        self._is_whole = group.form not in "df"
+        self.arguments = (ctypes.addressof(self._references), len(group.references), ctypes.addressof(self.memory))
+
+    def put(self, values: Sequence[float]) -> None:
+        self._pack(self.memory, 0, *(map(round, values) if self._is_whole else values))
+
+
+class LocalInstance:
+    """An instance in this process."""
+
+    def __init__(self, spec: Spec) -> None:
+        """Load the library, instantiate and initialise.
+
+        Raises:
+            FmuFault: the library cannot be loaded, lacks a function, or reports a failure.
+        """
+        self._spec, self._steps, self._step_s, self._log = spec, 0, spec.step_s, ""
+        self._flags: Any = None
+        self._prefix = f"fmi{spec.version}"
+        try:
+            self._library = ctypes.CDLL(spec.library)
+        except OSError as reason:
+            raise FmuFault(f"its library cannot be loaded: {reason}") from reason
+        self._states: dict[int, Any] = {}
+        self._component = self._instantiated()
+        self._finalizer = weakref.finalize(
+            self, _free, self._function("Terminate", _P), self._function("FreeInstance", _P, result=None),
+            self._component,
+        )  # fmt: skip
+        self._initialise()
+        self._sets = [self._access("Set", group) for group in spec.inputs]
+        self._gets = [self._access("Get", group) for group in spec.outputs]
+        if spec.version == 2:
+            self._do_step = self._function("DoStep", _P, _D, _D, _I)
+            self._last: tuple[Any, ...] = (1,)
+        else:
+            self._do_step = self._function("DoStep", _P, _D, _D, _B, _P, _P, _P, _P)
+            self._flags, self._time = (ctypes.c_bool * 3)(), ctypes.c_double()  # event, end, early return
+            at = ctypes.addressof(self._flags)
+            self._last = (False, at, at + 1, at + 2, ctypes.addressof(self._time))
+
+    def step(self, values: Sequence[float]) -> tuple[float, ...]:
+        """See `Instance`."""
+        first = 0
+        for call, buffer in self._sets:
+            size = buffer.size
+            buffer.put(values if size == len(values) else values[first : first + size])
+            first += size
+            if (status := call()) > _WARNING:
+                raise self._failed("Set", status)
+        status = self._do_step(self._component, self._steps * self._step_s, self._step_s, *self._last)
+        if status > _WARNING:
+            raise self._failed("DoStep", status)
+        if self._flags is not None and any(self._flags[1:]):
+            raise self._ended()
+        self._steps += 1
+        result: tuple[float, ...] = ()
+        for call, buffer in self._gets:
+            if (status := call()) > _WARNING:
+                raise self._failed("Get", status)
+            result += buffer.unpack(buffer.memory)
+        return result
+
+    def save(self) -> int:
+        """See `Instance`."""
+        state = ctypes.c_void_p()
+        name = f"Get{self._state}"
+        self._must(name, self._function(name, _P, _P)(self._component, ctypes.byref(state)))
+        return self._kept(state, self._steps)
+
+    def restore(self, state: int) -> None:
+        """See `Instance`."""
+        pointer, self._steps = self._states[state]
+        self._must(f"Set{self._state}", self._function(f"Set{self._state}", _P, _P)(self._component, pointer))
+
+    def forget(self, state: int) -> None:
+        """See `Instance`."""
+        pointer, _ = self._states.pop(state)
+        if self._finalizer.alive:
+            self._function(f"Free{self._state}", _P, _P)(self._component, ctypes.byref(pointer))
+
+    def serialise(self, state: int) -> bytes:
+        """See `Instance`."""
+        (pointer, steps), size = self._states[state], ctypes.c_size_t()
+        name = "SerializedFMUstateSize" if self._spec.version == 2 else "SerializedFMUStateSize"
+        self._must(name, self._function(name, _P, _P, _P)(self._component, pointer, ctypes.byref(size)))
+        if size.value > _MAX_STATE_BYTES:
+            raise FmuFault(f"says that its state has {size.value} bytes")
+        content, name = ctypes.create_string_buffer(max(1, size.value)), f"Serialize{self._state}"
+        self._must(name, self._function(name, _P, _P, _P, _N)(self._component, pointer, content, size))
+        return struct.pack("=q", steps) + content.raw[: size.value]
+
+    def deserialise(self, content: bytes) -> int:
+        """See `Instance`."""
+        (steps,), state = struct.unpack_from("=q", content), ctypes.c_void_p()
+        name = "DeSerializeFMUstate" if self._spec.version == 2 else "DeserializeFMUState"
+        call = self._function(name, _P, _S, _N, _P)
+        self._must(name, call(self._component, content[8:], len(content) - 8, ctypes.byref(state)))
+        return self._kept(state, steps)
+
+    def close(self) -> None:
+        """See `Instance`."""
+        self._finalizer()
+
+    @property
+    def _state(self) -> str:
+        """The word for a state in the names of functions."""
+        return "FMUstate" if self._spec.version == 2 else "FMUState"
+
+    def _kept(self, state: Any, steps: int) -> int:
+        number = max(self._states, default=0) + 1
+        self._states[number] = state, steps
+        return number
+
+    def _function(self, name: str, *arguments: Any, result: Any = _I) -> Any:
+        try:
+            return ctypes.CFUNCTYPE(result, *arguments)((f"{self._prefix}{name}", self._library))
+        except AttributeError:
+            raise FmuFault(f"its library has no function {self._prefix}{name}") from None
+
+    def _access(self, word: str, group: Group) -> tuple[Any, _Buffer]:
+        """Return function and memory that set or get a group."""
+        buffer = _Buffer(group)
+        sizes = () if self._spec.version == 2 else (group.size,)
+        call = self._function(f"{word}{group.kind}", _P, _P, _N, _P, *(_N for _ in sizes))
+        return functools.partial(call, self._component, *buffer.arguments, *sizes), buffer
+
+    def _instantiated(self) -> int:
+        """Return the address of a new instance."""
+        spec, name, token = self._spec, self._spec.name.encode(), self._spec.token.encode()
+        if spec.version == 2:
+            self._logger: Any = ctypes.CFUNCTYPE(None, _P, _S, _I, _S, _S)(self._said2)
+            libc = ctypes.CDLL(None)
+            addresses = [ctypes.cast(part, _P) for part in (self._logger, libc.calloc, libc.free)]
+            self._callbacks = _Callbacks(*addresses, None, None)
+            make = self._function("Instantiate", _S, _I, _S, _S, _P, _I, _I, result=_P)
+            resources = f"file://{spec.resources}".encode()
+            component = make(name, 1, token, resources, ctypes.byref(self._callbacks), 0, 0)
+        else:
+            self._logger = ctypes.CFUNCTYPE(None, _P, _I, _S, _S)(self._said3)
+            make = self._function("InstantiateCoSimulation", _S, _S, _S, _B, _B, _B, _B, _P, _N, _P, _P, _P, result=_P)
+            logger = ctypes.cast(self._logger, _P)
+            resources = os.path.join(spec.resources, "").encode()
+            component = make(name, token, resources, False, False, False, False, None, 0, None, logger, None)
+        if not component:
+            hint = f" (its description has the token {spec.token}, which the library may not know)"
+            raise FmuFault(f"refuses to be instantiated{self._words() or hint}")
+        return component
+
+    def _initialise(self) -> None:
+        """Set the parameters and initialise."""
+        spec, component = self._spec, self._component
+        if spec.version == 2:
+            setup = self._function("SetupExperiment", _P, _I, _D, _D, _I, _D)
+            self._must("SetupExperiment", setup(component, 0, 0.0, 0.0, 0, 0.0))
+        for group, values in spec.parameters:
+            call, buffer = self._access("Set", group)
+            buffer.put(values)
+            self._must("Set (of its parameters)", call())
+        if spec.version == 2:
+            status = self._function("EnterInitializationMode", _P)(component)
+        else:
+            enter = self._function("EnterInitializationMode", _P, _B, _D, _D, _B, _D)
+            status = enter(component, False, 0.0, 0.0, False, 0.0)
+        self._must("EnterInitializationMode", status)
+        self._must("ExitInitializationMode", self._function("ExitInitializationMode", _P)(component))
+
+    def _must(self, call: str, status: int) -> None:
+        if status > _WARNING:
+            raise self._failed(call, status)
+
+    def _failed(self, call: str, status: int) -> FmuFault:
+        if status == _FATAL:
+            self._finalizer.detach()  # not even the memory of the instance may be touched
+        word = _STATUS.get(status, f"status {status}")
+        return FmuFault(f"{self._prefix}{call} returned {word}{self._words()}")
+
+    def _ended(self) -> FmuFault:
+        what = "asks to end the simulation" if self._flags[1] else "returned early from its step"
+        return FmuFault(f"{what}{self._words()}")
+
+    def _words(self) -> str:
+        return f": {self._log[:_MAX_LOG]}" if self._log else ""
+
+    def _said2(self, _environment: Any, _name: Any, _status: int, _category: Any, text: bytes | None) -> None:
+        self._log = (text or b"").decode(errors="replace")
+
+    def _said3(self, _environment: Any, _status: int, _category: Any, text: bytes | None) -> None:
+        self._log = (text or b"").decode(errors="replace")
+
+
+def _free(terminate: Any, free: Any, component: int) -> None:
+    terminate(component)
+    free(component)
+
+
+_STEP, _SAVE, _RESTORE, _FORGET, _SERIALISE, _DESERIALISE = b"S", b"G", b"R", b"F", b"Z", b"D"
+_GOOD, _BAD = b"0", b"E"
+
+
+class IsolatedInstance:
+    """An instance in a process of its own, which may crash or hang without harm to this one."""
+
+    def __init__(self, spec: Spec, limit_s: float) -> None:
+        """Start the process, and initialise the FMU in it.
+
+        Args:
+            spec: The instance.
+            limit_s: Time after which a call counts as hanging [s].
+
+        Raises:
+            FmuFault: see `LocalInstance`; or the process ended or does not answer.
+        """
+        self._limit_s, self._step_s, self._steps = limit_s, spec.step_s, 0
+        ours, theirs = socket.socketpair()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", __file__, str(theirs.fileno()), str(os.getpid())],
+                pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL,
+            )  # fmt: skip
+        self._pipe = Connection(ours.detach())
+        self._finalizer = weakref.finalize(self, _kill, self._process, self._pipe)
+        self._count = sum(group.size for group in spec.outputs)
+        self._ask(json.dumps(spec).encode(), "its initialisation", max(limit_s, START_LIMIT_S))
+
+    def step(self, values: Sequence[float]) -> tuple[float, ...]:
+        """See `Instance`."""
+        doing = f"the step at {self._steps * self._step_s:g} s"
+        answer = self._ask(_STEP + struct.pack(f"={len(values)}d", *values), doing)
+        self._steps += 1
+        return struct.unpack(f"={self._count}d", answer)
+
+    def save(self) -> int:
+        """See `Instance`."""
+        return int(self._ask(_SAVE))
+
+    def restore(self, state: int) -> None:
+        """See `Instance`."""
+        self._ask(_RESTORE + str(state).encode())
+
+    def forget(self, state: int) -> None:
+        """See `Instance`."""
+        if self._finalizer.alive:
+            self._ask(_FORGET + str(state).encode())
+
+    def serialise(self, state: int) -> bytes:
+        """See `Instance`."""
+        return self._ask(_SERIALISE + str(state).encode())
+
+    def deserialise(self, content: bytes) -> int:
+        """See `Instance`."""
+        return int(self._ask(_DESERIALISE + content))
+
+    def close(self) -> None:
+        """See `Instance`."""
+        self._finalizer()
+
+    def _ask(self, request: bytes, doing: str = "a call", limit_s: float | None = None) -> bytes:
+        limit_s = limit_s or self._limit_s
+        try:
+            self._pipe.send_bytes(request)
+            if not self._pipe.poll(limit_s):
+                self.close()
+                raise FmuFault(f"hangs: {doing} took longer than {limit_s:g} s (isolate)")
+            answer = self._pipe.recv_bytes()
+        except (EOFError, OSError) as reason:
+            code = self._process.wait() if self._process.poll() is None else self._process.returncode
+            self.close()
+            end = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+            raise FmuFault(f"crashed in {doing}: its process ended with {end}") from reason
+        if answer[:1] == _BAD:
+            raise FmuFault(answer[1:].decode(errors="replace"))
+        return answer[1:]
+
+
+def _kill(process: subprocess.Popen[bytes], pipe: Connection) -> None:
+    process.kill()
+    process.wait()
+    pipe.close()
+
+
+def make_instance(spec: Spec, isolate_s: float | None) -> Instance:
+    """Return an instance of an FMU.
+
+    Args:
+        spec: The instance.
+        isolate_s: Time limit of a call, in a process of its own [s]; None for an instance in this process.
+
+    Raises:
+        FmuFault: the FMU cannot be loaded or initialised.
+    """
+    return LocalInstance(spec) if isolate_s is None else IsolatedInstance(spec, isolate_s)
+
+
+def _spec(text: bytes) -> Spec:
+    spec = Spec(*json.loads(text))
+    inputs, outputs = ([Group(*group) for group in groups] for groups in (spec.inputs, spec.outputs))
+    parameters = [(Group(*group), values) for group, values in spec.parameters]
+    return spec._replace(inputs=inputs, outputs=outputs, parameters=parameters)
+
+
+def _serve(pipe: Connection) -> None:
+    """Answer the requests of an `IsolatedInstance` until its end."""
+    instance: Any = None
+    while True:
+        request = pipe.recv_bytes()
+        word, rest = request[:1], request[1:]
+        try:
+            if instance is None:
+                instance, answer = LocalInstance(_spec(request)), b""
+            elif word == _STEP:
+                result = instance.step(struct.unpack(f"={len(rest) // 8}d", rest))
+                answer = struct.pack(f"={len(result)}d", *result)
+            elif word == _SAVE:
+                answer = str(instance.save()).encode()
+            elif word == _SERIALISE:
+                answer = instance.serialise(int(rest))
+            elif word == _DESERIALISE:
+                answer = str(instance.deserialise(rest)).encode()
+            else:
+                {_RESTORE: instance.restore, _FORGET: instance.forget}[word](int(rest))
+                answer = b""
+        except FmuFault as fault:
+            pipe.send_bytes(_BAD + str(fault).encode())
+        else:
+            pipe.send_bytes(_GOOD + answer)
+
+
+if __name__ == "__main__":
+    _PR_SET_PDEATHSIG = 1
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL))
+    if os.getppid() == int(sys.argv[2]):
+        try:
+            _serve(Connection(int(sys.argv[1])))
+        except (EOFError, OSError):
+            os._exit(0)
