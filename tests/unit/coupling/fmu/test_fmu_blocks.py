@@ -130,12 +130,19 @@ def test_variables_without_a_signal_are_listed_in_one_message(fmus, tmp_path):
         find_controller(fmu)
 
 
-def test_parameters_are_set_before_the_initialisation(fmus):
+def test_parameters_are_keys_and_set_before_the_initialisation(fmus, tmp_path):
     base = made(fmus / "yaw_damper_fmi2.fmu").step(DriverCommand(), MEASUREMENT).rear_steer_demand_rad
     double = made(f"{fmus}/yaw_damper_fmi2.fmu?gain_s=0.1").step(DriverCommand(), MEASUREMENT).rear_steer_demand_rad
     assert double == 2.0 * base
     with pytest.raises(ControllerError, match="gain_s"):
         made(f"{fmus}/yaw_damper_fmi2.fmu?gain=0.1")
+    changes = {"controllers.yaw_damper_fmi2.limit_deg": 2.0, "controllers.yaw_damper_fmi2.gain_s": 0.1}
+    fmu = fmus / "yaw_damper_fmi2.fmu"
+    setup = resolve("straight_line", overrides=changes, controllers=[fmu]).controller_setup(1e-3)
+    assert find_controller(fmu).make(setup).step(DriverCommand(), MEASUREMENT).rear_steer_demand_rad == double
+    shutil.copy(fmu, taken := tmp_path / "lqr.fmu")
+    with pytest.raises(ControllerError, match="cannot have the name 'lqr'"):
+        find_controller(taken)
 
 
 @pytest.mark.parametrize("text", ["yaw_damper_fmi2.fmu", "yaw_damper_fmi3.fmu?isolate=20"])
