@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.compilation import inlined
+from activesteer.compilation import compiled
 from activesteer.conventions import Array
 from activesteer.road.path import Path
 
@@ -68,11 +68,22 @@ class PathGrid(NamedTuple):
         return cls(low[0], low[1], cell, columns, rows, spacing, points.ravel(), kept[nearest].astype(np.float64))
 
 
-@inlined
-def along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells):
-    """Return distance along the path and distance to its left [m] of a place x, y [m]; straight beyond the ends.
+@compiled
+def _direction_at(points, at):
+    """Return the direction of the path at one of its points, a unit vector: that of its neighbours."""
+    before, after = max(at - 1, 0), min(at + 1, points.size // 2 - 1)
+    x, y = points[2 * after] - points[2 * before], points[2 * after + 1] - points[2 * before + 1]
+    length = math.sqrt(x * x + y * y)
+    return x / length, y / length
 
-    The other arguments are the fields of `PathGrid`.
+
+@compiled
+def along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells):
+    """Return the place x, y [m] on a path: distance along it and to its left [m], its direction, its curvature [1/m].
+
+    The direction is that of the tangent, a unit vector. Between two points of the path the direction turns evenly, so
+    that a place moves evenly too. The path continues straight beyond its ends. The other arguments are the fields of
+    `PathGrid`.
     """
     column = min(max(int((x - x0) / cell), 0), int(columns) - 1)
     row = min(max(int((y - y0) / cell), 0), int(rows) - 1)
@@ -84,21 +95,23 @@ def along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells):
             if distance >= best:
                 break
             at, best = at + step, distance
-    found_s, found_n, least = 0.0, 0.0, math.inf
-    for segment in range(max(at - 1, 0), min(at, last - 1) + 1):
-        px, py = points[2 * segment], points[2 * segment + 1]
-        tx, ty = points[2 * segment + 2] - px, points[2 * segment + 3] - py
-        length = math.sqrt(tx * tx + ty * ty)
-        tx, ty = tx / length, ty / length
-        along = ((x - px) * tx + (y - py) * ty) / length
-        if segment > 0:
-            along = max(along, 0.0)
-        if segment < last - 1:
-            along = min(along, 1.0)
-        dx, dy = x - px - along * length * tx, y - py - along * length * ty
-        distance = dx * dx + dy * dy
-        if distance < least:
-            least = distance
-            found_s = (segment + along) * spacing
-            found_n = math.copysign(math.sqrt(distance), tx * dy - ty * dx)
-    return found_s, found_n
+    tx, ty = _direction_at(points, at)
+    dx, dy = x - points[2 * at], y - points[2 * at + 1]
+    ahead = dx * tx + dy * ty
+    if (at == 0 and ahead <= 0.0) or (at == last and ahead >= 0.0):
+        return at * spacing + ahead, tx * dy - ty * dx, tx, ty, 0.0
+    if ahead < 0.0:
+        at -= 1
+        tx, ty = _direction_at(points, at)
+        dx, dy = x - points[2 * at], y - points[2 * at + 1]
+        ahead = dx * tx + dy * ty
+    ux, uy = _direction_at(points, at + 1)
+    behind = (x - points[2 * at + 2]) * ux + (y - points[2 * at + 3]) * uy
+    part = min(max(ahead / (ahead - behind), 0.0), 1.0) if ahead != behind else 0.0
+    curvature = (tx * uy - ty * ux) / spacing
+    dx -= part * (points[2 * at + 2] - points[2 * at])
+    dy -= part * (points[2 * at + 3] - points[2 * at + 1])
+    tx, ty = tx + part * (ux - tx), ty + part * (uy - ty)
+    length = math.sqrt(tx * tx + ty * ty)
+    tx, ty = tx / length, ty / length
+    return (at + part) * spacing, tx * dy - ty * dx, tx, ty, curvature

@@ -1,9 +1,10 @@
 """The road that the manoeuvre sets and the vehicle drives on.
 
-A road is plane. Its friction may differ from place to place. Places are given in the world axes of the recording, x
-along the track from the initial position of the centre of gravity, y to the left; or, with `along = "path"`, by the
-distance along the path of the manoeuvre's course and the side of that path. For a wheel, the friction at its contact
-point counts. While the car settles before the recording, it rolls on `mu` alone.
+A road is a plane with a grade and a bank, on which there may be an uneven surface (`surface`). Its friction may differ
+from place to place. Places are given in the world axes of the recording, x along the track from the initial position of
+the centre of gravity, y to the left; or, with `along = "path"`, by the distance along the path of the manoeuvre's
+course and the side of that path. For a wheel, the friction at its contact point counts. While the car settles before
+the recording, it rolls on the plane, on `mu` alone.
 """
 
 from __future__ import annotations
@@ -19,11 +20,17 @@ from activesteer.config import Range, Source, build
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, RecordingError, nearest_names
 from activesteer.road.course import Course, course_of
+from activesteer.road.obstacle import Obstacle
 from activesteer.road.path import Path
 from activesteer.road.recorded import fail, table_of
+from activesteer.road.surface import Grid
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 
+_MAX_POINTS: Final = 100_000
+_MAX_LENGTH_M: Final = 100_000.0
+_SAMPLE_M: Final = 0.25
+"""Distance of the samples of a banking [m]: bank runs over tens of metres."""
 _SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
 """Name of a side -> its right and left border [m]."""
 _SLICES: Final = 20
@@ -62,6 +69,40 @@ class RoadPatch:
             )
         if self.side not in _SIDES:
             raise ManeuverError(f"is {self.side!r}; {nearest_names(self.side, _SIDES)}", key="side", value=self.side)
+
+
+@dataclass(frozen=True)
+class BankingTable:
+    """Bank over the distance; keys of the table [road.banking]. It runs smoothly through its points."""
+
+    s_m: tuple[float, ...]
+    """Distances along x or along the path [m], increasing."""
+    bank_rad: tuple[float, ...]
+    """Bank at these places [rad]; positive if the left side is higher."""
+
+    def __post_init__(self) -> None:
+        """Check the points.
+
+        Raises:
+            ManeuverError: they are too few or too many, do not increase, or are steeper than 45 deg.
+        """
+        count = len(self.s_m)
+        if count != len(self.bank_rad) or not 2 <= count <= _MAX_POINTS:
+            raise ManeuverError(f"has {count} s_m and {len(self.bank_rad)} bank; 2 to {_MAX_POINTS} of each are needed")
+        if not all(a < b for a, b in zip(self.s_m, self.s_m[1:], strict=False)):
+            raise ManeuverError("does not increase", key="s_m")
+        if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
+            raise ManeuverError(f"is longer than {_MAX_LENGTH_M:g} m", key="s_m")
+        if any(abs(bank) > math.pi / 4.0 for bank in self.bank_rad):
+            raise ManeuverError("is steeper than 45 deg", key="bank_deg")
+
+    def sampled(self) -> tuple[float, float, Array]:
+        """Return first distance, step [m] and cross slopes."""
+        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415 - slow to import, and needed for few roads
+
+        count = max(2, math.ceil((self.s_m[-1] - self.s_m[0]) / _SAMPLE_M) + 1)
+        s, step = np.linspace(self.s_m[0], self.s_m[-1], count, retstep=True)
+        return self.s_m[0], float(step), np.tan(PchipInterpolator(self.s_m, self.bank_rad)(s))
 
 
 class Area(NamedTuple):
@@ -120,22 +161,62 @@ class Road:
     patches: tuple[RoadPatch, ...] = ()
     """Stretches with their own friction; where two overlap, the later one counts."""
     along: Literal["x", "path"] = "x"
-    """What patches and sides follow: `x`, the world's x axis, or `path`, the path of the manoeuvre's course."""
+    """What patches, sides, obstacles and surfaces follow: `x`, the world's x axis, or `path`, the path of the
+    manoeuvre's course."""
+
+    bank_rad: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    """Bank of the whole road [rad]; positive if the left side is higher, as for a right-hand curve."""
+    obstacle: tuple[Obstacle, ...] = ()
+    """Bumps, cleats, kerbs, potholes, cross slopes and waves; their heights add up."""
+    banking: BankingTable | None = None
+    """Bank over the distance, as for a banked curve. Default: none."""
+    contact: Literal["auto", "single_point", "four_point", "enveloping"] = "auto"
+    """What a tyre feels of an uneven road, see `activesteer.vehicle.native_contact`. `auto`: `single_point` where all
+    that is uneven is long and smooth, else `enveloping`."""
+    start_m: Annotated[float, Range(3.0, 1000.0)] = 10.0
+    """Distance from which an uneven surface or `banking` counts in full [m]; from 2 m on it is blended in."""
+    outside: Literal["extend", "error"] = "extend"
+    """Beyond the known surface: `extend` its edge, or end the run with an `error`."""
 
     def __post_init__(self) -> None:
-        """Check that something follows the path.
+        """Check that no key is without effect.
 
         Raises:
-            ManeuverError: nothing does.
+            ManeuverError: one is.
         """
-        if self.along == "path" and not self.patches and self.mu_left is None and self.mu_right is None:
-            raise ManeuverError("'path' has no effect without patches, mu_left or mu_right", key="along")
+        split = self.patches or self.mu_left is not None or self.mu_right is not None
+        if self.along == "path" and not split and not self.is_uneven:
+            raise ManeuverError("'path' has no effect without patches, mu_left, mu_right or a surface", key="along")
+        gridded = self._is_gridded
+        for key, default, needed in (
+            ("contact", "auto", self.is_uneven), ("start_m", 10.0, gridded or self.banking is not None),
+            ("outside", "extend", gridded),
+        ):  # fmt: skip
+            if getattr(self, key) != default and not needed:
+                raise ManeuverError("has no effect on a road without such a surface; leave it out", key=key)
+
+    @property
+    def _is_gridded(self) -> bool:
+        return False
+
+    @property
+    def is_uneven(self) -> bool:
+        """Whether the road has a surface besides its plane."""
+        return bool(self.obstacle) or self.banking is not None or self._is_gridded
+
+    @property
+    def contact_used(self) -> str:
+        """Way of contact on the uneven surface."""
+        if self.contact != "auto":
+            return self.contact
+        smooth = not self._is_gridded and all(obstacle.is_smooth for obstacle in self.obstacle)
+        return "single_point" if smooth else "enveloping"
 
     def laid(self, course: Course | None) -> Road:
-        """Return the road as the car drives on it: with the path of the course if its friction follows that path.
+        """Return the road as the car drives on it: with the path of the course if it follows that path.
 
         Raises:
-            ManeuverError: the friction follows the path, and the manoeuvre has none.
+            ManeuverError: the road follows the path, and the manoeuvre has none.
         """
         if self.along == "x":
             return self
@@ -144,6 +225,14 @@ class Road:
                 "is 'path', but this manoeuvre sets the steering wheel and has no path; use 'x'", key="road.along"
             )
         return LaidRoad(*(getattr(self, field.name) for field in fields(Road)), path=course.path)
+
+    def grid(self) -> Grid | None:
+        """Return the heights of the surface without obstacles and banking; None if there are none."""
+        return None
+
+    def cross_slopes(self) -> tuple[float, float, Array] | None:
+        """Return first distance, step [m] and cross slopes of `banking`; None without it."""
+        return None if self.banking is None else self.banking.sampled()
 
     def areas(self) -> tuple[Area, ...]:
         """Return the areas whose friction is not `mu`; where areas overlap, the later one counts."""
@@ -180,7 +269,7 @@ def _slope(patch: RoadPatch) -> float:
 
 @dataclass(frozen=True)
 class LaidRoad(Road):
-    """A road whose friction follows a path."""
+    """A road that follows a path."""
 
     path: Path | None = None
     """The path of the course."""

@@ -17,7 +17,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.road.obstacle import OBSTACLE
+from activesteer.road.surface_kernels import SURFACE
 from activesteer.tyre.kernels.record import TYRE_RECORD
+from activesteer.vehicle.native_contact import CAM
 
 BLOCK_NAME: Final = "activesteer"
 MARKER: Final = 20121121.0
@@ -111,7 +114,8 @@ CURVE_TABLE: Final = _record("start_m", "per_m", "intervals", "count")
 _SECTIONS: Final[Mapping[str, Any]] = {
     "wheels": WHEEL, "tyres": TYRE_RECORD, "dampers": DAMPER, "actuators": ACTUATOR, "areas": AREA,
     "path_grids": PATH_GRID, "path_points": np.float64, "path_cells": np.float64, "links": LINK, "screws": SCREW,
-    "curve_axle_wheels": CURVE_AXLE_WHEEL, "curves": np.float64,
+    "curve_axle_wheels": CURVE_AXLE_WHEEL, "curves": np.float64, "surfaces": SURFACE, "obstacles": OBSTACLE, "cams": CAM,
+    "heights": np.float64,
 }  # fmt: skip
 HEADER: Final = _record(
     "n_dofs", "n_bodies", "n_userdata", "n_activations", "n_controls", "n_tendons", "n_tendon_jacobian",
@@ -126,7 +130,7 @@ counted in numbers from the block's start."""
 WHEEL_OUTPUT: Final = _record(
     "fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm", "slip_ratio", "slip_angle_rad", "inclination_rad",
     "deflection_x_rate_mps", "deflection_y_rate_mps", "deflection_z_rate_radps", "loaded_radius_m", "limited",
-    "friction_utilisation", "mu", "contact_x_m", "contact_y_m",
+    "friction_utilisation", "mu", "contact_x_m", "contact_y_m", "road_z_m", "road_slope_x", "road_slope_y",
 )  # fmt: skip
 """Outputs of the callback for each wheel, at the beginning of mjData.userdata. After them come the force of each damper
 and the readings of screws and motors, and last, not written by the callback, the number of active faults."""

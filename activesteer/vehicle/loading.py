@@ -18,11 +18,14 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError
 from activesteer.road.path_coordinates import PathGrid
 from activesteer.road.road import LaidRoad, Road
+from activesteer.road.road import Road
+from activesteer.road.surface import surface_of
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.curve_axle_model import curve_axle_records, fit_curve_axles
 from activesteer.vehicle.load import apply_load
 from activesteer.vehicle.named_parts import find
+from activesteer.vehicle.native_contact import cam_record
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.superposition_actuator import MOTOR, NAME, fit_motor, motor_record
@@ -88,8 +91,10 @@ def _compile(
     try:
         spec = mujoco.MjSpec.from_file(str(mjcf))
         spec.option.timestep = timestep_s
-        angle = math.atan(road.grade)
-        spec.option.gravity = [-GRAVITY_MPS2 * math.sin(angle), 0.0, -GRAVITY_MPS2 * math.cos(angle)]
+        angle, bank = math.atan(road.grade), road.bank_rad
+        across = -GRAVITY_MPS2 * math.cos(angle) * math.sin(bank) if bank else 0.0
+        down = -GRAVITY_MPS2 * math.cos(angle) * math.cos(bank)
+        spec.option.gravity = [-GRAVITY_MPS2 * math.sin(angle), across, down]
         # A state that is not finite must end the run; by default the engine would restart from its reference position.
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         # `integrator` makes damping implicit; the step must not be damped a second time.
@@ -183,6 +188,11 @@ def _force_block(
         grid = PathGrid.of(road.path)
         sections["path_points"], sections["path_cells"] = [grid.points], [grid.cells]
         sections["path_grids"] = [np.array([grid[:6]], fb.PATH_GRID)]
+    if (surface := surface_of(road)) is not None:
+        pressures = [float(wheel["pressure_Pa"][0]) for wheel in sections["wheels"]]
+        sections["surfaces"], sections["obstacles"] = [surface.head], [surface.obstacles]
+        sections["heights"] = [surface.numbers]
+        sections["cams"] = [cam_record(tyre, at) for tyre, at in zip(mounted.values(), pressures, strict=True)]
     sections["curve_axle_wheels"], sections["curves"] = curve_axle_records(model, parameters.curves)
     places: dict[str, tuple[float, int]] = {}
     if parameters.rear_actuator.is_screw:

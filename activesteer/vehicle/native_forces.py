@@ -10,6 +10,7 @@ scalar product of its motion axis (`cdof`, about the centre of mass of the tree)
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import mujoco
@@ -18,11 +19,14 @@ from numba import carray, types
 from activesteer.compilation import compiled_callback, inlined
 from activesteer.errors import ModelError
 from activesteer.road.path_coordinates import along_path
+from activesteer.road.obstacle import OBSTACLE
+from activesteer.road.surface_kernels import SURFACE, left_grid
 from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
 from activesteer.vehicle.native_actuators import brake_rate, drive_rate, dry_friction_rate, servo_rate
+from activesteer.vehicle.native_contact import CAM, contact_plane, plane_axes, spin_on_bend
 from activesteer.vehicle.native_curve_axle import add_curve_axle_forces
 from activesteer.vehicle.native_memory import array_at, f64_pointer, records_at, word
 from activesteer.vehicle.native_screws import screw_rate
@@ -35,7 +39,13 @@ _dampers_at: Final = records_at(fb.DAMPER)
 _actuators_at: Final = records_at(fb.ACTUATOR)
 _areas_at: Final = records_at(fb.AREA)
 _path_grids_at: Final = records_at(fb.PATH_GRID)
+_surfaces_at: Final = records_at(SURFACE)
+_obstacles_at: Final = records_at(OBSTACLE)
+_cams_at: Final = records_at(CAM)
 _outputs_at: Final = records_at(fb.WHEEL_OUTPUT)
+_LEAST_STRETCH: Final = 0.1
+"""Distance along the middle of a road per distance beside it is at most the inverse; for places near the centre of a
+curve."""
 
 
 @inlined
@@ -72,17 +82,10 @@ def _interpolate(x, xs, ys, count):
 
 @inlined
 def _road_mu(block, header, mu, x, y):
-    """Return the friction of the road at a place [m], world axes; `mu` outside all areas."""
+    """Return the friction of the road at a place on it [m]; `mu` outside all areas."""
     if header.areas_felt == 0.0:
         return mu
     areas = _areas_at(block, header.areas, header.n_areas)
-    if header.n_path_grids != 0.0:
-        grid = _path_grids_at(block, header.path_grids, 1)[0]
-        points = carray(f64_pointer(block + 8 * int(header.path_points)), (int(header.n_path_points),))
-        cells = carray(f64_pointer(block + 8 * int(header.path_cells)), (int(header.n_path_cells),))
-        x, y = along_path(
-            x, y, grid.x0_m, grid.y0_m, grid.cell_m, grid.columns, grid.rows, grid.spacing_m, points, cells
-        )
     for index in range(areas.size - 1, -1, -1):
         area = areas[index]
         if area.start_m <= x < area.end_m and area.right_m < y <= area.left_m:
@@ -91,9 +94,41 @@ def _road_mu(block, header, mu, x, y):
 
 
 @inlined
+def _place_on_road(block, header, x, y):
+    """Return the place x, y [m] of the world along the road, as `along_path` does."""
+    if header.n_path_grids == 0.0 or header.areas_felt == 0.0:
+        return x, y, 1.0, 0.0, 0.0
+    grid = _path_grids_at(block, header.path_grids, 1)[0]
+    points = carray(f64_pointer(block + 8 * int(header.path_points)), (int(header.n_path_points),))
+    cells = carray(f64_pointer(block + 8 * int(header.path_cells)), (int(header.n_path_cells),))
+    return along_path(x, y, grid.x0_m, grid.y0_m, grid.cell_m, grid.columns, grid.rows, grid.spacing_m, points, cells)
+
+
+@inlined
+def _across(axes, first, x, y, z):
+    """Return the component of a vector along one of the axes of `plane_axes`."""
+    return axes[first] * x + axes[first + 1] * y + axes[first + 2] * z
+
+
+@inlined
+def _back(axes, x, y, z):
+    """Return a vector of the plane in world axes."""
+    return (
+        axes[3] * x + axes[6] * y + axes[0] * z,
+        axes[4] * x + axes[7] * y + axes[1] * z,
+        axes[5] * x + axes[8] * y + axes[2] * z,
+    )
+
+
+@inlined
 def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs, qfrc):
     wheels = _wheels_at(block, header.wheels, header.n_wheels)
     tyres = _tyres_at(block, header.tyres, header.n_tyres)
+    uneven = header.n_surfaces != 0.0 and header.areas_felt != 0.0
+    surface = _surfaces_at(block, header.surfaces, 1)[0]
+    obstacles = _obstacles_at(block, header.obstacles, header.n_obstacles)
+    cams = _cams_at(block, header.cams, header.n_cams)
+    heights = carray(f64_pointer(block + 8 * int(header.heights)), (int(header.n_heights),))
     for index in range(wheels.size):
         wheel = wheels[index]
         body = int(wheel.body)
@@ -107,7 +142,39 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
         reach = xpos[3 * body + 2] * az / (ax * ax + ay * ay)
         contact_x = xpos[3 * body] + reach * ax
         contact_y = xpos[3 * body + 1] + reach * ay
-        mu = _road_mu(block, header, wheel.mu, contact_x, contact_y)
+        height = xpos[3 * body + 2]
+        vx = cvel[6 * body + 3] + wy * to_z - wz * to_y
+        vy = cvel[6 * body + 4] + wz * to_x - wx * to_z
+        vz = cvel[6 * body + 5] + wx * to_y - wy * to_x
+        axes = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+        road_z, forward, sideways = 0.0, 0.0, 0.0
+        if uneven:
+            p = tyres[index]
+            horizontal = (ax * ax + ay * ay) ** 0.5
+            to_lowest = p.UNLOADED_RADIUS * az / horizontal
+            contact_x = xpos[3 * body] + to_lowest * ax
+            contact_y = xpos[3 * body + 1] + to_lowest * ay
+            hx, hy = ay / horizontal, -ax / horizontal
+        along, across, cos, sin, curvature = _place_on_road(block, header, contact_x, contact_y)
+        if uneven:
+            stretch = 1.0 / max(1.0 - curvature * across, _LEAST_STRETCH)
+            road_z, forward, sideways, bend = contact_plane(
+                surface, heights, obstacles, cams[index], along, across, cos, sin, stretch, hx, hy, p.UNLOADED_RADIUS
+            )
+            axes = plane_axes(forward, sideways, hx, hy)
+            if surface.ends != 0.0 and left_grid(surface, along, across):
+                road_z = math.nan  # noticed like any value that is not finite; `Vehicle.check` says why
+            height = _across(
+                axes, 0, xpos[3 * body] - contact_x, xpos[3 * body + 1] - contact_y, xpos[3 * body + 2] - road_z
+            )
+            if bend != 0.0:
+                spin = wx * ax + wy * ay + wz * az
+                more = spin_on_bend(p, spin, vx * hx + vy * hy, bend, height, wheel.pressure_Pa) - spin
+                wx, wy, wz = wx + more * ax, wy + more * ay, wz + more * az
+            ax, ay, az = _across(axes, 3, ax, ay, az), _across(axes, 6, ax, ay, az), _across(axes, 0, ax, ay, az)
+            vx, vy, vz = _across(axes, 3, vx, vy, vz), _across(axes, 6, vx, vy, vz), _across(axes, 0, vx, vy, vz)
+            wx, wy, wz = _across(axes, 3, wx, wy, wz), _across(axes, 6, wx, wy, wz), _across(axes, 0, wx, wy, wz)
+        mu = _road_mu(block, header, wheel.mu, along, across)
         tyre = tyre_on_road(
             tyres[index],
             mu,
@@ -115,13 +182,13 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
             wheel.low_speed_mps,
             wheel.low_speed_damping_Nspm,
             timestep_s,
-            xpos[3 * body + 2],
+            height,
             ax,
             ay,
             az,
-            cvel[6 * body + 3] + wy * to_z - wz * to_y,
-            cvel[6 * body + 4] + wz * to_x - wx * to_z,
-            cvel[6 * body + 5] + wx * to_y - wy * to_x,
+            vx,
+            vy,
+            vz,
             wx,
             wy,
             wz,
@@ -129,6 +196,15 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
             act[int(wheel.act_y)],
             act[int(wheel.act_z)],
         )
+        hx, hy = tyre.heading_x, tyre.heading_y
+        fz = tyre.fz_N
+        gx = tyre.fx_N * hx - tyre.fy_N * hy
+        gy = tyre.fx_N * hy + tyre.fy_N * hx
+        arm_x, arm_y, arm_z = tyre.arm_x_m, tyre.arm_y_m, tyre.arm_z_m
+        if uneven:
+            gx, gy, fz = _back(axes, gx, gy, fz)
+            arm_x, arm_y, arm_z = _back(axes, arm_x, arm_y, arm_z)
+            contact_x, contact_y = xpos[3 * body] + arm_x, xpos[3 * body + 1] + arm_y
         out = outputs[index]
         out.fx_N = tyre.fx_N
         out.fy_N = tyre.fy_N
@@ -148,23 +224,20 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
         out.mu = mu
         out.contact_x_m = contact_x
         out.contact_y_m = contact_y
-        hx, hy = tyre.heading_x, tyre.heading_y
-        fz = tyre.fz_N
-        gx = tyre.fx_N * hx - tyre.fy_N * hy
-        gy = tyre.fx_N * hy + tyre.fy_N * hx
-        px, py, pz = to_x + tyre.arm_x_m, to_y + tyre.arm_y_m, to_z + tyre.arm_z_m
+        out.road_z_m = road_z
+        out.road_slope_x = forward
+        out.road_slope_y = sideways
+        px, py, pz = to_x + arm_x, to_y + arm_y, to_z + arm_z
         chain = wheel.chain[: int(wheel.chain_length)]
-        _apply(
-            qfrc,
-            cdof,
-            chain,
-            gx,
-            gy,
-            fz,
-            py * fz - pz * gy + tyre.mx_Nm * hx - tyre.my_Nm * hy,
-            pz * gx - px * fz + tyre.mx_Nm * hy + tyre.my_Nm * hx,
-            px * gy - py * gx + tyre.mz_Nm,
-        )
+        tx = py * fz - pz * gy + tyre.mx_Nm * hx - tyre.my_Nm * hy
+        ty = pz * gx - px * fz + tyre.mx_Nm * hy + tyre.my_Nm * hx
+        tz = px * gy - py * gx + tyre.mz_Nm
+        if uneven:
+            mx, my, mz = _back(
+                axes, tyre.mx_Nm * hx - tyre.my_Nm * hy, tyre.mx_Nm * hy + tyre.my_Nm * hx, tyre.mz_Nm
+            )
+            tx, ty, tz = py * fz - pz * gy + mx, pz * gx - px * fz + my, px * gy - py * gx + mz
+        _apply(qfrc, cdof, chain, gx, gy, fz, tx, ty, tz)
 
 
 @inlined

@@ -98,10 +98,13 @@ def _in_the_road_plane(columns, sines, cosines, gravity_mps2, out):
         cos, cr, cp = cosines[row, 0], cosines[row, 1], cosines[row, 2]
         out[row, 0], out[row, 1] = vx * cos + vy * sin, vy * cos - vx * sin
         # An accelerometer measures the specific force. After rotation into the road plane, add gravity, which has a
-        # component in this plane on a grade.
+        # component in this plane on a grade or a bank.
         out[row, 2] = cp * ax + sp * (sr * ay + cr * az) + gravity_mps2[0] * cos
         out[row, 3] = cr * ay - sr * az - gravity_mps2[0] * sin
         out[row, 4] = -sp * ax + cp * (sr * ay + cr * az) + gravity_mps2[2]
+        if gravity_mps2[1] != 0.0:  # a bank
+            out[row, 2] += gravity_mps2[1] * sin
+            out[row, 3] += gravity_mps2[1] * cos
         # Rate of the Euler angle about the road's normal, not about the body's z axis.
         out[row, 5] = (sr * columns[row, 9] + cr * columns[row, 10]) / cp
 

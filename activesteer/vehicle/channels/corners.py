@@ -35,6 +35,12 @@ _TYRE: Final = (
     ),
 )  # fmt: skip
 """Output of the native forces -> its channel: name, unit, meaning."""
+_ROAD: Final = (
+    ("road_z_m", "road_z_m", "m", "height of the plane that the tyre feels, below the wheel"),
+    ("road_slope_x", "road_slope_x", "", "forward slope of that plane, positive uphill"),
+    ("road_slope_y", "road_slope_y", "", "sideways slope of that plane, positive where the left side is higher"),
+)
+"""The same on an uneven road only."""
 _BRAKES: Final = (
     ("demand_Pa", "brake_pressure_demand_Pa", "Pa", "brake pressure demand of driver and controller", "corners"),
     ("pressure_Pa", "brake_pressure_Pa", "Pa", "pressure in the wheel brake", "corners"),
@@ -55,6 +61,7 @@ def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
     """Yield the signals of each wheel: its tyre, and its position relative to the chassis."""
     at_rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, at_rest)
+    outputs = _TYRE if fb.header_of(model)["n_surfaces"][0] == 0.0 else (*_TYRE, *_ROAD)
     for index, (corner, words) in enumerate(CORNERS_IN_WORDS.items()):
 
         def of(
@@ -62,7 +69,7 @@ def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
         ) -> Signal:
             return signal("corners", f"{corner}_{name}", unit, f"{meaning}, {words}", values)
 
-        for field, name, unit, meaning in _TYRE:
+        for field, name, unit, meaning in outputs:
             yield of(name, unit, meaning, Column("userdata", fb.output_slot(index, field)))
         *_, height = sensor(model, f"{corner}_wheel_position")
         axis = sensor(model, f"{corner}_wheel_axis")

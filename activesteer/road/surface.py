@@ -1,0 +1,112 @@
+"""Surface of an uneven road: everything that its keys say about height, as arrays for the kernels."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import Array
+from activesteer.road.obstacle import OBSTACLE
+from activesteer.road.surface_kernels import ENVELOPING, FOUR_POINT, SINGLE_POINT, SURFACE, heights_at
+
+if TYPE_CHECKING:
+    from activesteer.road.road import Road
+
+_CONTACTS: Final = {"single_point": SINGLE_POINT, "four_point": FOUR_POINT, "enveloping": ENVELOPING}
+_BLEND_M: Final = 2.0
+"""Distance from which the surface is blended in [m]: ahead of the front wheels of a car at the start."""
+_REACH_M: Final = 0.4
+"""Distance within which a tyre feels the road [m]."""
+
+
+class Grid(NamedTuple):
+    """Heights over distance along the road and distance to the left.
+
+    Attributes:
+        s_m: First distance along the road [m].
+        step_s_m: Distance of the rows [m].
+        d_m: First distance to the left [m].
+        step_d_m: Distance of the columns [m].
+        z_m: Heights [m], shape (rows, columns), at least two of each.
+    """
+
+    s_m: float
+    step_s_m: float
+    d_m: float
+    step_d_m: float
+    z_m: Array
+
+
+class Surface(NamedTuple):
+    """An uneven road for the kernels.
+
+    Attributes:
+        head: `SURFACE`, shape (1,).
+        numbers: The numbers that belong to it.
+        obstacles: `OBSTACLE`, in the order of their starts.
+    """
+
+    head: NDArray[Any]
+    numbers: Array
+    obstacles: NDArray[Any]
+
+    def at(self, s_m: Array, d_m: Array) -> Array:
+        """Return height [m] and slopes along and across of places.
+
+        Args:
+            s_m: Distances along the road [m], shape (n,).
+            d_m: Distances to the left of its middle [m], shape (n,).
+
+        Returns:
+            Shape (n, 3).
+        """
+        s, d = np.ascontiguousarray(s_m, np.float64), np.ascontiguousarray(d_m, np.float64)
+        return heights_at(self.head[0], self.numbers, self.obstacles, s, d)
+
+
+def surface_of(road: Road) -> Surface | None:
+    """Return the surface of a road; None if it is plane.
+
+    Raises:
+        ManeuverError: a file of the road is wrong.
+    """
+    return _surface_of(road) if road.is_uneven else None
+
+
+@functools.lru_cache(maxsize=4)
+def _surface_of(road: Road) -> Surface:
+    head = np.zeros(1, SURFACE)
+    grid, slopes = road.grid(), road.cross_slopes()
+    numbers = []
+    if grid is not None:
+        rows, columns = grid.z_m.shape
+        head["grid_s_m"], head["grid_per_s"], head["rows"] = grid.s_m, 1.0 / grid.step_s_m, rows
+        head["grid_d_m"], head["grid_per_d"], head["columns"] = grid.d_m, 1.0 / grid.step_d_m, columns
+        head["rise_m"] = _rise(grid)
+        numbers.append(grid.z_m.ravel())
+    if slopes is not None:
+        start, step, values = slopes
+        head["slope_s_m"], head["slope_per_s"], head["slopes"] = start, 1.0 / step, len(values)
+        numbers.append(values)
+    head["contact"], head["blend_m"], head["start_m"] = _CONTACTS[road.contact_used], _BLEND_M, road.start_m
+    head["ends"] = road.outside == "error"
+    records = [obstacle.record() for obstacle in sorted(road.obstacle, key=lambda it: it.start_m)]
+    obstacles = np.concatenate(records) if records else np.empty(0, OBSTACLE)
+    return Surface(head, np.concatenate(numbers) if numbers else np.zeros(1), obstacles)
+
+
+def _rise(grid: Grid) -> float:
+    """Return the largest difference of height within the reach of a tyre [m]."""
+    rows = max(1, math.ceil(_REACH_M / grid.step_s_m))
+    highest, lowest = grid.z_m.copy(), grid.z_m.copy()
+    done = 1
+    while done < rows:
+        shift = min(done, rows - done)
+        np.maximum(highest[:-shift], highest[shift:], out=highest[:-shift])
+        np.minimum(lowest[:-shift], lowest[shift:], out=lowest[:-shift])
+        done += shift
+    return float((highest - lowest).max())

@@ -1,0 +1,213 @@
+"""Contact of a wheel with an uneven road: the plane that the tyre feels.
+
+The tyre's formula needs a plane. Three ways lead to it, from the place straight below the lowest point of the wheel:
+
+* `SINGLE_POINT`: tangent plane of the road at that place.
+* `FOUR_POINT`: plane through the middles of four points, `FOUR_POINT_AHEAD` of the free radius ahead and behind, and
+  `BESIDE` of the tyre's width to the left and right.
+* `ENVELOPING`: two elliptical cams roll over the road in the plane of the wheel, one behind the other. The mean of
+  their heights is the height of the plane, the difference over their distance its forward slope. The difference of the
+  road `BESIDE` of the width to the left and right is its sideways slope. The cam touches the road at one point, so its
+  path is that of a tyre over a step: the contact begins before the step and ends after it.
+
+The cams follow |x/a|^c + |z/b|^c = 1 with a = `ELLIPS_LENGTH` R0, b = `ELLIPS_HEIGHT` R0, c = `ELLIPS_ORDER`; their
+distance is `ELLIPS_SHIFT` times the length of the contact patch at the nominal load of the tyre file.
+
+Range: the parameters of the Magic Formula book (1.471, 0.9622, 1.5174, 0.8335) belong to a 205/60 R15 at 2.2 bar and
+were fitted to slow rolling over steps and cleats up to `ELLIPS_MAX_STEP` (25 mm), at constant axle height. The belt's
+own vibration, above 30 Hz, is not modelled. The distance of the cams does not follow the load.
+
+Sources: Schmeitz, A semi-empirical three-dimensional model of the pneumatic tyre rolling over arbitrarily uneven road
+surfaces, TU Delft 2004, chapter 4; Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 10.1.6 and appendix 3
+(parameters of the 205/60 R15).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.compilation import compiled
+from activesteer.road.surface_kernels import ENVELOPING, SINGLE_POINT, height_at, near_obstacles
+from activesteer.tyre.kernels.vertical import contact_patch, effective_rolling_radius
+from activesteer.tyre.tyre_parameters import TyreParameters
+
+FOUR_POINT_AHEAD: Final = 0.1
+BESIDE: Final = 0.3
+CAM_POINTS: Final = 65
+_CAM_STEP_M: Final = 0.006
+"""Distance of the tabulated points of a cam [m]: 64 of them reach 0.38 m, beyond any step that a tyre survives."""
+_COARSE_M: Final = 0.018
+"""Distance of the first places at which a cam looks for the road [m]; a cleat of 20 mm cannot hide between two."""
+_FINE_M: Final = 0.0004
+"""Distance of the last ones; a step of 25 mm then changes the height of a cam by 0.1 mm at most [m]."""
+
+CAM: Final = np.dtype(
+    (
+        np.record,
+        [("distance_m", np.float64), ("reach_m", np.float64), ("beside_m", np.float64), ("drop_m", np.float64, (CAM_POINTS,))],
+    )
+)
+"""Cams of a wheel: their distance, the half length of the table of `drop_m`, the height of the cam above its lowest
+point in steps of `_CAM_STEP_M`, and half the width over which the sideways slope is taken."""
+
+
+def cam_record(tyre: TyreParameters, pressure_Pa: float) -> NDArray[Any]:
+    """Return the cams of a tyre, a `CAM` of shape (1,).
+
+    Args:
+        tyre: The tyre.
+        pressure_Pa: Inflation pressure [Pa].
+    """
+    radius = tyre["UNLOADED_RADIUS"]
+    half_length, half_height, order = (
+        tyre["ELLIPS_LENGTH"] * radius, tyre["ELLIPS_HEIGHT"] * radius, tyre["ELLIPS_ORDER"],
+    )  # fmt: skip
+    length, _ = contact_patch(tyre.record, tyre["FNOMIN"], pressure_Pa)
+    x = np.minimum(_CAM_STEP_M * np.arange(CAM_POINTS), half_length)
+    drop = half_height * (1.0 - (1.0 - (x / half_length) ** order) ** (1.0 / order))
+    numbers = (tyre["ELLIPS_SHIFT"] * length, float(x[-1]), BESIDE * tyre["WIDTH"], drop)
+    return np.array([numbers], CAM)
+
+
+@compiled
+def _cam_height(surface, numbers, obstacles, first, last, cam, reach, s, d, ahead_s, ahead_d):
+    """Return height of the lowest point of a cam, and its change per metre forwards.
+
+    Args:
+        surface: The road, with `numbers`, `obstacles`, `first` and `last` as for `height_at`.
+        cam: A `CAM`.
+        reach: Distance within which the road may touch the cam [m].
+        s: Place of the cam's middle.
+        d: Its other coordinate.
+        ahead_s: Change of s per metre forwards.
+        ahead_d: Change of d per metre forwards.
+    """
+    best, at = -math.inf, 0.0
+    count = int(reach / _COARSE_M) + 1
+    for index in range(-count, count + 1):
+        x = index * _COARSE_M
+        z = height_at(surface, numbers, obstacles, first, last, s + x * ahead_s, d + x * ahead_d)[0]
+        z -= _drop(cam, abs(x))
+        if z > best:
+            best, at = z, x
+    step = 0.5 * _COARSE_M
+    while step > _FINE_M:
+        middle = at
+        for side in (-1.0, 1.0):
+            x = middle + side * step
+            z = height_at(surface, numbers, obstacles, first, last, s + x * ahead_s, d + x * ahead_d)[0]
+            z -= _drop(cam, abs(x))
+            if z > best:
+                best, at = z, x
+        step *= 0.5
+    # Where the cam touches, its slope is that of its path (envelope theorem), at a corner too.
+    place = min(abs(at) / _CAM_STEP_M, CAM_POINTS - 1.000001)
+    index = int(place)
+    slope = (cam.drop_m[index + 1] - cam.drop_m[index]) / _CAM_STEP_M
+    return best, math.copysign(slope, at)
+
+
+@compiled
+def _drop(cam, x):
+    """Return how far a cam lies above its lowest point at a distance [m]."""
+    place = x / _CAM_STEP_M
+    index = int(place)
+    if index >= CAM_POINTS - 1:
+        return cam.drop_m[CAM_POINTS - 1] + 10.0 * (x - cam.reach_m)
+    return cam.drop_m[index] + (place - index) * (cam.drop_m[index + 1] - cam.drop_m[index])
+
+
+@compiled
+def contact_plane(surface, numbers, obstacles, cam, along, across, cos, sin, stretch, heading_x, heading_y, free_radius):
+    """Return height, forward slope, sideways slope and forward change of slope [1/m] of the plane that a tyre feels.
+
+    Args:
+        surface: A `SURFACE`.
+        numbers: Its numbers.
+        obstacles: Its obstacles.
+        cam: The `CAM` of the wheel.
+        along: Distance along the road of the place below the wheel [m].
+        across: Its distance to the left of the middle [m].
+        cos: Cosine of the road's direction against world x.
+        sin: Its sine.
+        stretch: Distance along the road's middle per distance along the road at this place.
+        heading_x: Heading of the wheel in the world, a horizontal unit vector.
+        heading_y: Its y component.
+        free_radius: Free radius of the tyre [m].
+    """
+    first, last, highest = near_obstacles(obstacles, along, across)
+    if first >= last and surface.rows == 0.0 and surface.slopes == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    ahead_s = (heading_x * cos + heading_y * sin) * stretch
+    ahead_d = heading_y * cos - heading_x * sin
+    left_s = -ahead_d * stretch
+    left_d = heading_x * cos + heading_y * sin
+    if surface.contact == SINGLE_POINT:
+        z, z_s, z_d = height_at(surface, numbers, obstacles, first, last, along, across)
+        return z, z_s * ahead_s + z_d * ahead_d, z_s * left_s + z_d * left_d, 0.0
+    beside = cam.beside_m
+    left = height_at(surface, numbers, obstacles, first, last, along + beside * left_s, across + beside * left_d)[0]
+    right = height_at(surface, numbers, obstacles, first, last, along - beside * left_s, across - beside * left_d)[0]
+    sideways = (left - right) / (2.0 * beside)
+    if surface.contact != ENVELOPING:
+        ahead = FOUR_POINT_AHEAD * free_radius
+        front = height_at(surface, numbers, obstacles, first, last, along + ahead * ahead_s, across + ahead * ahead_d)[0]
+        rear = height_at(surface, numbers, obstacles, first, last, along - ahead * ahead_s, across - ahead * ahead_d)[0]
+        return 0.25 * (left + right + front + rear), (front - rear) / (2.0 * ahead), sideways, 0.0
+    rise = surface.rise_m + highest
+    reach = 0.0
+    while reach < cam.reach_m and _drop(cam, reach) < rise:
+        reach += _COARSE_M
+    half = 0.5 * cam.distance_m
+    front, front_slope = _cam_height(
+        surface, numbers, obstacles, first, last, cam, reach, along + half * ahead_s, across + half * ahead_d, ahead_s,
+        ahead_d,
+    )  # fmt: skip
+    rear, rear_slope = _cam_height(
+        surface, numbers, obstacles, first, last, cam, reach, along - half * ahead_s, across - half * ahead_d, ahead_s,
+        ahead_d,
+    )  # fmt: skip
+    return 0.5 * (front + rear), (front - rear) / cam.distance_m, sideways, (front_slope - rear_slope) / cam.distance_m
+
+
+@compiled
+def plane_axes(forward, sideways, heading_x, heading_y):
+    """Return normal and two axes of a plane, nine components in world axes; the first axis lies above world x.
+
+    Args:
+        forward: Slope along the heading.
+        sideways: Slope to the left of the heading.
+        heading_x: Heading, a horizontal unit vector.
+        heading_y: Its y component.
+    """
+    slope_x = forward * heading_x - sideways * heading_y
+    slope_y = forward * heading_y + sideways * heading_x
+    nz = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+    nx, ny = -slope_x * nz, -slope_y * nz
+    level = 1.0 / math.sqrt(1.0 + slope_x * slope_x)
+    ax, az = level, slope_x * level
+    # n x a, with a in the plane of x and z.
+    return nx, ny, nz, ax, 0.0, az, ny * az, nz * ax - nx * az, -ny * ax
+
+
+@compiled
+def spin_on_bend(p, spin, speed, bend, loaded_radius, pressure_Pa):
+    """Return the spin that a tyre feels on a road that bends along its heading [rad/s].
+
+    The tread rolls off on the road at the effective rolling radius relative to the normal of the plane, which turns
+    with the speed times the bend. The contact point lags behind the centre by the loaded radius times that rate.
+
+    Args:
+        p: Record of the tyre.
+        spin: Spin of the wheel [rad/s].
+        speed: Speed along the heading [m/s].
+        bend: Forward change of the forward slope [1/m]; negative over a crest.
+        loaded_radius: Distance of the wheel centre from the plane [m].
+        pressure_Pa: Inflation pressure [Pa].
+    """
+    rolling = effective_rolling_radius(p, p.FNOMIN, spin, pressure_Pa)
+    return spin - (loaded_radius - rolling) / rolling * bend * speed
