@@ -96,7 +96,9 @@ class Obstacle:
         if not right < left:
             raise ManeuverError(f"the left border at {left:g} m is not left of the right one at {right:g} m")
         if steep and self.length_m is not None and self.length_m < 2.0 * self.edge_m:
-            raise ManeuverError(f"is {self.length_m:g} m; two edges of edge_m = {self.edge_m:g} m need more", key="length_m")
+            raise ManeuverError(
+                f"is {self.length_m:g} m; two edges of edge_m = {self.edge_m:g} m need more", key="length_m"
+            )
 
     @property
     def _borders(self) -> tuple[float, float]:

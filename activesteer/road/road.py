@@ -149,6 +149,12 @@ class Road:
     """The road under the wheels; keys of the table [road] in a manoeuvre file."""
 
     OVERRULED: ClassVar = {"mu": {"mu_left": None, "mu_right": None}}
+    KEY_HINTS: ClassVar = {
+        "bank": "give bank_deg for the whole road, or a table banking over the distance",
+        **dict.fromkeys(
+            ("bump", "bumps", "obstacles", "cleat", "kerb", "pothole"), "give tables [[road.obstacle]] with a kind"
+        ),
+    }
 
     mu: Friction = 1.0
     """Friction relative to that in the tyre files [-]."""

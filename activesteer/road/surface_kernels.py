@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from activesteer.compilation import compiled
-from activesteer.road.obstacle import COSINE_BUMP, CROSS_SLOPE, PLATEAU
+from activesteer.road.obstacle import COSINE_BUMP, CROSS_SLOPE, PLATEAU, SINE
 
 SURFACE: Final = np.dtype(
     (
@@ -45,65 +45,73 @@ NEAR_M: Final = 1.0
 
 
 @compiled
-def _obstacle_at(it, s, d):
-    """Return height and slopes along s and d of one obstacle."""
-    if not it.right_m < d <= it.left_m:
-        return 0.0, 0.0, 0.0
-    x = s - it.start_m + it.skew * d
-    if x <= 0.0:
-        return 0.0, 0.0, 0.0
-    length = it.length_m
-    if it.shape == PLATEAU:
-        edge = it.edge_m
-        along = min(x, length - x)
-        across = min(d - it.right_m, it.left_m - d)
-        if along <= 0.0:
-            return 0.0, 0.0, 0.0
-        if along >= edge and across >= edge:
-            return it.height_m, 0.0, 0.0
-        steep = it.height_m / edge
+def _plateau_at(it, x, d):
+    """Return height and slopes along x and d of a step with its edges, x behind its beginning."""
+    along = min(x, it.length_m - x)
+    across = min(d - it.right_m, it.left_m - d)
+    height, slope_x, slope_d = it.height_m, 0.0, 0.0
+    if along <= 0.0:
+        height = 0.0
+    elif along < it.edge_m or across < it.edge_m:
+        steep = it.height_m / it.edge_m
+        height = steep * min(along, across)
         if along <= across:
-            slope = steep if x <= length - x else -steep
-            return steep * along, slope, slope * it.skew
-        return steep * across, 0.0, steep if d - it.right_m <= it.left_m - d else -steep
-    if it.shape == COSINE_BUMP:
-        if x >= length:
-            return 0.0, 0.0, 0.0
-        phase = 2.0 * math.pi * x / length
-        slope = math.pi * it.height_m / length * math.sin(phase)
-        return 0.5 * it.height_m * (1.0 - math.cos(phase)), slope, slope * it.skew
-    part = x / length
-    if it.shape == CROSS_SLOPE:
-        if part >= 1.0:
-            return it.height_m * d, 0.0, it.height_m
-        turned = it.height_m * part * part * (3.0 - 2.0 * part)
-        slope = it.height_m * d * 6.0 * part * (1.0 - part) / length
-        return turned * d, slope, turned + slope * it.skew
+            slope_x = steep if x <= it.length_m - x else -steep
+        else:
+            slope_d = steep if d - it.right_m <= it.left_m - d else -steep
+    return height, slope_x, slope_d
+
+
+@compiled
+def _sine_at(it, x):
+    """Return height and slope of a wave that grows over its first period and fades over its last one."""
+    part = x / it.length_m
     growth, rate = 1.0, 0.0
     if it.waves > 0.0 and part > it.waves - 1.0:
-        if part >= it.waves:
-            return 0.0, 0.0, 0.0
-        growth, rate = it.waves - part, -1.0 / length
+        growth, rate = max(it.waves - part, 0.0), -1.0 / it.length_m if part < it.waves else 0.0
     if part < growth:
-        growth, rate = part, 1.0 / length
+        growth, rate = part, 1.0 / it.length_m
     wave = it.height_m * math.sin(2.0 * math.pi * part)
-    slope = rate * wave + growth * it.height_m * math.cos(2.0 * math.pi * part) * 2.0 * math.pi / length
-    return growth * wave, slope, slope * it.skew
+    slope = it.height_m * math.cos(2.0 * math.pi * part) * 2.0 * math.pi / it.length_m
+    return growth * wave, rate * wave + growth * slope
+
+
+@compiled
+def _obstacle_at(it, s, d):
+    """Return height and slopes along s and d of one obstacle."""
+    x, length = s - it.start_m + it.skew * d, it.length_m
+    z, slope_x, slope_d = 0.0, 0.0, 0.0
+    if x <= 0.0 or not it.right_m < d <= it.left_m:
+        return z, slope_x, slope_d
+    if it.shape == PLATEAU:
+        z, slope_x, slope_d = _plateau_at(it, x, d)
+    elif it.shape == CROSS_SLOPE:
+        part = min(x / length, 1.0)
+        slope_d = it.height_m * part * part * (3.0 - 2.0 * part)
+        slope_x = it.height_m * d * 6.0 * part * (1.0 - part) / length
+        z = slope_d * d
+    elif it.shape == COSINE_BUMP and x < length:
+        phase = 2.0 * math.pi * x / length
+        z = 0.5 * it.height_m * (1.0 - math.cos(phase))
+        slope_x = math.pi * it.height_m / length * math.sin(phase)
+    elif it.shape == SINE:
+        z, slope_x = _sine_at(it, x)
+    return z, slope_x, slope_d + slope_x * it.skew
 
 
 @compiled
 def near_obstacles(obstacles, s, d):
-    """Return first and last (excluded) of the obstacles within `NEAR_M` of a place, and their rise in a tyre's reach [m]."""
+    """Return first and last (excluded) of the obstacles near a place, and their rise in a tyre's reach [m]."""
     first, last, highest = obstacles.size, 0, 0.0
     for index in range(obstacles.size):
         it = obstacles[index]
         x = s - it.start_m + it.skew * d
         margin = NEAR_M * (1.0 + abs(it.skew))
         length = it.length_m
-        if it.shape == CROSS_SLOPE or (it.shape > CROSS_SLOPE and it.waves == 0.0):
+        if it.shape == CROSS_SLOPE:
             length = math.inf
-        elif it.shape > CROSS_SLOPE:
-            length *= it.waves
+        elif it.shape == SINE:
+            length = length * it.waves if it.waves > 0.0 else math.inf
         if -margin < x < length + margin and it.right_m - NEAR_M < d < it.left_m + NEAR_M:
             first, last = min(first, index), index + 1
             if it.shape == PLATEAU:

@@ -19,6 +19,12 @@ _DASHES: Final = (0.0, (4.0, 2.0))
 _CHANNELS: Final = {"r": "yaw_rate_radps", "ay": "ay_mps2", "roll": "roll_rad", "beta": "sideslip_rad"}
 """Column of a reference -> channel."""
 _SHOWN: Final = {column: (quantity_of(name).title, quantity_of(name).factor) for column, name in _CHANNELS.items()}
+_UNEVEN: Final = (
+    ("z", "heave [mm]", 1e3), ("pitch", "pitch [deg]", math.degrees(1.0)), ("roll", "roll [deg]", math.degrees(1.0)),
+    ("r", "yaw rate [deg/s]", math.degrees(1.0)), ("Fz_FL", "load, front left [kN]", 1e-3),
+    ("Fz_RR", "load, rear right [kN]", 1e-3),
+)  # fmt: skip
+"""Column of a reference on an uneven road, its label, and the factor to the unit there."""
 _CROSS: Final = (("rack", "ay"), ("ay", "r"), ("ay", "roll"), ("ay", "beta"))
 """Abscissa and ordinate of the cross-plots."""
 _AXIS_NAMES: Final = _SHOWN | {"rack": ("rack [mm] (- steers left)", 1e3)}
@@ -38,6 +44,19 @@ def run_picture(run: str, ours: Table, reference: Table | None) -> Picture:
         curves.append(Curve(ours["t"], factor * ours[quantity.column], "ours", _OURS, _DASHES))
         panels.append(Panel("time [s]", label, curves, areas=areas))
     return Picture(run, panels, height_in=5.2, shared_legend=True)
+
+
+def uneven_picture(run: str, ours: Table, reference: Table) -> Picture:
+    """Return a run over an uneven road: heave, pitch, roll, yaw rate and two wheel loads over time."""
+    panels = []
+    for column, label, factor in _UNEVEN:
+        start = 1e3 * (ours[column][0] - reference[column][0]) if column == "z" else 0.0
+        curves = [
+            Curve(reference["t"], factor * reference[column], "reference", _THEIRS, width=2.6),
+            Curve(ours["t"], factor * ours[column] - start, "ours", _OURS, _DASHES),
+        ]
+        panels.append(Panel("time [s]", label, curves))
+    return Picture(run, panels, height_in=7.5, shared_legend=True)
 
 
 def cross_picture(run: str, ours: Table, reference: Table | None) -> Picture:

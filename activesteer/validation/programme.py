@@ -11,7 +11,7 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
-from activesteer.files import json_text, make_folder, replacing, write_text
+from activesteer.files import json_text, make_folder, replacing, shown_path, write_text
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import simulate
@@ -19,10 +19,11 @@ from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.validation.comparison import Comparison, to_json
 from activesteer.validation.kinematics import Curves, compare_kinematics
 from activesteer.validation.our_runs import compare_run
-from activesteer.validation.reference import ReferenceData, Table
+from activesteer.validation.reference import ReferenceData, Table, read_table
 from activesteer.validation.reference_columns import reference_columns
 from activesteer.validation.static import compare_static
 from activesteer.validation.tyre_grid import compare_tyre
+from activesteer.validation.uneven import ROADS, UnevenRun, uneven_runs
 
 _FRICTION: Final = 0.9
 """Friction of the road in all reference runs."""
@@ -72,7 +73,8 @@ def validate(
 
     Args:
         reference: Folder in `models/reference`.
-        more: Folder with further reference runs NAME.csv in the same columns.
+        more: Folder with further reference runs NAME.csv in the same columns; those on uneven roads are described in
+            its `roads.json`.
         timestep_s: Step of our simulation [s].
         unknown_runs: Drive also the runs without a reference.
         jobs: Number of processes; by default the number of processors.
@@ -87,7 +89,8 @@ def validate(
     """
     data = ReferenceData.load(reference, more)
     references = {run: table for run in data.runs if (table := data.run(run)) is not None}
-    driven = data.runs if unknown_runs else list(references)
+    uneven = {} if more is None else {run.name: run for run in _uneven(data, more)}
+    driven: list[str | UnevenRun] = [*(data.runs if unknown_runs else references), *uneven.values()]
 
     def report(done: int, what: str) -> None:
         if progress is not None:
@@ -104,20 +107,46 @@ def validate(
         _columns,
         [(data, run, timestep_s) for run in driven],
         jobs,
-        lambda place, done: report(done + 2, driven[place]),
+        lambda place, done: report(done + 2, run if isinstance(run := driven[place], str) else run.name),
         scheduler=scheduler,
     )
     for run, columns in zip(driven, found, strict=True):
+        if isinstance(run, UnevenRun):
+            runs[run.name], references[run.name] = columns, run.table
+            comparisons += run.compare(columns)
+            continue
         runs[run] = columns
         if run in references:
             comparisons += compare_run(run, columns, references[run])
     return Validation(data, comparisons, curves, runs, references)
 
 
-def _columns(data: ReferenceData, run: str, timestep_s: float) -> Table:
+def _uneven(data: ReferenceData, folder: Path) -> list[UnevenRun]:
+    """Return the runs on uneven roads of a folder, all of whose files must be understood."""
+    for path in sorted(folder.iterdir()):
+        if path.suffix != ".csv" and path.name != ROADS and path.suffix != ".md":
+            raise ParameterError(
+                f"{shown_path(path)} is no reference run: the folder may hold runs NAME.csv, {ROADS} and a README.md",
+                value=path.name,
+            )
+    names = [path.stem.removesuffix("_reference") for path in sorted(folder.glob("*.csv"))]
+    roads = {name: read_table(folder / f"{name}.csv") for name in names if name not in data.runs}
+    return uneven_runs(folder, data.runs, roads, data.point_from_cg_m[0])
+
+
+def _columns(data: ReferenceData, run: str | UnevenRun, timestep_s: float) -> Table:
     """Drive a run and return it in the columns of the reference."""
-    recording = simulate(data.maneuver(run), vehicle=data.vehicle, timestep_s=timestep_s)
+    maneuver = data.maneuver(run) if isinstance(run, str) else run.maneuver(_start_speed_mps(data, run, timestep_s))
+    recording = simulate(maneuver, vehicle=data.vehicle, timestep_s=timestep_s)
     return reference_columns(recording, data.point_from_cg_m)
+
+
+def _start_speed_mps(data: ReferenceData, run: UnevenRun, timestep_s: float) -> float:
+    """Return the speed from which our car has the reference's speed after settling; both coast."""
+    wanted = float(run.table["vx"][0])
+    short = run.maneuver(wanted) | {"duration_s": 0.01}
+    settled = reference_columns(simulate(short, vehicle=data.vehicle, timestep_s=timestep_s), data.point_from_cg_m)
+    return wanted**2 / float(settled["vx"][0])
 
 
 def write_json(result: Validation, path: Path) -> Path:

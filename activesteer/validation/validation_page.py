@@ -11,7 +11,7 @@ from activesteer.files import make_folder, write_text
 from activesteer.pages import Page, Section, Table, Text, failed, passed, render_page
 from activesteer.plotting import as_svg, draw
 from activesteer.validation.comparison import Comparison
-from activesteer.validation.figures import RUN_PICTURES, sweep_picture
+from activesteer.validation.figures import RUN_PICTURES, sweep_picture, uneven_picture
 from activesteer.validation.programme import Validation
 from activesteer.validation.study import Response
 
@@ -73,7 +73,10 @@ def _runs(result: Validation) -> list[Section]:
             sections.append(Section(run, pictures=pictures, tables=[_comparisons(rows)]))
     for run, ours in result.runs.items():
         reference = result.references.get(run)
-        pictures = [as_svg(draw(picture(run, ours, reference))) for picture in RUN_PICTURES]
+        if reference is not None and "ay" not in reference:
+            pictures = [as_svg(draw(uneven_picture(run, ours, reference)))]
+        else:
+            pictures = [as_svg(draw(picture(run, ours, reference))) for picture in RUN_PICTURES]
         texts = (
             ["The reference of this run is not known here; the page shows our run alone."] if reference is None else []
         )

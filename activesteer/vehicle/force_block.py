@@ -114,8 +114,8 @@ CURVE_TABLE: Final = _record("start_m", "per_m", "intervals", "count")
 _SECTIONS: Final[Mapping[str, Any]] = {
     "wheels": WHEEL, "tyres": TYRE_RECORD, "dampers": DAMPER, "actuators": ACTUATOR, "areas": AREA,
     "path_grids": PATH_GRID, "path_points": np.float64, "path_cells": np.float64, "links": LINK, "screws": SCREW,
-    "curve_axle_wheels": CURVE_AXLE_WHEEL, "curves": np.float64, "surfaces": SURFACE, "obstacles": OBSTACLE, "cams": CAM,
-    "heights": np.float64,
+    "curve_axle_wheels": CURVE_AXLE_WHEEL, "curves": np.float64, "surfaces": SURFACE, "obstacles": OBSTACLE,
+    "cams": CAM, "heights": np.float64,
 }  # fmt: skip
 HEADER: Final = _record(
     "n_dofs", "n_bodies", "n_userdata", "n_activations", "n_controls", "n_tendons", "n_tendon_jacobian",

@@ -18,7 +18,6 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError
 from activesteer.road.path_coordinates import PathGrid
 from activesteer.road.road import LaidRoad, Road
-from activesteer.road.road import Road
 from activesteer.road.surface import surface_of
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb

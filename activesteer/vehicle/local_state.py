@@ -13,6 +13,8 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import CORNERS, Array, yaw_of
+from activesteer.errors import ParameterError
+from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.chassis_heading import turn_chassis_back
 
@@ -46,9 +48,18 @@ class LocalState:
 
         Args:
             vehicle: The car, rolling along the world's x axis.
+
+        Raises:
+            ParameterError: the road is uneven or banked.
         """
         self.vehicle = vehicle
         model = vehicle.model
+        if model.opt.gravity[1] != 0.0 or fb.header_of(model)["n_surfaces"][0] != 0.0:
+            raise ParameterError(
+                "straight driving is no equilibrium on an uneven or banked road; linear analyses need a road without "
+                "bank, obstacles and surfaces",
+                key="road",
+            )
         dof_names = []
         for joint in range(model.njnt):
             free = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE

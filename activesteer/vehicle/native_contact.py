@@ -48,7 +48,12 @@ _FINE_M: Final = 0.0004
 CAM: Final = np.dtype(
     (
         np.record,
-        [("distance_m", np.float64), ("reach_m", np.float64), ("beside_m", np.float64), ("drop_m", np.float64, (CAM_POINTS,))],
+        [
+            ("distance_m", np.float64),
+            ("reach_m", np.float64),
+            ("beside_m", np.float64),
+            ("drop_m", np.float64, (CAM_POINTS,)),
+        ],
     )
 )
 """Cams of a wheel: their distance, the half length of the table of `drop_m`, the height of the cam above its lowest
@@ -78,7 +83,11 @@ def _cam_height(surface, numbers, obstacles, first, last, cam, reach, s, d, ahea
     """Return height of the lowest point of a cam, and its change per metre forwards.
 
     Args:
-        surface: The road, with `numbers`, `obstacles`, `first` and `last` as for `height_at`.
+        surface: The road; this and the next four arguments as for `height_at`.
+        numbers: Its numbers.
+        obstacles: Its obstacles.
+        first: First obstacle near.
+        last: Last one, excluded.
         cam: A `CAM`.
         reach: Distance within which the road may touch the cam [m].
         s: Place of the cam's middle.
@@ -122,7 +131,9 @@ def _drop(cam, x):
 
 
 @compiled
-def contact_plane(surface, numbers, obstacles, cam, along, across, cos, sin, stretch, heading_x, heading_y, free_radius):
+def contact_plane(
+    surface, numbers, obstacles, cam, along, across, cos, sin, stretch, heading_x, heading_y, free_radius
+):
     """Return height, forward slope, sideways slope and forward change of slope [1/m] of the plane that a tyre feels.
 
     Args:
@@ -155,7 +166,9 @@ def contact_plane(surface, numbers, obstacles, cam, along, across, cos, sin, str
     sideways = (left - right) / (2.0 * beside)
     if surface.contact != ENVELOPING:
         ahead = FOUR_POINT_AHEAD * free_radius
-        front = height_at(surface, numbers, obstacles, first, last, along + ahead * ahead_s, across + ahead * ahead_d)[0]
+        front = height_at(surface, numbers, obstacles, first, last, along + ahead * ahead_s, across + ahead * ahead_d)[
+            0
+        ]
         rear = height_at(surface, numbers, obstacles, first, last, along - ahead * ahead_s, across - ahead * ahead_d)[0]
         return 0.25 * (left + right + front + rear), (front - rear) / (2.0 * ahead), sideways, 0.0
     rise = surface.rise_m + highest

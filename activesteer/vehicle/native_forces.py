@@ -18,8 +18,8 @@ from numba import carray, types
 
 from activesteer.compilation import compiled_callback, inlined
 from activesteer.errors import ModelError
-from activesteer.road.path_coordinates import along_path
 from activesteer.road.obstacle import OBSTACLE
+from activesteer.road.path_coordinates import along_path
 from activesteer.road.surface_kernels import SURFACE, left_grid
 from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.kernels.record import TYRE_RECORD
@@ -121,7 +121,7 @@ def _back(axes, x, y, z):
 
 
 @inlined
-def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs, qfrc):
+def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs, qfrc):  # noqa: PLR0915 - one wheel, compiled as one function
     wheels = _wheels_at(block, header.wheels, header.n_wheels)
     tyres = _tyres_at(block, header.tyres, header.n_tyres)
     uneven = header.n_surfaces != 0.0 and header.areas_felt != 0.0
@@ -233,9 +233,7 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
         ty = pz * gx - px * fz + tyre.mx_Nm * hy + tyre.my_Nm * hx
         tz = px * gy - py * gx + tyre.mz_Nm
         if uneven:
-            mx, my, mz = _back(
-                axes, tyre.mx_Nm * hx - tyre.my_Nm * hy, tyre.mx_Nm * hy + tyre.my_Nm * hx, tyre.mz_Nm
-            )
+            mx, my, mz = _back(axes, tyre.mx_Nm * hx - tyre.my_Nm * hy, tyre.mx_Nm * hy + tyre.my_Nm * hx, tyre.mz_Nm)
             tx, ty, tz = py * fz - pz * gy + mx, pz * gx - px * fz + my, px * gy - py * gx + mz
         _apply(qfrc, cdof, chain, gx, gy, fz, tx, ty, tz)
 

@@ -17,7 +17,7 @@ from activesteer.road.road import Road, RoadPatch
 
 @compiled
 def _native(x, y, x0, y0, cell, columns, rows, spacing, points, cells):
-    return along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells)
+    return along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells)[:2]
 
 
 def _along(x_m: float, y_m: float, grid: PathGrid) -> tuple[float, float]:

@@ -1,0 +1,145 @@
+"""The car on banked and uneven roads against hand calculations."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import activesteer
+from activesteer.conventions import GRAVITY_MPS2
+from activesteer.errors import ManeuverError, ParameterError
+from activesteer.recording import Recording
+from activesteer.road.obstacle import Obstacle
+from activesteer.road.road import Road
+from activesteer.scenario import load_car
+from activesteer.vehicle.local_state import LocalState
+from tests.physics.runs import car, corners, last, mass_kg
+
+
+def drive(road: dict[str, Any], speed_kmh: float = 60.0, duration_s: float = 3.0, **more: Any) -> Recording:
+    """Drive straight ahead over a road."""
+    table = {"kind": "open_loop", "speed_kmh": speed_kmh, "duration_s": duration_s, "road": road} | more
+    return activesteer.simulate(table)
+
+
+@pytest.mark.parametrize(
+    "road",
+    [
+        {"bank_deg": 3.0},
+        {
+            "obstacle": [
+                {"kind": "cross_slope_ramp", "start_m": 5.0, "length_m": 20.0, "slope": math.tan(math.radians(3.0))}
+            ]
+        },
+    ],
+)
+def test_on_a_bank_the_tyres_carry_the_weight_and_its_part_down_the_slope(road: dict[str, Any]) -> None:
+    # A driver holds the straight line: a path along x, so that there is no lateral acceleration at the end.
+    path = {"kind": "follow_path", "path": {"x_m": [20.0 * i for i in range(10)], "y_m": [0.0] * 10}}
+    recording = drive(road, duration_s=9.0, **path)
+    end, bank, weight_N = last(recording, 1.0), math.radians(3.0), mass_kg(car()) * GRAVITY_MPS2
+    loads, across = corners(recording, "tyre_fz_N")[end].mean(axis=0), corners(recording, "tyre_fy_N")[end].mean(axis=0)
+    steer = corners(recording, "steer_rad")[end].mean(axis=0)
+    assert loads.sum() == pytest.approx(weight_N * math.cos(bank), rel=2e-3)
+    # The tyres push uphill, to the left; the drive's part of it is small.
+    drag_part = (corners(recording, "tyre_fx_N")[end].mean(axis=0) * np.sin(steer)).sum()
+    assert (across * np.cos(steer)).sum() + drag_part == pytest.approx(weight_N * math.sin(bank), rel=0.02)
+    # Moments about the contact line: m g h sin(bank) = (sum of right loads - left loads) x half track, within the few
+    # millimetres by which roll and compliance move the weight and the contact points.
+    sizes, height_m = car().dimensions(), float(recording["z_m"][0])
+    half_track = 0.25 * (sizes["front_track_m"] + sizes["rear_track_m"])  # type: ignore[operator]
+    moved = 0.5 * (loads[1] + loads[3] - loads[0] - loads[2])
+    assert moved == pytest.approx(weight_N * math.sin(bank) * height_m / (2.0 * half_track), rel=0.06)
+
+
+def test_a_bank_of_the_whole_road_and_a_cross_slope_give_the_same_loads() -> None:
+    path = {"kind": "follow_path", "path": {"x_m": [20.0 * i for i in range(10)], "y_m": [0.0] * 10}}
+    slope = math.tan(math.radians(4.0))
+    ramp = {"obstacle": [{"kind": "cross_slope_ramp", "start_m": 5.0, "length_m": 10.0, "slope": slope}]}
+    one, other = drive({"bank_deg": 4.0}, duration_s=9.0, **path), drive(ramp, duration_s=9.0, **path)
+    end = last(one, 0.5)
+    for name in ("tyre_fz_N", "tyre_fy_N"):
+        expected = corners(one, name)[end].mean(axis=0)
+        assert corners(other, name)[end].mean(axis=0) == pytest.approx(expected, rel=5e-3, abs=10.0)
+
+
+def test_a_bump_on_the_other_side_gives_the_mirrored_run() -> None:
+    bump = {"kind": "cosine_bump", "start_m": 8.0, "length_m": 1.2, "height_m": 0.04}
+    left, right = (drive({"obstacle": [bump | {"side": side}]}, duration_s=1.5) for side in ("left", "right"))
+    for name in ("z_m", "pitch_rad", "vx_mps"):
+        assert left[name] == pytest.approx(right[name], abs=1e-9)
+    for name in ("roll_rad", "yaw_rate_radps", "ay_mps2"):
+        assert np.abs(left[name]).max() > 1e-3
+        assert left[name] == pytest.approx(-right[name], abs=1e-8)
+    assert left["fl_tyre_fz_N"] == pytest.approx(right["fr_tyre_fz_N"], abs=1e-4)
+
+
+def test_the_loads_of_a_long_wave_follow_mass_times_gravity_and_vertical_acceleration() -> None:
+    wave = {"kind": "sine_wave", "start_m": 5.0, "length_m": 40.0, "height_m": 0.2}
+    recording = drive({"obstacle": [wave]}, 60.0, 6.0)
+    end = last(recording, 2.4)  # one wave
+    carried = corners(recording, "tyre_fz_N")[end].sum(axis=1)
+    # The whole car, wheels included: the sum of the forces is the rate of its momentum. The wave of 40 m at 60 km/h has
+    # 0.42 Hz, and the slope of 0.03 tilts the forces by 0.0005 of their size.
+    curvature = 0.2 * (2.0 * math.pi / 40.0) ** 2
+    swing = 0.5 * np.ptp(carried)
+    still = mass_kg(car()) * curvature * (60.0 / 3.6) ** 2
+    # Below the body's 1.2 Hz the car follows the road, and its own resonance adds (0.42/1.2)^2, 12 to 20 %.
+    assert carried.mean() == pytest.approx(mass_kg(car()) * GRAVITY_MPS2, rel=0.01)
+    assert 1.0 < swing / still < 1.25
+
+
+def test_contact_on_a_smooth_bump_hardly_depends_on_its_model_and_on_a_cleat_it_does() -> None:
+    def peak_N(obstacle: dict[str, Any], contact: str) -> float:
+        return float(drive({"contact": contact, "obstacle": [obstacle]}, 30.0, 1.5)["fl_tyre_fz_N"].max())
+
+    bump = {"kind": "cosine_bump", "start_m": 6.0, "length_m": 3.0, "height_m": 0.05}
+    single = peak_N(bump, "single_point")
+    for contact in ("four_point", "enveloping"):
+        assert peak_N(bump, contact) == pytest.approx(single, rel=0.03)
+    cleat = {"kind": "cleat", "start_m": 6.0, "length_m": 0.05, "height_m": 0.01}
+    # A tyre swallows a cleat shorter than its contact patch; a single point drops from it.
+    assert peak_N(cleat, "enveloping") < 0.95 * peak_N(cleat, "single_point")
+
+
+def test_friction_and_heights_follow_a_path() -> None:
+    turn = np.linspace(0.0, 1.2, 40)
+    x, y = 80.0 * np.sin(turn), 80.0 * (1.0 - np.cos(turn))
+    table = {"kind": "follow_path", "path": {"x_m": list(x), "y_m": list(y)}}
+    bump = {"kind": "cosine_bump", "start_m": 50.0, "length_m": 4.0, "height_m": 0.06, "side": "left"}
+    recording = drive({"along": "path", "obstacle": [bump]}, 40.0, 7.0, **table)
+    # The left wheels meet the bump 50 m along the arc, the right ones not at all.
+    when = recording["fl_road_z_m"] > 1e-4
+    arc = 80.0 * np.arctan2(recording["fl_contact_x_m"], 80.0 - recording["fl_contact_y_m"])
+    assert arc[when].min() == pytest.approx(50.1, abs=0.3)
+    assert arc[when].max() == pytest.approx(53.9, abs=0.3)
+    assert recording["fl_road_z_m"].max() == pytest.approx(0.06, abs=1e-3)
+    assert np.abs(recording["fr_road_z_m"]).max() == 0.0
+
+
+def test_linear_analyses_refuse_an_uneven_or_banked_road() -> None:
+    bump = Obstacle("cosine_bump", 10.0, 3.0, 0.05)
+    for road in (Road(bank_rad=0.05), Road(obstacle=(bump,))):
+        with pytest.raises(ParameterError, match="no equilibrium on an uneven or banked road"):
+            LocalState(load_car().on(road))
+
+
+@pytest.mark.parametrize(
+    ("road", "problem"),
+    [
+        ({"contact": "single_point"}, "no effect on a road without such a surface"),
+        ({"obstacle": [{"kind": "cleat", "start_m": 6.0, "height_m": 0.01}]}, "a cleat needs it"),
+        ({"obstacle": [{"kind": "bump", "start_m": 6.0}]}, "allowed are 'cosine_bump'"),
+        ({"obstacle": [{"kind": "cosine_bump", "start_m": 1.0, "length_m": 1.0, "height_m": 0.1}]}, "at least 2"),
+        ({"obstacle": [{"kind": "kerb", "start_m": 6.0, "height_m": 0.1, "waves": 3}]}, "no effect on this kerb"),
+        ({"banking": {"s_m": [0.0, 10.0], "bank_deg": [0.0]}}, "2 to 100000 of each"),
+        ({"bank": 3.0}, "give bank_deg for the whole road"),
+        ({"bumps": []}, "give tables"),
+    ],
+)
+def test_a_wrong_road_is_refused_with_its_key(road: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ManeuverError, match=problem):
+        drive(road)
