@@ -107,7 +107,7 @@ class Obstacle:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether the obstacle hardly bends within the contact patch, so that one point of contact tells enough."""
+        """True if the obstacle hardly bends within the contact patch, so that one point of contact tells enough."""
         return self.kind in _SMOOTH and self.length_m is not None and self.length_m >= _LONG_M
 
     def record(self) -> Any:

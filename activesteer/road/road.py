@@ -20,10 +20,10 @@ from activesteer.config import Range, Source, build
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, RecordingError, nearest_names
 from activesteer.road.course import Course, course_of
+from activesteer.road.grid import Grid
 from activesteer.road.obstacle import Obstacle
 from activesteer.road.path import Path
 from activesteer.road.recorded import fail, table_of
-from activesteer.road.surface import Grid
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 
@@ -207,7 +207,7 @@ class Road:
 
     @property
     def is_uneven(self) -> bool:
-        """Whether the road has a surface besides its plane."""
+        """True if the road has a surface besides its plane."""
         return bool(self.obstacle) or self.banking is not None or self._is_gridded
 
     @property

@@ -4,41 +4,22 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array
+from activesteer.road.grid import Grid
 from activesteer.road.obstacle import OBSTACLE
+from activesteer.road.road import Road
 from activesteer.road.surface_kernels import ENVELOPING, FOUR_POINT, SINGLE_POINT, SURFACE, heights_at
-
-if TYPE_CHECKING:
-    from activesteer.road.road import Road
 
 _CONTACTS: Final = {"single_point": SINGLE_POINT, "four_point": FOUR_POINT, "enveloping": ENVELOPING}
 _BLEND_M: Final = 2.0
 """Distance from which the surface is blended in [m]: ahead of the front wheels of a car at the start."""
 _REACH_M: Final = 0.4
 """Distance within which a tyre feels the road [m]."""
-
-
-class Grid(NamedTuple):
-    """Heights over distance along the road and distance to the left.
-
-    Attributes:
-        s_m: First distance along the road [m].
-        step_s_m: Distance of the rows [m].
-        d_m: First distance to the left [m].
-        step_d_m: Distance of the columns [m].
-        z_m: Heights [m], shape (rows, columns), at least two of each.
-    """
-
-    s_m: float
-    step_s_m: float
-    d_m: float
-    step_d_m: float
-    z_m: Array
 
 
 class Surface(NamedTuple):
