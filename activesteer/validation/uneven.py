@@ -195,8 +195,8 @@ def _steering(given: Any, name: str) -> dict[str, Any] | None:
         start = _STEER_AT_S[0] if start is None else start
         end = start + (_STEER_AT_S[1] - _STEER_AT_S[0] if ramp is None else ramp) if end is None else end
         listed = [given.get(key) for key in ("time_s", "value")]
-        if all(isinstance(column, list) for column in listed):
-            times, values = listed  # type: ignore[assignment]
+        if isinstance(listed[0], list) and isinstance(listed[1], list):
+            times, values = listed[0], listed[1]
         elif value is None or not end > start:
             raise ParameterError(
                 f"{ROADS}: {name}: steer is {shown(given)}; a value and the times of its ramp are needed"

@@ -148,8 +148,8 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
         vz = cvel[6 * body + 5] + wx * to_y - wy * to_x
         axes = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
         road_z, forward, sideways = 0.0, 0.0, 0.0
+        p, hx, hy = tyres[index], 1.0, 0.0
         if uneven:
-            p = tyres[index]
             horizontal = (ax * ax + ay * ay) ** 0.5
             to_lowest = p.UNLOADED_RADIUS * az / horizontal
             contact_x = xpos[3 * body] + to_lowest * ax
@@ -176,7 +176,7 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
             wx, wy, wz = _across(axes, 3, wx, wy, wz), _across(axes, 6, wx, wy, wz), _across(axes, 0, wx, wy, wz)
         mu = _road_mu(block, header, wheel.mu, along, across)
         tyre = tyre_on_road(
-            tyres[index],
+            p,
             mu,
             wheel.pressure_Pa,
             wheel.low_speed_mps,
