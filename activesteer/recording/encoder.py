@@ -36,11 +36,18 @@ def _index_record(channel_id: int, time_ns: NDArray[np.uint64], offsets: NDArray
     return len(entries), head + entries.tobytes()
 
 
-def one_message(channel_id: int, data: bytes) -> ChunkData:
-    """Return a chunk with a single message at time zero."""
-    record = message_record(channel_id, FixedMessage().constant(data))
-    index = _index_record(channel_id, np.zeros(1, np.uint64), np.zeros(1, np.int64))
-    return ChunkData(0, 0, bytes(record.template), {channel_id: index})
+def few_messages(channel_id: int, messages: Sequence[tuple[int, bytes]]) -> ChunkData:
+    """Return a chunk of messages of one topic: time [ns], ascending, and data of each."""
+    records = []
+    for time_ns, data in messages:
+        record = message_record(channel_id, FixedMessage().constant(data))
+        block = record.allocate(1)
+        record.views(block)[1][:] = time_ns
+        records.append(block.tobytes())
+    times = np.array([time_ns for time_ns, _ in messages], np.uint64)
+    offsets = np.cumsum([0, *map(len, records[:-1])])
+    chunk = b"".join(records)
+    return ChunkData(int(times[0]), int(times[-1]), chunk, {channel_id: _index_record(channel_id, times, offsets)})
 
 
 class _Rows:

@@ -21,7 +21,7 @@ from activesteer.recording.contents import check_metadata, check_metrics
 FORMAT_VERSION = 1
 """Version of the format; raised when an older reader could misread a file."""
 
-STATE_TOPIC, TRANSFORMS_TOPIC, SCENE_TOPIC = "/state/", "/tf", "/scene"
+STATE_TOPIC, TRANSFORMS_TOPIC, SCENE_TOPIC, EVENTS_TOPIC = "/state/", "/tf", "/scene", "/events"
 RUN_RECORD, RESULT_RECORD, METRICS_RECORD = "activesteer.run", "activesteer.result", "activesteer.metrics"
 """Names of the metadata records: known before the run, known after the run, metrics."""
 
@@ -49,7 +49,7 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
         metadata: Values that JSON can represent; numpy numbers and arrays become numbers and lists.
 
     Returns:
-        The values as JSON text, without the key `metrics`; and the metrics, as numbers in text.
+        The values as JSON text, without the keys `metrics` and `events`; and the metrics, as numbers in text.
 
     Raises:
         RecordingError: a value cannot be represented or has the wrong type, or a metric is not a number.
@@ -66,7 +66,7 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
                 if isinstance(value, float) and abs(value) > MAX_NUMBER}  # fmt: skip
     check_metrics(metrics)
     for key, value in metadata.items():
-        if key == "metrics":
+        if key in ("metrics", "events"):
             continue
         try:
             texts[str(key)] = json.dumps(value, default=_plain, ensure_ascii=False)

@@ -29,7 +29,9 @@ from activesteer.recording.contents import (
     check_names,
 )
 from activesteer.recording.decoder import Block, BlockDecoder, Group
+from activesteer.recording.events import MAX_EVENTS, decode_event, events_of, tables_of
 from activesteer.recording.format import (
+    EVENTS_TOPIC,
     FORMAT_RECORD,
     FORMAT_VERSION,
     METRICS_RECORD,
@@ -132,7 +134,7 @@ def _decode(descriptor: int, records: Records) -> Contents:
             raise RecordingError(f"two topics have the name {topic.topic!r:.100}")
         topics[topic.topic] = topic
     channels, groups = _channels(records, topics)
-    transforms, scene = topics.get(TRANSFORMS_TOPIC), topics.get(SCENE_TOPIC)
+    transforms, scene, log = (topics.get(name) for name in (TRANSFORMS_TOPIC, SCENE_TOPIC, EVENTS_TOPIC))
     bodies = _bodies(transforms)
     known = {*groups, *([] if transforms is None else [transforms.id])}
     decoder = BlockDecoder(
@@ -144,6 +146,7 @@ def _decode(descriptor: int, records: Records) -> Contents:
     check_names(list(records.attachments), "attachments", MAX_OTHER_RECORDS)
     rows = _Rows(len(channels))
     scenes: list[bytes] = []
+    events: list[bytes] = []
     for start, length in records.chunks:
         try:
             data, crc = messages_of(_content(descriptor, start, length))
@@ -153,9 +156,13 @@ def _decode(descriptor: int, records: Records) -> Contents:
             metadata["complete"] = False
             break
         scenes += block.others.get(scene.id, ()) if scene else ()
+        events += block.others.get(log.id, ()) if log else ()
     if len(scenes) > 1:
         raise RecordingError(f"there are {len(scenes)} scenes")
     parts = decode_scene(scenes[0]) if scenes else ()
+    if events:
+        metadata["events"] = tables_of(map(decode_event, events[: MAX_EVENTS + 1]))
+        events_of(metadata)
     values, poses = rows.collected(descriptor, decoder, list(channels))
     return Contents(
         channels, rows.time_s(), values, poses, metadata, metrics, records.attachments, parts, records.damage

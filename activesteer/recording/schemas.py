@@ -20,6 +20,7 @@ from activesteer.signals import Channel
 
 TRANSFORMS_SCHEMA = "foxglove.FrameTransforms"
 SCENE_SCHEMA = "foxglove.SceneUpdate"
+LOG_SCHEMA = "foxglove.Log"
 WORLD = "world"
 """Name of the frame of all poses."""
 
@@ -65,11 +66,14 @@ _FOXGLOVE = {
     "repeated foxglove.SpherePrimitive spheres = 9, repeated foxglove.CylinderPrimitive cylinders = 10, "
     "repeated foxglove.LinePrimitive lines = 11, repeated foxglove.TriangleListPrimitive triangles = 12, "
     "repeated foxglove.TextPrimitive texts = 13, repeated foxglove.ModelPrimitive models = 14",
+    "Log": "google.protobuf.Timestamp timestamp = 1, Type level = 2, string message = 3, string name = 4, "
+    "string file = 5, fixed32 line = 6",
     "SceneUpdate": "repeated foxglove.SceneEntityDeletion deletions = 1, repeated foxglove.SceneEntity entities = 2",
 }
 _FOXGLOVE_ENUMS = {
     "LinePrimitive": ("LINE_STRIP", "LINE_LOOP", "LINE_LIST"),
     "SceneEntityDeletion": ("MATCHING_ID", "ALL"),
+    "Log": ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"),
 }
 
 

@@ -28,8 +28,10 @@ from activesteer.recording.contents import (
     MAX_ROWS,
     check_names,
 )
-from activesteer.recording.encoder import BlockEncoder, one_message
+from activesteer.recording.encoder import BlockEncoder, few_messages
+from activesteer.recording.events import Event, encode_event, events_of
 from activesteer.recording.format import (
+    EVENTS_TOPIC,
     FORMAT_RECORD,
     FORMAT_VERSION,
     LIBRARY,
@@ -43,6 +45,7 @@ from activesteer.recording.format import (
 )
 from activesteer.recording.scene import ScenePart, encode_scene
 from activesteer.recording.schemas import (
+    LOG_SCHEMA,
     SCENE_SCHEMA,
     TRANSFORMS_SCHEMA,
     WORLD,
@@ -113,10 +116,12 @@ class McapWriter:
         if (size := sum(map(len, (attachments or {}).values()))) > MAX_OTHER_BYTES // 2:
             raise RecordingError(f"the attachments have {size} bytes, at most {MAX_OTHER_BYTES // 2} are allowed")
         texts, metrics = metadata_texts(metadata or {})
+        events = events_of(metadata or {})
         scene_data = encode_scene(scene)
         self._last_row_ns = self._last_pose_ns = -1
         self._row_count = 0
         self._saved_ns = -1
+        self._events_id: int | None = None
         self._pending: list[tuple[int, Future[None]]] = []
         self._stream = open_target(self.path, overwrite=overwrite)
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="mcap-writer")
@@ -124,6 +129,8 @@ class McapWriter:
         try:
             self._file = McapFile(self._stream, LIBRARY + __version__)
             self._begin(texts, metrics, attachments or {}, scene_data)
+            if events:
+                self.write_events(events)
         except BaseException as error:
             self._abandon()
             if self.path.is_file():  # without rows, it cannot be opened
@@ -162,7 +169,7 @@ class McapWriter:
         self._file.add_metadata(FORMAT_RECORD, {"version": str(FORMAT_VERSION)})
         self._encoder = BlockEncoder(self.channels, self.body_names, group_ids, transforms_id)
         if scene_id is not None:
-            self._file.add_chunk(one_message(scene_id, scene))
+            self._file.add_chunk(few_messages(scene_id, [(0, scene)]))
         self._stream.flush()
 
     def write(
@@ -217,6 +224,22 @@ class McapWriter:
             self._last_row_ns = int(row_ns[-1])
         if poses:
             self._last_pose_ns = int(pose_ns[-1])
+
+    def write_events(self, events: Sequence[Event]) -> None:
+        """Write events, in the order of their times.
+
+        Raises:
+            RecordingError: the file is closed, or cannot be written.
+        """
+        if self._closed:
+            raise RecordingError(f"{self.path} is closed", value=self.path)
+        self._await(0)
+        try:
+            if self._events_id is None:
+                self._events_id = self._file.add_topic(EVENTS_TOPIC, LOG_SCHEMA, foxglove_schema(), {})
+            self._file.add_chunk(few_messages(self._events_id, [encode_event(event) for event in events]))
+        except OSError as error:
+            raise self._failure(error) from error
 
     def flush(self) -> Path:
         """Wait until all blocks are in the file; return its path.

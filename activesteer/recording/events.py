@@ -1,0 +1,93 @@
+"""Events of a run: what was changed on the way, which fault was set, which phase began.
+
+In a file an event is a message of Foxglove's log, so other tools show it on their time axis. In the metadata the events
+are a list of tables with the fields of `Event`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import Any, Final, NamedTuple
+
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message_factory import GetMessageClass
+
+from activesteer.errors import RecordingError
+from activesteer.recording.schemas import LOG_SCHEMA, foxglove_schema
+from activesteer.road.recorded import fail, sequence, table_of, text
+
+MAX_EVENTS: Final = 10_000
+"""Largest number of events in a recording."""
+_MAX_LETTERS: Final = 2000
+_INFO: Final = 2
+"""Level of the messages in Foxglove's log."""
+
+
+class Event(NamedTuple):
+    """An event.
+
+    Attributes:
+        time_s: Time at which the next step began [s].
+        kind: `set` for a changed key, `fail` for a fault, `phase` for a phase of the manoeuvre.
+        what: The change (`road.mu = 0.3`), the fault (`rear:stuck`) or the name of the phase.
+    """
+
+    time_s: float
+    kind: str
+    what: str
+
+
+def events_of(metadata: Mapping[str, Any]) -> list[Event]:
+    """Return the events in the metadata of a recording.
+
+    Raises:
+        RecordingError: an event is damaged, or there are more than `MAX_EVENTS`.
+    """
+    listed = sequence(metadata.get("events", ()), "events")
+    if len(listed) > MAX_EVENTS:
+        raise fail("events", f"has {len(listed)} entries, at most {MAX_EVENTS} are allowed")
+    return [_event(entry, f"events.{index}") for index, entry in enumerate(listed)]
+
+
+def tables_of(events: Iterable[Event]) -> list[dict[str, Any]]:
+    """Return events as the list of tables that the metadata hold."""
+    return [event._asdict() for event in events]
+
+
+def encode_event(event: Event) -> tuple[int, bytes]:
+    """Return the time [ns] and the message of an event."""
+    time_ns = round(event.time_s * 1e9)
+    message = _log_class()(level=_INFO, message=event.what, name=event.kind)
+    message.timestamp.FromNanoseconds(time_ns)
+    return time_ns, message.SerializeToString()
+
+
+def decode_event(data: bytes) -> Event:
+    """Return the event of a message.
+
+    Raises:
+        RecordingError: it is no event of ours.
+    """
+    message = _log_class().FromString(data)
+    return _event({"time_s": message.timestamp.ToNanoseconds() / 1e9, "kind": message.name, "what": message.message},
+                  "events")  # fmt: skip
+
+
+def _event(entry: object, key: str) -> Event:
+    table = table_of(entry, key)
+    time_s, kind, what = table.get("time_s"), text(table.get("kind"), f"{key}.kind"), text(table.get("what"), key)
+    if isinstance(time_s, bool) or not isinstance(time_s, int | float) or not 0.0 <= time_s <= 1e6:
+        raise fail(f"{key}.time_s", f"is {time_s!r:.40}, expected a time from 0 to 1e6 s")
+    if max(len(kind), len(what)) > _MAX_LETTERS:
+        raise RecordingError(f"an event has more than {_MAX_LETTERS} letters")
+    return Event(float(time_s), kind, what)
+
+
+@cache
+def _log_class() -> Any:
+    pool = DescriptorPool()
+    for file in FileDescriptorSet.FromString(foxglove_schema()).file:
+        pool.Add(file)
+    return GetMessageClass(pool.FindMessageTypeByName(LOG_SCHEMA))
