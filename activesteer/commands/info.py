@@ -23,6 +23,7 @@ def _info(options: argparse.Namespace) -> int:
     from activesteer.analysis.loss_of_control import kept, losses
     from activesteer.analysis.tables import comparison
     from activesteer.recording import Recording
+    from activesteer.recording.events import events_of
 
     recording = Recording.open(options.file, recover=True)
     metadata = recording.metadata
@@ -48,6 +49,8 @@ def _info(options: argparse.Namespace) -> int:
     for key in ("overrides", "versions"):
         if metadata.get(key):
             print_entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
+    for event in events_of(metadata):
+        print_entry(f"at {event.time_s:.3f} s: ", f"{event.kind} {event.what}")
     if not metadata.get("complete", True):
         print_entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly")))
     if result := [*losses(recording.metrics), *kept(recording.metrics)]:

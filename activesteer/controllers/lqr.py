@@ -93,6 +93,7 @@ class Lqr:
     interval_s = 0.005
     reads = ("lqr", "servos", "estimator")
     gains = LqrParameters
+    derived = ("_schedules",)
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Make the controller of one run."""

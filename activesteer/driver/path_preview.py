@@ -72,6 +72,8 @@ class PathPreviewDriver:
         robot: Driver that limits the steering wheel angle and holds the speed.
     """
 
+    derived = ("_gains",)
+
     def __init__(
         self, robot: OpenLoopDriver, model: LateralModel, parameters: DriverParameters, timestep_s: float
     ) -> None:

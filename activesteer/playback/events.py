@@ -1,4 +1,4 @@
-"""Warnings of a run: active faults, and actuators at their limits."""
+"""Events of a run: what was changed on the way, active faults, and actuators at their limits."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from activesteer.display_units import display_unit
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
+from activesteer.recording.events import events_of
 
 _LIMIT: Final = "_saturated"
 _SHORTEST_S: Final = 0.05
@@ -19,7 +20,7 @@ _SHORTEST_S: Final = 0.05
 
 
 class Event(NamedTuple):
-    """Begin or end of a fault or a saturation.
+    """Begin or end of a fault or a saturation, or a recorded event.
 
     Attributes:
         time_s: Time of the event [s].
@@ -33,9 +34,18 @@ class Event(NamedTuple):
 
 
 def events(run: Run) -> list[Event]:
-    """Return the faults of the manoeuvre and the recorded saturations, sorted by time."""
-    found = [*_faults(run), *_limits(run)]
+    """Return the faults of the manoeuvre, the recorded events and the saturations, sorted by time."""
+    found = [*_faults(run), *_recorded(run), *_limits(run)]
     return sorted(found, key=lambda event: event.time_s)
+
+
+def _recorded(run: Run) -> list[Event]:
+    levels = {"fail": ("FAULT ", rr.TextLogLevel.ERROR)}
+    found = []
+    for event in events_of(run.recording.metadata):
+        start, level = levels.get(event.kind, (f"{event.kind}: ", rr.TextLogLevel.INFO))
+        found.append(Event(event.time_s, start + event.what, level))
+    return found
 
 
 def _faults(run: Run) -> list[Event]:

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from activesteer.errors import RecordingError
 from activesteer.files import MAX_NUMBER
+from activesteer.recording.events import events_of
 from activesteer.road.course import course_of
 from activesteer.road.footprint import footprint_of
 from activesteer.road.recorded import fail, table_of, text
@@ -141,6 +142,7 @@ def check_metadata(metadata: Mapping[str, Any]) -> None:
     road_of(metadata)
     course_of(metadata)
     footprint_of(metadata)
+    events_of(metadata)
 
 
 _MISSING: Final = object()

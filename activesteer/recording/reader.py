@@ -29,7 +29,7 @@ from activesteer.recording.contents import (
     check_names,
 )
 from activesteer.recording.decoder import Block, BlockDecoder, Group
-from activesteer.recording.events import MAX_EVENTS, decode_event, events_of, tables_of
+from activesteer.recording.events import MAX_EVENTS, decode_event, tables_of
 from activesteer.recording.format import (
     EVENTS_TOPIC,
     FORMAT_RECORD,
@@ -157,12 +157,13 @@ def _decode(descriptor: int, records: Records) -> Contents:
             break
         scenes += block.others.get(scene.id, ()) if scene else ()
         events += block.others.get(log.id, ()) if log else ()
+        if len(events) > MAX_EVENTS:
+            raise RecordingError(f"there are more than {MAX_EVENTS} events")
     if len(scenes) > 1:
         raise RecordingError(f"there are {len(scenes)} scenes")
     parts = decode_scene(scenes[0]) if scenes else ()
     if events:
-        metadata["events"] = tables_of(map(decode_event, events[: MAX_EVENTS + 1]))
-        events_of(metadata)
+        metadata["events"] = tables_of(map(decode_event, events))
     values, poses = rows.collected(descriptor, decoder, list(channels))
     return Contents(
         channels, rows.time_s(), values, poses, metadata, metrics, records.attachments, parts, records.damage

@@ -111,7 +111,7 @@ def resolve(
     sorted_out: dict[str, list[Override]] = {part: [] for part in (*_PARTS, "controllers")}
     owned = own_controllers(controllers) if any(map(own_path, changes)) else {}
     for key, value in changes.items():
-        part, path = _which_part(key, kind, owned)
+        part, path = part_of(key, kind, owned)
         sorted_out[part].append(Override(key, tuple(path), value))
     of_file = table
     table, source = applied(kind, table, source, sorted_out["maneuver"])
@@ -149,7 +149,7 @@ def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequenc
         ParameterError: an override changes another part.
     """
     for key, value in overrides.items():
-        part, path = _which_part(key, type(scenario.maneuver))
+        part, path = part_of(key, type(scenario.maneuver))
         part = "vehicle" if part == "controllers" else part
         if part not in parts and path[0] != "road":
             allowed, word = [*parts, "road"], {"maneuver": "manoeuvre"}.get(part, part)
@@ -159,7 +159,7 @@ def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequenc
             )  # fmt: skip
 
 
-def _which_part(
+def part_of(
     key: str, kind: type[Maneuver], owned: Mapping[str, Sequence[Plugin]] | None = None
 ) -> tuple[str, list[str]]:
     """Return the part that an override changes (a name of `_PARTS`, or a user's controllers), and the key inside it.
@@ -212,7 +212,7 @@ def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> A
     Raises:
         ParameterError: there is no such key, or a part of it has no value.
     """
-    part, path = _which_part(key, type(scenario.maneuver))
+    part, path = part_of(key, type(scenario.maneuver))
     if part == "controllers":
         if path[0] not in (owned := own_controllers(controllers)):
             raise ParameterError("no controller here has such a parameter", key=key)

@@ -5,20 +5,24 @@ from __future__ import annotations
 import copy
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.controllers import Controller
+from activesteer.config import Source
+from activesteer.controllers import Controller, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver
 from activesteer.errors import ManeuverError, ParameterError, shown
-from activesteer.faults import Fault
+from activesteer.faults import Fault, check_faults
 from activesteer.scenario import Scenario
+from activesteer.scenario.changing import changed
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.control_unit import ControlUnit, control_unit, told_by_sensor
 from activesteer.simulation.recorder import Recorder
+from activesteer.simulation.retuning import retuned
 from activesteer.vehicle import Uncopyable, engine_warnings_held
 from activesteer.vehicle.faults import Faults
 
@@ -35,6 +39,7 @@ class LoopState(NamedTuple):
     motion: Motion
     commands: tuple[DriverCommand, ActuatorCommand]
     step: int
+    changes: tuple[tuple[str, Any, float], ...]
 
 
 class OneAtATime:
@@ -65,6 +70,8 @@ class ClosedLoop(Uncopyable):
     """A manoeuvre, a driver, a controller and a car.
 
     Attributes:
+        scenario: Manoeuvre, car and driver, with the changes made on the way.
+        changes: Keys changed on the way and their values, and the times of the changes [s].
         maneuver: Source of the setpoints.
         driver: The driver.
         controller: The active steering, inside a control unit if it needs one.
@@ -98,12 +105,14 @@ class ClosedLoop(Uncopyable):
             DriverError: the driver cannot be created, or fails while the car settles.
             SimulationDiverged: the car does not settle.
         """
+        self.scenario, self._plugin = scenario, find_controller(controller)
+        self._start, self.changes = scenario, ()
         self.maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.ground, timestep_s)
         vehicle.limit_hands(scenario.driver.parameters.steering_torque_limit_Nm)
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
         self.driver: Driver = scenario.driver.plugin.make(self.driver_setup)
-        self.controller_setup, self.controller = control_unit(controller, scenario, vehicle)
+        self.controller_setup, self.controller = control_unit(self._plugin, scenario, vehicle)
         self.in_use = OneAtATime()
         settling, steps = maneuver.settling_setpoint(), round(maneuver.settle_s / timestep_s)
         self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
@@ -123,14 +132,61 @@ class ClosedLoop(Uncopyable):
         """Number of steps of the manoeuvre."""
         return round(self.maneuver.duration_s / self.vehicle.timestep_s)
 
-    def fail(self, faults: Sequence[Fault]) -> None:
+    def fail(self, faults: Sequence[Fault], *, more: bool = False) -> None:
         """Replace the faults by these, each of which acts at its time.
 
+        Args:
+            faults: The faults.
+            more: Whether to keep the present faults, with their memory.
+
         Raises:
-            ManeuverError: a fault concerns a part that this car does not have.
+            ManeuverError: a fault concerns a part that this car does not have, or that has a fault at this time.
         """
+        before = self.faults if more else None
+        if before is not None:
+            faults = (*self._fault_list, *faults)
+            check_faults(faults, self.maneuver.duration_s, Source("", error=ManeuverError).fail)
         self.faults.release()
         self.faults, self._fault_list = Faults(self.vehicle, faults), tuple(faults)
+        if before is not None:
+            self.faults.take_memory_of(before)
+
+    def change(self, key: str, value: Any) -> None:
+        """Change a key of the manoeuvre, its road, the controller or the driver, from the next step on.
+
+        A controller or driver keeps its memory, see `activesteer.simulation.retuning`.
+
+        Raises:
+            ParameterError: there is no such key, it cannot change during a run, or nothing reads it.
+            ManeuverError: a value of the manoeuvre is wrong.
+        """
+        time_s = self.step_count * self.vehicle.timestep_s
+        part, after = changed(self.scenario, key, value, self._plugin, time_s)
+        if part == "controller":
+            _, old = control_unit(self._plugin, self.scenario, self.vehicle)
+            self.controller_setup, new = control_unit(self._plugin, after, self.vehicle)
+            self.controller = retuned(self.controller, old, new)
+        elif part == "driver":
+            make, who = after.driver.plugin.make, after.driver
+            old, self.driver_setup = (
+                make(self.driver_setup), replace(self.driver_setup, parameters=who.parameters, own=who.own)
+            )  # fmt: skip
+            self.driver = retuned(self.driver, old, make(self.driver_setup))
+        self._adopt(after)
+        self.changes = (*self.changes, (key, value, time_s))
+
+    def _adopt(self, scenario: Scenario) -> None:
+        """Take over a changed scenario, apart from the blocks that controller and driver are."""
+        if scenario.maneuver is not self.scenario.maneuver:
+            self.vehicle.change_road(scenario.maneuver.ground)
+        self.scenario, self.maneuver = scenario, scenario.maneuver
+        self.vehicle.limit_hands(scenario.driver.parameters.steering_torque_limit_Nm)
+
+    def _changed_by(self, changes: Sequence[tuple[str, Any, float]]) -> Scenario:
+        scenario = self._start
+        for key, value, time_s in changes:
+            scenario = changed(scenario, key, value, self._plugin, time_s).scenario
+        return scenario
 
     def run(self, recorder: Recorder | None = None) -> None:
         """Drive the manoeuvre to its end; see `advance`."""
@@ -207,6 +263,7 @@ class ClosedLoop(Uncopyable):
             self.motion,
             self.commands,
             self.step_count,
+            self.changes,
         )
 
     def restore_state(self, state: LoopState) -> None:
@@ -220,6 +277,11 @@ class ClosedLoop(Uncopyable):
         """
         if not isinstance(state, LoopState) or not _is_sound(state):
             raise ParameterError(f"is {shown(state)}; a state of this loop is needed", key="state", value=state)
+        if state.changes != self.changes:
+            self._adopt(self._changed_by(state.changes))
+            self.changes, who = state.changes, self.scenario.driver
+            self.driver_setup = replace(self.driver_setup, parameters=who.parameters, own=who.own)
+            self.controller_setup, _ = control_unit(self._plugin, self.scenario, self.vehicle)
         if state.faults != self._fault_list:
             self.fail(state.faults)
         self.vehicle.restore_state(state.engine)
@@ -243,4 +305,6 @@ def _is_sound(state: LoopState) -> bool:
         and isinstance(state.motion, Motion)
         and [type(command) for command in commands] == [DriverCommand, ActuatorCommand]
         and isinstance(state.step, int)
+        and isinstance(state.changes, tuple)
+        and all(isinstance(change, tuple) and len(change) == 3 for change in state.changes)
     )

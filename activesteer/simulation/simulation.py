@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
@@ -12,12 +13,15 @@ from typing import Any, Final, NamedTuple, Self
 import mujoco
 
 from activesteer.analysis.metrics import metrics
+from activesteer.config import Source, build
 from activesteer.controllers import CONTROLLER, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
+from activesteer.faults import Fault, fault_table
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording
+from activesteer.recording.events import MAX_EVENTS, Event, tables_of
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
@@ -39,6 +43,7 @@ class SavedState(NamedTuple):
     loop: LoopState
     rows: RecordedRows
     given: dict[str, int]
+    events: tuple[Event, ...]
     metadata: dict[str, Any]
 
 
@@ -68,9 +73,10 @@ class Simulation:
     at a time can drive a simulation.
 
     Attributes:
-        scenario: Manoeuvre, car and driver.
+        scenario: Manoeuvre, car and driver, as at the start.
         loop: The blocks: `loop.driver`, `loop.controller`, `loop.vehicle`, and the properties of the car they may know.
         context: Contents of the recording apart from its rows.
+        events: What was changed on the way; see `set` and `fail`.
 
     Example:
         >>> import activesteer
@@ -116,6 +122,7 @@ class Simulation:
         self.loop = ClosedLoop(self.scenario, controller, timestep_s)
         self.context = RunContext.of(self.scenario, self.loop.vehicle, controller)
         self._given: dict[str, int] = {}
+        self.events: tuple[Event, ...] = ()
         self._failure: BaseException | None = None
         self._writer: McapWriter | None = None
 
@@ -141,7 +148,7 @@ class Simulation:
     @property
     def setpoint(self) -> Setpoint:
         """Present demand of the manoeuvre on the driver."""
-        return self.scenario.maneuver.setpoint(self.time_s)
+        return self.loop.maneuver.setpoint(self.time_s)
 
     @property
     def measurement(self) -> Measurement:
@@ -197,9 +204,7 @@ class Simulation:
         self, steps: int, driver_command: DriverCommand | None, actuator_command: ActuatorCommand | None
     ) -> Measurement:
         loop, left = self.loop, self.steps - self.loop.step_count
-        if self._failure is not None:
-            problem = f"the run failed ({type(self._failure).__name__}); it can continue only from a saved state"
-            raise ManeuverError(f"{problem}: {self._failure}") from self._failure
+        self._check_going_on()
         if isinstance(steps, bool) or not isinstance(steps, Integral) or steps < 0:
             raise ParameterError(f"is {shown(steps)}; a whole number of steps, 0 or more, is needed", key="steps")
         if steps > left:
@@ -222,6 +227,78 @@ class Simulation:
                 self._recorder.flush()
         return loop.measurement
 
+    def set(self, key: str, value: Any) -> None:
+        """Change a key from the next step on; the recording keeps the change as an event.
+
+        The frictions of the road, the speed and the inputs of the manoeuvre, and the parameters of controller and
+        driver can change. Controller and driver keep their memory.
+
+        Args:
+            key: Dotted key, as in `overrides`: `road.mu`, `speed_kmh`, `controllers.lqr.sideslip_scale_deg`.
+            value: New value, in the unit of the key.
+
+        Raises:
+            ParameterError: there is no such key, it cannot change during a run, or nothing reads it.
+            ManeuverError: a value of the manoeuvre is wrong or has no effect, or the simulation is being driven.
+
+        Example:
+            >>> import activesteer
+            >>> simulation = activesteer.Simulation("straight_line", overrides={"duration_s": 1.0})
+            >>> _ = simulation.advance(500)
+            >>> simulation.set("road.mu", 0.3)
+            >>> simulation.run()
+            >>> simulation.recording()["fl_mu"][[499, 501]].tolist()
+            [1.0, 0.3]
+        """
+        with self.loop.in_use:
+            self._check_going_on()
+            self.loop.change(key, value)
+            self._note("set", f"{key} = {json.dumps(value, default=str)}")
+
+    def fail(self, fault: str | Fault) -> None:
+        """Set a fault, beside those that act already; the recording keeps it as an event.
+
+        Args:
+            fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.
+
+        Raises:
+            ParameterError: the text has another form.
+            ManeuverError: the car has no such part, the part has a fault at this time, or the time is past.
+
+        Example:
+            >>> import activesteer
+            >>> simulation = activesteer.Simulation("step_steer", "ars", overrides={"duration_s": 2.0})
+            >>> _ = simulation.advance(800)
+            >>> simulation.fail("rear:stuck")
+            >>> simulation.run()
+            >>> simulation.recording().metadata["events"]
+            [{'time_s': 0.8, 'kind': 'fail', 'what': 'rear:stuck'}]
+        """
+        with self.loop.in_use:
+            self._check_going_on()
+            if isinstance(fault, str):
+                start_s = None if "@" in fault else self.time_s
+                fault = build(Fault, fault_table(fault, start_s), Source("", error=ManeuverError))
+            if not isinstance(fault, Fault):
+                raise ParameterError(f"is {shown(fault)}; a fault or its text is needed", key="fault", value=fault)
+            if fault.start_s < self.time_s - 1e-9:
+                raise ManeuverError(f"is {fault.start_s:g} s; the run is at {self.time_s:g} s", key="start_s")
+            self.loop.fail([fault], more=True)
+            later = "" if fault.start_s <= self.time_s + 1e-9 and fault.end_s is None else f"@{fault.start_s:g}"
+            self._note("fail", f"{fault.name}{later}{'' if fault.end_s is None else f'-{fault.end_s:g}'}")
+
+    def _note(self, kind: str, what: str) -> None:
+        if len(self.events) >= MAX_EVENTS:
+            raise RecordingError(f"a recording has at most {MAX_EVENTS} events", allowed=MAX_EVENTS)
+        self.events = (*self.events, Event(self.time_s, kind, what))
+        if self._writer is not None:
+            self._writer.write_events(self.events[-1:])
+
+    def _check_going_on(self) -> None:
+        if self._failure is not None:
+            problem = f"the run failed ({type(self._failure).__name__}); it can continue only from a saved state"
+            raise ManeuverError(f"{problem}: {self._failure}") from self._failure
+
     def run(self) -> None:
         """Drive the manoeuvre to its end; see `advance`."""
         self.advance(self.steps - self.loop.step_count)
@@ -236,7 +313,7 @@ class Simulation:
         with self.loop.in_use:
             with self._watched():
                 rows = self._recorder.save_state()
-            return SavedState(self.loop.save_state(), rows, dict(self._given), self.context.metadata)
+            return SavedState(self.loop.save_state(), rows, dict(self._given), self.events, self.context.metadata)
 
     def restore_state(self, state: SavedState) -> None:
         """Go back to a saved state, from which the simulation continues bit-identically.
@@ -259,7 +336,7 @@ class Simulation:
             self._recorder.check_state(state.rows)
             self.loop.restore_state(state.loop)
             self._recorder.restore_state(state.rows)
-            self._given, self._failure = dict(state.given), None
+            self._given, self.events, self._failure = dict(state.given), state.events, None
 
     def copy(self) -> Self:
         """Return an independent simulation that continues bit-identically.
@@ -324,6 +401,8 @@ class Simulation:
         recording.metadata["complete"] = failure is None and self.done
         if self._given:
             recording.metadata["commands_given"] = dict(self._given)
+        if self.events:
+            recording.metadata["events"] = tables_of(self.events)
         if failure is not None:
             recording.metadata["error"] = f"{type(failure).__name__}: {failure}"
         elif not self.done:

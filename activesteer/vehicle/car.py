@@ -392,6 +392,14 @@ class Vehicle(Uncopyable):
                 else:
                     raise ParameterError(f"belongs to another car: {name} has another size", key="model")
 
+    def change_road(self, road: Road) -> None:
+        """Drive on with other frictions; the road has as many areas as before."""
+        fb.section_of(self.model, "wheels")["mu"] = road.mu
+        areas = fb.section_of(self.model, "areas")
+        assert len(areas) == len(road.areas())
+        for record, area in zip(areas, road.areas(), strict=True):
+            record[...] = np.array(area, fb.AREA)
+
     def limit_hands(self, torque_Nm: float | None) -> None:
         """Limit the torque of the hands on the steering wheel [N m]; None for no limit."""
         hands, felt = self._hands, 1.0 - self.parameters.steering.assist_fraction

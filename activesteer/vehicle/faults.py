@@ -106,6 +106,11 @@ class Faults:
             acting.release()
         self._vehicle.note_faults(0)
 
+    def take_memory_of(self, other: Faults) -> None:
+        """Take over the memory of faults that stand first here too, and so go on."""
+        for acting, before in zip(self._acting, other._acting, strict=False):
+            acting.memory = before.memory
+
     def save_state(self) -> list[Any]:
         """Return the memory of the faults."""
         return copy.deepcopy([acting.memory for acting in self._acting])

@@ -28,6 +28,7 @@ from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.pages import render
 from activesteer.recording import Recording
+from activesteer.recording.events import events_of
 from activesteer.theory.proportions import percent
 
 TITLE: Final = "activesteer report"
@@ -50,6 +51,9 @@ _CHANGE_MARK: Final = {
     Change.OTHER: "",
 }
 """Marks beside the colours, for readers who cannot see these."""
+
+
+_MOST_EVENTS: Final = 20
 
 
 class _Section(NamedTuple):
@@ -135,7 +139,7 @@ def _section(group: Group, anchor: str) -> _Section:
         anchor,
         group,
         judge(group),
-        list(dict.fromkeys(filter(None, map(changed_parameters, group.runs)))),
+        [*dict.fromkeys(filter(None, map(changed_parameters, group.runs))), *_events(group)],
         key_titles(group),
         results(group),
         metric_titles(group),
@@ -143,6 +147,17 @@ def _section(group: Group, anchor: str) -> _Section:
         rows(recordings, "controller", "maneuver", "timestep_s"),
         [run.name for run in group.runs],
     )
+
+
+def _events(group: Group) -> list[str]:
+    """Return what happened on the way, a line for each run."""
+    listed = {run.name: events_of(run.recording.metadata) for run in group.runs}
+    return [
+        f"{name}, on the way: {', '.join(f'{event.what} at {event.time_s:.4g} s' for event in events[:_MOST_EVENTS])}"
+        + (f" and {len(events) - _MOST_EVENTS} more" if len(events) > _MOST_EVENTS else "")
+        for name, events in listed.items()
+        if events
+    ]
 
 
 def _facts(groups: Sequence[Group], made: date) -> list[str]:
