@@ -101,7 +101,7 @@ def _with(cls: type[Any], table: Mapping[str, Any], path: list[str], value: Any,
 def _driver(scenario: Scenario, path: list[str], value: Any) -> Any:
     who = scenario.driver
     if not who.plugin.ours and path[0] == who.plugin.key and path[1:]:
-        values = who.own.get(path[0], {}) | who.plugin.own_values({".".join(path[1:]): value})
+        values = {**who.own.get(path[0], {}), **who.plugin.own_values({".".join(path[1:]): value})}
         return replace(who, own={**who.own, path[0]: values})
     if not who.plugin.ours:
         raise ParameterError(f"has no effect: {who.plugin.name} drives", key=".".join(("driver", *path)), value=value)
@@ -128,5 +128,5 @@ def _same_course(before: Maneuver, of: Maneuver | None = None, **values: Any) ->
     """Return a manoeuvre with the very course of another one, so that a driver stays on his path."""
     after = replace(before, **values) if of is None else of
     if "_course" in before.__dict__:
-        after.__dict__["_course"] = before.__dict__["_course"]
+        vars(after)["_course"] = before.__dict__["_course"]
     return after

@@ -53,11 +53,11 @@ def _kept(running: Any, before: Any, after: Any, seen: set[int]) -> Any:
 
 def _fill(running: Any, before: Any, after: Any, seen: set[int]) -> None:
     """Give an object the memory of a running one."""
-    states = [_state(block) for block in (running, before, after)]
+    old, made, new_state = (_state(block) for block in (running, before, after))
     derived = getattr(type(running), "derived", ())
-    new = {name: value for name, value in _kept_parts(*states, seen).items() if name not in derived}
+    new = {name: value for name, value in _kept_parts(old, made, new_state, seen).items() if name not in derived}
     if hasattr(after, "__setstate__"):
-        after.__setstate__({**states[2], **new})
+        after.__setstate__({**new_state, **new})
         return
     for name, value in new.items():
         object.__setattr__(after, name, value)
