@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.arguments import add_controller, add_json, add_output, add_scenario, scenario_of
 from activesteer.commands.output import BAD, GOOD, painted, print_json
 from activesteer.commands.progress import ProgressBar
-from activesteer.errors import ParameterError, shown
+from activesteer.errors import ActiveSteerError, ParameterError, shown
 from activesteer.files import make_folder
 
 if TYPE_CHECKING:
@@ -38,57 +39,90 @@ def add_to(commands: Any) -> None:
     run.set_defaults(action=_run)
 
 
+class _Failures(dict[str, str]):
+    """Label of a controller -> message of its error; the other controllers drive all the same."""
+
+    @contextmanager
+    def caught(self, label: str, *, alone: bool) -> Iterator[None]:
+        """Report an error of a controller; the error of a controller that drives alone ends the command."""
+        try:
+            yield
+        except ActiveSteerError as error:
+            if alone:
+                raise
+            self[label] = str(error)
+            print("\n".join([f"activesteer: {label}: {error}", *getattr(error, "__notes__", [])]), file=sys.stderr)
+
+
 def _run(options: argparse.Namespace) -> int:
-    from activesteer.analysis.metrics import evaluation_of
-    from activesteer.analysis.tables import comparison
     from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
     from activesteer.coupling.fmu import isolated
     from activesteer.scenario import check_gains
     from activesteer.simulation.preparation import prepared
-    from activesteer.simulation.runner import run_scenario
 
     options.driver = isolated(options.driver, options.isolate)
     controllers = [find_controller(isolated(name, options.isolate)) for name in options.controller or ["none"]]
-    scenario = scenario_of(options)
+    scenario, failures, alone = scenario_of(options), _Failures(), len(controllers) == 1
+    check_gains(scenario.overrides, controllers)
     # Check all controllers before the first run.
     for controller in controllers:
-        controller.make(scenario.controller_setup(DEFAULT_TIMESTEP_S))
-    check_gains(scenario.overrides, controllers)
+        with failures.caught(controller.label, alone=alone):
+            controller.make(scenario.controller_setup(DEFAULT_TIMESTEP_S))
     paths = _output_paths(options.output, scenario.maneuver.name, controllers)
+    driving = list(zip(controllers, paths, strict=True))
     scenario = prepared(scenario)
     if not options.replace:
-        for controller, path in zip(controllers, paths, strict=True):
+        for controller, path in driving:
             _check_settings(path, _settings(scenario, controller))
     recordings = {}
-    for controller, path in zip(controllers, paths, strict=True):
-        label = controller.label
-        with ProgressBar(f"{scenario.maneuver.name} {label}", quiet=options.json) as progress:
-            recordings[label] = run_scenario(scenario, controller, path=path, progress=progress)
-        if not options.json:
-            print(f"{scenario.maneuver.name} {label}: {path}", file=sys.stderr)
-        if problem := recordings[label].metadata.get("metrics_error"):
-            print(f"{scenario.maneuver.name} {label}: no metrics: {problem}", file=sys.stderr)
+    for controller, path in driving:
+        if (label := controller.label) not in failures:
+            with failures.caught(label, alone=alone):
+                recordings[label] = _driven(scenario, controller, path, quiet=options.json)
     if options.json:
         runs = [
-            {"controller": controller.name, "file": str(path), "metrics": recording.metrics}
-            for controller, path, recording in zip(controllers, paths, recordings.values(), strict=True)
+            {"controller": controller.name, "file": str(path) if path.is_file() else None}
+            | ({"metrics": recordings[label].metrics} if (label := controller.label) in recordings else {})
+            | ({"error": failures[label]} if label in failures else {})
+            for controller, path in driving
         ]
         print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs})
     elif any(recording.metrics for recording in recordings.values()):
-        metrics = {label: recording.metrics for label, recording in recordings.items()}
-        names = [metric.name for metric in evaluation_of(next(iter(recordings.values()))).key_metrics]
-        chosen = metrics if options.all else {run: _chosen(found, names) for run, found in metrics.items()}
-        print(comparison(chosen, _paint))
-        _print_outcomes(metrics)
-        total = len({name for found in metrics.values() for name in found})
-        if not options.all and total > len(names):
-            print(f"{len(names)} of {total} metrics; --all prints all")
-    if options.plot:
+        _print_table(recordings, every=options.all)
+    if options.plot and recordings:
         for figure in _plot(recordings, paths[0].parent, scenario):
             if not options.json:
                 print(f"figure: {figure}")
-    return 0
+    return 1 if failures else 0
+
+
+def _driven(scenario: Any, controller: Plugin, path: Path, *, quiet: bool) -> Any:
+    """Drive and record one controller, and return the recording."""
+    from activesteer.simulation.runner import run_scenario
+
+    name = f"{scenario.maneuver.name} {controller.label}"
+    with ProgressBar(name, quiet=quiet) as progress:
+        recording = run_scenario(scenario, controller, path=path, progress=progress)
+    if not quiet:
+        print(f"{name}: {path}", file=sys.stderr)
+    if problem := recording.metadata.get("metrics_error"):
+        print(f"{name}: no metrics: {problem}", file=sys.stderr)
+    return recording
+
+
+def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
+    """Print the key metrics of all runs beside each other, or every metric."""
+    from activesteer.analysis.metrics import evaluation_of
+    from activesteer.analysis.tables import comparison
+
+    metrics = {label: recording.metrics for label, recording in recordings.items()}
+    names = [metric.name for metric in evaluation_of(next(iter(recordings.values()))).key_metrics]
+    print(comparison(metrics if every else {run: _chosen(found, names) for run, found in metrics.items()}, _paint))
+    _print_outcomes(metrics)
+    total = len({name for found in metrics.values() for name in found})
+    if not every and total > len(names):
+        print(f"{len(names)} of {total} metrics; --all prints all")
 
 
 def _chosen(metrics: Mapping[str, float], names: Sequence[str]) -> dict[str, float]:

@@ -83,6 +83,8 @@ def _status(folder: Path, *, as_json: bool) -> int:
     print(f"{progress['done']} of {progress['total']} runs are done: {counts}{at_work}")
     for error, number in progress["errors"].items():
         print(f"{number:6}  {error}")
+    for key in progress["without_effect"]:
+        print(f"without effect: {key} changes no metric of any run")
     return 0
 
 

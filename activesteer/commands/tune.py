@@ -41,13 +41,16 @@ def _tune(options: argparse.Namespace) -> int:
     figures = _draw(result, options.output)
     if options.json:
         front = [vars(trial) for trial in result.front]
-        print_json({"done": result.done, "failed": result.failed, "front": front, "figures": list(map(str, figures))})
+        about = {"done": result.done, "failed": result.failed, "without_effect": result.without_effect}
+        print_json(about | {"front": front, "figures": list(map(str, figures))})
         return 0
     print(f"{result.done} sets tried, {result.failed} with a failed run; the best:")
     for trial in result.front:
         print("  ".join(f"{name} {value:.4g}" for name, value in trial.objectives.items()))
         for key, value in trial.values.items():
             print(f"  {key} = {value!r}")
+    for key in result.without_effect:
+        print(f"without effect: {key} changes no metric of any run")
     for path in figures:
         print(f"figure: {path}")
     return 0

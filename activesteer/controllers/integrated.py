@@ -147,7 +147,7 @@ class Integrated:
         """Return the allowed pressure difference between the sides for the remaining angles [Pa]."""
         p, car, now, (front, rear) = self._parameters, self._car, turn.estimate, remaining_rad.tolist()
         force_N = min(slopes[0] * car.front_stiffness_Nprad * front, slopes[1] * car.rear_stiffness_Nprad * rear)
-        moment_Nm = (car.cg_to_front_m + car.cg_to_rear_m) * max(force_N, 0.0)
+        moment_Nm = car.wheelbase_m * max(force_N, 0.0)
         off = abs(turn.desired_radps - now.yaw_rate_radps) / p.side_yaw_rate_radps
         off += abs(now.sideslip_rad - turn.sideslip_rad) / p.side_sideslip_rad
         return min(max(1.0 - off, 0.0) * p.side_difference_Pa, moment_Nm / self._side_moment_m3)

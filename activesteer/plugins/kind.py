@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import difflib
 import os
 import sysconfig
 import traceback
@@ -14,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.config import Range
-from activesteer.errors import ActiveSteerError, shown
+from activesteer.errors import ActiveSteerError, nearest_names, shown
 
 _USUAL: Final = frozenset({float, bool, np.float64})
 """Types of nearly all numbers in a command; numbers of other types take the slow check."""
@@ -22,6 +24,8 @@ _LIMITED: Final = _USUAL | {int}
 """Types of nearly all numbers with a range, which keeps a whole number within the range of float64."""
 _LIBRARIES: Final = tuple({sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")})
 """Folders of code that no user wrote."""
+_OURS: Final = "activesteer."
+"""Start of the names of our modules."""
 
 
 @dataclass(frozen=True)
@@ -161,4 +165,25 @@ def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
     outside = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
     last = (own or outside or frames)[-1:]
     places = [f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last]
-    return f"{type(error).__name__}: {error}".removesuffix(": ") + "".join(places)
+    words = f"{type(error).__name__}: {error}".removesuffix(": ")
+    if isinstance(error, AttributeError) and error.name and type(error.obj).__module__.startswith(_OURS):
+        words += f"; {_nearest_attributes(error.obj, error.name)}"
+    return words + "".join(places)
+
+
+def _nearest_attributes(given: Any, name: str) -> str:
+    """Return words for the attributes closest to a wrong name, those of inner dataclasses included."""
+    known = _attributes(given)
+    last = {path.rpartition(".")[2]: path for path in sorted(known, key=lambda path: -path.count("."))}
+    close = difflib.get_close_matches(name, last, n=3, cutoff=0.6)
+    return f"did you mean {' or '.join(last[match] for match in close)}?" if close else nearest_names(name, known)
+
+
+def _attributes(given: Any) -> list[str]:
+    """Return the public values of an object, and with a dot those of its dataclasses."""
+    names = [*getattr(given, "_fields", ()), *vars(type(given)), *getattr(given, "__dict__", ())]
+    found = [name for name in dict.fromkeys(names) if name[0] != "_" and not callable(getattr(given, name, None))]
+    for name in tuple(found):
+        if dataclasses.is_dataclass(inner := getattr(given, name)):
+            found += [f"{name}.{path}" for path in _attributes(inner)]
+    return found

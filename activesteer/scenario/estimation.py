@@ -27,8 +27,7 @@ def estimator_setup(car: Car) -> EstimatorSetup | None:
     config, body = car.config, car.config.single_track
     if config.two_track is None:
         return None
-    wheelbase_m = body.cg_to_front_m + body.cg_to_rear_m
-    per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / wheelbase_m
+    per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / body.wheelbase_m
     loads_N = per_metre * body.cg_to_rear_m, per_metre * body.cg_to_front_m
     front, rear = (_known(*pair) for pair in zip(car.new_tyres, loads_N, strict=True))
     pressure_Pa = config.brakes.hydraulics.full_pedal_pressure_Pa

@@ -121,9 +121,7 @@ def _spirals(ground: Ground, name: str, effort: Effort) -> dict[str, Run]:
     """Drive a spiral to each side with a steadily rising steering wheel angle."""
     config = ground.scenario("slowly_increasing_steer").car.config
     single_track = config.single_track
-    angle_deg = math.degrees(
-        config.steering.ratio * (single_track.cg_to_front_m + single_track.cg_to_rear_m) / effort.radius_m
-    )
+    angle_deg = math.degrees(config.steering.ratio * single_track.wheelbase_m / effort.radius_m)
     runs = ground.drive(
         f"effort_{name}",
         "slowly_increasing_steer",

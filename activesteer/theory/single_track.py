@@ -64,6 +64,11 @@ class SingleTrackParameters:
                 f"is {self.source!r}; allowed are {', '.join(SOURCES)}", key="source", value=self.source
             )
 
+    @property
+    def wheelbase_m(self) -> float:
+        """Distance between the axles, l [m]."""
+        return self.cg_to_front_m + self.cg_to_rear_m
+
 
 def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:
     """Return the speed at which an understeering car reaches half the yaw rate of a neutral one, sqrt(l/EG).

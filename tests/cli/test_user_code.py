@@ -63,3 +63,17 @@ def test_prints_of_user_code_do_not_disturb_json(call: Call, controller: Callabl
 def test_prints_of_user_code_are_seen_without_json(call: Call, controller: Callable[..., str]) -> None:
     given: Any = controller('print("said")\nreturn ActuatorCommand()\n')
     assert "said" in call("run", "step_steer", "-c", given, *SHORT).out
+
+
+def test_controller_that_fails_leaves_the_table_to_the_others(call: Call, controller: Callable[..., str]) -> None:
+    given = controller("if self.steps > 100:\n    raise ValueError('no')\nreturn ActuatorCommand()\n")
+    short = ("--set", "settle_s=0", "--set", "duration_s=2.2", "--set", "steer.start_s=0.05")
+    told = call("run", "step_steer", "-c", given, "-c", "none", *short, "-o", "runs")
+    assert told.status == 1
+    assert "yaw rate steady state" in told.out
+    assert "Mine.step raised ValueError: no" in told.err
+    failed, other = call("run", "step_steer", "-c", given, "-c", "none", *short, "-o", "runs", "--json").json["runs"]
+    assert "metrics" not in failed
+    assert "ValueError" in failed["error"]
+    assert other["metrics"]
+    assert "error" not in other

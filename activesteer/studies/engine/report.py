@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shlex
@@ -13,9 +14,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from activesteer.controllers import find_controller
 from activesteer.conventions import Array, run_looks
 from activesteer.display_units import parameter_label
-from activesteer.errors import StudyError
+from activesteer.driver import find_driver
+from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import write_text
 from activesteer.metric_table import recorded_metric
 from activesteer.pages import render
@@ -119,9 +122,20 @@ def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, An
     few = len(levels) <= _BINS
     ordered = (sorted(levels) if numeric else [str(level) for level in levels]) if few or not numeric else []
     relative = next((factor.nominal for factor in study.factors if factor.key == key), "")
-    words, unit = parameter_label(key)
+    words, unit = _label(study, key)
     told = {"label": f"{words}{_RELATIVE.get(relative, '')}", "unit": "" if relative == "times" else unit}
     return {"key": key, **told, "numeric": numeric, "levels": ordered}
+
+
+def _label(study: StudyFile, key: str) -> tuple[str, str]:
+    """Return label and unit of a factor; those of a user's controller or driver as its code declares them."""
+    words, unit = parameter_label(key)
+    with contextlib.suppress(ActiveSteerError):  # the code may be elsewhere by now
+        for plugin in (*map(find_controller, study.controllers), find_driver(study.driver)):
+            table, _, name = key.partition(f"{plugin.kind.table}.{plugin.key}.")
+            if not plugin.ours and not table and name in plugin.declared:
+                return f"{plugin.key}: {name}", plugin.declared[name].unit
+    return words, unit
 
 
 def _of_group(

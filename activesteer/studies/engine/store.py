@@ -35,6 +35,8 @@ except ImportError:  # not available on Windows
 
 RESULTS: Final = "results.parquet"
 _ROW_GROUP: Final = 65536
+_WITHOUT_EFFECT: Final = "without_effect.json"
+_KEY_CHARACTERS: Final = 200
 
 
 class Progress(NamedTuple):
@@ -46,6 +48,7 @@ class Progress(NamedTuple):
         by_status: Status -> number of runs.
         errors: The most frequent errors, with their numbers.
         running: Whether a process works on the study.
+        without_effect: Factors that change no metric of any run, once the study is complete.
     """
 
     total: int
@@ -53,6 +56,7 @@ class Progress(NamedTuple):
     by_status: dict[str, int]
     errors: dict[str, int]
     running: bool
+    without_effect: list[str]
 
     def to_json(self) -> dict[str, Any]:
         """Return the progress as JSON values."""
@@ -168,7 +172,24 @@ class Store:
                     if entry["values"]:
                         found[entry["values"]] = found.get(entry["values"], 0) + entry["counts"]
         maximum = dict(sorted(errors.items(), key=lambda item: -item[1])[:10])
-        return Progress(about["runs"], sum(counts.values()), counts, maximum, _is_locked(self.folder / ".lock"))
+        running = _is_locked(self.folder / ".lock")
+        return Progress(about["runs"], sum(counts.values()), counts, maximum, running, self.without_effect())
+
+    def note_without_effect(self, factors: Sequence[str]) -> None:
+        """Store the factors that change no metric of any run.
+
+        Raises:
+            StudyError: they cannot be written.
+        """
+        if factors:
+            write_text(self.folder / _WITHOUT_EFFECT, json.dumps(factors) + "\n", StudyError)
+
+    def without_effect(self) -> list[str]:
+        """Return the stored factors of `note_without_effect`; none if the file is damaged."""
+        with contextlib.suppress(OSError, ValueError):
+            found = json.loads((self.folder / _WITHOUT_EFFECT).read_text(encoding="utf-8"))
+            return [str(key)[:_KEY_CHARACTERS] for key in found] if isinstance(found, list) else []
+        return []
 
     def _spans(self) -> list[tuple[int, int]]:
         return sorted(

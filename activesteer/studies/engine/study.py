@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from activesteer.scenario import FileOrTable
+from activesteer.studies.engine.effects import MAX_ROWS, without_effect
 from activesteer.studies.engine.plan import Plan, task_size
 from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
 from activesteer.studies.engine.run_settings import Request, prepare
-from activesteer.studies.engine.run_task import Status, drive, failed_row
+from activesteer.studies.engine.run_task import CURVE, Status, drive, failed_row
 from activesteer.studies.engine.store import Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.task_queue import TaskQueue, WorkerDied
@@ -106,6 +107,10 @@ def study(
             store.join()
         table = store.read()
         _warn_of_patterns(parsed, table)
+        if missing and not store.missing(len(plan)) and parsed.case_list is None:
+            curves = [name for name in table.column_names if name.startswith(CURVE)]
+            rows = table.slice(0, MAX_ROWS).drop_columns(curves)
+            store.note_without_effect(without_effect(plan, rows.to_pylist()))
         return table
 
 

@@ -14,6 +14,7 @@ from activesteer.config import Range, build
 from activesteer.errors import StudyError, nearest_names, not_installed
 from activesteer.files import make_folder, write_text
 from activesteer.scenario import FileOrTable
+from activesteer.studies.engine.effects import without_effect
 from activesteer.studies.engine.factor_values import label_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
@@ -109,12 +110,14 @@ class Tuning:
         failed: Number of sets with a failed run.
         front: Sets that no other set beats in every objective; with one objective, the best set.
         trials: All sets that could be judged.
+        without_effect: Factors that change no metric of any run, if sets were tried now.
     """
 
     done: int
     failed: int
     front: list[Trial]
     trials: list[Trial]
+    without_effect: list[str]
 
 
 def tune(
@@ -174,13 +177,13 @@ def tune(
                 values = {factor.key: _suggest(trial, factor) for factor in study.factors}
                 yield trial, drive, plan.settings, _requests(plan, trial.number, values)
 
-        checked = False
+        judged: Sequence[Row] = ()
         for place, (trial, rows, error) in enumerate(TaskQueue(workers).outcomes(tasks()), begun + 1):
             values, violation = (None, 0.0)
             if error is None and all(row["status"] == Status.OK for row in rows):
-                if not checked:
+                if not judged:
                     _check_metrics(study, table, rows)
-                    checked = True
+                judged = rows
                 values, violation = _judged(table, rows)
             if values is None:
                 made.tell(trial, state=optuna.trial.TrialState.FAIL)
@@ -191,7 +194,7 @@ def tune(
                 made.tell(trial, values)
             if progress is not None:
                 progress(place, wanted)
-    result = _result(optuna, made, table)
+    result = _result(optuna, made, table, without_effect(plan, judged))
     write_text(folder / "front.json", json.dumps([vars(trial) for trial in result.front], indent=2) + "\n", StudyError)
     return result
 
@@ -284,7 +287,7 @@ def _rows_of(controller: str, maneuver: str, rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row["controller"] == controller and maneuver in ("", row["maneuver"])]
 
 
-def _result(optuna: Any, made: Any, table: TuneTable) -> Tuning:
+def _result(optuna: Any, made: Any, table: TuneTable, idle: list[str]) -> Tuning:
     complete = made.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
     names = [objective.name for objective in table.objectives]
     judged = [
@@ -294,7 +297,7 @@ def _result(optuna: Any, made: Any, table: TuneTable) -> Tuning:
     ]  # fmt: skip
     kept = [trial for trial in judged if trial.violation == 0.0]
     front = [trial for trial in kept if not any(_dominates(other, trial) for other in kept)]
-    return Tuning(len(made.trials), len(made.trials) - len(judged), front, judged)
+    return Tuning(len(made.trials), len(made.trials) - len(judged), front, judged, idle)
 
 
 def _dominates(a: Trial, b: Trial) -> bool:

@@ -507,3 +507,18 @@ def test_parameter_of_an_own_driver_is_a_key_too(write):
     assert run["steering_wheel_demand_rad"][-1] == pytest.approx(math.radians(20.0))
     with raises(ParameterError):
         resolve("straight_line", overrides={"driver.Holds.angl_deg": 20}, driver=f"{path}:Holds")
+
+
+@pytest.mark.parametrize(
+    ("body", "attribute"),
+    [
+        ("def __init__(self, setup): self.length_m = setup.wheelbase_m", "single_track.wheelbase_m"),
+        ("def __init__(self, setup): self.gains = setup.gains.lqr.rear_scale", "rear_scale_rad"),
+        ("def step(self, command, measurement): return measurement.yawrate_radps", "yaw_rate_radps"),
+    ],
+)
+def test_misspelt_attribute_is_answered_with_the_nearest(write, body, attribute):
+    step = "" if "step" in body else "\n            def step(self, command, measurement): return ActuatorCommand()"
+    path = write(f"class Mine:\n    {body}{step}".replace("            def", "    def"))
+    with pytest.raises(ControllerError, match=f"did you mean .*{attribute}"):
+        find_controller(f"{path}:Mine").make(setup()).step(steering(0.0), measured(0.0))
