@@ -75,6 +75,7 @@ def all_commands() -> Commands:
         compare,
         driver,
         envelope,
+        explore,
         fault_map,
         figures,
         fit,
@@ -104,7 +105,7 @@ def all_commands() -> Commands:
 
     commands = Commands(f"activesteer {__version__}")
     for title, modules in {
-        "drive": (listing, run, watch),
+        "drive": (listing, run, watch, explore),
         "recordings": (info, report, compare, replay, video, import_, recover),
         "car": (vehicle, tyre, kc),
         "study": (study, tune, fit, envelope, fault_map, identify, linearise, driver, margins),

@@ -1,0 +1,328 @@
+"""A car driven by hand in real time: courses, the hands at its wheel and pedals, and the drive itself."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.conventions import CORNERS
+from activesteer.driver import DriverSetup
+from activesteer.driver.speed_hold import SpeedHold
+from activesteer.errors import ActiveSteerError, ParameterError, shown
+from activesteer.explore.car_shape import BODIES, shape_of
+from activesteer.explore.choice import Choice, Folder
+from activesteer.explore.runs import Reply, free_path
+from activesteer.road.course import CONE_RADIUS_M
+from activesteer.road.footprint import Footprint
+from activesteer.scenario import resolve
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
+from activesteer.simulation.control_unit import control_unit
+from activesteer.simulation.live_view import Pacer
+from activesteer.simulation.simulation import Simulation
+
+_LONGEST_S: Final = 900.0
+_HANDS_RADPS: Final = math.radians(500.0)
+"""Rate of the steering wheel [rad/s]: below the 700 to 1000 deg/s that humans reach for a moment."""
+_FASTEST_MPS2: Final = 11.0
+"""Lateral acceleration of a full turn by key [m/s2], a little more than dry tyres transmit."""
+_PEDAL_PER_S: Final = 4.0
+"""Rate of the pedals [1/s]: a foot needs a quarter of a second for the whole way."""
+_PLANE: Final = {"kind": "open_loop", "name": "plane", "hold_last": True, "steering": {"time_s": [0.0], "steering_wheel_deg": [0.0]}}
+
+
+class DrivingCourse(NamedTuple):
+    """A place to drive.
+
+    Attributes:
+        title: Its name in words.
+        maneuver: Manoeuvre whose road and course it has.
+        speed_kmh: Speed at the start [km/h].
+        radius_m: Radius of a circle to the left that begins at the start [m]; 0 for none.
+        mu: Friction of the road [-].
+    """
+
+    title: str
+    maneuver: Any
+    speed_kmh: float
+    radius_m: float = 0.0
+    mu: float = 1.0
+
+
+COURSES: Final = {
+    "lane_change": DrivingCourse("Double lane change", "double_lane_change", 70.0),
+    "slalom": DrivingCourse("Slalom", "slalom", 60.0),
+    "skid_pad": DrivingCourse("Skid pad, radius 40 m", _PLANE, 50.0, radius_m=40.0),
+    "plane": DrivingCourse("Free plane, dry", _PLANE, 60.0),
+    "slippery": DrivingCourse("Free plane, packed snow", _PLANE, 40.0, mu=0.3),
+}
+"""Name -> place to drive."""
+
+
+class Hands(NamedTuple):
+    """What hands and feet ask for.
+
+    Attributes:
+        steer: Position of the steering, -1 full right to 1 full left.
+        throttle: Throttle pedal, 0 to 1.
+        brake: Brake pedal, 0 to 1.
+        direct: Whether `steer` is the position of a gamepad's stick or a slider, and not of a key.
+    """
+
+    steer: float = 0.0
+    throttle: float = 0.0
+    brake: float = 0.0
+    direct: bool = False
+
+    @classmethod
+    def read(cls, message: Mapping[str, Any]) -> Hands:
+        """Read a message of the page.
+
+        Raises:
+            ParameterError: a position is no number within its range.
+        """
+        values = []
+        for key, low in (("steer", -1.0), ("throttle", 0.0), ("brake", 0.0)):
+            value = message.get(key, 0.0)
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= 1.0:
+                raise ParameterError(f"is {shown(value)}; a number from {low:g} to 1 is needed", key=key, value=value)
+            values.append(float(value))
+        return cls(*values, direct=message.get("direct") is True)
+
+
+class HandDriver:
+    """A driver whose hands and feet are those of a person at the page.
+
+    The hands turn the wheel at a limited rate towards the angle asked for. Full steering is the angle of a steady turn
+    at `_FASTEST_MPS2`, a (l / v^2) (1 + (v / v_ch)^2) times the steering ratio, and at most the lock. Without a foot on
+    a pedal, the driver holds the speed.
+
+    Attributes:
+        hands: What is asked for now.
+        hold_mps: Speed that is held [m/s]; None if the car shall coast.
+    """
+
+    def __init__(self, setup: DriverSetup, hold_mps: float | None) -> None:
+        """Take the car, with straight wheels and no foot on a pedal."""
+        car = setup.single_track
+        self.hands, self.hold_mps = Hands(), hold_mps
+        self._wheelbase_m, self._characteristic_mps = car.cg_to_front_m + car.cg_to_rear_m, car.characteristic_speed_mps
+        self._setup, self._angle_rad, self._throttle, self._brake = setup, 0.0, 0.0, 0.0
+        self._hold = SpeedHold(setup.parameters, setup.drive, car.mass_kg, setup.wheel_radius_m, setup.timestep_s)
+
+    def full_turn_rad(self, speed_mps: float) -> float:
+        """Return the steering wheel angle of full steering at a speed [rad]."""
+        square, slow = max(speed_mps * speed_mps, 1.0), self._characteristic_mps**2
+        turn = _FASTEST_MPS2 * self._wheelbase_m * (1.0 / square + 1.0 / slow)
+        return min(self._setup.steering_ratio * turn, self._setup.steering_wheel_limit_rad)
+
+    def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
+        """Move hands and feet by one step."""
+        step_s, hands = self._setup.timestep_s, self.hands
+        target = hands.steer * self.full_turn_rad(measurement.speed_mps)
+        self._angle_rad = _towards(self._angle_rad, target, _HANDS_RADPS * step_s)
+        self._throttle = _towards(self._throttle, hands.throttle, _PEDAL_PER_S * step_s)
+        self._brake = _towards(self._brake, hands.brake, _PEDAL_PER_S * step_s)
+        drive = self._setup.drive
+        low, high = drive.limits_Nm(drive.speed_radps(measurement.wheel_speed_radps), 1)
+        if self._throttle > 0.0 or self._brake > 0.0:
+            torque = low + self._throttle * (high - low)
+            self._hold.reset()
+            if self.hold_mps is not None:
+                self.hold_mps = max(measurement.speed_mps, 0.0)
+        elif self.hold_mps is not None and self.hold_mps > 1.0:
+            torque = self._hold.step(self.hold_mps, measurement)
+        else:
+            torque = low
+        return DriverCommand(self._angle_rad, torque, self._brake)
+
+
+def _towards(value: float, target: float, most: float) -> float:
+    return value + min(max(target - value, -most), most)
+
+
+class Drive:
+    """A drive in real time, recorded to a file.
+
+    Attributes:
+        path: The recording.
+    """
+
+    def __init__(self, message: Mapping[str, Any], folder: Folder) -> None:
+        """Put the car at the start of a course.
+
+        Args:
+            message: The choice of the page; `maneuver` is one of `COURSES`.
+            folder: The user's own files, and the place of the recording.
+
+        Raises:
+            ActiveSteerError: the choice is wrong, or the car cannot be built.
+        """
+        choice: Choice = folder.choice(message, COURSES)
+        self._course = course = COURSES[choice.maneuver]
+        speed = {"speed_kmh": course.speed_kmh}
+        given = {**course.maneuver, **speed, "duration_s": _LONGEST_S} if isinstance(course.maneuver, dict) else course.maneuver
+        overrides = {"road.mu": course.mu, "duration_s": _LONGEST_S} | ({} if given is not course.maneuver else speed)
+        if given is not course.maneuver:
+            overrides.pop("duration_s")
+        scenario = resolve(given, folder.located(choice.vehicle), overrides, lambda setup: self._take(setup))
+        self._simulation = Simulation(scenario, folder.located(choice.controllers[0]))
+        self._names = {"controller": choice.controllers[0]}
+        self.path = free_path(folder.path, f"drive_{choice.maneuver}", ".mcap")
+        self._files = ExitStack()
+        self._files.enter_context(self._simulation.recorded_to(self.path))
+        vehicle = self._simulation.loop.vehicle
+        self._size = Footprint.from_table(vehicle.dimensions())
+        self._bodies = [vehicle.body_names.index(name) for name in BODIES]
+        self._standing = np.ones(len(self._cones()), bool)
+        self._pacer, self._lap_s, self._turned_rad, self._last_lap_s = Pacer(), 0.0, 0.0, None
+        self._bearing_rad, self._gate_s, self._seen = self._bearing(), None, 0
+        self._longest_s = self._busy_s = 0.0
+
+    def _take(self, setup: DriverSetup) -> HandDriver:
+        self._driver = HandDriver(setup, self._course.speed_kmh / 3.6)
+        return self._driver
+
+    def _cones(self) -> np.ndarray:
+        course = self._simulation.scenario.maneuver.course
+        return np.empty((0, 2)) if course is None else course.cone_centres_m()
+
+    def start(self) -> Reply:
+        """Return the first message: course and shape of the car."""
+        course = self._simulation.scenario.maneuver.course
+        header, arrays = shape_of(self._simulation.loop.vehicle)
+        lanes = [] if course is None else [lane._asdict() for lane in course.lanes]
+        return Reply(
+            {
+                "kind": "drive", "title": self._course.title, "shape": header, "cones": self._cones().tolist(),
+                "lanes": lanes, "radius_m": self._course.radius_m, "file": self.path.name,
+            },
+            tuple(arrays),
+        )  # fmt: skip
+
+    def act(self, message: Mapping[str, Any]) -> None:
+        """Carry out a message of the page: hands, controller, speed to hold.
+
+        Raises:
+            ActiveSteerError: a value is wrong, or there is no such controller.
+        """
+        if "controller" in message:
+            loop, name = self._simulation.loop, str(message["controller"])
+            _, loop.controller = control_unit(name, self._simulation.scenario, loop.vehicle)
+            self._names["controller"] = name
+        if "hold" in message:
+            speed = self._simulation.motion.speed_mps
+            self._driver.hold_mps = max(speed, 0.0) if message["hold"] is True else None
+        if "steer" in message:
+            self._driver.hands = Hands.read(message)
+            number = message.get("number", 0)
+            self._seen = number if isinstance(number, int) else 0
+
+    @property
+    def done(self) -> bool:
+        """True at the end of the longest drive."""
+        return self._simulation.done
+
+    def frame(self) -> Reply:
+        """Wait until the next picture is due, drive to its time, and return it.
+
+        Raises:
+            ActiveSteerError: the drive failed; the recording is kept.
+        """
+        simulation = self._simulation
+        until_s = self._pacer.next(simulation.time_s)
+        begun_s = time.perf_counter()
+        left = simulation.steps - simulation.loop.step_count
+        simulation.advance(max(1, min(round((until_s - simulation.time_s) / 1e-3), left)))
+        self._busy_s = time.perf_counter() - begun_s
+        self._longest_s = max(self._longest_s, self._busy_s)
+        return self._picture()
+
+    def _picture(self) -> Reply:
+        simulation = self._simulation
+        loop, motion, truth = simulation.loop, simulation.motion, simulation.truth
+        data = loop.vehicle.data
+        fallen = self._hit_cones()
+        self._time_laps()
+        moving = motion.speed_mps > 1.0
+        header = {
+            "kind": "frame", "time_s": round(simulation.time_s, 3), "speed_kmh": 3.6 * motion.speed_mps,
+            "steering_wheel_deg": math.degrees(loop.measurement.steering_wheel_rad),
+            "sideslip_deg": math.degrees(math.atan2(motion.lateral_speed_mps, motion.speed_mps)) if moving else 0.0,
+            "yaw_rate_degps": math.degrees(motion.yaw_rate_radps), "ay_mps2": truth["ay_mps2"],
+            "rear_deg": math.degrees(loop.measurement.rear_steer_rad),
+            "superposition_deg": math.degrees(loop.measurement.superposition_rad),
+            "friction_use": max(truth[f"{corner}_friction_utilisation"] for corner in CORNERS),
+            "sliding": [truth[f"{corner}_friction_utilisation"] > 0.98 for corner in CORNERS],
+            "cones": fallen, "lap_s": self._lap_s, "last_lap_s": self._last_lap_s, "controller": self._names["controller"],
+            "hold_kmh": None if self._driver.hold_mps is None else 3.6 * self._driver.hold_mps,
+            "seen": self._seen, "behind_s": self._pacer.lost_s, "busy_ms": 1e3 * self._busy_s,
+        }  # fmt: skip
+        poses = np.concatenate([data.xpos[1:][self._bodies], data.xquat[1:][self._bodies]], axis=1)
+        return Reply(header, (poses.astype(np.float32),))
+
+    def _hit_cones(self) -> list[int]:
+        """Return the cones that the body has hit since the last picture, by their numbers."""
+        motion, size, cones = self._simulation.motion, self._size, self._cones()
+        if not len(cones):
+            return []
+        chassis = self._simulation.truth
+        ahead, left = (cones - [chassis["front_axle_x_m"], chassis["front_axle_y_m"]]).T
+        cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        along, beside = ahead * cos + left * sin, left * cos - ahead * sin
+        inside = (along < size.front_m + CONE_RADIUS_M) & (along > size.rear_m - CONE_RADIUS_M)
+        hit = self._standing & inside & (np.abs(beside) < 0.5 * size.width_m + CONE_RADIUS_M)
+        self._standing &= ~hit
+        return np.flatnonzero(hit).tolist()
+
+    def _bearing(self) -> float:
+        """Return the direction from the middle of the circle to the car [rad]."""
+        motion = self._simulation.motion
+        return math.atan2(motion.y_m - self._course.radius_m, motion.x_m)
+
+    def _time_laps(self) -> None:
+        """Time laps of the circle, or the way from the first gate to the last."""
+        now_s, course = self._simulation.time_s, self._simulation.scenario.maneuver.course
+        if self._course.radius_m:
+            bearing = self._bearing()
+            self._turned_rad += math.remainder(bearing - self._bearing_rad, math.tau)
+            self._bearing_rad = bearing
+            self._gate_s = 0.0 if self._gate_s is None else self._gate_s
+            if abs(self._turned_rad) >= math.tau:
+                self._turned_rad = math.fmod(self._turned_rad, math.tau)
+                self._last_lap_s, self._gate_s = now_s - self._gate_s, now_s
+            self._lap_s = now_s - self._gate_s
+        elif course is not None and course.last_gate_x_m is not None and self._last_lap_s is None:
+            x_m = self._simulation.motion.x_m
+            if self._gate_s is None and x_m >= course.first_gate_x_m:
+                self._gate_s = now_s
+            if self._gate_s is not None:
+                self._lap_s = now_s - self._gate_s
+                if x_m >= course.last_gate_x_m:
+                    self._last_lap_s = self._lap_s
+
+    def end(self) -> Reply:
+        """Complete the recording."""
+        simulation = self._simulation
+        problem = ""
+        try:
+            with self._files:
+                simulation.end_file(simulation.recording())
+        except ActiveSteerError as error:
+            problem = str(error)
+        return Reply(
+            {
+                "kind": "driven", "file": self.path.name, "folder": str(self.path.parent), "error": problem,
+                "time_s": simulation.time_s, "behind_s": self._pacer.lost_s, "longest_ms": 1e3 * self._longest_s,
+            }
+        )  # fmt: skip
+
+    def discard(self) -> Path:
+        """Complete the recording after a failure and return its path."""
+        self.end()
+        return self.path

@@ -1,0 +1,151 @@
+// Curves over time and tracks from above, of the present runs and, pale, of the previous ones.
+import { element, number, onTheme, paint, runColour } from "./look.js";
+
+const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
+const SHOWN = 6, HEIGHT = 170, GHOST = "59";
+
+function padded(low, high, least) {
+  if (low == null) return [0, least];
+  const half = Math.max(0.55 * (high - low), least / 2), middle = (low + high) / 2;
+  return [middle - half, middle + half];
+}
+
+export class Curves {
+  constructor(box, pointed) {
+    this.box = box;
+    this.pointed = pointed;
+    this.plots = new Map();
+    new ResizeObserver(() => { for (const { plot, holder } of this.plots.values()) plot.setSize({ width: holder.clientWidth, height: HEIGHT }); }).observe(box);
+    onTheme(() => this.draw());
+  }
+
+  // runs: name -> {place, dashes, plots}; ghosts: the same of before.
+  show(runs, ghosts) {
+    this.runs = runs;
+    this.ghosts = ghosts;
+    this.draw();
+  }
+
+  draw() {
+    if (!this.runs) return;
+    const all = [...[...this.ghosts].map(([name, run]) => [name, run, true]), ...[...this.runs].map(([name, run]) => [name, run, false])].filter(([, run]) => run.plots);
+    if (!all.length) return;
+    const longest = all.reduce((a, b) => (a[1].plots.samples * a[1].plots.step_s >= b[1].plots.samples * b[1].plots.step_s ? a : b))[1].plots;
+    const time = Array.from({ length: longest.samples }, (_, i) => longest.start_s + i * longest.step_s);
+    const titles = [...new Set(all.flatMap(([, run]) => run.plots.panels.filter((panel) => panel.series.length).map((panel) => panel.title)))].slice(0, SHOWN);
+    for (const [title, { figure, plot }] of this.plots) if (!titles.includes(title)) { plot.destroy(); figure.remove(); this.plots.delete(title); }
+    for (const title of titles) {
+      const lines = [], data = [time];
+      let panelOf = null;
+      for (const [name, run, ghost] of all) {
+        const panel = run.plots.panels.find((other) => other.title === title);
+        if (!panel) continue;
+        panelOf = panel;
+        for (const series of panel.series) {
+          if (ghost && series.dotted) continue;
+          lines.push({ name, ghost, place: run.place, dash: series.dotted ? [1.5, 3] : run.dashes.map((d) => 1.5 * d), dotted: series.dotted });
+          data.push(on(time, run.plots, series.values));
+        }
+      }
+      this.panel(title, panelOf, lines, data);
+    }
+  }
+
+  panel(title, panel, lines, data) {
+    const key = JSON.stringify(lines);
+    let shown = this.plots.get(title);
+    if (shown && shown.key === key) { shown.plot.setData(data); return; }
+    if (!shown) {
+      const values = element("span", { class: "quiet" }), holder = element("div", { role: "img", "aria-label": `${title} over time` });
+      const figure = element("div", {}, element("p", {}, element("b", {}, title), ` ${panel.unit} `, values), holder);
+      this.box.append(figure);
+      shown = { figure, holder, values };
+      this.plots.set(title, shown);
+    } else shown.plot.destroy();
+    shown.key = key;
+    const axis = (size) => ({ stroke: () => paint("quiet"), font: FONT, size, gap: 4, grid: { stroke: () => paint("grid"), width: 1 }, ticks: { show: false } });
+    shown.plot = new uPlot({
+      width: shown.holder.clientWidth || 380, height: HEIGHT, legend: { show: false }, padding: [6, 14, 0, 0],
+      cursor: { y: false, sync: { key: "explore" }, drag: { x: false, y: false } },
+      scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
+      axes: [axis(26), axis(44)],
+      series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
+      hooks: { setCursor: [(u) => {
+        const i = u.cursor.idx;
+        shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost || line.dotted ? [] : [element("span", { style: `color:${runColour(line.place)}` }, `${number(u.data[k + 1][i])} `)]))]));
+        if (i != null && u.cursor.event) this.pointed(u.data[0][i]);
+      }] },
+    }, data, shown.holder);
+  }
+}
+
+// Values of a run at other instants.
+function on(time, plots, values) {
+  if (plots.samples === time.length) return values;
+  return time.map((t) => values[Math.round((t - plots.start_s) / plots.step_s)] ?? null);
+}
+
+export class Track {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.runs = new Map();
+    this.ghosts = new Map();
+    this.time = 0;
+    new ResizeObserver(() => this.draw()).observe(canvas.parentElement);
+    onTheme(() => this.draw());
+  }
+
+  show(runs, ghosts) {
+    this.runs = runs;
+    this.ghosts = ghosts;
+    this.draw();
+  }
+
+  at(time) { this.time = time; this.draw(); }
+
+  draw() {
+    const scale = devicePixelRatio, width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    if (!width || !height) return;
+    this.canvas.width = width * scale;
+    this.canvas.height = height * scale;
+    const pen = this.canvas.getContext("2d");
+    pen.scale(scale, scale);
+    const tracks = [...this.ghosts.values(), ...this.runs.values()].map((run) => run.plots?.track).filter(Boolean);
+    if (!tracks.length) return;
+    const points = tracks.flatMap((track) => track.tracks.flatMap(({ x, y }) => x.map((v, i) => [v, y[i]]).filter(([a, b]) => a != null && b != null)));
+    const course = tracks.at(-1), ends = [...points, ...course.cones.map((cone) => [cone.x ?? cone[0], cone.y ?? cone[1]])];
+    let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
+    for (const [x, y] of ends) { left = Math.min(left, x); right = Math.max(right, x); low = Math.min(low, y); high = Math.max(high, y); }
+    [left, right, low, high] = [left - 3, right + 6, low - 3, high + 3];
+    const zoomX = (width - 20) / (right - left), zoomY = Math.min((height - 34) / (high - low), 12 * zoomX);
+    const place = (x, y) => [10 + (x - left) * zoomX, height - 24 - (y - low) * zoomY];
+    const line = (xs, ys) => { pen.beginPath(); xs.forEach((x, i) => { if (x != null && ys[i] != null) pen.lineTo(...place(x, ys[i])); }); pen.stroke(); };
+    pen.font = FONT;
+    pen.fillStyle = paint("lane");
+    for (const lane of course.lanes) {
+      const xs = lane.x ?? [lane.start_x_m, lane.end_x_m, lane.end_x_m, lane.start_x_m], ys = lane.y ?? [lane.left_y_m, lane.left_y_m, lane.right_y_m, lane.right_y_m];
+      pen.beginPath();
+      xs.forEach((x, i) => pen.lineTo(...place(x, ys[i])));
+      pen.fill();
+    }
+    pen.fillStyle = paint("cone");
+    for (const cone of course.cones) { pen.beginPath(); pen.arc(...place(cone.x ?? cone[0], cone.y ?? cone[1]), 2.4, 0, 7); pen.fill(); }
+    for (const [runs, tail, thick] of [[this.ghosts, GHOST, 1.2], [this.runs, "", 2]]) {
+      for (const run of runs.values()) for (const track of run.plots?.track?.tracks ?? []) {
+        pen.strokeStyle = runColour(run.place) + tail;
+        pen.lineWidth = thick;
+        line(track.x, track.y);
+        const i = Math.min(Math.round((this.time - run.plots.start_s) / run.plots.step_s), track.x.length - 1);
+        if (tail || !track.yaw || track.x[i] == null) continue;
+        const [back, front] = track.car.ends, half = track.car.width / 2, cos = Math.cos(track.yaw[i]), sin = Math.sin(track.yaw[i]);
+        pen.fillStyle = runColour(run.place);
+        pen.beginPath();
+        for (const [a, b] of [[front, half], [front, -half], [back, -half], [back, half]]) pen.lineTo(...place(track.x[i] + a * cos - b * sin, track.y[i] + a * sin + b * cos));
+        pen.fill();
+      }
+    }
+    pen.fillStyle = paint("quiet");
+    const stretch = zoomY / zoomX;
+    pen.fillText(`from above, ${Math.round(right - left)} m${stretch > 1.05 ? `, ${stretch.toFixed(1)} times wider than true` : ""}`, 10, height - 7);
+  }
+}

@@ -1,0 +1,25 @@
+// Colours of the page and of the runs, light or dark.
+const data = JSON.parse(document.getElementById("data").textContent);
+const root = document.documentElement;
+const watchers = [];
+
+export const courses = data.courses;
+export const onTheme = (watcher) => watchers.push(watcher);
+export const dark = () => root.classList.contains("dark");
+export const paint = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
+export const runColour = (place) => (dark() ? data.dark : data.light)[place];
+
+export function setTheme(isDark) {
+  root.classList.toggle("dark", isDark);
+  for (const watcher of watchers) watcher();
+}
+
+setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
+
+export const element = (name, attributes = {}, ...children) => {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+};
+export const number = (value, digits) => (value == null ? "–" : value.toFixed(digits ?? (Math.abs(value) < 10 ? 2 : Math.abs(value) < 1000 ? 1 : 0)).replace("-", "−"));

@@ -1,0 +1,179 @@
+// Cars, road and cones in three dimensions. Axes are those of ISO 8855: x forward, y left, z up.
+import * as THREE from "./three.module.min.js";
+import { onTheme, paint, runColour } from "./look.js";
+
+const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, TURN_S = 0.35, SLOW_MPS = 1;
+const TRAIL_APART_M = 0.4, TRAIL_POINTS = 1500, ROAD_M = 4000;
+
+export class Scene {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(48, 1.6, 0.3, 900);
+    this.camera.up.set(0, 0, 1);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8a80, 2.2));
+    const sun = new THREE.DirectionalLight(0xffffff, 1.8);
+    sun.position.set(-30, 40, 60);
+    this.scene.add(sun);
+    this.ground = new THREE.Mesh(new THREE.PlaneGeometry(ROAD_M, ROAD_M), new THREE.MeshLambertMaterial());
+    this.ground.position.z = -0.02;
+    this.grid = new THREE.GridHelper(1000, 100);
+    this.grid.rotation.x = Math.PI / 2;
+    this.scene.add(this.ground, this.grid);
+    this.cars = new Map();
+    this.course = new THREE.Group();
+    this.scene.add(this.course);
+    this.heading = null;
+    onTheme(() => this.colours());
+    this.colours();
+    new ResizeObserver(() => this.fit()).observe(canvas.parentElement);
+    this.fit();
+  }
+
+  colours() {
+    const sky = new THREE.Color(paint("sky"));
+    this.scene.background = sky;
+    this.scene.fog = new THREE.Fog(sky, 60, 420);
+    this.ground.material.color.set(paint("ground"));
+    for (const material of [this.grid.material].flat()) { material.color.set(paint("line")); material.vertexColors = false; material.needsUpdate = true; material.transparent = true; material.opacity = 0.35; }
+    for (const car of this.cars.values()) for (const material of car.painted) material.color.set(runColour(car.place));
+  }
+
+  fit() {
+    const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.stale = true;
+  }
+
+  // Keep the shape of the cars: panels of the message and their points and normals.
+  setShape(shape, arrays) {
+    this.shape = shape;
+    this.geometries = shape.panels.map((panel, i) => {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.BufferAttribute(arrays[2 * i].slice(), 3));
+      geometry.setAttribute("normal", new THREE.BufferAttribute(arrays[2 * i + 1].slice(), 3));
+      return geometry;
+    });
+    for (const name of [...this.cars.keys()]) this.remove(name);
+  }
+
+  car(name, place, opacity = 1) {
+    if (this.cars.has(name)) return this.cars.get(name);
+    const bodies = this.shape.bodies.map(() => new THREE.Group()), painted = [];
+    this.shape.panels.forEach((panel, i) => {
+      const colour = panel.rgb ? new THREE.Color().setRGB(...panel.rgb, THREE.SRGBColorSpace) : new THREE.Color(runColour(place));
+      const material = new THREE.MeshPhongMaterial({ color: colour, shininess: 50, side: THREE.DoubleSide, transparent: opacity < 1, opacity });
+      if (!panel.rgb) painted.push(material);
+      bodies[this.shape.bodies.indexOf(panel.body)].add(new THREE.Mesh(this.geometries[i], material));
+    });
+    const trail = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: runColour(place) }));
+    trail.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * TRAIL_POINTS), 3));
+    trail.geometry.setDrawRange(0, 0);
+    trail.frustumCulled = false;
+    painted.push(trail.material);
+    this.scene.add(...bodies, trail);
+    const car = { bodies, painted, place, trail, points: 0 };
+    this.cars.set(name, car);
+    return car;
+  }
+
+  remove(name) {
+    const car = this.cars.get(name);
+    if (!car) return;
+    this.scene.remove(...car.bodies, car.trail);
+    this.cars.delete(name);
+  }
+
+  // Place the bodies of a car: 7 numbers each, position and quaternion w x y z, between two rows of poses.
+  place(name, poses, row = 0, part = 0) {
+    const car = this.cars.get(name), size = 7 * car.bodies.length;
+    const next = Math.min(row + 1, poses.length / size - 1);
+    car.bodies.forEach((body, i) => {
+      const a = row * size + 7 * i, b = next * size + 7 * i;
+      body.position.set(...[0, 1, 2].map((k) => poses[a + k] + part * (poses[b + k] - poses[a + k])));
+      body.quaternion.set(poses[a + 4], poses[a + 5], poses[a + 6], poses[a + 3]);
+      if (part) body.quaternion.slerp(new THREE.Quaternion(poses[b + 4], poses[b + 5], poses[b + 6], poses[b + 3]), part);
+    });
+    this.stale = true;
+  }
+
+  // The trail of a car up to here; it grows while the car drives, or is drawn whole from its poses.
+  grow(name) {
+    const car = this.cars.get(name), at = car.bodies[0].position, points = car.trail.geometry.getAttribute("position");
+    const last = car.points ? Math.hypot(at.x - points.getX(car.points - 1), at.y - points.getY(car.points - 1)) : Infinity;
+    if (last < TRAIL_APART_M) return;
+    if (car.points === TRAIL_POINTS) { points.array.copyWithin(0, 3); car.points -= 1; }
+    points.setXYZ(car.points, at.x, at.y, 0.03);
+    car.points += 1;
+    points.needsUpdate = true;
+    car.trail.geometry.setDrawRange(0, car.points);
+  }
+
+  trail(name, poses, until) {
+    const car = this.cars.get(name), size = 7 * car.bodies.length, points = car.trail.geometry.getAttribute("position");
+    const every = Math.max(1, Math.ceil(until / TRAIL_POINTS));
+    car.points = 0;
+    for (let row = 0; row < until; row += every) points.setXYZ(car.points++, poses[row * size], poses[row * size + 1], 0.03);
+    points.needsUpdate = true;
+    car.trail.geometry.setDrawRange(0, car.points);
+  }
+
+  setCourse(cones, lanes, radius = 0) {
+    this.course.clear();
+    this.cones = cones.map(([x, y]) => {
+      const cone = new THREE.Mesh(new THREE.ConeGeometry(0.145, 0.5, 16), new THREE.MeshLambertMaterial({ color: 0xf07d00 }));
+      cone.rotation.x = Math.PI / 2;
+      cone.position.set(x, y, 0.25);
+      this.course.add(cone);
+      return cone;
+    });
+    for (const lane of lanes) {
+      const length = lane.end_x_m - lane.start_x_m, width = lane.left_y_m - lane.right_y_m;
+      const flat = new THREE.Mesh(new THREE.PlaneGeometry(length, width), new THREE.MeshBasicMaterial({ color: 0xfff2c0, transparent: true, opacity: 0.28 }));
+      flat.position.set(lane.start_x_m + length / 2, lane.right_y_m + width / 2, -0.005);
+      this.course.add(flat);
+    }
+    if (radius) {
+      const ring = new THREE.Mesh(new THREE.RingGeometry(radius - 0.1, radius + 0.1, 128), new THREE.MeshBasicMaterial({ color: 0xffffff }));
+      ring.position.set(0, radius, 0);
+      this.course.add(ring);
+    }
+    this.heading = null;
+    this.stale = true;
+  }
+
+  knock(index, sideways) {
+    const cone = this.cones[index];
+    if (!cone) return;
+    cone.rotation.set(0, 0, sideways);
+    cone.position.z = 0.12;
+  }
+
+  // Follow the velocity of a car, not its heading: a car that slides then turns in the picture.
+  follow(name, dt, velocity) {
+    const car = this.cars.get(name);
+    if (!car) return;
+    const at = car.bodies[0].position, speed = Math.hypot(...velocity);
+    const wanted = speed > SLOW_MPS ? Math.atan2(velocity[1], velocity[0]) : this.heading ?? 0;
+    if (this.heading == null) this.heading = wanted;
+    const turn = Math.atan2(Math.sin(wanted - this.heading), Math.cos(wanted - this.heading));
+    this.heading += turn * (1 - Math.exp(-dt / TURN_S));
+    const cos = Math.cos(this.heading), sin = Math.sin(this.heading);
+    this.camera.position.set(at.x - 1.3 - CAMERA_BACK * cos, at.y - CAMERA_BACK * sin, CAMERA_UP);
+    this.camera.lookAt(at.x + AHEAD * cos, at.y + AHEAD * sin, 0.6);
+    this.grid.position.set(10 * Math.round(at.x / 10), 10 * Math.round(at.y / 10), 0);
+    this.ground.position.set(at.x, at.y, -0.02);
+    this.stale = true;
+  }
+
+  draw() {
+    if (!this.stale) return;
+    this.stale = false;
+    this.renderer.render(this.scene, this.camera);
+  }
+}

@@ -1,0 +1,214 @@
+"""Runs for the sliders: a choice of the page becomes curves, track, poses and key figures of each controller."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from activesteer.analysis.report.curves import plots
+from activesteer.analysis.report.groups import groups_of
+from activesteer.analysis.report.results import KEY_FIGURES
+from activesteer.analysis.report.run_page import write_report
+from activesteer.conventions import Array, run_looks
+from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.explore.car_shape import poses_of, shape_of
+from activesteer.explore.choice import Choice, Folder, numbers
+from activesteer.explore.sliders import Slider, sliders
+from activesteer.metric_table import Better, recorded_metric
+from activesteer.recording import Recording
+from activesteer.resources import DEFAULT_DRIVER
+from activesteer.scenario import Scenario, resolve
+from activesteer.simulation.preparation import prepared
+from activesteer.simulation.simulation import Simulation
+
+_CHUNK: Final = 500
+"""Steps between two looks for a newer choice; about 10 ms."""
+
+
+class Reply(NamedTuple):
+    """A message to the page.
+
+    Attributes:
+        header: JSON values; `kind` names the message.
+        arrays: Numbers that follow the header, 32 bits each.
+    """
+
+    header: dict[str, Any]
+    arrays: tuple[Array, ...] = ()
+
+
+class Runs:
+    """Runs for the sliders, with what is worth keeping between two of them.
+
+    Attributes:
+        folder: The user's own files, and the place of saved recordings.
+    """
+
+    def __init__(self, folder: Folder) -> None:
+        """Start without a run."""
+        self.folder = folder
+        self._held_rad: dict[tuple[str, str], float] = {}
+        self._kept: dict[str, Recording] = {}
+        self._choice: tuple[Choice, dict[str, float]] | None = None
+
+    def describe(self, message: Mapping[str, Any]) -> Reply:
+        """Return the sliders and the car of a choice."""
+        choice = self.folder.choice(message)
+        scenario = self._resolved(choice, {})
+        header, arrays = shape_of(scenario.car.on(scenario.maneuver.road, 1e-3))
+        return Reply(
+            {
+                "kind": "description",
+                "title": scenario.maneuver.title or choice.maneuver,
+                "sliders": [slider._asdict() for slider in self._sliders(choice, scenario)],
+                "shape": header,
+            },
+            tuple(arrays),
+        )
+
+    def run(self, message: Mapping[str, Any], values: object, stale: Callable[[], bool]) -> Iterator[Reply]:
+        """Drive the chosen controllers, and yield a reply for each as soon as it is driven.
+
+        Args:
+            message: The choice.
+            values: Values of the sliders that were moved.
+            stale: Whether the page has made a newer choice, for which this one is dropped.
+
+        Raises:
+            ActiveSteerError: the choice is wrong.
+        """
+        choice = self.folder.choice(message)
+        allowed = {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
+        overrides = numbers(values, allowed)
+        scenario = self._held(choice, self._resolved(choice, overrides))
+        looks = run_looks(choice.controllers)
+        self._kept, self._choice = {}, (choice, overrides)
+        for name in choice.controllers:
+            look = looks[name]
+            run = {"kind": "run", "name": name, "label": look.label, "place": look.place, "dashes": look.dashes}
+            try:
+                recording = self._driven(scenario, self.folder.located(name), stale)
+            except ActiveSteerError as error:
+                yield Reply({**run, "error": str(error)})
+                continue
+            if recording is None:
+                return
+            self._kept[name] = recording
+            step_s, poses = poses_of(recording)
+            shown = plots(groups_of({f"{name}.mcap": recording})[0])
+            yield Reply({**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}, (poses,))
+        yield Reply({"kind": "finished", **self._commands(choice, overrides)})
+
+    def save(self) -> Reply:
+        """Write the last runs as recordings.
+
+        Raises:
+            ParameterError: there is no run yet.
+        """
+        paths = []
+        for name, recording in self._runs().items():
+            path = self._free(f"{recording.metadata['maneuver']['name']}_{_plain(name)}", ".mcap")
+            recording.save(path)
+            paths.append(path)
+        return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": str(self.folder.path)})
+
+    def report(self, path: Path) -> Reply:
+        """Write a report of the last runs.
+
+        Raises:
+            ParameterError: there is no run yet.
+        """
+        write_report({f"{_plain(name)}.mcap": recording for name, recording in self._runs().items()}, path)
+        return Reply({"kind": "report"})
+
+    def _runs(self) -> dict[str, Recording]:
+        if not self._kept:
+            raise ParameterError("there is no run to save yet; move a slider or choose a manoeuvre")
+        return self._kept
+
+    def _free(self, stem: str, suffix: str) -> Path:
+        """Return a path in the folder that does not exist yet."""
+        return free_path(self.folder.path, stem, suffix)
+
+    def _resolved(self, choice: Choice, overrides: Mapping[str, float]) -> Scenario:
+        return resolve(
+            self.folder.located(choice.maneuver),
+            self.folder.located(choice.vehicle),
+            dict(overrides),
+            self.folder.located(choice.driver),
+        )
+
+    def _sliders(self, choice: Choice, scenario: Scenario | None = None) -> list[Slider]:
+        return sliders(scenario or self._resolved(choice, {}), choice.controllers)
+
+    def _held(self, choice: Choice, scenario: Scenario) -> Scenario:
+        """Return a scenario with its amplitude: that of the last search while a slider moves, else a new one."""
+        maneuver: Any = scenario.maneuver
+        if maneuver.search is None:
+            return prepared(scenario)
+        key = choice.maneuver, choice.vehicle
+        if choice.dragging and key in self._held_rad:
+            return replace(scenario, maneuver=maneuver.with_amplitude(self._held_rad[key]))
+        ready = prepared(scenario)
+        steer: Any = ready.maneuver
+        self._held_rad[key] = steer.steer.steering_wheel_rad
+        return ready
+
+    def _driven(self, scenario: Scenario, controller: str, stale: Callable[[], bool]) -> Recording | None:
+        """Return the recording of a run; None if a newer choice has come."""
+        if stale():
+            return None
+        simulation = Simulation(scenario, controller)
+        while not simulation.done:
+            if stale():
+                return None
+            simulation.advance(min(_CHUNK, simulation.steps - round(simulation.time_s / 1e-3)))
+        return simulation.recording()
+
+    def _commands(self, choice: Choice, overrides: Mapping[str, float]) -> dict[str, str]:
+        """Return the command line and the Python code that repeat the runs."""
+        words = ["activesteer", "run", choice.maneuver]
+        words += [word for name in choice.controllers for word in ("-c", name)]
+        words += ["--vehicle", choice.vehicle] if choice.vehicle != "compact" else []
+        words += ["--driver", choice.driver] if choice.driver != DEFAULT_DRIVER else []
+        words += [word for key, value in overrides.items() for word in ("--set", f"{key}={value:g}")]
+        given = {
+            "vehicle": choice.vehicle if choice.vehicle != "compact" else None,
+            "overrides": {key: float(f"{value:g}") for key, value in overrides.items()} or None,
+            "driver": choice.driver if choice.driver != DEFAULT_DRIVER else None,
+        }
+        more = "".join(f", {key}={json.dumps(value)}" for key, value in given.items() if value is not None)
+        names = json.dumps(list(choice.controllers))
+        python = f"runs = [activesteer.simulate({json.dumps(choice.maneuver)}, name{more}) for name in {names}]"
+        return {"command": shlex.join(words), "python": python}
+
+
+def free_path(folder: Path, stem: str, suffix: str) -> Path:
+    """Return a path in a folder that does not exist yet, numbered if necessary."""
+    path, number = folder / f"{stem}{suffix}", 1
+    while path.exists():
+        number += 1
+        path = folder / f"{stem}_{number}{suffix}"
+    return path
+
+
+def _plain(name: str) -> str:
+    """Return a controller's name as part of a file name."""
+    return "".join(letter if letter.isalnum() else "_" for letter in name)
+
+
+def _figures(recording: Recording) -> list[dict[str, Any]]:
+    """Return the key figures of a run in display units."""
+    found = []
+    for figure in KEY_FIGURES:
+        name = next((name for name in figure.metrics if name in recording.metrics), None)
+        if name is not None:
+            metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
+            size = abs(value) if metric.better is Better.SMALLER else value
+            shown = size if size == size else None  # JSON has no nan
+            found.append({"title": figure.title, "unit": metric.unit_name, "value": shown})
+    return found

@@ -1,0 +1,237 @@
+"""The server of the page: files of the page, and a WebSocket between the browser and the worker process.
+
+It listens on 127.0.0.1 alone. The address of the page contains a random token, and the headers Host and Origin must be
+those of this server, so that neither another user's browser nor another page in yours can reach it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import multiprocessing
+import secrets
+import socket
+import struct
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+from typing import Any, Final
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.errors import ActiveSteerError
+from activesteer.explore.drive import COURSES
+from activesteer.explore.worker import work
+from activesteer.version import __version__
+
+HOST: Final = "127.0.0.1"
+_MAX_MESSAGE: Final = 20_000
+"""Most bytes of a message from the page; its choices have some hundred."""
+_TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
+_OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css")
+"""Files that the page shares with the report."""
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "
+    "connect-src 'self' ws://{host}; frame-ancestors 'none'; base-uri 'none'"
+)
+
+
+class ExploreServer:
+    """The server and its worker process.
+
+    Attributes:
+        url: Address of the page, with its token.
+    """
+
+    def __init__(self, folder: Path, port: int) -> None:
+        """Open the port and start the worker process.
+
+        Args:
+            folder: Folder of the user's own files and of recordings.
+            port: Port; 0 for any free one.
+
+        Raises:
+            ActiveSteerError: the port is taken, or the folder does not exist.
+        """
+        if not folder.is_dir():
+            raise ActiveSteerError(f"{folder} is no folder; the page reads and writes files there")
+        self._socket = socket.socket()
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._socket.bind((HOST, port))
+        except OSError as error:
+            self._socket.close()
+            raise ActiveSteerError(f"port {port} cannot be opened ({error.strerror}); --port 0 takes a free one") from error
+        self._socket.listen()
+        self._token = secrets.token_urlsafe(16)
+        self._host = f"{HOST}:{self._socket.getsockname()[1]}"
+        self.url = f"http://{self._host}/{self._token}/"
+        self._report = ""
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._worker = context.Process(target=work, args=(theirs, str(folder.resolve())), daemon=True)
+        self._worker.start()
+        theirs.close()
+        self._ready: tuple[dict[str, Any], list[Any]] | None = None
+        self._page: WebSocket | None = None
+
+    @property
+    def port(self) -> int:
+        """Port of the server."""
+        return int(self._host.rpartition(":")[2])
+
+    def serve(self, listening: Callable[[], None]) -> None:
+        """Serve until the process is stopped.
+
+        Args:
+            listening: Function that is called once the server accepts connections.
+        """
+        config = uvicorn.Config(
+            self._app(listening), log_level="warning", lifespan="on", ws_max_size=_MAX_MESSAGE, server_header=False
+        )
+        try:
+            uvicorn.Server(config).run(sockets=[self._socket])
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """End the worker process, which completes the recording of a drive."""
+        self._pipe.close()
+        self._worker.join(2.0)
+        if self._worker.is_alive():
+            self._worker.terminate()
+        self._socket.close()
+
+    def _app(self, listening: Callable[[], None]) -> Starlette:
+        async def lifespan(_app: Starlette) -> Any:
+            pump = asyncio.create_task(self._pump())
+            listening()
+            yield
+            pump.cancel()
+
+        from contextlib import asynccontextmanager
+
+        token = f"/{self._token}"
+        return Starlette(
+            routes=[
+                Route(f"{token}/", self._index),
+                Route(f"{token}/report", self._show_report),
+                Route(f"{token}/{{name}}", self._file),
+                WebSocketRoute(f"{token}/socket", self._talk),
+            ],
+            middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
+            lifespan=asynccontextmanager(lifespan),
+        )
+
+    async def _index(self, _request: Request) -> Response:
+        text = (resources.files("activesteer.explore") / "page" / "index.html").read_text("utf-8")
+        colours = {
+            "light": RUN_COLOURS, "dark": RUN_COLOURS_ON_DARK, "version": __version__,
+            "courses": {name: course.title for name, course in COURSES.items()},
+        }  # fmt: skip
+        text = text.replace("{{ data }}", json.dumps(colours).replace("<", "\\u003c"))
+        return HTMLResponse(text, headers={"Content-Security-Policy": _POLICY.format(host=self._host)})
+
+    async def _file(self, request: Request) -> Response:
+        name = request.path_params["name"]
+        package = "activesteer.pages" if name in _OF_REPORTS else "activesteer.explore"
+        folder = resources.files(package) / ("templates" if name in _OF_REPORTS else "page")
+        suffix = Path(name).suffix
+        if suffix not in _TYPES or name not in {entry.name for entry in folder.iterdir()}:
+            return PlainTextResponse("there is no such file", 404)
+        headers = {"Cache-Control": "no-store", "X-Content-Type-Options": "nosniff"}
+        return Response((folder / name).read_bytes(), media_type=_TYPES[suffix], headers=headers)
+
+    async def _show_report(self, _request: Request) -> Response:
+        if not self._report:
+            return PlainTextResponse("there is no report yet", 404)
+        return HTMLResponse(self._report)
+
+    async def _talk(self, page: WebSocket) -> None:
+        """Pass messages of the page to the worker; a second page takes the place of the first."""
+        if page.headers.get("origin") not in (f"http://{self._host}", f"http://localhost:{self.port}"):
+            await page.close(1008)
+            return
+        await page.accept()
+        if self._page is not None:
+            await self._tell(self._page, {"kind": "error", "text": "this page was opened in another window", "about": "window"})
+        self._page = page
+        if self._ready is not None:
+            await self._deliver(*self._ready)
+        try:
+            while True:
+                text = await page.receive_text()
+                try:
+                    message = json.loads(text, parse_constant=_no_constant)
+                    if not isinstance(message, dict):
+                        raise ValueError("no object")
+                except (ValueError, RecursionError):
+                    await self._tell(page, {"kind": "error", "text": "the page sent a message that is no JSON", "about": None})
+                    continue
+                self._pipe.send(message)
+        except (WebSocketDisconnect, KeyError):
+            pass
+        finally:
+            if self._page is page:
+                self._page = None
+                self._pipe.send({"kind": "end"})
+
+    async def _pump(self) -> None:
+        """Pass messages of the worker to the page."""
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                header, arrays = await loop.run_in_executor(None, self._pipe.recv)
+            except (EOFError, OSError):
+                if self._page is not None:
+                    text = "the worker process has ended; start `activesteer explore` again"
+                    await self._tell(self._page, {"kind": "error", "text": text, "about": "worker"})
+                return
+            if header["kind"] == "ready":
+                self._ready = header, arrays
+            if header["kind"] == "report":
+                self._report = header.pop("html")
+            await self._deliver(header, arrays)
+
+    async def _deliver(self, header: dict[str, Any], arrays: list[Any]) -> None:
+        """Send a header, and behind it its arrays: length, JSON, numbers of 32 bits."""
+        page = self._page
+        if page is None:
+            return
+        header = {**header, "arrays": [list(shape) for shape, _ in arrays]}
+        text = json.dumps(_finite(header), allow_nan=False).encode()
+        text += b" " * (-(4 + len(text)) % 4)  # the numbers begin at a multiple of their size
+        try:
+            await page.send_bytes(struct.pack("<I", len(text)) + text + b"".join(data for _, data in arrays))
+        except (WebSocketDisconnect, RuntimeError):
+            self._page = None
+
+    @staticmethod
+    async def _tell(page: WebSocket, header: dict[str, Any]) -> None:
+        text = json.dumps({**header, "arrays": []}).encode()
+        text += b" " * (-(4 + len(text)) % 4)
+        await page.send_bytes(struct.pack("<I", len(text)) + text)
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(name)
+
+
+def _finite(value: Any) -> Any:
+    """Return JSON values with null in place of numbers that are not finite."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    return value
