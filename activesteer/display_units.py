@@ -100,6 +100,7 @@ _AS_WRITTEN: Final = {
     "_Npm": "N/m", "_Npmm": "N/mm", "_radps": "rad/s", "_degps": "deg/s", "_mps2": "m/s2", "_srad": "s rad",
     "_1ps": "1/s", "_mps": "m/s", "_kmh": "km/h", "_Nm": "N m", "_Hz": "Hz", "_kg": "kg", "_rad": "rad", "_deg": "deg",
     "_mm": "mm", "_Pa": "Pa", "_m": "m", "_s": "s", "_N": "N", "_g": "g",
+    "_s2": "s2",
 }  # fmt: skip
 """Suffix of a key or a column -> unit of its values."""
 

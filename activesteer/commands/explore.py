@@ -40,7 +40,7 @@ def _explore(options: argparse.Namespace) -> int:
 
     def listening() -> None:
         if options.json:
-            print_json({"url": server.url, "port": server.port})
+            print_json({"url": server.url, "port": server.port}, one_line=True)
         else:
             print(server.url, flush=True)
             print("Ctrl-C ends the page", file=sys.stderr)

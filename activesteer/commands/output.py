@@ -49,9 +49,16 @@ def print_wrapped(text: str) -> None:
         print(coloured("\n".join(wrapped)))
 
 
-def print_json(value: Any) -> None:
-    """Print a value as JSON; see `json_text`."""
-    print(json_text(value), file=_for_json[-1] if _for_json else None)
+def print_json(value: Any, *, one_line: bool = False) -> None:
+    """Print a value as JSON; see `json_text`.
+
+    Args:
+        value: The value.
+        one_line: Whether another program reads the value as one line while this program goes on.
+    """
+    text = json_text(value)
+    text = " ".join(line.strip() for line in text.splitlines()) if one_line else text
+    print(text, file=_for_json[-1] if _for_json else None, flush=one_line)
 
 
 _for_json: Final[list[TextIO]] = []

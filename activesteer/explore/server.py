@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import math
 import multiprocessing
 import secrets
 import socket
@@ -31,6 +30,7 @@ from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from activesteer.errors import ActiveSteerError
 from activesteer.explore.drive import COURSES
 from activesteer.explore.worker import work
+from activesteer.files import finite
 from activesteer.version import __version__
 
 HOST: Final = "127.0.0.1"
@@ -208,7 +208,7 @@ class ExploreServer:
         if page is None:
             return
         header = {**header, "arrays": [list(shape) for shape, _ in arrays]}
-        text = json.dumps(_finite(header), allow_nan=False).encode()
+        text = json.dumps(finite(header), allow_nan=False).encode()
         text += b" " * (-(4 + len(text)) % 4)  # the numbers begin at a multiple of their size
         try:
             await page.send_bytes(struct.pack("<I", len(text)) + text + b"".join(data for _, data in arrays))
@@ -224,14 +224,3 @@ class ExploreServer:
 
 def _no_constant(name: str) -> None:
     raise ValueError(name)
-
-
-def _finite(value: Any) -> Any:
-    """Return JSON values with null in place of numbers that are not finite."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    return value

@@ -82,8 +82,14 @@ def _of(group: str, values: Any, ranges: dict[str, tuple[float, float, float]]) 
     known = set(key_paths(type(values)))
     for key, (low, high, step) in ranges.items():
         if key in known and (value := _value(values, key)) is not None:
-            label, unit = parameter_label(key)
+            label, unit = _label(key)
             yield Slider(key, label, unit, group, min(low, value), max(high, value), step, value)
+
+
+def _label(key: str) -> tuple[str, str]:
+    """Return label and unit of a key, without the tables that only sort it."""
+    words, unit = parameter_label(key)
+    return words.removeprefix("factors: ").removeprefix("load: "), unit
 
 
 def _value(holder: Any, key: str) -> float | None:
@@ -112,7 +118,7 @@ def _gains(group: str, gains: Any, prefix: str) -> Iterator[Slider]:
         top = min(high, _TIMES * abs(value)) if value else min(high, 1.0)
         low = max(low, 0.0)
         digits = 2 - math.floor(math.log10(max(top - low, 1e-9)))
-        label, unit = parameter_label(f"controllers.{group}.{key}")
+        label, unit = _label(key)
         yield Slider(
             f"{prefix}.{key}", label, unit, group, low, round(top, digits + 2), round((top - low) / _STEPS, digits + 2),
             value,

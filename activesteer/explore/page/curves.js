@@ -113,7 +113,7 @@ export class Track {
     const tracks = [...this.ghosts.values(), ...this.runs.values()].map((run) => run.plots?.track).filter(Boolean);
     if (!tracks.length) return;
     const points = tracks.flatMap((track) => track.tracks.flatMap(({ x, y }) => x.map((v, i) => [v, y[i]]).filter(([a, b]) => a != null && b != null)));
-    const course = tracks.at(-1), ends = [...points, ...course.cones.map((cone) => [cone.x ?? cone[0], cone.y ?? cone[1]])];
+    const course = tracks.at(-1), ends = [...points, ...course.cones.map((cone) => [cone[0], cone[1]])];
     let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
     for (const [x, y] of ends) { left = Math.min(left, x); right = Math.max(right, x); low = Math.min(low, y); high = Math.max(high, y); }
     [left, right, low, high] = [left - 3, right + 6, low - 3, high + 3];
@@ -123,13 +123,13 @@ export class Track {
     pen.font = FONT;
     pen.fillStyle = paint("lane");
     for (const lane of course.lanes) {
-      const xs = lane.x ?? [lane.start_x_m, lane.end_x_m, lane.end_x_m, lane.start_x_m], ys = lane.y ?? [lane.left_y_m, lane.left_y_m, lane.right_y_m, lane.right_y_m];
+      const [start, end] = lane.x, [below, above] = lane.y;
       pen.beginPath();
-      xs.forEach((x, i) => pen.lineTo(...place(x, ys[i])));
+      for (const [x, y] of [[start, below], [end, below], [end, above], [start, above]]) pen.lineTo(...place(x, y));
       pen.fill();
     }
     pen.fillStyle = paint("cone");
-    for (const cone of course.cones) { pen.beginPath(); pen.arc(...place(cone.x ?? cone[0], cone.y ?? cone[1]), 2.4, 0, 7); pen.fill(); }
+    for (const cone of course.cones) { pen.beginPath(); pen.arc(...place(cone[0], cone[1]), 2.4, 0, 7); pen.fill(); }
     for (const [runs, tail, thick] of [[this.ghosts, GHOST, 1.2], [this.runs, "", 2]]) {
       for (const run of runs.values()) for (const track of run.plots?.track?.tracks ?? []) {
         pen.strokeStyle = runColour(run.place) + tail;

@@ -3,7 +3,7 @@ import * as THREE from "./three.module.min.js";
 import { onTheme, paint, runColour } from "./look.js";
 
 const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, TURN_S = 0.35, SLOW_MPS = 1;
-const TRAIL_APART_M = 0.4, TRAIL_POINTS = 1500, ROAD_M = 4000;
+const TRAIL_APART_M = 0.4, TRAIL_POINTS = 1500, ROAD_M = 1200, TILE_M = 10;
 
 export class Scene {
   constructor(canvas) {
@@ -13,15 +13,18 @@ export class Scene {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(48, 1.6, 0.3, 900);
     this.camera.up.set(0, 0, 1);
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8a80, 2.2));
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb0b0a8, 2.6));
     const sun = new THREE.DirectionalLight(0xffffff, 1.8);
     sun.position.set(-30, 40, 60);
     this.scene.add(sun);
-    this.ground = new THREE.Mesh(new THREE.PlaneGeometry(ROAD_M, ROAD_M), new THREE.MeshLambertMaterial());
+    this.asphalt = new THREE.CanvasTexture(document.createElement("canvas"));
+    this.asphalt.wrapS = this.asphalt.wrapT = THREE.RepeatWrapping;
+    this.asphalt.repeat.set(ROAD_M / TILE_M, ROAD_M / TILE_M);
+    this.asphalt.anisotropy = 8;
+    this.asphalt.colorSpace = THREE.SRGBColorSpace;
+    this.ground = new THREE.Mesh(new THREE.PlaneGeometry(ROAD_M, ROAD_M), new THREE.MeshBasicMaterial({ map: this.asphalt }));
     this.ground.position.z = -0.02;
-    this.grid = new THREE.GridHelper(1000, 100);
-    this.grid.rotation.x = Math.PI / 2;
-    this.scene.add(this.ground, this.grid);
+    this.scene.add(this.ground);
     this.cars = new Map();
     this.course = new THREE.Group();
     this.scene.add(this.course);
@@ -36,9 +39,27 @@ export class Scene {
     const sky = new THREE.Color(paint("sky"));
     this.scene.background = sky;
     this.scene.fog = new THREE.Fog(sky, 60, 420);
-    this.ground.material.color.set(paint("ground"));
-    for (const material of [this.grid.material].flat()) { material.color.set(paint("line")); material.vertexColors = false; material.needsUpdate = true; material.transparent = true; material.opacity = 0.35; }
+    this.pave();
     for (const car of this.cars.values()) for (const material of car.painted) material.color.set(runColour(car.place));
+  }
+
+  // A tile of the ground: grains, which show the speed, and a line at its edges, TILE_M apart.
+  pave() {
+    const canvas = this.asphalt.image, pen = canvas.getContext("2d");
+    canvas.width = canvas.height = 256;
+    pen.fillStyle = paint("ground");
+    pen.fillRect(0, 0, 256, 256);
+    let seed = 7;
+    const next = () => (seed = (seed * 16807) % 2147483647) / 2147483647;
+    for (let i = 0; i < 900; i++) {
+      pen.fillStyle = next() < 0.5 ? "rgba(255,255,255,.10)" : "rgba(0,0,0,.12)";
+      pen.fillRect(256 * next(), 256 * next(), 3, 3);
+    }
+    pen.strokeStyle = paint("line");
+    pen.globalAlpha = 0.55;
+    pen.strokeRect(0, 0, 256, 256);
+    this.asphalt.dispose();
+    this.asphalt.needsUpdate = true;
   }
 
   fit() {
@@ -166,8 +187,7 @@ export class Scene {
     const cos = Math.cos(this.heading), sin = Math.sin(this.heading);
     this.camera.position.set(at.x - 1.3 - CAMERA_BACK * cos, at.y - CAMERA_BACK * sin, CAMERA_UP);
     this.camera.lookAt(at.x + AHEAD * cos, at.y + AHEAD * sin, 0.6);
-    this.grid.position.set(10 * Math.round(at.x / 10), 10 * Math.round(at.y / 10), 0);
-    this.ground.position.set(at.x, at.y, -0.02);
+    this.ground.position.set(TILE_M * Math.round(at.x / TILE_M), TILE_M * Math.round(at.y / TILE_M), -0.02);
     this.stale = true;
   }
 

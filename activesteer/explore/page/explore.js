@@ -1,0 +1,241 @@
+// The page: messages of the worker, the tab Explore, and the tabs themselves.
+import { Curves, Track } from "./curves.js";
+import { Drive } from "./drive.js";
+import { dark, element, number, onTheme, runColour, setTheme } from "./look.js";
+import { Scene } from "./scene.js";
+import { Socket } from "./socket.js";
+
+const $ = (id) => document.getElementById(id);
+const MOST_CONTROLLERS = 3, DRAG_MS = 40, FIRST = { maneuver: "sine_with_dwell", controllers: ["none", "ars", "afs"] };
+
+export function say(text) {
+  $("message").textContent = text;
+  $("message").hidden = !text;
+}
+
+const curves = new Curves($("curves"), (time) => { player.show(time); player.pause(); });
+const track = new Track($("track"));
+const scene = new Scene($("view"));
+const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], asked: 0 };
+window.activesteer = state; // for tests and the curious
+
+const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), say);
+const drive = new Drive(socket, say);
+
+const choice = () => ({ maneuver: $("maneuver").value, vehicle: $("vehicle").value, driver: $("driver").value, controllers: chosen() });
+const chosen = () => {
+  const names = [...$("controllers").querySelectorAll("input:checked")].map((box) => box.value), own = $("own").value.trim();
+  return own ? [...names.slice(0, MOST_CONTROLLERS - 1), own] : names;
+};
+
+function describe() {
+  if (!chosen().length) { say("Choose at least one controller."); return; }
+  say("");
+  state.values = {};
+  state.runs = new Map();
+  state.ghosts = new Map();
+  socket.send({ kind: "describe", id: ++state.id, ...choice() });
+}
+
+let waiting = null;
+function ask(dragging) {
+  if (waiting) clearTimeout(waiting);
+  waiting = setTimeout(() => {
+    waiting = null;
+    if (!dragging || !state.dragged) keepGhosts();
+    state.dragged = dragging;
+    state.asked = performance.now();
+    state.first = null;
+    $("state").textContent = "driving …";
+    socket.send({ kind: "run", id: ++state.id, ...choice(), dragging, values: state.values });
+  }, dragging ? DRAG_MS : 0);
+}
+
+// The result before this change stays as a pale curve until the slider is let go and moved again.
+function keepGhosts() {
+  if (!state.released) return;
+  state.ghosts = new Map(state.runs);
+}
+
+const hear = {
+  ready(header) {
+    for (const [id, names] of [["maneuver", header.maneuvers], ["vehicle", header.vehicles], ["driver", header.drivers]]) {
+      $(id).replaceChildren(...names.map((name) => element("option", { value: name }, name)));
+    }
+    $("maneuver").value = FIRST.maneuver;
+    $("vehicle").value = "compact";
+    $("driver").value = "typical";
+    $("controllers").querySelectorAll("label").forEach((label) => label.remove());
+    for (const name of header.controllers) {
+      const box = element("input", { type: "checkbox", value: name });
+      box.checked = FIRST.controllers.includes(name);
+      box.addEventListener("change", () => {
+        const most = MOST_CONTROLLERS - ($("own").value.trim() ? 1 : 0), on = [...$("controllers").querySelectorAll("input:checked")];
+        if (on.length > most) (on.find((other) => other !== box) ?? box).checked = false;
+        describe();
+      });
+      $("controllers").append(element("label", {}, box, ` ${name}`));
+    }
+    drive.offer(header);
+    describe();
+  },
+
+  description(header, arrays) {
+    if (header.id !== state.id) return;
+    $("title").textContent = header.title;
+    state.sliders = header.sliders;
+    showSliders();
+    scene.setShape(header.shape, arrays);
+    ask(false);
+  },
+
+  run(header, arrays) {
+    if (header.id !== state.id) return;
+    if (state.first == null) { state.first = performance.now() - state.asked; state.runs = new Map(); }
+    if (header.error) say(`${header.name}: ${header.error}`);
+    state.runs.set(header.name, { ...header, poses: arrays[0] });
+    redraw();
+  },
+
+  finished(header) {
+    if (header.id !== state.id) return;
+    state.released = !state.dragged;
+    state.all = performance.now() - state.asked;
+    $("state").textContent = `first curve after ${Math.round(state.first)} ms, all after ${Math.round(state.all)} ms`;
+    $("command").textContent = header.command;
+    $("python").textContent = header.python;
+  },
+
+  saved(header) { $("state").textContent = `saved ${header.files.join(", ")} in ${header.folder}`; },
+  report() { window.open("report", "_blank"); },
+  error(header) { say(header.text); $("state").textContent = ""; if (header.about === "start") drive.failed(); },
+  drive: (header, arrays) => drive.begin(header, arrays),
+  frame: (header, arrays) => drive.frame(header, arrays),
+  driven: (header) => drive.ended(header),
+};
+
+function redraw() {
+  curves.show(state.runs, state.ghosts);
+  track.show(state.runs, state.ghosts);
+  const drawn = [...state.runs.values()].filter((run) => run.poses);
+  for (const name of [...scene.cars.keys()]) if (!state.runs.has(name)) scene.remove(name);
+  for (const run of drawn) scene.car(run.name, run.place);
+  const course = drawn[0]?.plots.track;
+  if (course && state.course !== state.id) {
+    state.course = state.id;
+    scene.setCourse(course.cones, course.lanes.map((lane) => ({ start_x_m: lane.x[0], end_x_m: lane.x[1], right_y_m: lane.y[0], left_y_m: lane.y[1] })));
+  }
+  player.length();
+  showFigures();
+}
+
+function showFigures() {
+  const runs = [...state.runs.values()].filter((run) => run.figures), titles = [...new Set(runs.flatMap((run) => run.figures.map((figure) => figure.title)))];
+  const head = element("tr", {}, element("th", {}, ""), ...titles.map((title) => element("th", {}, title, ...unitOf(runs, title))));
+  const rows = runs.map((run) => element("tr", {}, element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), run.label), ...titles.map((title) => {
+    const now = run.figures.find((figure) => figure.title === title), before = state.ghosts.get(run.name)?.figures?.find((figure) => figure.title === title);
+    const change = now?.value != null && before?.value != null ? now.value - before.value : null;
+    return element("td", {}, number(now?.value), element("span", {}, change == null || Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change)}`));
+  })));
+  $("figures").replaceChildren(head, ...rows);
+}
+
+function unitOf(runs, title) {
+  const unit = runs.flatMap((run) => run.figures).find((figure) => figure.title === title)?.unit;
+  return unit ? [element("span", { class: "quiet" }, ` ${unit}`)] : [];
+}
+
+function showSliders() {
+  const groups = [...new Set(state.sliders.map((slider) => slider.group))];
+  const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group));
+  $("sliders").replaceChildren(...groups.map((group, i) => {
+    const box = element("details", { "data-group": group }, element("summary", {}, group));
+    box.open = open.size ? open.has(group) : i !== 1;
+    for (const slider of state.sliders.filter((other) => other.group === group)) box.append(sliderOf(slider));
+    return box;
+  }));
+}
+
+function sliderOf(slider) {
+  const digits = Math.max(0, -Math.floor(Math.log10(slider.step)));
+  const shown = element("output", {}), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": slider.label, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
+  const box = element("div", { class: "slider" }, element("span", {}, slider.label), shown, input);
+  const write = () => { shown.textContent = `${number(+input.value, digits)} ${slider.unit}`; box.classList.toggle("changed", slider.key in state.values); };
+  const moved = (dragging) => {
+    const value = Math.min(slider.high, Math.max(slider.low, slider.low + Math.round((input.value - slider.low) / slider.step) * slider.step));
+    if (Math.abs(value - slider.value) < 1e-9) delete state.values[slider.key];
+    else state.values[slider.key] = +value.toPrecision(9);
+    write();
+    ask(dragging);
+  };
+  input.value = slider.value;
+  input.addEventListener("input", () => moved(true));
+  input.addEventListener("change", () => moved(false));
+  input.addEventListener("dblclick", () => { input.value = slider.value; moved(false); });
+  // Without this, a step of the keyboard is a hundredth of the range, whatever the step of the slider.
+  input.addEventListener("keydown", (event) => {
+    const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
+    if (!way) return;
+    event.preventDefault();
+    input.value = +input.value + way * slider.step;
+    moved(false);
+  });
+  write();
+  return box;
+}
+
+// Time on the pictures: it plays, or follows the slider or the pointer on a curve.
+const player = {
+  time: 0, end: 1, playing: true, last: null,
+  length() {
+    this.end = Math.max(...[...state.runs.values()].filter((run) => run.plots).map((run) => run.plots.step_s * (run.plots.samples - 1)), 0.1);
+    $("time").max = this.end;
+    this.show(Math.min(this.time, this.end));
+  },
+  show(time) {
+    const dt = Math.abs(time - this.time);
+    if (time < this.time) scene.heading = null;
+    this.time = time;
+    $("time").value = time;
+    $("clock").textContent = `${number(time, 2)} s`;
+    track.at(time);
+    let first = true;
+    for (const run of state.runs.values()) {
+      if (!run.poses || !scene.cars.has(run.name)) continue;
+      const size = 7 * scene.shape.bodies.length, rows = run.poses.length / size, exact = Math.min(time / run.pose_step_s, rows - 1), row = Math.floor(exact);
+      scene.place(run.name, run.poses, row, exact - row);
+      scene.trail(run.name, run.poses, row + 1);
+      if (!first) continue;
+      first = false;
+      const a = Math.max(0, row - 1) * size, b = Math.min(row + 1, rows - 1) * size, s = Math.max((b - a) / size, 1) * run.pose_step_s;
+      scene.follow(run.name, dt || 10, [(run.poses[b] - run.poses[a]) / s, (run.poses[b + 1] - run.poses[a + 1]) / s]);
+    }
+  },
+  pause() { this.playing = false; $("play").textContent = "Play"; },
+  tick(now) {
+    requestAnimationFrame((next) => this.tick(next));
+    const dt = this.last == null ? 0 : (now - this.last) / 1000;
+    this.last = now;
+    if (drive.shown) { drive.draw(); return; }
+    if (this.playing && state.runs.size) this.show(this.time + dt > this.end ? 0 : this.time + dt);
+    scene.draw();
+  },
+};
+
+for (const id of ["maneuver", "vehicle", "driver", "own"]) $(id).addEventListener("change", describe);
+$("reset").addEventListener("click", () => { state.values = {}; showSliders(); ask(false); });
+$("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
+$("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });
+$("save").addEventListener("click", () => socket.send({ kind: "save" }));
+$("report").addEventListener("click", () => socket.send({ kind: "report" }));
+for (const what of ["command", "python"]) $(`copy-${what}`).addEventListener("click", () => navigator.clipboard.writeText($(what).textContent));
+$("theme").addEventListener("click", () => setTheme(!dark()));
+onTheme(() => { scene.stale = true; showFigures(); });
+for (const name of ["explore", "drive"]) {
+  $(`tab-${name}`).addEventListener("click", () => {
+    for (const other of ["explore", "drive"]) { $(other).hidden = other !== name; $(`tab-${other}`).setAttribute("aria-selected", String(other === name)); }
+    drive.show(name === "drive");
+    scene.fit();
+  });
+}
+requestAnimationFrame((now) => player.tick(now));
