@@ -1,19 +1,23 @@
 """Make the pictures of HTML pages in the documentation: `python tools/make_page_pictures.py`.
 
-The tool drives short runs, writes a report, a comparison and a standard's page, and draws the top of each in Chromium.
+The tool drives short runs, writes a report, a comparison and a standard's page, and draws the top of each in Chromium. It
+also draws the page of `activesteer explore`.
 Run it again after a change of the look of these pages. It takes about a minute.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import shutil
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import Final
 
 from PIL import Image
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Browser, sync_playwright
 
 from activesteer.cli import main as activesteer
 
@@ -42,16 +46,34 @@ def write_pages(folder: Path) -> dict[str, Path]:
     return {"page_report": report, "page_comparison": comparison, "page_standard": folder / "iso21994.html"}
 
 
+def draw_explore(browser: Browser, folder: Path) -> Image.Image:
+    """Return a picture of `activesteer explore` in the middle of a sine with dwell."""
+    program = "from activesteer.cli import main; main()"
+    command = [sys.executable, "-c", program, "explore", "--json", "-o", str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        shown = browser.new_page(viewport={"width": 1200, "height": 1000})
+        shown.goto(json.loads(server.stdout.readline())["url"])
+        shown.wait_for_selector("#state:has-text('all after')", timeout=60_000)
+        shown.locator("#time").fill("2.6")
+        shown.wait_for_timeout(3000)
+        picture = Image.open(io.BytesIO(shown.screenshot())).convert("RGB")
+        server.terminate()
+    return picture
+
+
 def main() -> None:
     """Draw the top of each page."""
     width, height = SIZE
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        pictures = {"page_explore": draw_explore(browser, Path(folder))}
         for name, page in write_pages(Path(folder)).items():
             shown = browser.new_page(viewport={"width": width, "height": height})
             shown.goto(page.as_uri())
             shown.wait_for_timeout(500)
-            picture = Image.open(io.BytesIO(shown.screenshot())).convert("RGB")
+            pictures[name] = Image.open(io.BytesIO(shown.screenshot())).convert("RGB")
+        for name, picture in pictures.items():
             file = PICTURES / f"{name}.png"
             picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
             print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")

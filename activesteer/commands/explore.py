@@ -28,14 +28,16 @@ def add_to(commands: Any) -> None:
 
 
 def _explore(options: argparse.Namespace) -> int:
+    if not 0 <= options.port <= 65535:
+        raise ParameterError(f"--port: is {options.port}, must be 0 to 65535")
+    if not Path(options.output).is_dir():
+        raise ParameterError(f"-o: {options.output} is no folder; the page reads and writes files there")
     try:
         from activesteer.explore.server import ExploreServer
     except ModuleNotFoundError as error:
         raise ParameterError(
             f"explore needs {error.name}, which is not installed: pip install 'activesteer[explore]'"
         ) from error
-    if not 0 <= options.port <= 65535:
-        raise ParameterError(f"--port: is {options.port}, must be 0 to 65535")
     server = ExploreServer(Path(options.output), options.port)
 
     def listening() -> None:

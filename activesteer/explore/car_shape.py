@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.conventions import CORNERS
 from activesteer.drawing.bodywork import CHASSIS, dressed
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint
@@ -19,7 +20,7 @@ POSE_HZ: Final = 50.0
 """Rate of the poses of a recorded run [1/s]; the page interpolates between them."""
 
 
-def shape_of(vehicle: Vehicle) -> tuple[dict[str, Any], list[Array]]:
+def shape_of(vehicle: Vehicle) -> tuple[dict[str, Any], list[NDArray[np.float32]]]:
     """Return the surfaces of a car.
 
     Returns:
@@ -42,7 +43,7 @@ def shape_of(vehicle: Vehicle) -> tuple[dict[str, Any], list[Array]]:
     return header, arrays
 
 
-def poses_of(recording: Recording) -> tuple[float, Array]:
+def poses_of(recording: Recording) -> tuple[float, NDArray[np.float32]]:
     """Return the poses of `BODIES` of a recorded run.
 
     Returns:

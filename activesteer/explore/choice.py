@@ -74,7 +74,9 @@ class Folder:
         chosen = build(Choice, message, _SOURCE)
         names = self.names()
         if not 1 <= len(chosen.controllers) <= MAX_CONTROLLERS:
-            raise ParameterError(f"has {len(chosen.controllers)} names; 1 to {MAX_CONTROLLERS} are allowed", key="controllers")
+            raise ParameterError(
+                f"has {len(chosen.controllers)} names; 1 to {MAX_CONTROLLERS} are allowed", key="controllers"
+            )
         self._check("maneuver", chosen.maneuver, list(courses) if courses else names["maneuvers"], r".+\.toml")
         self._check("vehicle", chosen.vehicle, names["vehicles"], r".+\.toml")
         self._check("driver", chosen.driver, names["drivers"], r".+\.toml")
@@ -120,6 +122,8 @@ def numbers(values: object, allowed: Mapping[str, tuple[float, float]]) -> dict[
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
             raise ParameterError(f"is {shown(value)}; a number is needed", key=key, value=value)
         if not low <= value <= high:
-            raise ParameterError(f"is {value:g}, must be {low:g} to {high:g}", key=key, value=value, allowed=(low, high))
+            raise ParameterError(
+                f"is {value:g}, must be {low:g} to {high:g}", key=key, value=value, allowed=(low, high)
+            )
         found[key] = float(value)
     return found

@@ -6,12 +6,11 @@ import math
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, Array
 from activesteer.driver import DriverSetup
 from activesteer.driver.speed_hold import SpeedHold
 from activesteer.errors import ActiveSteerError, ParameterError, shown
@@ -33,7 +32,7 @@ _FASTEST_MPS2: Final = 11.0
 """Lateral acceleration of a full turn by key [m/s2], a little more than dry tyres transmit."""
 _PEDAL_PER_S: Final = 4.0
 """Rate of the pedals [1/s]: a foot needs a quarter of a second for the whole way."""
-_PLANE: Final = {"kind": "open_loop", "name": "plane", "hold_last": True, "steering": {"time_s": [0.0], "steering_wheel_deg": [0.0]}}
+_PLANE: Final = "straight_line"
 
 
 class DrivingCourse(NamedTuple):
@@ -44,14 +43,14 @@ class DrivingCourse(NamedTuple):
         maneuver: Manoeuvre whose road and course it has.
         speed_kmh: Speed at the start [km/h].
         radius_m: Radius of a circle to the left that begins at the start [m]; 0 for none.
-        mu: Friction of the road [-].
+        mu: Friction of the road [-]; that of the manoeuvre by default.
     """
 
     title: str
     maneuver: Any
     speed_kmh: float
     radius_m: float = 0.0
-    mu: float = 1.0
+    mu: float | None = None
 
 
 COURSES: Final = {
@@ -111,14 +110,16 @@ class HandDriver:
         """Take the car, with straight wheels and no foot on a pedal."""
         car = setup.single_track
         self.hands, self.hold_mps = Hands(), hold_mps
-        self._wheelbase_m, self._characteristic_mps = car.cg_to_front_m + car.cg_to_rear_m, car.characteristic_speed_mps
+        self._wheelbase_m = car.cg_to_front_m + car.cg_to_rear_m
+        # A car that does not understeer has no characteristic speed.
+        self._understeer_s2pm2 = 1.0 / car.characteristic_speed_mps**2 if car.characteristic_speed_mps else 0.0
         self._setup, self._angle_rad, self._throttle, self._brake = setup, 0.0, 0.0, 0.0
         self._hold = SpeedHold(setup.parameters, setup.drive, car.mass_kg, setup.wheel_radius_m, setup.timestep_s)
 
     def full_turn_rad(self, speed_mps: float) -> float:
         """Return the steering wheel angle of full steering at a speed [rad]."""
-        square, slow = max(speed_mps * speed_mps, 1.0), self._characteristic_mps**2
-        turn = _FASTEST_MPS2 * self._wheelbase_m * (1.0 / square + 1.0 / slow)
+        square = max(speed_mps * speed_mps, 1.0)
+        turn = _FASTEST_MPS2 * self._wheelbase_m * (1.0 / square + self._understeer_s2pm2)
         return min(self._setup.steering_ratio * turn, self._setup.steering_wheel_limit_rad)
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
@@ -153,24 +154,23 @@ class Drive:
         path: The recording.
     """
 
-    def __init__(self, message: Mapping[str, Any], folder: Folder) -> None:
+    def __init__(self, message: Mapping[str, Any], folder: Folder, pacer: Pacer | None = None) -> None:
         """Put the car at the start of a course.
 
         Args:
             message: The choice of the page; `maneuver` is one of `COURSES`.
             folder: The user's own files, and the place of the recording.
+            pacer: Keeper of the pace; that of the clock by default.
 
         Raises:
             ActiveSteerError: the choice is wrong, or the car cannot be built.
         """
         choice: Choice = folder.choice(message, COURSES)
         self._course = course = COURSES[choice.maneuver]
-        speed = {"speed_kmh": course.speed_kmh}
-        given = {**course.maneuver, **speed, "duration_s": _LONGEST_S} if isinstance(course.maneuver, dict) else course.maneuver
-        overrides = {"road.mu": course.mu, "duration_s": _LONGEST_S} | ({} if given is not course.maneuver else speed)
-        if given is not course.maneuver:
-            overrides.pop("duration_s")
-        scenario = resolve(given, folder.located(choice.vehicle), overrides, lambda setup: self._take(setup))
+        overrides = {"speed_kmh": course.speed_kmh, "duration_s": _LONGEST_S}
+        if course.mu is not None:
+            overrides["road.mu"] = course.mu
+        scenario = resolve(course.maneuver, folder.located(choice.vehicle), overrides, self._take)
         self._simulation = Simulation(scenario, folder.located(choice.controllers[0]))
         self._names = {"controller": choice.controllers[0]}
         self.path = free_path(folder.path, f"drive_{choice.maneuver}", ".mcap")
@@ -180,7 +180,7 @@ class Drive:
         self._size = Footprint.from_table(vehicle.dimensions())
         self._bodies = [vehicle.body_names.index(name) for name in BODIES]
         self._standing = np.ones(len(self._cones()), bool)
-        self._pacer, self._lap_s, self._turned_rad, self._last_lap_s = Pacer(), 0.0, 0.0, None
+        self._pacer, self._lap_s, self._turned_rad, self._last_lap_s = pacer or Pacer(), 0.0, 0.0, None
         self._bearing_rad, self._gate_s, self._seen = self._bearing(), None, 0
         self._longest_s = self._busy_s = 0.0
 
@@ -188,7 +188,7 @@ class Drive:
         self._driver = HandDriver(setup, self._course.speed_kmh / 3.6)
         return self._driver
 
-    def _cones(self) -> np.ndarray:
+    def _cones(self) -> Array:
         course = self._simulation.scenario.maneuver.course
         return np.empty((0, 2)) if course is None else course.cone_centres_m()
 
@@ -259,7 +259,8 @@ class Drive:
             "superposition_deg": math.degrees(loop.measurement.superposition_rad),
             "friction_use": max(truth[f"{corner}_friction_utilisation"] for corner in CORNERS),
             "sliding": [truth[f"{corner}_friction_utilisation"] > 0.98 for corner in CORNERS],
-            "cones": fallen, "lap_s": self._lap_s, "last_lap_s": self._last_lap_s, "controller": self._names["controller"],
+            "cones": fallen, "lap_s": self._lap_s, "last_lap_s": self._last_lap_s,
+            "controller": self._names["controller"],
             "hold_kmh": None if self._driver.hold_mps is None else 3.6 * self._driver.hold_mps,
             "seen": self._seen, "behind_s": self._pacer.lost_s, "busy_ms": 1e3 * self._busy_s,
         }  # fmt: skip
@@ -321,8 +322,3 @@ class Drive:
                 "time_s": simulation.time_s, "behind_s": self._pacer.lost_s, "longest_ms": 1e3 * self._longest_s,
             }
         )  # fmt: skip
-
-    def discard(self) -> Path:
-        """Complete the recording after a failure and return its path."""
-        self.end()
-        return self.path

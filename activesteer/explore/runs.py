@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.results import KEY_FIGURES
 from activesteer.analysis.report.run_page import write_report
-from activesteer.conventions import Array, run_looks
+from activesteer.conventions import run_looks
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.car_shape import poses_of, shape_of
 from activesteer.explore.choice import Choice, Folder, numbers
@@ -38,7 +42,7 @@ class Reply(NamedTuple):
     """
 
     header: dict[str, Any]
-    arrays: tuple[Array, ...] = ()
+    arrays: tuple[NDArray[np.float32], ...] = ()
 
 
 class Runs:
@@ -135,15 +139,14 @@ class Runs:
         return free_path(self.folder.path, stem, suffix)
 
     def _resolved(self, choice: Choice, overrides: Mapping[str, float]) -> Scenario:
-        return resolve(
-            self.folder.located(choice.maneuver),
-            self.folder.located(choice.vehicle),
-            dict(overrides),
-            self.folder.located(choice.driver),
-        )
+        maneuver, vehicle, driver = map(self.folder.located, (choice.maneuver, choice.vehicle, choice.driver))
+        return resolve(maneuver, vehicle, overrides, driver, controllers=self._located(choice))
+
+    def _located(self, choice: Choice) -> list[str]:
+        return [self.folder.located(name) for name in choice.controllers]
 
     def _sliders(self, choice: Choice, scenario: Scenario | None = None) -> list[Slider]:
-        return sliders(scenario or self._resolved(choice, {}), choice.controllers)
+        return sliders(scenario or self._resolved(choice, {}), self._located(choice))
 
     def _held(self, choice: Choice, scenario: Scenario) -> Scenario:
         """Return a scenario with its amplitude: that of the last search while a slider moves, else a new one."""
@@ -209,6 +212,6 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
         if name is not None:
             metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
             size = abs(value) if metric.better is Better.SMALLER else value
-            shown = size if size == size else None  # JSON has no nan
+            shown = size if math.isfinite(size) else None
             found.append({"title": figure.title, "unit": metric.unit_name, "value": shown})
     return found

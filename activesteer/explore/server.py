@@ -12,7 +12,8 @@ import multiprocessing
 import secrets
 import socket
 import struct
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from importlib import resources
 from pathlib import Path
 from typing import Any, Final
@@ -60,17 +61,17 @@ class ExploreServer:
             port: Port; 0 for any free one.
 
         Raises:
-            ActiveSteerError: the port is taken, or the folder does not exist.
+            ActiveSteerError: the port is taken.
         """
-        if not folder.is_dir():
-            raise ActiveSteerError(f"{folder} is no folder; the page reads and writes files there")
         self._socket = socket.socket()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self._socket.bind((HOST, port))
         except OSError as error:
             self._socket.close()
-            raise ActiveSteerError(f"port {port} cannot be opened ({error.strerror}); --port 0 takes a free one") from error
+            raise ActiveSteerError(
+                f"port {port} cannot be opened ({error.strerror}); --port 0 takes a free one"
+            ) from error
         self._socket.listen()
         self._token = secrets.token_urlsafe(16)
         self._host = f"{HOST}:{self._socket.getsockname()[1]}"
@@ -112,13 +113,12 @@ class ExploreServer:
         self._socket.close()
 
     def _app(self, listening: Callable[[], None]) -> Starlette:
-        async def lifespan(_app: Starlette) -> Any:
+        @asynccontextmanager
+        async def lifespan(_app: Starlette) -> AsyncIterator[None]:
             pump = asyncio.create_task(self._pump())
             listening()
             yield
             pump.cancel()
-
-        from contextlib import asynccontextmanager
 
         token = f"/{self._token}"
         return Starlette(
@@ -129,7 +129,7 @@ class ExploreServer:
                 WebSocketRoute(f"{token}/socket", self._talk),
             ],
             middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])],
-            lifespan=asynccontextmanager(lifespan),
+            lifespan=lifespan,
         )
 
     async def _index(self, _request: Request) -> Response:
@@ -163,19 +163,16 @@ class ExploreServer:
             return
         await page.accept()
         if self._page is not None:
-            await self._tell(self._page, {"kind": "error", "text": "this page was opened in another window", "about": "window"})
+            await self._tell(self._page, "this page was opened in another window")
         self._page = page
         if self._ready is not None:
             await self._deliver(*self._ready)
         try:
             while True:
                 text = await page.receive_text()
-                try:
-                    message = json.loads(text, parse_constant=_no_constant)
-                    if not isinstance(message, dict):
-                        raise ValueError("no object")
-                except (ValueError, RecursionError):
-                    await self._tell(page, {"kind": "error", "text": "the page sent a message that is no JSON", "about": None})
+                message = _read(text)
+                if message is None:
+                    await self._tell(page, "the page sent a message that is no JSON object")
                     continue
                 self._pipe.send(message)
         except (WebSocketDisconnect, KeyError):
@@ -193,8 +190,7 @@ class ExploreServer:
                 header, arrays = await loop.run_in_executor(None, self._pipe.recv)
             except (EOFError, OSError):
                 if self._page is not None:
-                    text = "the worker process has ended; start `activesteer explore` again"
-                    await self._tell(self._page, {"kind": "error", "text": text, "about": "worker"})
+                    await self._tell(self._page, "the worker process has ended; start `activesteer explore` again")
                 return
             if header["kind"] == "ready":
                 self._ready = header, arrays
@@ -203,23 +199,31 @@ class ExploreServer:
             await self._deliver(header, arrays)
 
     async def _deliver(self, header: dict[str, Any], arrays: list[Any]) -> None:
-        """Send a header, and behind it its arrays: length, JSON, numbers of 32 bits."""
-        page = self._page
-        if page is None:
-            return
-        header = {**header, "arrays": [list(shape) for shape, _ in arrays]}
-        text = json.dumps(finite(header), allow_nan=False).encode()
-        text += b" " * (-(4 + len(text)) % 4)  # the numbers begin at a multiple of their size
-        try:
-            await page.send_bytes(struct.pack("<I", len(text)) + text + b"".join(data for _, data in arrays))
-        except (WebSocketDisconnect, RuntimeError):
-            self._page = None
+        if self._page is not None:
+            try:
+                await self._page.send_bytes(_packed(header, arrays))
+            except (WebSocketDisconnect, RuntimeError):
+                self._page = None
 
     @staticmethod
-    async def _tell(page: WebSocket, header: dict[str, Any]) -> None:
-        text = json.dumps({**header, "arrays": []}).encode()
-        text += b" " * (-(4 + len(text)) % 4)
-        await page.send_bytes(struct.pack("<I", len(text)) + text)
+    async def _tell(page: WebSocket, error: str) -> None:
+        await page.send_bytes(_packed({"kind": "error", "text": error, "about": None}, []))
+
+
+def _packed(header: dict[str, Any], arrays: list[Any]) -> bytes:
+    """Return a message: length, JSON, and behind it the arrays as numbers of 32 bits."""
+    text = json.dumps(finite({**header, "arrays": [list(shape) for shape, _ in arrays]}), allow_nan=False).encode()
+    text += b" " * (-(4 + len(text)) % 4)  # the numbers begin at a multiple of their size
+    return struct.pack("<I", len(text)) + text + b"".join(data for _, data in arrays)
+
+
+def _read(text: str) -> dict[str, Any] | None:
+    """Return a message of the page; None if it is no JSON object."""
+    try:
+        message = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        return None
+    return message if isinstance(message, dict) else None
 
 
 def _no_constant(name: str) -> None:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Final, NamedTuple
 
-from activesteer.config import Range, dataclass_in, field_in_unit, key_paths, spellings
-from activesteer.config.keys import fields_of, hints_of
+from activesteer.config import field_in_unit, spellings
+from activesteer.controllers import declared_parameters
 from activesteer.display_units import parameter_label
-from activesteer.scenario import Scenario
+from activesteer.errors import ParameterError
+from activesteer.plugins import Declared
+from activesteer.scenario import Scenario, value_of
 
 _MANEUVER: Final = {
     "speed_kmh": (20.0, 160.0, 1.0),
@@ -67,23 +70,29 @@ def sliders(scenario: Scenario, controllers: Sequence[str]) -> list[Slider]:
 
     Args:
         scenario: Manoeuvre and car with the values of their files.
-        controllers: Names of the controllers, whose gains follow.
+        controllers: The controllers, whose gains follow; a file with its folder.
+
+    Raises:
+        ControllerError: there is no such controller.
     """
-    found = [*_of("manoeuvre", scenario.maneuver, _MANEUVER), *_of("car", scenario.car.config, _CAR)]
-    table = scenario.car.config.controllers
+    found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
     for name in controllers:
-        gains = getattr(table, name, None)
-        if gains is not None:
-            found += _gains(name, gains, f"controllers.{name}")
-    return found
+        for key, declared in declared_parameters(name, scenario.car.config.controllers).items():
+            if (gain := _gain(key, declared)) is not None:
+                found.append(gain)
+    return list({slider.key: slider for slider in found}.values())
 
 
-def _of(group: str, values: Any, ranges: dict[str, tuple[float, float, float]]) -> Iterator[Slider]:
-    known = set(key_paths(type(values)))
+def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float, float]]) -> Iterator[Slider]:
     for key, (low, high, step) in ranges.items():
-        if key in known and (value := _value(values, key)) is not None:
-            label, unit = _label(key)
-            yield Slider(key, label, unit, group, min(low, value), max(high, value), step, value)
+        with suppress(ParameterError):  # not every manoeuvre has every key
+            value = value_of(scenario, key)
+            if _is_number(value):
+                yield Slider(key, *_label(key), group, min(low, value), max(high, value), step, value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _label(key: str) -> tuple[str, str]:
@@ -92,34 +101,20 @@ def _label(key: str) -> tuple[str, str]:
     return words.removeprefix("factors: ").removeprefix("load: "), unit
 
 
-def _value(holder: Any, key: str) -> float | None:
-    """Return the value of a key in the unit of the key; None if it is no number."""
-    *tables, last = key.split(".")
-    for table in tables:
-        holder = getattr(holder, table)
-    name, factor = field_in_unit(last, fields_of(type(holder)))
-    value = None if name is None else getattr(holder, name)
-    return float(value) / factor if isinstance(value, (int, float)) and not isinstance(value, bool) else None
-
-
-def _gains(group: str, gains: Any, prefix: str) -> Iterator[Slider]:
-    """Yield sliders for the gains of a controller, from zero to some multiples of the present value."""
-    hints = hints_of(type(gains), include_extras=True)
-    for name, field_value in ((name, getattr(gains, name)) for name in fields_of(type(gains))):
-        if dataclass_in(hints[name]) is not None:
-            yield from _gains(group, field_value, f"{prefix}.{name}")
-            continue
-        value = _value(gains, key := spellings(name)[-1])
-        if value is None:
-            continue
-        _, factor = field_in_unit(key, fields_of(type(gains)))
-        limits = next((item for item in getattr(hints[name], "__metadata__", ()) if isinstance(item, Range)), Range())
-        low, high = (limit / factor for limit in limits[:2])
-        top = min(high, _TIMES * abs(value)) if value else min(high, 1.0)
-        low = max(low, 0.0)
-        digits = 2 - math.floor(math.log10(max(top - low, 1e-9)))
-        label, unit = _label(key)
-        yield Slider(
-            f"{prefix}.{key}", label, unit, group, low, round(top, digits + 2), round((top - low) / _STEPS, digits + 2),
-            value,
-        )  # fmt: skip
+def _gain(key: str, declared: Declared) -> Slider | None:
+    """Return the slider of a gain, from zero to some multiples of its value; None if it is no number."""
+    if not _is_number(declared.default):
+        return None
+    tables, _, name = key.rpartition(".")
+    shown = spellings(name)[-1]
+    _, factor = field_in_unit(shown, (name,))
+    value, (low, high) = declared.default / factor, (limit / factor for limit in declared.limits)
+    top = min(high, _TIMES * abs(value) if value else 1.0)
+    bottom = max(low, 0.0 if value >= 0.0 else -top)
+    digits = 4 - math.floor(math.log10(max(top - bottom, 1e-9)))
+    label, unit = _label(f"{tables}.{shown}")
+    group = tables.split(".")[1] if "." in tables else tables
+    return Slider(
+        f"{tables}.{shown}", label, unit or declared.unit, group, bottom, round(top, digits),
+        round((top - bottom) / _STEPS, digits), value,
+    )  # fmt: skip

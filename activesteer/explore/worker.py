@@ -37,7 +37,8 @@ class _Worker:
     def __init__(self, connection: Connection, folder: Folder) -> None:
         self._connection, self._folder = connection, folder
         self._waiting: deque[dict[str, Any]] = deque()
-        self._runs, self._drive = Runs(folder), None
+        self._runs = Runs(folder)
+        self._drive: Drive | None = None
         self._reports = Path(tempfile.mkdtemp(prefix="activesteer-"))
 
     def run(self) -> None:
@@ -67,7 +68,7 @@ class _Worker:
         number = message.pop("id", None)
         if kind == "describe":
             yield self._numbered(self._runs.describe(message), number)
-        elif kind == "run":
+        elif kind == "run" and self._drive is None:  # a drive comes before curves; the page asks again after it
             values = message.pop("values", {})
             for reply in self._runs.run(message, values, self._stale):
                 yield self._numbered(reply, number)
@@ -90,7 +91,7 @@ class _Worker:
         elif kind == "act":
             if self._drive is not None:
                 self._drive.act(message)
-        else:
+        elif kind != "run":
             yield Reply({"kind": "error", "text": f"the page sent an unknown message: {kind!r}", "about": None})
 
     def _drive_on(self, drive: Drive) -> None:

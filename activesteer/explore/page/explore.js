@@ -47,6 +47,8 @@ function ask(dragging) {
     state.asked = performance.now();
     state.first = null;
     $("state").textContent = "driving …";
+    state.busy = true;
+    if (drive.shown) return;
     socket.send({ kind: "run", id: ++state.id, ...choice(), dragging, values: state.values });
   }, dragging ? DRAG_MS : 0);
 }
@@ -62,13 +64,15 @@ const hear = {
     for (const [id, names] of [["maneuver", header.maneuvers], ["vehicle", header.vehicles], ["driver", header.drivers]]) {
       $(id).replaceChildren(...names.map((name) => element("option", { value: name }, name)));
     }
-    $("maneuver").value = FIRST.maneuver;
+    // The address may choose: #maneuver=slalom&controllers=none,lqr
+    const wanted = new URLSearchParams(location.hash.slice(1)), first = wanted.get("controllers")?.split(",") ?? FIRST.controllers;
+    $("maneuver").value = wanted.get("maneuver") ?? FIRST.maneuver;
     $("vehicle").value = "compact";
     $("driver").value = "typical";
     $("controllers").querySelectorAll("label").forEach((label) => label.remove());
     for (const name of header.controllers) {
       const box = element("input", { type: "checkbox", value: name });
-      box.checked = FIRST.controllers.includes(name);
+      box.checked = first.includes(name);
       box.addEventListener("change", () => {
         const most = MOST_CONTROLLERS - ($("own").value.trim() ? 1 : 0), on = [...$("controllers").querySelectorAll("input:checked")];
         if (on.length > most) (on.find((other) => other !== box) ?? box).checked = false;
@@ -100,6 +104,7 @@ const hear = {
   finished(header) {
     if (header.id !== state.id) return;
     state.released = !state.dragged;
+    state.busy = false;
     state.all = performance.now() - state.asked;
     $("state").textContent = `first curve after ${Math.round(state.first)} ms, all after ${Math.round(state.all)} ms`;
     $("command").textContent = header.command;
@@ -150,7 +155,7 @@ function showSliders() {
   const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
-    box.open = open.size ? open.has(group) : i !== 1;
+    box.open = open.size ? open.has(group) : i !== 1 && i < 4;
     for (const slider of state.sliders.filter((other) => other.group === group)) box.append(sliderOf(slider));
     return box;
   }));
@@ -236,6 +241,7 @@ for (const name of ["explore", "drive"]) {
     for (const other of ["explore", "drive"]) { $(other).hidden = other !== name; $(`tab-${other}`).setAttribute("aria-selected", String(other === name)); }
     drive.show(name === "drive");
     scene.fit();
+    if (name === "explore" && state.busy) ask(false);
   });
 }
 requestAnimationFrame((now) => player.tick(now));

@@ -1,0 +1,93 @@
+"""The local page in a browser: a slider changes the curve, and keys move the car. Skipped without a browser."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+import activesteer
+from tests.conftest import PHONE
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+pytest.importorskip("uvicorn", reason="needs the extra `explore`")
+pytestmark = pytest.mark.render
+
+COMMAND = [sys.executable, "-c", "from activesteer.cli import main; raise SystemExit(main())", "explore", "--json"]
+LAST_YAW_RATE = """() => [...activesteer.runs.values()].map((run) =>
+  run.plots.panels.find((panel) => panel.title === "Yaw rate").series[0].values.at(-1))"""
+DONE = "#state:has-text('all after')"
+LIMIT_MS = 60_000
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+    folder = tmp_path_factory.mktemp("explore")
+    with subprocess.Popen([*COMMAND, "-o", str(folder)], stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        yield json.loads(server.stdout.readline())["url"], folder
+        server.send_signal(signal.SIGINT)
+        server.wait(20)
+
+
+def opened(browser: Browser, url: str, **options: object) -> tuple[Page, list[str]]:
+    page, problems = browser.new_page(**options), []  # type: ignore[arg-type]
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on("console", lambda message: problems.append(message.text) if message.type == "error" else None)
+    page.goto(url)
+    return page, problems
+
+
+def test_a_slider_changes_the_curve_and_the_command_repeats_it(browser: Browser, served: tuple[str, Path]) -> None:
+    address = served[0] + "#maneuver=step_steer&controllers=none,ars"
+    page, problems = opened(browser, address, viewport={"width": 700, "height": 500})
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    before = page.evaluate(LAST_YAW_RATE)
+    slider = page.locator('input[data-key="speed_kmh"]')
+    slider.focus()
+    slider.press("PageUp")
+    page.wait_for_selector("#command:has-text('speed_kmh=90')", timeout=LIMIT_MS)
+    after = page.evaluate(LAST_YAW_RATE)
+    assert len(after) == 2
+    assert after[0] < before[0] - 0.5  # the same 0.4 g at a higher speed is a lower yaw rate
+    assert "\N{MINUS SIGN}" in page.inner_text("#figures")  # changes against the pale curves
+    assert problems == []
+    page.close()
+
+
+def test_keys_drive_the_car_and_leave_a_recording(browser: Browser, served: tuple[str, Path]) -> None:
+    page, problems = opened(browser, served[0], viewport={"width": 600, "height": 500})
+    page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
+    page.click("#tab-drive")
+    page.select_option("#course", "plane")
+    page.click("#start")
+    page.wait_for_selector("#gauges dd", timeout=LIMIT_MS)
+    page.keyboard.down("ArrowLeft")
+    page.wait_for_timeout(2000)
+    page.keyboard.up("ArrowLeft")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("#driven:has-text('saved as')", timeout=LIMIT_MS)
+    recording = activesteer.Recording.open(served[1] / "drive_plane.mcap")
+    assert recording["y_m"][-1] > 1.0
+    assert recording["yaw_rate_radps"].max() > 0.1
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
+def test_the_page_fits_a_phone(browser: Browser, served: tuple[str, Path]) -> None:
+    page, problems = opened(browser, served[0], **PHONE)
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["viewport"]["width"]
+    page.click("#tab-drive")
+    assert page.locator("#touch-throttle").is_visible()
+    assert problems == []
+    page.close()

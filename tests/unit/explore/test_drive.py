@@ -1,0 +1,102 @@
+"""A drive by hand: signs, limits of the hands, cones, laps, and the recording that is left."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import activesteer
+from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.explore.choice import Folder
+from activesteer.explore.drive import Drive, Hands
+from activesteer.simulation.live_view import Pacer
+
+
+class Clock:
+    """A clock that goes on by 0.1 s, the longest time between two pictures, at each look."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        self.now_s += 0.1
+        return self.now_s
+
+
+def drive(course: str, folder: Path, controller: str = "none") -> Drive:
+    pacer = Pacer(clock=Clock(), sleep=lambda _: None)
+    return Drive({"maneuver": course, "controllers": [controller]}, Folder(folder), pacer)
+
+
+def go(car: Drive, until_s: float) -> dict[str, Any]:
+    while True:
+        header = car.frame().header
+        if header["time_s"] >= until_s:
+            return header
+
+
+def test_steering_to_the_left_turns_left_and_the_recording_holds_the_drive(tmp_path: Path) -> None:
+    car = drive("plane", tmp_path)
+    shape = car.start()
+    assert shape.header["cones"] == []
+    car.act({"steer": 0.5, "direct": True, "number": 7})
+    frame = go(car, 1.5)
+    assert frame["yaw_rate_degps"] > 5.0
+    assert frame["seen"] == 7
+    assert frame["speed_kmh"] == pytest.approx(60.0, abs=3.0)  # held
+    car.act({"controller": "ars"})
+    assert abs(go(car, 2.0)["rear_deg"]) > 0.05
+    end = car.end().header
+    recording = activesteer.Recording.open(car.path)
+    assert recording.time_s[-1] == pytest.approx(end["time_s"], abs=2e-3)
+    assert recording["yaw_rate_radps"][-1] > 0.0
+
+
+def test_the_hands_turn_no_faster_than_hands_and_no_further_than_a_full_turn(tmp_path: Path) -> None:
+    car = drive("plane", tmp_path)
+    car.act({"steer": 1.0})
+    angles = [go(car, 0.1 * count)["steering_wheel_deg"] for count in range(1, 12)]
+    rates = [(b - a) / 0.1 for a, b in itertools.pairwise(angles)]
+    assert max(rates) < 600.0
+    speed, car_ = 60.0 / 3.6, car._driver._setup.single_track
+    assert car_.characteristic_speed_mps is not None
+    wheelbase, slow = car_.cg_to_front_m + car_.cg_to_rear_m, car_.characteristic_speed_mps
+    full = car._driver._setup.steering_ratio * 11.0 * wheelbase / speed**2 * (1.0 + (speed / slow) ** 2)
+    assert angles[-1] == pytest.approx(math.degrees(full), rel=0.15)  # the column twists, the speed falls
+    car.end()
+
+
+def test_a_foot_on_the_brake_stops_the_car(tmp_path: Path) -> None:
+    car = drive("slippery", tmp_path)
+    car.act({"brake": 1.0, "steer": 0.0})
+    assert go(car, 5.0)["speed_kmh"] < 4.0
+    car.end()
+
+
+def test_a_car_that_drives_straight_on_hits_cones_once_and_leaves_the_others(tmp_path: Path) -> None:
+    car = drive("slalom", tmp_path)
+    cones = car.start().header["cones"]
+    fallen: list[int] = []
+    while (header := car.frame().header)["time_s"] < 9.0:
+        fallen += header["cones"]
+    assert 0 < len(fallen) == len(set(fallen)) <= len(cones)
+    assert header["lap_s"] > 1.0
+    car.end()
+
+
+@pytest.mark.parametrize("message", [{"steer": 2.0}, {"steer": math.nan}, {"throttle": -0.1}, {"brake": "full"}])
+def test_positions_out_of_range_are_refused(message: dict[str, Any]) -> None:
+    with pytest.raises(ParameterError):
+        Hands.read(message)
+
+
+def test_an_unknown_controller_is_refused_and_the_drive_goes_on(tmp_path: Path) -> None:
+    car = drive("plane", tmp_path)
+    with pytest.raises(ActiveSteerError):
+        car.act({"controller": "arrs"})
+    assert go(car, 0.3)["time_s"] >= 0.3
+    car.end()
