@@ -1,7 +1,7 @@
 """Make the pictures of HTML pages in the documentation: `python tools/make_page_pictures.py`.
 
-The tool drives short runs, writes a report, a comparison and a standard's page, and draws the top of each in Chromium. It
-also draws the page of `activesteer explore`.
+The tool drives short runs, writes a report, a comparison and a standard's page, and draws the top of each in Chromium.
+It also draws the page of `activesteer explore`.
 Run it again after a change of the look of these pages. It takes about a minute.
 """
 
