@@ -186,7 +186,9 @@ METRICS: Final = {
             "rad", "roll_steady_state", "roll_peak", "roll_peak_abs", "roll_rms", "front_steer_steady_state",
             "yaw_rate_phase_at_1Hz", "ay_phase_at_1Hz", "roll_phase_at_1Hz", "yaw_angle_after_1000ms",
         ),
-        *_declare("s", "yaw_rate_response_time", "ay_response_time", significance=TIME_S, better=_SMALLER),
+        *_declare(
+            "s", "yaw_rate_response_time", "ay_response_time", "yaw_rate_delay", "ay_delay",
+            significance=TIME_S, better=_SMALLER),
         *_declare(
             "s", "step_time", "yaw_rate_peak_time", "ay_peak_time", "roll_response_time", "roll_peak_time",
             "sideslip_response_time", "sideslip_peak_time", "steer_begin_time", "steer_reversal_time",

@@ -78,12 +78,14 @@ class Claim:
         passed: Whether it holds.
         values: The numbers that decide, named `<system>_<metric>`.
         obstacle: Why it cannot pass whatever the numbers are; empty if nothing prevents it.
+        distance: Distance from passing: the sum over its broken conditions, each 0 to 1; 0 if it passes.
     """
 
     statement: Statement
     passed: bool
     values: dict[str, float]
     obstacle: str = ""
+    distance: float = 0.0
 
     @property
     def id(self) -> str:

@@ -12,6 +12,7 @@ from typing import Final
 
 from activesteer.analysis import path_following, track
 from activesteer.analysis.claims.claim import SYSTEMS, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.condition import at_least, at_most
 from activesteer.analysis.claims.path_following import (
     AFTER_SIDESLIP,
     AFTER_YAW_RATE,
@@ -69,17 +70,15 @@ STATEMENTS: Final = (L1, L2, L3, L4)
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     """Check claims L1 to L4; see `scenarios.Claims`."""
     runs = SystemRuns(recordings, path_following.metrics, "double lane change")
-    oscillates = runs.metrics["none"][AFTER_YAW_RATE] > SETTLED_YAW_RATE_RADPS
-    others = all(runs.both_lower(name, CALMED, 0.0) for name in AFTER_DRIVER)
+    oscillates = at_least(runs.metrics["none"][AFTER_YAW_RATE], SETTLED_YAW_RATE_RADPS, strict=True)
+    others = [part for name in AFTER_DRIVER for part in runs.both_lower(name, CALMED, 0.0)]
     lowered = runs.both_lower(YAW_RATE_PEAK, PEAK_FRACTION, YAW_RATE_RADPS)
     return [
         _alike(runs),
-        runs.judge(
-            L2, oscillates and others and calmed(runs), runs.pick(AFTER_YAW_RATE, AFTER_SIDESLIP, *AFTER_DRIVER)
-        ),
+        runs.judge(L2, [oscillates, *others, *calmed(runs)], runs.pick(AFTER_YAW_RATE, AFTER_SIDESLIP, *AFTER_DRIVER)),
         runs.judge(
             L3,
-            lowered and runs.both_lower(SIDESLIP_PEAK, PEAK_FRACTION, SIDESLIP_RAD),
+            [*lowered, *runs.both_lower(SIDESLIP_PEAK, PEAK_FRACTION, SIDESLIP_RAD)],
             runs.pick(YAW_RATE_PEAK, SIDESLIP_PEAK),
         ),
         held(runs, L4),
@@ -96,4 +95,4 @@ def _alike(runs: SystemRuns) -> Claim:
         for one, other in combinations(SYSTEMS, 2)
     }
     cones = {f"{system}_{CONES_HIT}": runs.metrics[system].get(CONES_HIT, math.nan) for system in SYSTEMS}
-    return runs.judge(L1, all(value <= ALIKE_M for value in differences.values()), differences | cones)
+    return runs.judge(L1, [at_most(value, ALIKE_M) for value in differences.values()], differences | cones)

@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.condition import Condition, at_most
 from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.path_following import AFTER_S
 from activesteer.metric_table import SIDESLIP_RAD, YAW_RATE_RADPS
@@ -34,11 +35,13 @@ CALMED_WORDS: Final = (
 )
 
 
-def calmed(runs: SystemRuns) -> bool:
-    """Return whether both systems calm yaw rate and sideslip after the last gate, and the car then runs straight."""
-    settled = all(runs.metrics[system][AFTER_YAW_RATE] <= SETTLED_YAW_RATE_RADPS for system in SYSTEMS_WITH_CONTROL)
-    lower_yaw_rate = runs.both_lower(AFTER_YAW_RATE, CALMED, YAW_RATE_RADPS)
-    return settled and lower_yaw_rate and runs.both_lower(AFTER_SIDESLIP, CALMED, SIDESLIP_RAD)
+def calmed(runs: SystemRuns) -> list[Condition]:
+    """Return the conditions that both systems calm yaw rate and sideslip after the last gate, to straight running."""
+    return [
+        *(at_most(runs.metrics[system][AFTER_YAW_RATE], SETTLED_YAW_RATE_RADPS) for system in SYSTEMS_WITH_CONTROL),
+        *runs.both_lower(AFTER_YAW_RATE, CALMED, YAW_RATE_RADPS),
+        *runs.both_lower(AFTER_SIDESLIP, CALMED, SIDESLIP_RAD),
+    ]
 
 
 def held_statement(number: str) -> Statement:
@@ -56,5 +59,5 @@ def held_statement(number: str) -> Statement:
 
 def held(runs: SystemRuns, statement: Statement) -> Claim:
     """Check L4, Z5 or W4."""
-    low = runs.metrics["ars"][SIDESLIP_PEAK] <= LOW_SIDESLIP_RAD
-    return runs.judge(statement, low and runs.is_smallest("ars", SIDESLIP_PEAK, SIDESLIP_RAD), runs.pick(SIDESLIP_PEAK))
+    low = at_most(runs.metrics["ars"][SIDESLIP_PEAK], LOW_SIDESLIP_RAD)
+    return runs.judge(statement, [low, *runs.is_smallest("ars", SIDESLIP_PEAK, SIDESLIP_RAD)], runs.pick(SIDESLIP_PEAK))

@@ -18,6 +18,7 @@ import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.condition import Condition, at_least, at_most, both, either
 from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.source import RecordingLike
@@ -97,24 +98,29 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
 
 def _lost(runs: SystemRuns) -> Claim:
     none = runs.metrics["none"]
-    failed = any(none[ratio] > limit for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True))
-    lost = none[SIDESLIP] > LOST_SIDESLIP_RAD
-    alone = all(none[SIDESLIP] > 2.0 * runs.metrics[system][SIDESLIP] for system in SYSTEMS_WITH_CONTROL)
+    failed = either(
+        at_least(none[ratio], limit, strict=True) for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True)
+    )
+    lost = at_least(none[SIDESLIP], LOST_SIDESLIP_RAD, strict=True)
+    alone = [
+        at_least(none[SIDESLIP], 2.0 * runs.metrics[system][SIDESLIP], strict=True) for system in SYSTEMS_WITH_CONTROL
+    ]
     values = {f"none_{ratio}": none[ratio] for ratio in RATIOS}
-    return runs.judge(D1, failed and lost and alone, values | runs.pick(SIDESLIP))
+    return runs.judge(D1, [failed, lost, *alone], values | runs.pick(SIDESLIP))
 
 
 def _kept(runs: SystemRuns, statement: Statement, system: str) -> Claim:
     values = {
         f"{run}_{metric}": runs.metrics[run][metric] for metric in (*RATIOS, SIDESLIP) for run in ("none", system)
     }
-    kept = _keeps(runs, system) and not _keeps(runs, "none")
-    return runs.judge(statement, kept and runs.lowers(system, SIDESLIP, 1.0, SIDESLIP_RAD), values)
+    breaks = both(_keeps(runs, "none")).negated
+    lowers = runs.lowers(system, SIDESLIP, 1.0, SIDESLIP_RAD)
+    return runs.judge(statement, [*_keeps(runs, system), breaks, *lowers], values)
 
 
-def _keeps(runs: SystemRuns, system: str) -> bool:
-    within = all(runs.size(system, ratio) <= limit for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True))
-    return within and runs.metrics[system][SIDESLIP] <= KEPT_SIDESLIP_RAD
+def _keeps(runs: SystemRuns, system: str) -> list[Condition]:
+    within = [at_most(runs.size(system, ratio), limit) for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True)]
+    return [*within, at_most(runs.metrics[system][SIDESLIP], KEPT_SIDESLIP_RAD)]
 
 
 def _opposite(runs: SystemRuns) -> Claim:
@@ -128,7 +134,11 @@ def _opposite(runs: SystemRuns) -> Claim:
     correlation = float(np.sum(rear * front)) / scale if scale > 0.0 else math.nan
     return runs.judge(
         D4,
-        correlation < 0.0 and common_s >= MIN_COMMON_S and fraction >= OPPOSITE_FRACTION,
+        [
+            at_most(correlation, 0.0, 1.0, strict=True),
+            at_least(common_s, MIN_COMMON_S),
+            at_least(fraction, OPPOSITE_FRACTION),
+        ],
         {
             "added_angles_correlation": correlation,
             "added_angles_opposite_share": fraction,
@@ -149,9 +159,10 @@ def _added_angles(ars: RecordingLike, afs: RecordingLike) -> tuple[Array, Array,
 
 
 def _effective(runs: SystemRuns) -> Claim:
-    less = runs.metrics["afs"][SIDESLIP] - runs.metrics["ars"][SIDESLIP] >= SIDESLIP_RAD
+    less = at_least(runs.metrics["afs"][SIDESLIP] - runs.metrics["ars"][SIDESLIP], SIDESLIP_RAD)
+    sooner = at_most(runs.size("ars", RATIOS[0]), runs.size("afs", RATIOS[0]), RATIO_LIMITS[0])
     return runs.judge(
         D5,
-        _keeps(runs, "ars") and less and runs.size("ars", RATIOS[0]) <= runs.size("afs", RATIOS[0]),
+        [*_keeps(runs, "ars"), less, sooner],
         {f"{run}_{metric}": runs.metrics[run][metric] for metric in (SIDESLIP, RATIOS[0]) for run in ("ars", "afs")},
     )

@@ -13,6 +13,7 @@ from typing import Final
 
 from activesteer.analysis import path_following
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.condition import at_least, true
 from activesteer.analysis.claims.path_following import (
     AFTER_SIDESLIP,
     AFTER_YAW_RATE,
@@ -86,19 +87,18 @@ STATEMENTS: Final = (Z1, Z2, Z3, Z4, Z5)
 def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     """Check claims Z1 to Z5; see `scenarios.Claims`."""
     runs = SystemRuns(recordings, path_following.metrics, "slalom")
-    wider = all(runs.metrics["none"][TRACK] - runs.metrics[system][TRACK] >= TRACK_M for system in SYSTEMS_WITH_CONTROL)
-    kept = all(
-        runs.metrics["afs"][metric] >= NOT_REDUCED * runs.metrics["none"][metric] for metric in (YAW_RATE, SIDESLIP)
-    )
-    large = runs.metrics["afs"][STEERING_PEAK] > LARGE_STEERING_WHEEL_RAD
-    passes = runs.metrics["afs"][CONES_MISSED] == 0.0
-    calmest = runs.is_smallest("ars", YAW_RATE, YAW_RATE_RADPS) and runs.is_smallest("ars", SIDESLIP, SIDESLIP_RAD)
+    none, afs = runs.metrics["none"], runs.metrics["afs"]
+    wider = [at_least(none[TRACK] - runs.metrics[system][TRACK], TRACK_M) for system in SYSTEMS_WITH_CONTROL]
+    kept = [at_least(afs[metric], NOT_REDUCED * none[metric]) for metric in (YAW_RATE, SIDESLIP)]
+    large = at_least(afs[STEERING_PEAK], LARGE_STEERING_WHEEL_RAD, strict=True)
+    passes = true(afs[CONES_MISSED] == 0.0)
+    calmest = [*runs.is_smallest("ars", YAW_RATE, YAW_RATE_RADPS), *runs.is_smallest("ars", SIDESLIP, SIDESLIP_RAD)]
     return [
         runs.judge(Z1, wider, runs.pick(TRACK, CONES_HIT)),
         runs.judge(Z2, calmed(runs), runs.pick(AFTER_YAW_RATE, AFTER_SIDESLIP)),
         runs.judge(
             Z3,
-            kept and large and passes and runs.is_largest("afs", STEERING, STEERING_WHEEL_RAD),
+            [*kept, large, passes, *runs.is_largest("afs", STEERING, STEERING_WHEEL_RAD)],
             runs.pick(YAW_RATE, SIDESLIP, STEERING, STEERING_PEAK),
         ),
         runs.judge(Z4, calmest, runs.pick(YAW_RATE, SIDESLIP)),

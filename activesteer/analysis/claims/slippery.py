@@ -11,8 +11,15 @@ from typing import Final
 
 from activesteer.analysis import path_following
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.path_following import LARGE_STEERING_WHEEL_RAD, held, held_statement
-from activesteer.analysis.claims.system_runs import SystemRuns
+from activesteer.analysis.claims.condition import Condition, at_least, at_most
+from activesteer.analysis.claims.path_following import (
+    LARGE_STEERING_WHEEL_RAD,
+    SETTLED_YAW_RATE_RADPS,
+    SIDESLIP_PEAK,
+    held,
+    held_statement,
+)
+from activesteer.analysis.claims.system_runs import Metrics, SystemRuns
 from activesteer.analysis.series import rms
 from activesteer.analysis.source import RecordingLike
 from activesteer.metric_table import CONES_HIT, LANE_OVERSTEP, STAYS_IN_LANES, TRACK_M
@@ -23,6 +30,12 @@ LARGE_YAW_RATE_RADPS: Final = math.radians(5.0)
 """Yaw rate at the end that no car has which continues straight [rad/s]."""
 LARGE_SIDESLIP_RAD: Final = math.radians(5.0)
 """Sideslip angle at the end that no car has which continues straight [rad]."""
+KEPT_SIDESLIP_RAD: Final = math.radians(5.0)
+"""Largest sideslip angle at which the steering still turns the car on the slippery road [rad]: the 12 deg of a dry road
+(`sine_with_dwell.KEPT_SIDESLIP_RAD`) in proportion to the friction, 0.4 to 0.9, because the slip angle of the largest
+side force is proportional to it."""
+SCALE_M: Final = 0.5
+"""Overstep that counts as a whole distance from keeping to the lanes [m]."""
 END_S: Final = 3.0
 """Length of the end of the run, which the paper's figures show [s]."""
 WHEEL: Final = "steering_wheel_peak_abs_rad"
@@ -36,7 +49,9 @@ def _stays_statement(number: str, system: str, text: str) -> Statement:
         number,
         text,
         f"The whole body of {system} goes through every lane and never crosses a side; the body of none "
-        f"does not, and gets at least {TRACK_M:g} m further out.",
+        f"does not, and gets at least {TRACK_M:g} m further out. {system} is under control: its sideslip stays within "
+        f"{math.degrees(KEPT_SIDESLIP_RAD):.0f} deg, and in the last {END_S:g} s of the run the root mean square of "
+        f"its yaw rate is at most {math.degrees(SETTLED_YAW_RATE_RADPS):g} deg/s.",
         Fake.NO_EFFECT,
         Fake.REVERSED,
     )
@@ -74,23 +89,41 @@ def _metrics(recording: RecordingLike) -> dict[str, float]:
     return without | path_following.metrics(recording) | end
 
 
+def _outside(metrics: Metrics) -> Condition:
+    """Return the condition that a body does not keep to the lanes."""
+    room = max(abs(metrics[LANE_OVERSTEP]) / SCALE_M, 1e-6)
+    return Condition(room if metrics[STAYS_IN_LANES] == 0.0 else -room, strict=True)
+
+
+def _inside(metrics: Metrics) -> Condition:
+    """Return the condition that a body keeps to the lanes."""
+    room = max(abs(metrics[LANE_OVERSTEP]) / SCALE_M, 1e-6)
+    return Condition(room if metrics[STAYS_IN_LANES] == 1.0 else -room, strict=True)
+
+
 def _leaves(runs: SystemRuns) -> Claim:
     none = runs.metrics["none"]
-    steers = none[WHEEL] > LARGE_STEERING_WHEEL_RAD and all(
-        none[WHEEL] > LARGER * runs.metrics[system][WHEEL] for system in SYSTEMS_WITH_CONTROL
-    )
-    lost = none[YAW_RATE_END] > LARGE_YAW_RATE_RADPS and none[SIDESLIP_END] > LARGE_SIDESLIP_RAD
+    conditions = [
+        _outside(none),
+        at_least(none[WHEEL], LARGE_STEERING_WHEEL_RAD, strict=True),
+        *(at_least(none[WHEEL], LARGER * runs.metrics[system][WHEEL], strict=True) for system in SYSTEMS_WITH_CONTROL),
+        at_least(none[YAW_RATE_END], LARGE_YAW_RATE_RADPS, strict=True),
+        at_least(none[SIDESLIP_END], LARGE_SIDESLIP_RAD, strict=True),
+    ]
     names = (LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT, YAW_RATE_END, SIDESLIP_END)
-    values = {f"none_{name}": none[name] for name in names}
-    return runs.judge(W1, none[STAYS_IN_LANES] == 0.0 and steers and lost, values | runs.pick(WHEEL))
+    return runs.judge(W1, conditions, {f"none_{name}": none[name] for name in names} | runs.pick(WHEEL))
 
 
 def _stays(runs: SystemRuns, statement: Statement, system: str) -> Claim:
-    names = (LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT)
+    names = (LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT, SIDESLIP_PEAK, YAW_RATE_END)
     none, kept = runs.metrics["none"], runs.metrics[system]
-    further_m = none[LANE_OVERSTEP] - kept[LANE_OVERSTEP]
+    conditions = [
+        _inside(kept),
+        _outside(none),
+        at_least(none[LANE_OVERSTEP] - kept[LANE_OVERSTEP], TRACK_M),
+        at_most(kept[SIDESLIP_PEAK], KEPT_SIDESLIP_RAD),
+        at_most(kept[YAW_RATE_END], SETTLED_YAW_RATE_RADPS),
+    ]
     return runs.judge(
-        statement,
-        kept[STAYS_IN_LANES] == 1.0 and none[STAYS_IN_LANES] == 0.0 and further_m >= TRACK_M,
-        {f"{run}_{name}": runs.metrics[run][name] for name in names for run in ("none", system)},
+        statement, conditions, {f"{run}_{name}": runs.metrics[run][name] for name in names for run in ("none", system)}
     )

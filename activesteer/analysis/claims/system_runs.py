@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from activesteer.analysis.claims.action import MEAN_S, largest_action
 from activesteer.analysis.claims.claim import SYSTEMS, SYSTEMS_WITH_CONTROL, Claim, Statement, check_systems
+from activesteer.analysis.claims.condition import Condition, at_least, at_most
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import Evaluable, RecordingLike
 from activesteer.errors import RecordingError
@@ -30,6 +31,7 @@ class SystemRuns:
             `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`action.largest_action`).
             No run may demand as much of an actuator that its system does not have: an action that a system did not
             perform proves nothing.
+        hindrance: Distance of the obstacle from vanishing, 0 to 1: the missing part of the smallest action.
     """
 
     def __init__(
@@ -51,11 +53,16 @@ class SystemRuns:
         cut = [system for system in SYSTEMS if _is_cut_short(recordings[system])]
         self.metrics = {system: _evaluated(recordings[system], metrics, system in cut) for system in SYSTEMS}
         self.whole = not cut
-        self.obstacle = ", ".join(f"the run {system} ends too early" for system in cut) or _pretence(recordings)
+        self.obstacle, self.hindrance = ", ".join(f"the run {system} ends too early" for system in cut), 1.0
+        if not cut:
+            self.obstacle, self.hindrance = _pretence(recordings)
 
-    def judge(self, statement: Statement, holds: bool, values: dict[str, float]) -> Claim:
-        """Return the claim, which passes if its criterion holds and there is no obstacle."""
-        return Claim(statement, holds and not self.obstacle, values, self.obstacle)
+    def judge(self, statement: Statement, conditions: Iterable[Condition], values: dict[str, float]) -> Claim:
+        """Return the claim, which passes if all its conditions hold and there is no obstacle."""
+        conditions = tuple(conditions)
+        distance = sum(condition.distance for condition in conditions) + (self.hindrance if self.obstacle else 0.0)
+        holds = all(condition.holds for condition in conditions)
+        return Claim(statement, holds and not self.obstacle, values, self.obstacle, distance)
 
     def pick(self, *names: str) -> dict[str, float]:
         """Return metrics of all systems, named `<system>_<metric>`."""
@@ -65,8 +72,8 @@ class SystemRuns:
         """Return the magnitude of a metric."""
         return abs(self.metrics[system][name])
 
-    def lowers(self, system: str, name: str, fraction: float, minimum: float) -> bool:
-        """Return whether a system lowers the magnitude of a metric to a fraction, and noticeably.
+    def lowers(self, system: str, name: str, fraction: float, minimum: float) -> list[Condition]:
+        """Return the conditions that a system lowers the magnitude of a metric to a fraction, and noticeably.
 
         Args:
             system: The system.
@@ -75,21 +82,22 @@ class SystemRuns:
             minimum: Least difference from the value without control.
         """
         none, value = self.size("none", name), self.size(system, name)
-        return value <= fraction * none and none - value >= minimum
+        noticeable = [at_least(none - value, minimum)] if minimum else []
+        return [at_most(value, fraction * none), *noticeable]
 
-    def both_lower(self, name: str, fraction: float, minimum: float) -> bool:
-        """Return whether both systems lower a metric; see `lowers`."""
-        return all(self.lowers(system, name, fraction, minimum) for system in SYSTEMS_WITH_CONTROL)
+    def both_lower(self, name: str, fraction: float, minimum: float) -> list[Condition]:
+        """Return the conditions that both systems lower a metric; see `lowers`."""
+        return [part for system in SYSTEMS_WITH_CONTROL for part in self.lowers(system, name, fraction, minimum)]
 
-    def is_smallest(self, system: str, name: str, minimum: float) -> bool:
-        """Return whether the magnitude of a metric is noticeably below the two other runs."""
+    def is_smallest(self, system: str, name: str, minimum: float) -> list[Condition]:
+        """Return the conditions that the magnitude of a metric is noticeably below the two other runs."""
         others = [self.size(other, name) for other in SYSTEMS if other != system]
-        return all(other - self.size(system, name) >= minimum for other in others)
+        return [at_least(other - self.size(system, name), minimum) for other in others]
 
-    def is_largest(self, system: str, name: str, minimum: float) -> bool:
-        """Return whether the magnitude of a metric is noticeably above the two other runs."""
+    def is_largest(self, system: str, name: str, minimum: float) -> list[Condition]:
+        """Return the conditions that the magnitude of a metric is noticeably above the two other runs."""
         others = [self.size(other, name) for other in SYSTEMS if other != system]
-        return all(self.size(system, name) - other >= minimum for other in others)
+        return [at_least(self.size(system, name) - other, minimum) for other in others]
 
 
 class _Whole(dict[str, float]):
@@ -126,14 +134,16 @@ def _is_cut_short(recording: RecordingLike) -> bool:
     return isinstance(duration_s, (int, float)) and end_s < duration_s
 
 
-def _pretence(recordings: Mapping[str, RecordingLike]) -> str:
-    """Describe an action of a run that does not fit its system; empty if all actions fit."""
+def _pretence(recordings: Mapping[str, RecordingLike]) -> tuple[str, float]:
+    """Describe an action of a run that does not fit its system, with the largest missing part, 0 to 1; empty: none."""
+    found: list[tuple[str, float]] = []
     for system in SYSTEMS:
         for name, owner in (("rear_steer", "ars"), ("superposition", "afs")):
             demand = f"{name}_demand_rad"
             angle = f"{math.degrees(STEER_RAD):.2f} deg of {name.replace('_', ' ')}"
             if system != owner and float(np.abs(recordings[system][demand]).max()) >= STEER_RAD:
-                return f"the run {system} demands {angle}"
-            if system == owner and not largest_action(recordings[system], demand) >= STEER_RAD:
-                return f"the run {system} never demands {angle} more than straight ahead, as a mean over {MEAN_S:g} s"
-    return ""
+                found.append((f"the run {system} demands {angle}", 1.0))
+            if system == owner and not (action := largest_action(recordings[system], demand)) >= STEER_RAD:
+                words = f"the run {system} never demands {angle} more than straight ahead, as a mean over {MEAN_S:g} s"
+                found.append((words, min(1.0, 1.0 - action / STEER_RAD)))
+    return (found[0][0], max(missing for _, missing in found)) if found else ("", 0.0)

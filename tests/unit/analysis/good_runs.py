@@ -54,8 +54,8 @@ def good(scenario: str) -> Arguments:
         },
         "double_lane_change_low_mu": {
             "none": {"track": wider(1.6), "steering_rad": 3.0, "yaw_rate": 0.3, "sideslip": 0.2},
-            "ars": {"track": wider(1.02), "steering_rad": 0.9, **rear},
-            "afs": {"track": wider(0.98), "steering_rad": 1.2, "sideslip": 0.03, **front},
+            "ars": {"track": wider(1.02), "steering_rad": 0.9, "after": 0.2, **rear},
+            "afs": {"track": wider(0.98), "steering_rad": 1.2, "sideslip": 0.03, "after": 0.2, **front},
         },
     }[scenario]  # fmt: skip
 

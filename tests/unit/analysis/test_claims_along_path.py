@@ -68,6 +68,9 @@ def test_only_the_broken_one_of_the_slalom_fails(broken, system, change):
         (["W1"], "none", {"after": 0.1}),  # calm in the end
         (["W2"], "ars", {"track": wider(1.6)}),
         (["W2"], "ars", {"stops_m": 110.0}),
+        (["W2"], "ars", {"after": 1.0}),  # through the lanes, but not straight at the end
+        (["W3"], "afs", {"after": 1.0}),
+        (["W2", "W4"], "ars", {"sideslip": 0.09}),  # 5.2 deg
         (["W3"], "afs", {"track": wider(1.6)}),
         (["W3"], "afs", {"stops_m": 110.0}),
         (["W4"], "ars", {"sideslip": 0.036}),  # 2.06 deg
