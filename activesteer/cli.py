@@ -86,6 +86,7 @@ def all_commands() -> Commands:
         linearise,
         listing,
         margins,
+        match,
         recover,
         replay,
         report,
@@ -108,7 +109,7 @@ def all_commands() -> Commands:
         "drive": (listing, run, watch, explore),
         "recordings": (info, report, compare, replay, video, import_, recover),
         "car": (vehicle, tyre, kc),
-        "study": (study, tune, fit, envelope, fault_map, identify, linearise, driver, margins),
+        "study": (study, tune, match, fit, envelope, fault_map, identify, linearise, driver, margins),
         "verify": (reproduce, test, figures, validate, bench),
     }.items():
         commands.begin_group(title)

@@ -2,11 +2,14 @@
 
     python tools/renew_population.py [-o DIR] [--samples N] [--jobs N]
     python tools/renew_population.py --comparison [-o DIR] [--samples N] [--jobs N]
+    python tools/renew_population.py --judge S2=S1 W2=W2 W3=W3
 
 500 samples take half an hour on two idle processors. The tool resumes an interrupted run and accepts a folder that
 `activesteer reproduce --population N -o DIR` has finished. Call tools/make_claims_table.py afterwards. The second line
 does the same for the comparison of controllers, whose table stands in docs/chassis_control.md; call
-`tools/make_doc_pictures.py comparison_population` after it.
+`tools/make_doc_pictures.py comparison_population` after it. The third line judges the stored population again after a
+criterion has changed: it drives only the samples in which the claim behind the equals sign held, because the claim
+before it can hold only there.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ import pyarrow.parquet as pq
 
 from activesteer.analysis.bands import FILE as BANDS
 from activesteer.analysis.bands import TRACK, Band, band_of_tracks, band_over_time, table_of
-from activesteer.analysis.claims import STATEMENTS, Kind
+from activesteer.analysis.claims import SCENARIO_OF, STATEMENTS, SYSTEMS, Claim, Kind
 from activesteer.analysis.claims.population import SUMMARY, Change, Population, read_population
 from activesteer.commands.progress import RunCounter
 from activesteer.conventions import CURVE_STEP_S
@@ -34,11 +37,13 @@ from activesteer.errors import StudyError
 from activesteer.files import make_folder, replacing, write_text
 from activesteer.metric_table import metric
 from activesteer.resources import find_study, studies_dir
-from activesteer.studies.engine.run_task import CLAIM, CURVE
+from activesteer.studies.engine.plan import Plan
+from activesteer.studies.engine.run_task import CLAIM, CURVE, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
+from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.studies.paper.comparison_population import comparison_text
 from activesteer.studies.paper.comparison_targets import REFERENCES
-from activesteer.studies.paper.population import population
+from activesteer.studies.paper.population import population, summarise
 from activesteer.studies.paper.population_studies import STUDY, population_study
 from activesteer.theory.proportions import percent
 
@@ -246,7 +251,11 @@ def _in_short(table: pa.Table) -> pa.Table:
             columns[name] = table[name].cast(pa.int8())
         elif name in _KEPT:
             columns[name] = table[name].cast(pa.int16()) if name == "sample" else table[name].dictionary_encode()
-        elif name not in factors and not name.startswith(CURVE) and pa.types.is_floating(table.schema.field(name).type):
+        elif (
+            name not in factors
+            and not name.startswith((CURVE, DISTANCE))
+            and pa.types.is_floating(table.schema.field(name).type)
+        ):
             columns[name] = table[name].cast(pa.float32())
     return pa.table(columns)
 
@@ -271,6 +280,57 @@ def _bands(table: pa.Table) -> dict[tuple[str, str, str], Band]:
     return found
 
 
+def judge_again(changed: dict[str, str], jobs: int | None) -> Population:
+    """Judge the stored population again after criteria have changed, and store it.
+
+    Args:
+        changed: Number of each changed claim -> number of a claim of the same scenario without which it cannot hold.
+        jobs: Number of processes.
+    """
+    stored = read_population(STUDY)
+    path = studies_dir() / STUDY / RUNS
+    if stored is None:
+        raise StudyError(f"{path.parent} holds no population")
+    table = pq.read_table(path)
+    rows = table.select(_KEPT[:3]).to_pylist()
+    verdicts = {name: table[name].to_pylist() for name in table.column_names if name.startswith(CLAIM)}
+    wanted = sorted(
+        {
+            (row["maneuver"], row["sample"])
+            for claim, source in changed.items()
+            for row, held in zip(rows, verdicts[f"{CLAIM}{source}"], strict=True)
+            if held == 1 and row["maneuver"] == SCENARIO_OF[claim]
+        }
+    )
+    plan = Plan(population_study(stored.samples, stored.seed))
+    scenarios = [label for label, _ in plan.settings.maneuvers]
+    firsts = [(scenarios.index(name) * stored.samples + sample) * len(SYSTEMS) for name, sample in wanted]
+    tasks = [(plan.settings, plan.requests(range(first, first + len(SYSTEMS)))) for first in firsts]
+    driven = dict(zip(wanted, in_parallel(drive, tasks, jobs), strict=True))
+    for claim in changed:
+        column = verdicts[f"{CLAIM}{claim}"]
+        for place, row in enumerate(rows):
+            if column[place] is not None:
+                found = driven.get((row["maneuver"], row["sample"]))
+                column[place] = 0 if found is None else int(found[0][f"{CLAIM}{claim}"])
+    for name, column in verdicts.items():
+        table = table.set_column(table.column_names.index(name), name, pa.array(column, pa.int8()))
+    failed = [float(sum(own[place] == 0 for own in verdicts.values())) for place in range(len(rows))]
+    table = table.set_column(table.column_names.index("claims_failed"), "claims_failed", pa.array(failed, pa.float32()))
+    with replacing(path, StudyError) as target:
+        pq.write_table(table, target, compression="zstd", compression_level=19)
+    nominal = [Claim(STATEMENTS[claim.id], claim.passed, {}) for claim in stored.claims]
+    again = summarise(stored_runs(), population_study(stored.samples, stored.seed), nominal)
+    again = replace(
+        stored, claims=tuple(again.of(claim.id) if claim.id in changed else claim for claim in stored.claims)
+    )
+    for claim in changed:
+        before, after = stored.of(claim), again.of(claim)
+        print(f"{claim}: {percent(before.share)} % before, now {percent(after.share)} %")
+    print(f"{len(wanted)} samples driven again: {store_summary(again, STUDY)}")
+    return again
+
+
 def _curves(rows: pa.Table, channel: str) -> list[np.ndarray]:
     return [np.asarray(curve.values, dtype=np.float64) for curve in rows[f"{CURVE}{channel}"]]
 
@@ -284,7 +344,12 @@ def main() -> None:
     )
     parser.add_argument("--samples", type=int, metavar="N", help="default: that of studies/population.toml")
     parser.add_argument("--jobs", type=int, metavar="N")
+    parser.add_argument("--judge", nargs="+", metavar="CLAIM=CLAIM", help="judge the stored population again")
     options = parser.parse_args()
+    if options.judge:
+        found = judge_again(dict(pair.split("=") for pair in options.judge), options.jobs)
+        PAGE.write_text(page(found), encoding="utf-8")
+        return
     output = options.output or Path("build", "comparison" if options.comparison else "population")
     with RunCounter("population", quiet=False) as counter:
         controllers = COMPARED if options.comparison else None

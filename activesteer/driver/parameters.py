@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from activesteer.config import Range
 
@@ -18,6 +18,9 @@ class DriverParameters:
     """One line for lists."""
     preview_s: Annotated[float, Range(0.2, 5.0)]
     """Time ahead for which the driver sees the path [s]; he takes it for straight beyond."""
+    preview_points: Literal["all", "one"] = "all"
+    """Points of the path that the driver looks at: `all` within the preview, or the `one` at its end, as simple driver
+    models do. The one point has the sum of the gains of all."""
     reaction_delay_s: Annotated[float, Range(0.0, 1.0)]
     """Delay from seeing to acting, a multiple of the 10 ms between two looks [s]."""
     neuromuscular_lag_s: Annotated[float, Range(0.0, 0.5)]

@@ -170,6 +170,9 @@ def steering_gains(
     Valtetsiotis weigh the heading instead of e'. In a bend the car has a sideslip angle, and its heading would draw it
     off the path; the terms used here are 0 in a steady bend.
 
+    A driver who looks at one point steers by its distance from the line straight ahead with the sum of these gains. The
+    sum is right for a path that is shifted together with the car; the time of the point decides the damping.
+
     Beyond the preview the path is straight. Its gains follow without its points: a path that is shifted or turned
     together with the car requires the same steering, which gives the sum and the moment of the gains.
 
@@ -234,6 +237,9 @@ def _steering_gains(
     for index in range(waiting):
         per_waiting[index] = decision @ b[:, 0]
         decision = decision @ a
+    if parameters.preview_points == "one":
+        per_path[:-1], per_path[-1] = 0.0, -decision[3]
+        return SteeringGains(float(decision[0]), float(decision[1]), float(decision[4]), per_waiting, per_path)
     # Beyond the preview: all points together count as much as the car's own offset and heading.
     ahead = np.arange(float(len(per_path)))
     missing = -decision[3] - per_path.sum()

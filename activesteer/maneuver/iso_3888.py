@@ -40,7 +40,14 @@ class _Section(NamedTuple):
     centre_m: float
 
 
-def lanes(standard: LaneStandard, vehicle_width_m: float, start_x_m: float, side: float) -> tuple[Lane, ...]:
+def lanes(
+    standard: LaneStandard,
+    vehicle_width_m: float,
+    start_x_m: float,
+    side: float,
+    length_factor: float = 1.0,
+    offset_factor: float = 1.0,
+) -> tuple[Lane, ...]:
     """Return the three lanes.
 
     Args:
@@ -48,6 +55,8 @@ def lanes(standard: LaneStandard, vehicle_width_m: float, start_x_m: float, side
         vehicle_width_m: Width of the vehicle, b [m].
         start_x_m: Beginning of the entry lane, whose centre line is y = 0 [m].
         side: 1 for a side lane on the left, -1 on the right.
+        length_factor: Factor on all lengths of the standard [-].
+        offset_factor: Factor on the offset of the side lane and the exit lane [-].
 
     Returns:
         Entry, side and exit lane.
@@ -67,13 +76,13 @@ def lanes(standard: LaneStandard, vehicle_width_m: float, start_x_m: float, side
             _Section("side lane", 25.5, 11.0, aside, 0.5 * entry + 1.0 + 0.5 * aside),
             _Section("exit lane", 49.0, 12.0, back, 0.5 * (back - entry)),
         )
-    return tuple(_lane(section, start_x_m, side) for section in sections)
+    return tuple(_lane(section, start_x_m, length_factor, side * offset_factor) for section in sections)
 
 
-def _lane(section: _Section, start_x_m: float, side: float) -> Lane:
-    start = start_x_m + section.start_m
-    centre, half = side * section.centre_m, 0.5 * section.width_m
-    return Lane(section.name, start, start + section.length_m, centre - half, centre + half)
+def _lane(section: _Section, start_x_m: float, along: float, aside: float) -> Lane:
+    start = start_x_m + along * section.start_m
+    centre, half = aside * section.centre_m, 0.5 * section.width_m
+    return Lane(section.name, start, start + along * section.length_m, centre - half, centre + half)
 
 
 def cones(course: Sequence[Lane]) -> NDArray[np.float64]:

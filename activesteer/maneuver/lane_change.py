@@ -49,6 +49,10 @@ class LaneLayout:
     keeps the margin."""
     margin_m: Annotated[float, Range(0.0, 1.0)] = 0.1
     """Smallest distance of the car's sides, at its axles, from the edges of the lanes; path of least jerk only [m]."""
+    length_factor: Annotated[float, Range(0.5, 2.0)] = 1.0
+    """Factor on all lengths of the standard's course, for courses that only resemble it [-]."""
+    offset_factor: Annotated[float, Range(0.5, 2.0)] = 1.0
+    """Factor on the offset of the standard's lanes, for courses that only resemble it [-]."""
     throttle_off_m: Annotated[float, Range(0.0, 1000.0)] | None = None
     """Distance into the entry lane at which the car begins to coast, 2 m in ISO 3888-2 [m]. Default: the speed is
     held."""
@@ -79,15 +83,19 @@ class LaneChange(AlongCourse):
     def _make_course(self) -> Course:
         layout, width = self.lane, known_width(self.vehicle_width_m)
         # Laid out to the left and then mirrored, so that left and right agree to the last digit.
-        left = lanes(layout.standard, width, layout.entry_m, 1.0)
+        left = self._lanes(width, 1.0)
         if layout.path == "middle":
             path_x, path_y = _middle(left)
         else:
             self._check_margin(left, width)
             path_x, path_y = _least_jerk_path(left, 0.5 * width + layout.margin_m)
         side = SIGNS[layout.side]
-        course = lanes(layout.standard, width, layout.entry_m, side)
+        course = self._lanes(width, side)
         return Course(Path.through(path_x, side * path_y), course, cones(course), course[-1].end_x_m)
+
+    def _lanes(self, width: float, side: float) -> tuple[Lane, ...]:
+        layout = self.lane
+        return lanes(layout.standard, width, layout.entry_m, side, layout.length_factor, layout.offset_factor)
 
     def _check_margin(self, course: Sequence[Lane], width: float) -> None:
         narrowest = min(course, key=lambda lane: lane.left_y_m - lane.right_y_m)

@@ -78,7 +78,8 @@ class Claim:
         passed: Whether it holds.
         values: The numbers that decide, named `<system>_<metric>`.
         obstacle: Why it cannot pass whatever the numbers are; empty if nothing prevents it.
-        distance: Distance from passing: the sum over its broken conditions, each 0 to 1; 0 if it passes.
+        distance: Distance from passing: the sum over its broken conditions, each 0 to 1. If it passes, the smallest
+            margin of its conditions, at most 1, with a negative sign.
     """
 
     statement: Statement

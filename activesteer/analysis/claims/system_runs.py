@@ -62,7 +62,9 @@ class SystemRuns:
         conditions = tuple(conditions)
         distance = sum(condition.distance for condition in conditions) + (self.hindrance if self.obstacle else 0.0)
         holds = all(condition.holds for condition in conditions)
-        return Claim(statement, holds and not self.obstacle, values, self.obstacle, distance)
+        passed = holds and not self.obstacle
+        room = -min(1.0, *(condition.margin for condition in conditions))
+        return Claim(statement, passed, values, self.obstacle, room if passed else distance)
 
     def pick(self, *names: str) -> dict[str, float]:
         """Return metrics of all systems, named `<system>_<metric>`."""

@@ -43,7 +43,10 @@ class FactorValues:
         self._factors = {factor.key: factor for factor in study.factors}
         self._nominal: dict[tuple[int, int], dict[str, Any]] = {}
         labels = [label_of(item) for item in study.maneuvers]
-        for factor in study.factors:
+        for number, factor in enumerate(study.factors):
+            if factor.of and factor.of not in (earlier := [other.key for other in study.factors[:number]]):
+                where = ("factors", factor.key, "of")
+                raise study.source.fail(where, f"is no earlier factor; {nearest_names(factor.of, earlier)}", factor.of)
             for name in factor.maneuvers:
                 if name not in labels:
                     place = ("factors", factor.key, "maneuvers")
@@ -80,7 +83,7 @@ class FactorValues:
             if factor is not None and any(values.get(other) != needed for other, needed in factor.when.items()):
                 continue
             if factor is not None and factor.nominal:
-                nominal = self._nominal_of(maneuver, vehicle)[key]
+                nominal = found.get(factor.of, self._nominal_of(maneuver, vehicle)[key])
                 found[key] = nominal * value if factor.nominal == "times" else nominal + value
             else:
                 found[key] = value

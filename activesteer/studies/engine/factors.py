@@ -17,7 +17,7 @@ from activesteer.errors import nearest_names, shown
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """Kinds of factors; a factor's table has exactly one of these keys."""
 _OPTIONS: Final = {"choice": ("weights",), "normal": ("truncate",)}
-_ANYWHERE: Final = ("nominal", "maneuvers", "when")
+_ANYWHERE: Final = ("nominal", "of", "maneuvers", "when")
 """Keys that every kind allows."""
 NOMINAL: Final = ("times", "plus")
 """Ways in which a factor may be relative to the value of the files."""
@@ -42,6 +42,7 @@ class Factor:
         mean: Mean of a normal distribution before truncation.
         deviation: Standard deviation of a normal distribution before truncation.
         nominal: One of `NOMINAL` if the values multiply the value of the files or are added to it; else empty.
+        of: Earlier factor to whose value the values are relative, in place of the value of the files; empty for none.
         maneuvers: Names of the manoeuvres in which the factor varies; empty for all.
         when: Values of other factors with which the factor varies; empty for all.
     """
@@ -55,6 +56,7 @@ class Factor:
     mean: float = 0.0
     deviation: float = 0.0
     nominal: str = ""
+    of: str = ""
     maneuvers: tuple[str, ...] = ()
     when: Mapping[str, Value] = field(default_factory=dict)
 
@@ -95,6 +97,8 @@ class Factor:
             table |= {"normal": [self.mean, self.deviation], "truncate": [self.low, self.high]}
         if self.nominal:
             table["nominal"] = self.nominal
+        if self.of:
+            table["of"] = self.of
         if self.maneuvers:
             table["maneuvers"] = list(self.maneuvers)
         if self.when:
@@ -110,7 +114,8 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
         table: `{ grid = [70, 80] }`, `{ choice = ["a", "b"], weights = [1, 2] }`, `{ uniform = [low, high] }`,
             `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`. Without bounds,
             a normal distribution is truncated at three standard deviations. With `nominal = "times"` the values
-            multiply the value of the files, with `nominal = "plus"` they are added to it. With
+            multiply the value of the files, with `nominal = "plus"` they are added to it; `of = "KEY"` takes the value
+            of an earlier factor in place of that of the files. With
             `maneuvers = ["slalom"]` the key varies in these manoeuvres only, with
             `when = { "sensors.preset" = "production" }` only where another factor has that value.
         source: Source of the study, for error messages.
@@ -139,6 +144,9 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
     nominal = table.get("nominal", "")
     if "nominal" in table and nominal not in NOMINAL:
         raise source.fail((*where, "nominal"), f"{shown(nominal)} is none of {', '.join(NOMINAL)}", nominal, NOMINAL)
+    of = table.get("of", "")
+    if not isinstance(of, str) or ("of" in table and not nominal):
+        raise source.fail((*where, "of"), "names an earlier factor, and stands beside nominal", of)
     maneuvers = table.get("maneuvers", [])
     if not isinstance(maneuvers, Sequence) or isinstance(maneuvers, str) or ("maneuvers" in table and not maneuvers):
         raise source.fail((*where, "maneuvers"), f"{shown(maneuvers)} is no list of names", maneuvers)
@@ -146,7 +154,7 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
     if not isinstance(when, Mapping) or ("when" in table and not when):
         raise source.fail((*where, "when"), f"{shown(when)} is no table of other factors and their values", when)
     names = tuple(map(str, maneuvers))
-    return replace(_read(key, kind, table, source), nominal=nominal, maneuvers=names, when=dict(when))
+    return replace(_read(key, kind, table, source), nominal=nominal, of=of, maneuvers=names, when=dict(when))
 
 
 def _read(key: str, kind: str, table: Mapping[str, Any], source: Source) -> Factor:

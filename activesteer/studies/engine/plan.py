@@ -69,7 +69,9 @@ class Plan:
         _check(study, self.samples, self._values)
         self.settings.expected.update(present_inputs(self.settings))
         table = {
-            key: value for key, value in study.to_table().items() if key not in (*labelled, "title", "tune", "fit")
+            key: value
+            for key, value in study.to_table().items()
+            if key not in (*labelled, "title", "tune", "match", "fit")
         }
         table["design"] = [samples.columns for samples in self.samples]
         table |= {key: [label for label, _ in labelled[key]] for key in labelled}
@@ -87,7 +89,7 @@ class Plan:
         for samples in self.samples:
             columns = {key: values for key, values in samples.columns.items() if _has_text(values)}
             rows: Iterable[tuple[Any, ...]] = dict.fromkeys(zip(*columns.values(), strict=True))
-            if study.tune is not None:  # a search combines values as it proceeds
+            if study.tune is not None or study.match is not None:  # a search combines values as it proceeds
                 columns = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
                 rows = itertools.product(*columns.values())
             for row in rows if columns else ():

@@ -29,6 +29,8 @@ _ERROR_CHARACTERS: Final = 500
 """Largest length of an error message in a row."""
 CLAIM: Final = "claim_"
 """Prefix of the columns that say whether a claim holds for the sample."""
+DISTANCE: Final = "distance_"
+"""Prefix of the columns that say how far a claim is from holding; see `Claim.distance`."""
 CURVE: Final = "curve_"
 """Prefix of the columns that hold a channel over time."""
 
@@ -163,13 +165,14 @@ def _is_kept(patterns: tuple[str, ...], name: str) -> bool:
 
 
 def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, float]:
-    """Return column -> 1 if a claim of the paper holds for the sample, else 0; empty if a run is missing."""
+    """Return the verdicts (1 if a claim of the paper holds, else 0) and distances; empty if a run is missing."""
     try:
         claims = SCENARIOS[maneuver](recordings)
     except (KeyError, ActiveSteerError):
         return {}
     failed = sum(not claim.passed for claim in claims)
-    return {f"{CLAIM}{claim.id}": float(claim.passed) for claim in claims} | {"claims_failed": float(failed)}
+    verdicts = {f"{CLAIM}{claim.id}": float(claim.passed) for claim in claims}
+    return verdicts | {f"{DISTANCE}{claim.id}": claim.distance for claim in claims} | {"claims_failed": float(failed)}
 
 
 def failed_row(settings: Settings, request: Request, status: Status, problem: str) -> Row:

@@ -21,10 +21,11 @@ from activesteer.studies.engine.factors import Factor, read_factor
 
 _KEYS: Final = (
     "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
-    "recordings", "curves", "claims", "timestep_s", "tune", "fit",
+    "recordings", "curves", "claims", "timestep_s", "tune", "fit", "match",
 )  # fmt: skip
 _SEARCHES: Final = {
     "tune": "it says what is to be made small",
+    "match": "it says which statements should hold",
     "fit": "it says which channels are compared, and how noisy they are",
 }
 """Tables of searches, which choose the factor values themselves; each with a hint for a missing table."""
@@ -51,6 +52,7 @@ class StudyFile:
         claims: Whether to check the paper's claims for every sample; this needs its three systems.
         timestep_s: Step of engine, driver and controller [s].
         tune: The table [tune], unparsed; see `tuning`.
+        match: The table [match], unparsed; see `match_file`.
         fit: The table [fit], unparsed; see `measured.fit_file`.
         title: One line for the report.
         source: For error messages.
@@ -71,6 +73,7 @@ class StudyFile:
     claims: bool = False
     timestep_s: float = DEFAULT_TIMESTEP_S
     tune: dict[str, Any] | None = None
+    match: dict[str, Any] | None = None
     fit: dict[str, Any] | None = None
     title: str = ""
     source: Source = Source("study")
@@ -136,7 +139,7 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
     Args:
         given: Name of a study of the package, a path, or a table. Relative paths in a file start at its folder, those
             in a table at the working directory.
-        search: `tune` or `fit` if the study must have that table.
+        search: `tune`, `match` or `fit` if the study must have that table.
 
     Returns:
         The study.

@@ -1,0 +1,50 @@
+"""`activesteer match`: find settings in which statements about runs hold."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from activesteer.commands.arguments import add_json, add_output, add_workers
+from activesteer.commands.output import print_json
+from activesteer.commands.progress import ProgressBar
+
+
+def add_to(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser("match", help="find settings of factors in which statements about the runs hold")
+    parser.add_argument("study", metavar="STUDY", help="a study file with a table [match], or its name")
+    add_output(parser, "DIR", "folder of the search; a search found there is resumed", "match")
+    parser.add_argument(
+        "--evaluations", type=int, metavar="N",
+        help="total number of evaluations, a scenario with all controllers each (default: that of the file)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--least", type=int, metavar="K", help="draw settings in which at least K statements hold, after a search"
+    )
+    add_workers(parser)
+    add_json(parser)
+    parser.set_defaults(action=_match)
+
+
+def _match(options: argparse.Namespace) -> int:
+    from activesteer.studies.engine.matching import lines_of, match
+
+    options.how_to_resume = "; the same command resumes it"
+    with ProgressBar("match", quiet=options.json) as bar:
+        found = match(
+            options.study,
+            options.output,
+            evaluations=options.evaluations,
+            least=options.least,
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            progress=lambda done, total, best, of: bar(
+                min(1.0, done / total), f"{done}/{total} evaluations, {best} of {of} hold"
+            ),
+        )
+    if options.json:
+        print_json(found.to_json())
+    else:
+        print("\n".join(lines_of(found)))
+    return 0

@@ -1,0 +1,365 @@
+"""Match: settings of a study's factors in which as many statements as possible hold.
+
+An evolution strategy (CMA-ES) searches the unit cube of the priors, in rounds: over all factors, then over the factors
+of some manoeuvres alone, whose other scenarios need not be driven again. The cost of a setting is the sum over its
+statements: 1 to 2 for one that fails, by its distance, and a little for one that holds by a thin margin; implausible
+numbers cost a little too. Scenarios are driven one after the other, and a setting that cannot come near the best one of
+its round is given up.
+
+`sample` draws settings from the priors under the condition that at least a number of statements hold (Metropolis, with
+proposals from the spread of the settings found; the uniform prior cancels, so that a setting is accepted if it holds).
+
+Sources: N. Hansen, The CMA evolution strategy: a tutorial, arXiv 1604.00772; P. Marjoram et al., Markov chain Monte
+Carlo without likelihoods, PNAS 100 (2003), 15324.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import StudyError, not_installed
+from activesteer.scenario import FileOrTable
+from activesteer.studies.engine.factor_values import label_of
+from activesteer.studies.engine.match_file import Statements
+from activesteer.studies.engine.match_store import Candidate, Evaluation, MatchStore
+from activesteer.studies.engine.plan import Plan
+from activesteer.studies.engine.prior import Prior
+from activesteer.studies.engine.run_identity import digest
+from activesteer.studies.engine.run_settings import prepare
+from activesteer.studies.engine.run_task import Row, drive
+from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.engine.task_queue import TaskQueue
+from activesteer.studies.engine.workers import workers_for
+
+Point = NDArray[np.float64]
+Progress = Callable[[int, int, int, int], None]
+"""Called with the evaluations done, their total, and the best count of the number of statements."""
+_GIVEN_UP: Final = 0.7
+"""Cost of each statement of a scenario that was not driven."""
+_SCALE: Final = 0.35
+"""Factor on the spread of the settings found, for a proposal of `sample`."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """Result of a match.
+
+    Attributes:
+        study: The study.
+        prior: Ranges and nominal values.
+        statements: Numbers of all statements.
+        evaluations: Scenarios driven, with all controllers each.
+        candidates: All settings that were tried.
+        seeds: Settings that the study file gave.
+    """
+
+    study: StudyFile
+    prior: Prior
+    statements: tuple[str, ...]
+    evaluations: int
+    candidates: tuple[Candidate, ...]
+    seeds: int
+
+    @property
+    def complete(self) -> list[Candidate]:
+        """Settings whose statements were all judged."""
+        return [one for one in self.candidates if len(one.distances) == len(self.statements)]
+
+    @property
+    def best(self) -> Candidate | None:
+        """The most plausible of the settings in which the most statements hold."""
+        return max(
+            self.complete, key=lambda one: (len(one.holding), -self.prior.implausibility(one.values)), default=None
+        )
+
+    @property
+    def front(self) -> list[Candidate]:
+        """For each number of statements from the best down, the most plausible setting, if it is more plausible."""
+        front: list[Candidate] = []
+        ordered = sorted(self.complete, key=lambda one: (-len(one.holding), self.prior.implausibility(one.values)))
+        for one in ordered:
+            size = self.prior.implausibility(one.values)
+            last = front[-1] if front else None
+            if last is None or (len(one.holding) < len(last.holding) and size < self.prior.implausibility(last.values)):
+                front.append(one)
+        return front
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the result as JSON values."""
+        return {
+            "statements": list(self.statements),
+            "evaluations": self.evaluations,
+            "settings": len(self.candidates),
+            "best": None if self.best is None else self.described(self.best),
+            "front": [self.described(one) for one in self.front],
+        }
+
+    def described(self, one: Candidate) -> dict[str, Any]:
+        """Return a setting as JSON values."""
+        return {
+            "number": one.number,
+            "origin": one.origin,
+            "holds": len(one.holding),
+            "fails": [claim for claim in self.statements if claim not in one.holding],
+            "implausibility": self.prior.implausibility(one.values),
+            "plausibility": self.prior.plausibility(one.values).value,
+            "values": one.values,
+            "distances": one.distances,
+        }
+
+
+def match(
+    study_file: FileOrTable,
+    output: str | os.PathLike[str],
+    *,
+    evaluations: int | None = None,
+    least: int | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> Match:
+    """Search for settings in which as many statements as possible hold; a search found in the folder is resumed.
+
+    Args:
+        study_file: Name or path of a study file with a table [match], or its table.
+        output: Folder of the search.
+        evaluations: Total number of evaluations; default: the number in the file.
+        least: Draw settings in which at least this number of statements hold, in place of the search.
+        jobs: Number of processes; default: the number of processors.
+        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
+        progress: Called after every evaluation.
+
+    Raises:
+        ActiveSteerError: an input is wrong, `cma` is not installed, or the folder cannot be written or holds another
+            search.
+    """
+    study = read_study(study_file, "match")
+    search = _Search(study, Path(output), progress)
+    total = search.statements.table.evaluations if evaluations is None else evaluations
+    with workers_for(jobs, scheduler=scheduler) as workers:
+        prepare(workers, search.plan.settings)
+        search.queue = TaskQueue(workers)
+        if least is None:
+            search.run(total)
+        else:
+            search.sample(total, least)
+    return search.result
+
+
+def read_match(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Match:
+    """Return the match in a folder as far as it is.
+
+    Raises:
+        ActiveSteerError: the study is wrong, or the folder holds another search.
+    """
+    return _Search(read_study(study_file, "match"), Path(folder), None).result
+
+
+class _Search:
+    """A search, its store and its workers."""
+
+    def __init__(self, study: StudyFile, folder: Path, progress: Progress | None) -> None:
+        self.study, self.progress = study, progress
+        self.statements = Statements(study)
+        self.plan, self.prior = Plan(study), Prior(study)
+        self.store = MatchStore(folder, f"# {self.plan.digest}\n{study.to_toml()}")
+        self.names = [label_of(item) for item in study.maneuvers]
+        self.all = [claim for name in self.names for claim in self.statements.of[name]]
+        self.queue: Any = None
+        self.total, self.best = 0, 0
+        self._checked: set[str] = set()
+
+    @property
+    def result(self) -> Match:
+        """The match so far."""
+        return Match(
+            self.study, self.prior, tuple(self.all), self.store.evaluations, tuple(self.store.candidates.values()),
+            len(self.statements.seeds),
+        )  # fmt: skip
+
+    def run(self, total: int) -> None:
+        """Search until so many evaluations are made."""
+        self.total = total
+        if not self.store.candidates and total:
+            first = [self.prior.nominal, *({**self.prior.nominal, **seed} for seed in self.statements.seeds)]
+            self.evaluate([self.prior.point(values) for values in first], ["nominal", *["seed"] * (len(first) - 1)])
+        blocks, table = self._blocks(), self.statements.table
+        rounds = sum(1 for _ in {one.origin for one in self.store.candidates.values() if one.origin.startswith("r")})
+        for number in itertools.count(rounds):
+            if self.store.evaluations >= total:
+                return
+            turn, place = divmod(number, len(blocks))
+            anywhere = place == 0 and table.explore_every and turn % table.explore_every == table.explore_every - 1
+            self._round(number, blocks[place], anywhere=bool(anywhere))
+
+    def _blocks(self) -> list[list[int]]:
+        """Return the coordinates of each kind of round: all, then those of the same manoeuvres."""
+        searched = self.prior.searched
+        groups: dict[tuple[str, ...], list[int]] = {}
+        for place, factor in enumerate(searched):
+            if factor.maneuvers and len(factor.maneuvers) < len(self.names):
+                groups.setdefault(factor.maneuvers, []).append(place)
+        small = [block for block in groups.values() if len(block) > 1]
+        return [list(range(len(searched))), *small] if len(searched) > len(small[0] if small else ()) else small
+
+    def _round(self, number: int, block: list[int], *, anywhere: bool) -> None:
+        """Make generations of the evolution strategy around the best setting, or anywhere."""
+        try:
+            import cma  # noqa: PLC0415 - an extra
+        except ImportError as reason:
+            raise not_installed(StudyError, "activesteer match", "cma", "study") from reason
+        table, rng = self.statements.table, np.random.default_rng([self.study.seed, number])
+        best = min(self.result.complete, key=self._cost, default=None)
+        centre = rng.random(len(self.prior.searched)) if anywhere or best is None else self.prior.point(best.values)
+        limit = np.inf if anywhere or best is None else self._cost(best)
+        sigma = 0.3 if anywhere else table.spread * (1.0 if len(block) == len(centre) else 1.5)
+        strategy = cma.CMAEvolutionStrategy(
+            np.clip(centre[block], 1e-3, 1.0 - 1e-3),
+            sigma,
+            {"bounds": [0.0, 1.0], "popsize": table.population, "seed": number + 1 + 1000 * self.study.seed,
+             "verbose": -9},
+        )  # fmt: skip
+        whole = len(block) == len(centre)
+        for _ in range(table.generations if whole else max(1, table.generations // 4)):
+            asked = strategy.ask()
+            points = []
+            for some in asked:
+                point = centre.copy()
+                point[block] = some
+                points.append(point)
+            costs = self.evaluate(points, [f"r{number}"] * len(points), limit + table.slack)
+            limit = min(limit, *costs)
+            strategy.tell(asked, costs)
+            if self.store.evaluations >= self.total or strategy.stop():
+                return
+
+    def sample(self, total: int, least: int) -> None:
+        """Draw settings in which at least so many statements hold."""
+        self.total = total
+        good = [one for one in self.result.complete if len(one.holding) >= least]
+        if len(good) < 2:
+            raise StudyError(f"{len(good)} settings have {least} statements that hold; search further first")
+        rng = np.random.default_rng([self.study.seed, len(self.store.candidates)])
+        chosen = rng.choice(len(good), min(len(good), self.statements.table.population), replace=False)
+        chains = [self.prior.point(good[place].values) for place in chosen]
+        spread = np.std([self.prior.point(one.values) for one in good], axis=0) + 0.01
+        origin = f"sample{least}"
+        while self.store.evaluations < total:
+            moves = rng.normal(size=(len(chains), len(spread))) * spread * _SCALE
+            moves *= rng.random(moves.shape) < max(0.3, 4.0 / len(spread))  # some numbers at a time
+            proposed = [chain + move for chain, move in zip(chains, moves, strict=True)]
+            inside = [bool(((point >= 0.0) & (point <= 1.0)).all()) for point in proposed]
+            tried = [point for point, into in zip(proposed, inside, strict=True) if into]
+            first = max(self.store.candidates) + 1
+            self.evaluate(tried, [origin] * len(tried), most=len(self.all) - least)
+            numbers = itertools.count(first)
+            for place, into in enumerate(inside):
+                if into:
+                    one = self.store.candidates[next(numbers)]
+                    if len(one.distances) == len(self.all) and len(one.holding) >= least:
+                        chains[place] = proposed[place]
+
+    def evaluate(
+        self, points: Sequence[Point], origins: Sequence[str], limit: float = np.inf, most: int | None = None
+    ) -> list[float]:
+        """Return the costs of settings, which are driven until they exceed a cost, or more statements fail."""
+        first = max(self.store.candidates, default=-1) + 1
+        candidates = [
+            Candidate(first + place, self.prior.values(point), origin)
+            for place, (point, origin) in enumerate(zip(points, origins, strict=True))
+        ]
+        for one in candidates:
+            self.store.begin(one)
+        mine = [self.store.candidates[one.number] for one in candidates]
+        tasks = (task for one in mine if (task := self._next(one, limit, most)) is not None)
+        for (number, maneuver, key), rows, error in self.queue.outcomes(tasks):
+            one = self.store.candidates[number]
+            if error is not None:
+                raise error
+            self._check(maneuver, rows)
+            self.store.add(one, maneuver, key, self._evaluation(maneuver, rows))
+            self._tell(one)
+            if (task := self._next(one, limit, most)) is not None:
+                self.queue.add(*task)
+        return [self._cost(one) for one in mine]
+
+    def _next(self, one: Candidate, limit: float, most: int | None) -> tuple[Any, ...] | None:
+        """Return the task of the next scenario of a setting; None if it is complete or given up."""
+        for place, maneuver in enumerate(self.names):
+            if maneuver in one.scenarios:
+                continue
+            failed = sum(distance > 0.0 for distance in one.distances.values())
+            if self._driven_cost(one) > limit or (most is not None and failed > most):
+                return None
+            requests = [
+                self.plan.request_with(controller, one.number, (place, 0, controller), one.values)
+                for controller in range(len(self.plan.settings.controllers))
+            ]
+            key = digest({"overrides": requests[0].overrides})[:16]
+            if (maneuver, key) in self.store.known:
+                self.store.add(one, maneuver, key, self.store.known[maneuver, key])
+                continue
+            return (one.number, maneuver, key), drive, self.plan.settings, requests
+        return None
+
+    def _evaluation(self, maneuver: str, rows: list[Row]) -> Evaluation:
+        about = {"run", "sample", *self.study.keys}
+        metrics = {
+            row["controller"]: {
+                name: float(f"{value:.6g}")
+                for name, value in row.items()
+                if isinstance(value, float) and name not in about and not name.startswith(("claim", "distance_"))
+            }
+            for row in rows
+        }
+        distances = self.statements.distances(maneuver, rows)
+        return Evaluation({claim: float(f"{value:.5g}") for claim, value in distances.items()}, metrics)
+
+    def _check(self, maneuver: str, rows: list[Row]) -> None:
+        if maneuver not in self._checked and all(row["status"] == "ok" for row in rows):
+            self._checked.add(maneuver)
+            self.statements.check_metrics(self.study, maneuver, rows)
+
+    def _driven_cost(self, one: Candidate) -> float:
+        table = self.statements.table
+        return sum(
+            1.0 + distance / (1.0 + distance) if distance > 0.0 else 0.3 * max(0.0, 1.0 + distance / table.room)
+            for distance in one.distances.values()
+        )
+
+    def _cost(self, one: Candidate) -> float:
+        missing = sum(len(self.statements.of[name]) for name in self.names if name not in one.scenarios)
+        implausible = self.statements.table.implausibility_cost * self.prior.implausibility(one.values)
+        return self._driven_cost(one) + _GIVEN_UP * missing + implausible
+
+    def _tell(self, one: Candidate) -> None:
+        if len(one.distances) == len(self.all):
+            self.best = max(self.best, len(one.holding))
+        if self.progress is not None:
+            self.progress(self.store.evaluations, self.total, self.best, len(self.all))
+
+
+def lines_of(found: Match) -> Iterator[str]:
+    """Yield the result for a terminal."""
+    yield f"{found.evaluations} evaluations of {len(found.candidates)} settings"
+    for one in found.front:
+        about = found.described(one)
+        fails = f"; fails: {' '.join(about['fails'])}" if about["fails"] else ""
+        yield (
+            f"{about['holds']:3} of {len(found.statements)} hold, implausibility {about['implausibility']:.2f} "
+            f"({about['plausibility']}), setting {one.number}{fails}"
+        )
+    if found.best is not None:
+        yield "values of the best:"
+        distances = found.prior.distances(found.best.values)
+        for key, value in found.best.values.items():
+            shown = f"{value:.4g}" if isinstance(value, float) else str(value)
+            yield f"  {key} = {shown}" + (f"  ({distances[key]:+.2f})" if key in distances else "")
