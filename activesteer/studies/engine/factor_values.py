@@ -76,8 +76,9 @@ class FactorValues:
         """
         label = label_of(self.study.maneuvers[maneuver])
         found = {}
-        for key, value in values.items():
-            factor = self._factors.get(key)
+        # In the order of the file, in which a factor follows the one to which it is relative.
+        for key in dict.fromkeys([*(key for key in self._factors if key in values), *values]):
+            value, factor = values[key], self._factors.get(key)
             if value is None or (factor is not None and factor.maneuvers and label not in factor.maneuvers):
                 continue
             if factor is not None and any(values.get(other) != needed for other, needed in factor.when.items()):
