@@ -221,8 +221,9 @@ class _Search:
         centre = rng.random(len(self.prior.searched)) if anywhere or best is None else self.prior.point(best.values)
         limit = np.inf if anywhere or best is None else self._cost(best)
         sigma = 0.3 if anywhere else table.spread * (1.0 if len(block) == len(centre) else 1.5)
+        start = np.clip(centre[block], 1e-3, 1.0 - 1e-3)
         strategy = cma.CMAEvolutionStrategy(
-            np.clip(centre[block], 1e-3, 1.0 - 1e-3),
+            start if len(block) > 1 else np.append(start, 0.5),  # cma needs two; the second has no effect
             sigma,
             {"bounds": [0.0, 1.0], "popsize": table.population, "seed": number + 1 + 1000 * self.study.seed,
              "verbose": -9},
@@ -233,7 +234,7 @@ class _Search:
             points = []
             for some in asked:
                 point = centre.copy()
-                point[block] = some
+                point[block] = some[: len(block)]
                 points.append(point)
             costs = self.evaluate(points, [f"r{number}"] * len(points), limit + table.slack)
             limit = min(limit, *costs)
