@@ -78,9 +78,9 @@ class MatchTable:
     slack: Annotated[float, Range(0.0)] = 2.5
     """A setting is given up when its failed statements cost this much more than those of the best setting."""
     population: Annotated[int, Range(4, 1000)] = 14
-    """Settings of a generation of the evolution strategy."""
+    """Largest number of settings of a generation of the evolution strategy."""
     generations: Annotated[int, Range(1, 10_000)] = 25
-    """Generations of a round over all factors; a round over the factors of some manoeuvres has a quarter of them."""
+    """Generations of a round over all factors; a round over some of them has a quarter of them."""
     spread: Annotated[float, Range(1e-3, 0.5)] = 0.08
     """Standard deviation of the first generation, in units of the ranges."""
     explore_every: Annotated[int, Range(0, 1000)] = 0

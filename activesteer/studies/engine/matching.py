@@ -1,7 +1,7 @@
 """Match: settings of a study's factors in which as many statements as possible hold.
 
-An evolution strategy (CMA-ES) searches the unit cube of the priors, in rounds: over all factors, then over the factors
-of some manoeuvres alone, whose other scenarios need not be driven again. The cost of a setting is the sum over its
+An evolution strategy (CMA-ES) searches the unit cube of the priors, in rounds: over the factors of one table and the
+same manoeuvres, whose other scenarios need not be driven again, and over all. The cost of a setting is the sum over its
 statements: 1 to 2 for one that fails, by its distance, and a little for one that holds by a thin margin; implausible
 numbers cost a little too. Scenarios are driven one after the other, and a setting that cannot come near the best one of
 its round is given up.
@@ -197,18 +197,21 @@ class _Search:
             if self.store.evaluations >= total:
                 return
             turn, place = divmod(number, len(blocks))
-            anywhere = place == 0 and table.explore_every and turn % table.explore_every == table.explore_every - 1
+            anywhere = (
+                place == len(blocks) - 1
+                and table.explore_every
+                and turn % table.explore_every == table.explore_every - 1
+            )
             self._round(number, blocks[place], anywhere=bool(anywhere))
 
     def _blocks(self) -> list[list[int]]:
-        """Return the coordinates of each kind of round: all, then those of the same manoeuvres."""
+        """Return the coordinates of each kind of round: those of one table and the same manoeuvres, and all."""
         searched = self.prior.searched
-        groups: dict[tuple[str, ...], list[int]] = {}
+        groups: dict[tuple[object, ...], list[int]] = {}
         for place, factor in enumerate(searched):
-            if factor.maneuvers and len(factor.maneuvers) < len(self.names):
-                groups.setdefault(factor.maneuvers, []).append(place)
-        small = [block for block in groups.values() if len(block) > 1]
-        return [list(range(len(searched))), *small] if len(searched) > len(small[0] if small else ()) else small
+            groups.setdefault((factor.maneuvers or factor.key.partition(".")[0]), []).append(place)
+        whole = list(range(len(searched)))
+        return [whole] if len(groups) == 1 else [*groups.values(), whole]
 
     def _round(self, number: int, block: list[int], *, anywhere: bool) -> None:
         """Make generations of the evolution strategy around the best setting, or anywhere."""
@@ -221,11 +224,12 @@ class _Search:
         centre = rng.random(len(self.prior.searched)) if anywhere or best is None else self.prior.point(best.values)
         limit = np.inf if anywhere or best is None else self._cost(best)
         sigma = 0.3 if anywhere else table.spread * (1.0 if len(block) == len(centre) else 1.5)
+        size = min(table.population, 4 + round(3.0 * np.log(len(block) + 1)))
         start = np.clip(centre[block], 1e-3, 1.0 - 1e-3)
         strategy = cma.CMAEvolutionStrategy(
             start if len(block) > 1 else np.append(start, 0.5),  # cma needs two; the second has no effect
             sigma,
-            {"bounds": [0.0, 1.0], "popsize": table.population, "seed": number + 1 + 1000 * self.study.seed,
+            {"bounds": [0.0, 1.0], "popsize": size, "seed": number + 1 + 1000 * self.study.seed,
              "verbose": -9},
         )  # fmt: skip
         whole = len(block) == len(centre)

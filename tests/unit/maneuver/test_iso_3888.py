@@ -20,6 +20,14 @@ def test_lanes_of_part_1(b):
     assert [0.5 * (lane.left_y_m + lane.right_y_m) for lane in (entry, aside, back)] == pytest.approx([0, 3.5, 0])
 
 
+def test_a_course_that_resembles_the_standard_is_scaled():
+    entry, aside, back = lanes("iso_3888_1", 2.0, 30.0, 1.0, 0.8, 0.5)
+    assert [lane.start_x_m for lane in (entry, aside, back)] == [30.0, 66.0, 106.0]
+    assert aside.end_x_m - aside.start_x_m == pytest.approx(20.0)
+    assert 0.5 * (aside.left_y_m + aside.right_y_m) == pytest.approx(1.75)
+    assert aside.left_y_m - aside.right_y_m == pytest.approx(2.65)  # the width is the car's
+
+
 @pytest.mark.parametrize("b", WIDTHS)
 def test_lanes_of_part_2(b):
     entry, aside, back = lanes("iso_3888_2", b, 10.0, 1.0)

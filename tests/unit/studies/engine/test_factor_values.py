@@ -37,6 +37,18 @@ def test_a_relative_factor_starts_from_each_manoeuvre() -> None:
     assert values.overrides(1, 0, sample) == {"speed_kmh": pytest.approx(66.0), "road.mu": pytest.approx(0.6)}
 
 
+def test_a_factor_follows_an_earlier_one() -> None:
+    factors = {
+        "road.mu": {"uniform": [0.3, 0.9]},
+        "speed_kmh": {"grid": [100.0], "nominal": "times", "of": "road.mu"},
+    }
+    values = FactorValues(read_study(table(**factors)))
+    # The order of the sample does not count, that of the file does.
+    assert values.overrides(0, 0, {"speed_kmh": 100.0, "road.mu": 0.5})["speed_kmh"] == pytest.approx(50.0)
+    with pytest.raises(StudyError, match="no earlier factor"):
+        FactorValues(read_study(table(**dict(reversed(factors.items())))))
+
+
 def test_a_factor_of_a_value_of_another_leaves_all_other_samples_alone() -> None:
     sensors = {
         "sensors.preset": {"choice": ["ideal", "production"]},
