@@ -321,12 +321,11 @@ def judge_again(changed: dict[str, str], jobs: int | None) -> Population:
         pq.write_table(table, target, compression="zstd", compression_level=19)
     nominal = [Claim(STATEMENTS[claim.id], claim.passed, {}) for claim in stored.claims]
     again = summarise(stored_runs(), population_study(stored.samples, stored.seed), nominal)
-    again = replace(
-        stored, claims=tuple(again.of(claim.id) if claim.id in changed else claim for claim in stored.claims)
-    )
-    for claim in changed:
-        before, after = stored.of(claim), again.of(claim)
-        print(f"{claim}: {percent(before.share)} % before, now {percent(after.share)} %")
+    judged = {claim.id: claim for claim in again.claims}
+    for before in (claim for claim in stored.claims if claim.id in changed):
+        print(f"{before.id}: {percent(before.share)} % before, now {percent(judged[before.id].share)} %")
+    kept = tuple(judged[claim.id] if claim.id in changed else claim for claim in stored.claims)
+    again = replace(stored, claims=kept)
     print(f"{len(wanted)} samples driven again: {store_summary(again, STUDY)}")
     return again
 

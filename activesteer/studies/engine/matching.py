@@ -207,11 +207,12 @@ class _Search:
     def _blocks(self) -> list[list[int]]:
         """Return the coordinates of each kind of round: those of one table and the same manoeuvres, and all."""
         searched = self.prior.searched
-        groups: dict[tuple[object, ...], list[int]] = {}
+        groups: dict[tuple[str, ...], list[int]] = {}
         for place, factor in enumerate(searched):
-            groups.setdefault((factor.maneuvers or factor.key.partition(".")[0]), []).append(place)
+            groups.setdefault(factor.maneuvers or (*self.names, factor.key.partition(".")[0]), []).append(place)
         whole = list(range(len(searched)))
-        return [whole] if len(groups) == 1 else [*groups.values(), whole]
+        cheapest_first = [groups[key] for key in sorted(groups, key=len)]
+        return [whole] if len(groups) == 1 else [*cheapest_first, whole]
 
     def _round(self, number: int, block: list[int], *, anywhere: bool) -> None:
         """Make generations of the evolution strategy around the best setting, or anywhere."""

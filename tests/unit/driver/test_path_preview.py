@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -173,7 +174,9 @@ def test_gains_of_the_path_fade_with_the_distance_and_leave_nothing_to_the_road_
 
 
 def test_a_driver_of_one_point_has_all_gain_there_and_corrects_an_offset_as_strongly() -> None:
-    many, one = (steering_gains(22.0, matrices, somebody(preview_points=points), RATIO) for points in ("all", "one"))
+    many, one = (
+        steering_gains(22.0, matrices, replace(somebody(), preview_points=points), RATIO) for points in ("all", "one")
+    )
     assert np.count_nonzero(one.per_path_radpm) == 1
     assert one.per_path_radpm[-1] == pytest.approx(many.per_path_radpm.sum())
     assert one.per_yaw_rate_s == many.per_yaw_rate_s

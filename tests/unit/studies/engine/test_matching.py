@@ -67,6 +67,7 @@ def test_a_hopeless_setting_is_given_up_before_its_other_scenarios(tmp_path):
     table["match"] = {**TABLE["match"], "statements": wanted, "slack": 0.1, "evaluations": 12}
     found = match(table, tmp_path, jobs=1)
     assert any(len(one.scenarios) == 1 for one in found.candidates)
+    assert found.best is not None
     assert len(found.best.holding) == 2
 
 
