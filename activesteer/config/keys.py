@@ -23,7 +23,8 @@ _EDGE_UNITS: Final = {
 
 
 def spellings(name: str) -> list[str]:
-    """Return the keys that fill a field: its name, and the name in a display unit."""
+    """Return the keys that fill a field: its name, and the name in a display unit; `class` fills `class_`."""
+    name = name.removesuffix("_")
     edges = [name[: -len(si)] + edge for edge, (si, _) in _EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]
 
@@ -40,8 +41,9 @@ def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, flo
     """
     if not isinstance(key, str):
         return None, 1.0
-    if key in fields:
-        return key, 1.0
+    for name in (key, f"{key}_"):
+        if name in fields:
+            return name, 1.0
     for edge, (si, factor) in _EDGE_UNITS.items():
         if key.endswith(edge) and key[: -len(edge)] + si in fields:
             return key[: -len(edge)] + si, factor

@@ -174,7 +174,7 @@ def to_table(value: Any, *, defaults: bool = True) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         values = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
         return {
-            field.name: to_table(item, defaults=defaults)
+            field.name.removesuffix("_"): to_table(item, defaults=defaults)
             for field, item in values.items()
             if item is not None and (defaults or item != field.default)
         }

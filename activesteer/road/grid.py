@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from activesteer.conventions import Array
 
 
@@ -23,3 +25,27 @@ class Grid(NamedTuple):
     d_m: float
     step_d_m: float
     z_m: Array
+
+    @property
+    def s(self) -> Array:
+        """Distances of the rows [m]."""
+        return self.s_m + self.step_s_m * np.arange(self.z_m.shape[0])
+
+    @property
+    def d(self) -> Array:
+        """Distances of the columns [m]."""
+        return self.d_m + self.step_d_m * np.arange(self.z_m.shape[1])
+
+
+def summed(fine: Grid, other: Grid) -> Grid:
+    """Return the sum of two grids on the columns and steps of the first one, over the rows of both.
+
+    Beyond its edges each grid is constant.
+    """
+    first = min(0, round((other.s_m - fine.s_m) / fine.step_s_m))
+    last = max(fine.z_m.shape[0], round((other.s[-1] - fine.s_m) / fine.step_s_m) + 1)
+    s = fine.s_m + fine.step_s_m * np.arange(first, last)
+    rows = np.clip(np.arange(first, last), 0, fine.z_m.shape[0] - 1)
+    across = np.array([np.interp(fine.d, other.d, row) for row in other.z_m])
+    more = np.column_stack([np.interp(s, other.s, column) for column in across.T])
+    return fine._replace(s_m=float(s[0]), z_m=fine.z_m[rows] + more)

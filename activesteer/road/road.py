@@ -20,10 +20,13 @@ from activesteer.config import Range, Source, build
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, RecordingError, nearest_names
 from activesteer.road.course import Course, course_of
-from activesteer.road.grid import Grid
+from activesteer.road.crg import unpacked
+from activesteer.road.grid import Grid, summed
 from activesteer.road.obstacle import Obstacle
 from activesteer.road.path import Path
+from activesteer.road.profile import ProfileTable
 from activesteer.road.recorded import fail, table_of
+from activesteer.road.roughness import Roughness
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 
@@ -174,6 +177,18 @@ class Road:
     """Bank of the whole road [rad]; positive if the left side is higher, as for a right-hand curve."""
     obstacle: tuple[Obstacle, ...] = ()
     """Bumps, cleats, kerbs, potholes, cross slopes and waves; their heights add up."""
+    profile: str | None = None
+    """CSV file with the columns s_m and z_m, or s_m, left_z_m and right_z_m: a path, or a name in the manoeuvre's
+    folder."""
+    heights: ProfileTable | None = None
+    """Heights of two tracks over the distance. Default: those of the CSV."""
+    roughness: Roughness | None = None
+    """Random roughness of ISO 8608. Default: none."""
+    crg: str | None = None
+    """OpenCRG file: a path, or a name in the manoeuvre's folder. The car enters it at `start_m`. Its reference line is
+    that of the road, unless the road is laid along a path."""
+    crg_data: tuple[str, ...] = ()
+    """Content of that file, compressed, as recordings keep it."""
     banking: BankingTable | None = None
     """Bank over the distance, as for a banked curve. Default: none."""
     contact: Literal["auto", "single_point", "four_point", "enveloping"] = "auto"
@@ -200,10 +215,18 @@ class Road:
         ):  # fmt: skip
             if getattr(self, key) != default and not needed:
                 raise ManeuverError("has no effect on a road without such a surface; leave it out", key=key)
+        if self.crg_data:
+            unpacked(self.crg_data)
+            if others := [key for key in ("heights", "roughness", "banking") if getattr(self, key) is not None]:
+                raise ManeuverError(f"cannot be combined with {' and '.join(others)}", key="crg")
+        elif self.crg is not None:
+            raise ManeuverError("is not read; build the road from a manoeuvre", key="crg")
+        if self.profile is not None and self.heights is None:
+            raise ManeuverError("is not read; build the road from a manoeuvre, or give heights", key="profile")
 
     @property
     def _is_gridded(self) -> bool:
-        return False
+        return self.heights is not None or self.roughness is not None or bool(self.crg_data)
 
     @property
     def is_uneven(self) -> bool:
@@ -224,17 +247,26 @@ class Road:
         Raises:
             ManeuverError: the road follows the path, and the manoeuvre has none.
         """
+        values = [getattr(self, field.name) for field in fields(Road)]
         if self.along == "x":
-            return self
+            line = unpacked(self.crg_data).line if self.crg_data else None
+            if line is None:
+                return self
+            ahead = np.linspace(0.0, self.start_m, 1 + math.ceil(self.start_m))[:-1]
+            x, y = np.append(ahead, self.start_m + line.x_m), np.append(0.0 * ahead, line.y_m)
+            return LaidRoad(*values, path=Path.through(x, y))
         if course is None:
             raise ManeuverError(
                 "is 'path', but this manoeuvre sets the steering wheel and has no path; use 'x'", key="road.along"
             )
-        return LaidRoad(*(getattr(self, field.name) for field in fields(Road)), path=course.path)
+        return LaidRoad(*values, path=course.path)
 
     def grid(self) -> Grid | None:
         """Return the heights of the surface without obstacles and banking; None if there are none."""
-        return None
+        if self.crg_data:
+            return unpacked(self.crg_data).grid._replace(s_m=self.start_m)
+        grids = [part.grid() for part in (self.roughness, self.heights) if part is not None]
+        return summed(*grids) if len(grids) > 1 else grids[0] if grids else None
 
     def cross_slopes(self) -> tuple[float, float, Array] | None:
         """Return first distance, step [m] and cross slopes of `banking`; None without it."""
@@ -307,7 +339,7 @@ def road_of(metadata: Mapping[str, Any]) -> Road:
     table = table_of(maneuver.get("road", {}), "maneuver.road")
     road = build(Road, table, Source("the metadata of the recording", error=RecordingError), ("maneuver", "road"))
     if road.along == "x":
-        return road
+        return road.laid(None)
     if (course := course_of(metadata)) is None:
         raise fail("maneuver.road.along", "is 'path', but the recording has no course")
     return road.laid(course)

@@ -13,6 +13,7 @@ from activesteer.controllers import ControllerSetup
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
 from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
+from activesteer.maneuver.road_files import with_road_files
 from activesteer.plugins import Plugin
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
@@ -119,9 +120,10 @@ def resolve(
     if any(field.name == "vehicle_width_m" for field in fields(kind)):
         table = {"vehicle_width_m": car.config.width_m, **table}
     table, csv_files = kind.filled_from_csv(table, folder, source)
+    table, road_files = with_road_files(table, folder, source)
     who = driver_with(driver, sorted_out["driver"])
     own = own_values({one.given: one.value for one in sorted_out["controllers"]}, owned)
-    made_from = {**files, **csv_files, **car.files, **who.files}
+    made_from = {**files, **csv_files, **road_files, **car.files, **who.files}
     built = build_maneuver(table, source)
     if is_recording(maneuver):
         built = build_maneuver(led(table, car.on(built.ground).steering_lag_s), source)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE, brake_setup, reset
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
-from activesteer.errors import ActiveSteerError, ModelError, ParameterError, shown
+from activesteer.errors import ActiveSteerError, ModelError, ParameterError, SimulationDiverged, shown
 from activesteer.road.road import Road
 from activesteer.sensors import SensorBlock
 from activesteer.sensors.block import speed_radii
@@ -324,8 +324,16 @@ class Vehicle(Uncopyable):
         """Check for warnings of the engine and for values that are not finite, commands first.
 
         Raises:
-            SimulationDiverged: there is a warning or such a value.
+            SimulationDiverged: there is a warning or such a value, or a wheel has left the known surface of a road
+                where this is an error.
         """
+        outputs = fb.wheel_outputs(self.data, len(CORNERS))
+        for corner, wheel in zip(CORNERS, outputs, strict=True):
+            if math.isnan(wheel["road_z_m"]) and math.isfinite(wheel["fz_N"]):
+                raise SimulationDiverged(
+                    f"the {corner} wheel leaves the known surface of the road at x = {wheel['contact_x_m']:.2f} m, y = "
+                    f"{wheel['contact_y_m']:.2f} m, {self.data.time:.3f} s; road.outside = 'extend' extends its edge"
+                )
         speed_mps = float(self._velocimeter[0])
         raise_if_diverged(self.model, self.data, self.rows.commands, speed_mps)
 

@@ -162,8 +162,6 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
                 surface, heights, obstacles, cams[index], along, across, cos, sin, stretch, hx, hy, p.UNLOADED_RADIUS
             )
             axes = plane_axes(forward, sideways, hx, hy)
-            if surface.ends != 0.0 and left_grid(surface, along, across):
-                road_z = math.nan  # noticed like any value that is not finite; `Vehicle.check` says why
             height = _across(
                 axes, 0, xpos[3 * body] - contact_x, xpos[3 * body + 1] - contact_y, xpos[3 * body + 2] - road_z
             )
@@ -225,6 +223,8 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
         out.contact_x_m = contact_x
         out.contact_y_m = contact_y
         out.road_z_m = road_z
+        if uneven and surface.ends != 0.0 and left_grid(surface, along, across):
+            out.road_z_m = math.nan  # noticed like any value that is not finite; `Vehicle.check` says why
         out.road_slope_x = forward
         out.road_slope_y = sideways
         px, py, pz = to_x + arm_x, to_y + arm_y, to_z + arm_z

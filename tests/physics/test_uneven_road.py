@@ -10,7 +10,7 @@ import pytest
 
 import activesteer
 from activesteer.conventions import GRAVITY_MPS2
-from activesteer.errors import ManeuverError, ParameterError
+from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.road.obstacle import Obstacle
 from activesteer.road.road import Road
@@ -143,3 +143,46 @@ def test_linear_analyses_refuse_an_uneven_or_banked_road() -> None:
 def test_a_wrong_road_is_refused_with_its_key(road: dict[str, Any], problem: str) -> None:
     with pytest.raises(ManeuverError, match=problem):
         drive(road)
+
+
+def test_over_a_crest_and_through_a_dip_the_loads_carry_mass_times_gravity_less_or_more_the_centripetal_part() -> None:
+    radius_m, speed = 400.0, 25.0
+    s = np.arange(0.0, 321.0)
+    bends = np.select([(s > 40) & (s <= 100), (s > 100) & (s <= 220), (s > 220) & (s <= 280)], [1.0, -1.0, 1.0])
+    slope = np.concatenate([[0.0], np.cumsum(0.5 * (bends[1:] + bends[:-1]))]) / radius_m
+    z = np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]))])
+    road = {"heights": {"s_m": list(s), "left_z_m": list(z)}, "start_m": 3.0}
+    recording = drive(road, 3.6 * speed, 9.0)
+    loads, x = corners(recording, "tyre_fz_N").sum(axis=1), recording["x_m"]
+    mass, centripetal = mass_kg(car()), speed**2 / radius_m
+    # The body's heave has decayed 45 m into each bend; the slope there is at most 0.14 (cosine 0.99).
+    for places, expected in (((85.0, 97.0), GRAVITY_MPS2 + centripetal), ((150.0, 170.0), GRAVITY_MPS2 - centripetal)):
+        inside = (x > places[0]) & (x < places[1])
+        assert loads[inside].mean() == pytest.approx(mass * expected, rel=0.015)
+
+
+def test_on_a_rough_road_the_energy_of_a_coasting_car_only_falls_and_dampers_take_it() -> None:
+    # Coasting without drag of brakes: what the car loses beyond a plane road goes into dampers and tyres.
+    coast = {"drive": "coast", "settle_s": 2.0}
+    plane = drive({}, 80.0, 6.0, **coast)
+    rough = drive({"roughness": {"class": "D", "seed": 4, "length_m": 200.0}}, 80.0, 6.0, **coast)
+
+    def energy_J(recording: Recording) -> np.ndarray:
+        mass = mass_kg(car())
+        return (
+            0.5 * mass * (recording["vx_mps"] ** 2 + recording["vz_mps"] ** 2) + mass * GRAVITY_MPS2 * recording["z_m"]
+        )
+
+    lost = [float(energy_J(run)[0] - energy_J(run)[-200:].mean()) for run in (plane, rough)]
+    travel = corners(rough, "travel_m")
+    dissipated = -np.sum(corners(rough, "damper_force_N")[1:] * -np.diff(travel, axis=0))
+    assert lost[1] > lost[0] > 0.0
+    # The dampers, at ratios of 0.9 to 1 to the wheel, take most of the difference; the rest is slip of the tyres.
+    assert 0.5 * dissipated < lost[1] - lost[0] < 2.0 * dissipated
+
+
+def test_leaving_the_known_surface_ends_the_run_if_that_is_an_error() -> None:
+    roughness = {"class": "A", "length_m": 30.0}
+    with pytest.raises(SimulationDiverged, match=r"f. wheel leaves the known surface of the road at x = 29\.9"):
+        drive({"roughness": roughness, "outside": "error"}, 60.0, 4.0)
+    assert drive({"roughness": roughness}, 60.0, 4.0)["fl_road_z_m"][-1] == pytest.approx(0.0, abs=0.05)
