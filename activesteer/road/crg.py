@@ -317,11 +317,12 @@ def _places(head: dict[str, float], names: list[str]) -> Array:
     count = len(names)
     right, left = head.get("long_section_v_right"), head.get("long_section_v_left")
     if right is not None and left is not None:
-        return np.linspace(right, left, count)
+        return np.linspace(right, left, count, dtype=np.float64)
     step = head.get("long_section_v_increment")
     if step is None or not step > 0.0:
         raise ManeuverError("does not say where its long sections lie")
-    return step * (np.arange(count) - 0.5 * (count - 1)) if right is None else right + step * np.arange(count)
+    first = -0.5 * step * (count - 1) if right is None else right
+    return first + step * np.arange(count, dtype=np.float64)
 
 
 def _channel(along: Mapping[str, Array], name: str, constant: float, rows: int) -> Array:

@@ -92,7 +92,7 @@ def _grid(it: Roughness) -> Grid:
         n = frequency[part]
         level = np.sqrt(it.level_m3 * (n / REFERENCE_1PM) ** -2.0 / (count * STEP_M))
         normal = random.standard_normal((part.size, columns, 2)) @ np.array([1.0, 1j])
-        factor = np.linalg.cholesky(_coherence(n, across * np.arange(columns)))
+        factor = np.linalg.cholesky(_coherence(n, across * np.arange(columns, dtype=np.float64)))
         lines[:, part] = (level[:, None] * np.einsum("fij,fj->fi", factor, normal)).T
     heights = np.fft.irfft(0.5 * count * lines, count, axis=1).T
     return Grid(0.0, STEP_M, -0.5 * it.width_m, across, np.ascontiguousarray(heights))
