@@ -34,6 +34,12 @@ PINION_M: Final = 0.0075
 TRAVEL_M: Final = np.linspace(-0.08, 0.08, 33)
 FORCE_N: Final = np.linspace(-4000.0, 4000.0, 17)
 TYRE_WIDTH_M: Final = 0.245
+MOTOR: Final = {
+    "speed_radps": [0.0, 1900.0], "torque_Nm": [330.0, 330.0], "max_power_W": 150e3, "gear_ratio": 9.7,
+    "efficiency": 0.9, "idle_loss_W": 300.0, "lag_s": 0.05, "rotor_inertia_kgm2": 0.0425,
+}  # fmt: skip
+"""The motor of each axle of a 85D, as a guess: 330 N m and half of the power of the car; its gear is the maker's, its
+efficiency, loss, lag and inertia are assumptions."""
 WHEEL_KG: Final = 23.57
 """Of each wheel: `Iwf` and `Iwr` are those of a disc of 47.15 kg with the radius `r_stat0`, and that is what the
 regression of the source's institute gives for both wheels of an axle (TUMFTM/TOTEM, after Fuchs, TUM 2014)."""
@@ -200,11 +206,13 @@ def car_table(given: dict[str, Any]) -> str:
         },
         "steering": {"rack_limit_m": round(PINION_M * np.radians(455.0), 4)},
         "brakes": {"front_torque_Nm": 3600.0, "rear_torque_Nm": 1700.0, "drag_torque_Nm": 3.0},
-        # A 85D as a guess: both axles driven, one gear (9.7), 386 kW.
+        # A 85D as a guess: both axles driven, as in the source (FWD and RWD are 1).
         "powertrain": {
             "front_fraction": 0.5, "max_torque_Nm": 6400.0, "max_power_W": 300e3, "engine_brake_torque_Nm": 1200.0,
-            "max_wheel_speed_radps": 195.0, "inertia_kgm2": 8.0, "lag_s": 0.05,
+            "max_wheel_speed_radps": 195.0,
         },
+        "motors": {"front": MOTOR, "rear": MOTOR},
+        "battery": {"discharge_power_W": 340e3, "charge_power_W": 60e3, "auxiliary_power_W": 500.0},
         "aerodynamics": {"drag_area_m2": given["cx"], "pressure_point_m": [-1.48, 0.0, 0.6]},
     }  # fmt: skip
     for axle, end, x in (("front", "F", 0.0), ("rear", "R", -given["l"])):

@@ -10,6 +10,7 @@ from activesteer.brakes.parameters import Brakes
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle.electric_drive import Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind
 from activesteer.vehicle_builder.design import Axle, Car, Link, Log, Solid
@@ -75,6 +76,9 @@ def complete(
         brakes = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0, drag_torque_Nm=1.5)
         log.note("brakes", "2200 and 700 N m per wheel", "the compact's: 1.35 g of a car of 1430 kg, 76 % in front")
     powertrain = table.powertrain
+    if powertrain is None and table.motors is not None:
+        powertrain = pedal_of(table.motors)
+        log.note("powertrain", "all of the motors' torque and power; 15 % of the torque on release", "a usual pedal")
     if powertrain is None:
         powertrain = Powertrain(
             front_fraction=1.0, max_torque_Nm=3170.0, max_power_W=101e3, engine_brake_torque_Nm=345.0, inertia_kgm2=3.7
@@ -105,6 +109,18 @@ def complete(
         aero,
         log.assumptions,
     )  # fmt: skip
+
+
+def pedal_of(motors: Motors) -> Powertrain:
+    """Return a powertrain whose pedal demands all that the motors can give."""
+    front_Nm, rear_Nm = (sum(motor.wheel_torque_Nm for motor in motors.on(axle)) for axle in ("front", "rear"))
+    return Powertrain(
+        front_fraction=round(front_Nm / (front_Nm + rear_Nm), 3),
+        max_torque_Nm=front_Nm + rear_Nm,
+        max_power_W=round(sum(motor.power_W for _, motor in motors), 1),
+        engine_brake_torque_Nm=round(0.15 * (front_Nm + rear_Nm), 1),
+        max_wheel_speed_radps=round(min(motor.speed_radps[-1] / motor.gear_ratio for _, motor in motors), 2),
+    )
 
 
 def _axle(

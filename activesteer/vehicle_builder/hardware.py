@@ -1,4 +1,4 @@
-"""Actuators and sensors of a table: tables of a vehicle file, copied unchanged."""
+"""Actuators, motors and sensors of a table: tables of a vehicle file, copied unchanged."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, Final, Protocol
 
 from activesteer.config import to_table
 from activesteer.sensors.parameters import Sensors
+from activesteer.vehicle.electric_drive import Battery, Motors
 from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle.superposition_actuator import SuperpositionActuator
 
@@ -15,7 +16,7 @@ _DIGITS: Final = 7
 
 
 class Hardware(Protocol):
-    """Source of actuators and sensors: a table of a car, or a vehicle file."""
+    """Source of actuators, motors and sensors: a table of a car, or a vehicle file."""
 
     @property
     def rear_actuator(self) -> RearActuator | None:
@@ -28,13 +29,23 @@ class Hardware(Protocol):
         ...
 
     @property
+    def motors(self) -> Motors | None:
+        """Electric motors."""
+        ...
+
+    @property
+    def battery(self) -> Battery | None:
+        """Battery of the motors."""
+        ...
+
+    @property
     def sensors(self) -> Sensors | None:
         """Sensors of the controllers."""
         ...
 
 
 def hardware_tables(part: Hardware) -> dict[str, Any]:
-    """Return the tables [rear_actuator], [superposition_actuator] and [sensors] that are not empty.
+    """Return the tables of actuators, motors, battery and sensors that are not empty.
 
     Args:
         part: A table of a car, or a vehicle file.
@@ -45,6 +56,8 @@ def hardware_tables(part: Hardware) -> dict[str, Any]:
     tables = {
         "rear_actuator": to_table(part.rear_actuator or RearActuator(), defaults=False),
         "superposition_actuator": to_table(part.superposition_actuator or SuperpositionActuator(), defaults=False),
+        "motors": to_table(part.motors or Motors(), defaults=False),
+        "battery": to_table(part.battery or Battery(), defaults=False),
         "sensors": _sensors(part.sensors or Sensors()),
     }
     return {name: in_degrees(table) for name, table in tables.items() if table}

@@ -16,6 +16,7 @@ from activesteer.config import Range, Source, build, read_toml
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import read_csv
 from activesteer.sensors.parameters import Sensors
+from activesteer.vehicle.electric_drive import Battery, Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle.superposition_actuator import SuperpositionActuator
@@ -197,6 +198,10 @@ class CarTable:
     """Actuator of the rear wheels. Default: the hinges of the model."""
     superposition_actuator: SuperpositionActuator | None = None
     """Actuator of the superposition. Default: the servo of the model."""
+    motors: Motors | None = None
+    """Electric motors on wheels or axles. Default: none."""
+    battery: Battery | None = None
+    """Battery of the motors. Default: without limits."""
     sensors: Sensors | None = None
     """Sensors of the controllers. Default: ideal sensors."""
 

@@ -31,8 +31,11 @@ _REMARKS: Final = {
     "brakes": "Torque per wheel at full pedal.",
     "rear_actuator": "Replaces the hinges of the model.",
     "superposition_actuator": "Replaces the servo of the model.",
+    "battery": "Limits at the terminals.",
     "sensors": "Sensors that the controllers read.",
-    "powertrain": "At the wheels: torques in first gear, power, rev limit in top gear.",
+    "powertrain": (
+        "At the wheels: torques in first gear, power, rev limit in top gear; of axles with motors, limits of the pedal."
+    ),
     "controllers.desired_yaw_rate": (
         "Controllers of the compact as a start; their gains belong to that car. Adapt them to the lateral acceleration "
         "that\nthis car reaches without control (max_lateral_acceleration_mps2) and to the lags of its servos; see the "

@@ -7,6 +7,7 @@ import typing
 from typing import Any, Final
 
 from activesteer.config import Range, dataclass_in
+from activesteer.vehicle.electric_drive import Motor, Motors
 from tests.unit.vehicle_builder.other_curves import other_curves
 
 _WORDS: Final = {
@@ -14,7 +15,10 @@ _WORDS: Final = {
     "rolling_radius": "third_of_deflection", "trail_load": "scaled", "source": "identified",
 }  # fmt: skip
 """Texts that are one of some words."""
-_WHOLE: Final = {"curves": other_curves()}
+_MOTOR: Final = Motor(
+    (0.0, 100.0, 300.0), (40.0, 30.0, 5.0), 4e3, 7.0, 0.8, 12.0, 0.7, 0.03, 500.0, 0.02, "splitting", 60.0
+)
+_WHOLE: Final = {"curves": other_curves(), "motors": Motors(rear=_MOTOR)}
 """Tables whose values belong together."""
 
 

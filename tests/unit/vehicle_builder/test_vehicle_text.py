@@ -15,9 +15,11 @@ from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
 from activesteer.scenario.car import VehicleConfig
 from activesteer.sensors.parameters import Sensors
+from activesteer.vehicle.electric_drive import Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle.rear_actuator import RearActuator
 from activesteer.vehicle_builder import new_vehicle
+from activesteer.vehicle_builder.completion import pedal_of
 from tests.raising import raises
 from tests.unit.vehicle_builder.other_values import all_changed, other_values
 from tests.unit.vehicle_builder.tables import COMPACT
@@ -30,7 +32,9 @@ def changed() -> dict[str, Any]:
 
 @pytest.mark.parametrize("table", [field.name for field in dataclasses.fields(VehicleConfig)])
 def test_every_table_that_is_written_is_read_back_equal(changed: dict[str, Any], table: str) -> None:
-    config = dataclasses.replace(load_car("compact").config, **{table: changed[table]})
+    # A battery is one of motors.
+    others = {"motors": changed["motors"]} if table == "battery" else {}
+    config = dataclasses.replace(load_car("compact").config, **{table: changed[table]}, **others)
     text = toml_text(to_table(config, defaults=False))
     assert build(VehicleConfig, tomllib.loads(text), Source("written")) == config
 
@@ -67,6 +71,16 @@ seed = 7
 
 [sensors.yaw_rate]
 noise_degps = 0.2
+
+[motors.rear]
+speed_radps = [0.0, 400.0, 1500.0]
+torque_Nm = [300.0, 300.0, 90.0]
+gear_ratio = 9.0
+differential = "splitting"
+split_torque_Nm = 1200.0
+
+[battery]
+discharge_power_W = 100e3
 """
 
 
@@ -80,6 +94,8 @@ def test_actuators_and_sensors_of_a_table_are_those_of_the_new_car(tmp_path: Pat
     wanted = build(Sensors, asked["sensors"], Source("asked"))
     assert config.sensors.yaw_rate.noise_radps == pytest.approx(wanted.yaw_rate.noise_radps, rel=1e-6)
     assert dataclasses.replace(config.sensors, yaw_rate=wanted.yaw_rate) == wanted
+    assert config.motors == build(Motors, asked["motors"], Source("asked"))
+    assert config.battery.discharge_power_W == 100e3
     # What the presets say is left to them.
     written = tomllib.loads(made.read_text(encoding="utf-8"))
     assert set(written["rear_actuator"]) == {"preset", "limit_deg", "backlash_m"}
@@ -102,3 +118,10 @@ def test_a_wrong_actuator_or_sensor_is_refused_before_the_car_is_made(
     with raises(ParameterError, file="own.toml", key=key):
         new_vehicle("own", own, tmp_path / "own")
     assert not (tmp_path / "own").exists()
+
+
+def test_a_car_of_motors_alone_has_a_pedal_that_demands_all_of_them() -> None:
+    pedal = pedal_of(build(Motors, tomllib.loads(HARDWARE)["motors"], Source("asked")))
+    assert (pedal.front_fraction, pedal.max_torque_Nm, pedal.max_wheel_speed_radps) == (0.0, 2700.0, 166.67)
+    # The map's greatest power: 300 N m less 0.1909 N m per rad/s beyond 400 rad/s, at 985.7 rad/s.
+    assert pedal.max_power_W == pytest.approx(985.714 * (300.0 - 210.0 / 1100.0 * 585.714), rel=1e-5)
