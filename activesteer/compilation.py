@@ -26,6 +26,7 @@ from llvmlite.binding import get_host_cpu_name
 from numba import njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
+from numba.extending import intrinsic, register_jitable
 from numba.np import linalg
 
 _VERSIONS: Final = ("numba", "llvmlite", "numpy", "mujoco")
@@ -67,6 +68,15 @@ def inlined(function: Callable[..., Any]) -> Any:
     return njit(inline="always", error_model="numpy")(function)
 
 
+def shared(function: Callable[..., Any]) -> Any:
+    """Decorator: let compiled code call a Python function, which then becomes part of it; Python still calls it as is.
+
+    The function is the law of a block. Its first argument is the block itself in Python, and a record of the block's
+    attributes in compiled code; see `native_blocks`.
+    """
+    return register_jitable(error_model="numpy")(function)
+
+
 def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], CFunc]:
     """Decorator: compile a function now to a C function that the engine can call, and keep it on disk.
 
@@ -102,9 +112,42 @@ def compiled_call(
         if not hasattr(dispatcher, "enable_caching"):
             return dispatcher
         dispatcher._cache = _cache_of(function)
-        return dispatcher.compile(result(*arguments))
+        entry = dispatcher.compile(result(*arguments))
+        (code,) = dispatcher.overloads.values()
+        _ADDRESSES[entry] = code.library.get_pointer_to_function(code.fndesc.llvm_func_name)
+        return entry
 
     return decorate
+
+
+_ADDRESSES: Final[dict[Any, int]] = {}
+
+
+def address_of(call: Any) -> int:
+    """Return the address of a `compiled_call`, at which `call_at` calls it; 0 where numba is switched off."""
+    return _ADDRESSES.get(call, 0)
+
+
+def call_at(result: types.Type, *arguments: types.Type) -> Any:
+    """Return an intrinsic: address and arguments of a `compiled_call` of these types -> its result.
+
+    The caller does not contain the code that it calls, so neither is compiled again when the other changes.
+    """
+
+    @intrinsic
+    def call(_typing_context, address, given):
+        def generate(context, builder, _signature, values):
+            convention = context.call_conv
+            pointer = convention.get_function_type(result, arguments).as_pointer()
+            unpacked = [builder.extract_value(values[1], index) for index in range(len(arguments))]
+            _, answer = convention.call_function(
+                builder, builder.inttoptr(values[0], pointer), result, arguments, unpacked
+            )
+            return answer
+
+        return result(types.intp, types.Tuple(arguments)), generate
+
+    return call
 
 
 class _ContentCache(FunctionCache):

@@ -109,6 +109,33 @@ def widths_of(message: type[tuple[Any, ...]]) -> tuple[int, ...]:
     return tuple(fields.count(field) for field in get_type_hints(message))
 
 
+def numbers_in(message: tuple[Any, ...]) -> list[float]:
+    """Return the numbers of a message one after the other; see `numbers_of`."""
+    row: list[float] = []
+    for width, value in zip(widths_of(type(message)), message, strict=True):
+        if width == 1:
+            row.append(value)
+        elif width:
+            row.extend(value)
+    return row
+
+
+@functools.cache
+def _types_of(message: type[tuple[Any, ...]]) -> tuple[Any, ...]:
+    return tuple(get_type_hints(message).values())
+
+
+def message_of(kind: type[_Message], row: Iterable[float]) -> _Message:
+    """Return a message from its numbers; fields without numbers are None."""
+    numbers, fields = iter(row), []
+    for width, hint in zip(widths_of(kind), _types_of(kind), strict=True):
+        if width == 1:
+            fields.append(hint(next(numbers)))
+        else:
+            fields.append(tuple(next(numbers) for _ in range(width)) or None)
+    return new_message(kind, fields)
+
+
 class WheelTorques(NamedTuple):
     """Torques of the individual wheels, order of `CORNERS`.
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from enum import Enum
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
+from activesteer.compilation import shared
 from activesteer.controllers.parameters import CorrectorParameters
+from activesteer.native_blocks import NativeBlock
 from activesteer.theory.tolerance import tolerance
 
 
@@ -26,15 +28,6 @@ class Decision(NamedTuple):
     front: int
 
 
-_NEUTRAL: Final = Decision(Situation.NEUTRAL, rear=0, front=0)
-# Table I: with oversteer the rear wheels turn in the direction of the yaw rate and the front wheels against it; with
-# understeer vice versa.
-_LEFT_OVERSTEER: Final = Decision(Situation.OVERSTEER, rear=1, front=-1)
-_LEFT_UNDERSTEER: Final = Decision(Situation.UNDERSTEER, rear=-1, front=1)
-_RIGHT_OVERSTEER: Final = Decision(Situation.OVERSTEER, rear=-1, front=1)
-_RIGHT_UNDERSTEER: Final = Decision(Situation.UNDERSTEER, rear=1, front=-1)
-
-
 def decide(yaw_rate_radps: float, error_radps: float) -> Decision:
     """Return the directions of the additional steer angles.
 
@@ -47,13 +40,24 @@ def decide(yaw_rate_radps: float, error_radps: float) -> Decision:
 
     Source: Dorsch 2012, Table I and Fig. 10.
     """
+    rear = rear_direction(error_radps)
+    oversteer = rear == (1 if yaw_rate_radps >= 0.0 else -1)
+    situation = Situation.OVERSTEER if oversteer else Situation.UNDERSTEER
+    return Decision(situation if rear else Situation.NEUTRAL, rear, -rear)
+
+
+@shared
+def rear_direction(error_radps: float) -> int:
+    """Return the direction of the rear wheels, `Decision.rear`; the front wheels turn the other way.
+
+    Table I: with oversteer the rear wheels turn in the direction of the yaw rate, with understeer against it.
+    """
     if error_radps == 0.0:
-        return _NEUTRAL
-    if yaw_rate_radps >= 0.0:
-        return _LEFT_OVERSTEER if error_radps < 0.0 else _LEFT_UNDERSTEER
-    return _RIGHT_OVERSTEER if error_radps > 0.0 else _RIGHT_UNDERSTEER
+        return 0
+    return 1 if error_radps < 0.0 else -1
 
 
+@shared
 def cut_off(angle_rad: float, limit_rad: float) -> tuple[float, int]:
     """Return an angle limited to either side [rad], and the side of the active limit: 1, -1, or 0 for none."""
     if angle_rad > limit_rad:
@@ -63,12 +67,21 @@ def cut_off(angle_rad: float, limit_rad: float) -> tuple[float, int]:
     return angle_rad, 0
 
 
-class Corrector:
+class Corrector(NativeBlock):
     """PID on the yaw rate error behind the tolerance function.
 
     With the proportional gain alone it is the P corrector of the paper. The integral stops growing towards an active
     limit, and it fades with the tolerance function.
     """
+
+    _deadband_start_radps: float
+    _deadband_end_radps: float
+    _proportional_gain_s: float
+    _integral_fraction: float
+    _derivative_fraction_s: float
+    _filter_fraction: float
+    _integral_rad: float
+    _filtered_radps: float
 
     def __init__(self, parameters: CorrectorParameters, timestep_s: float) -> None:
         """Make the feedback of one run.
@@ -84,7 +97,7 @@ class Corrector:
         self._derivative_fraction_s = p.derivative_gain_s2 / timestep_s
         self._filter_fraction = 1.0 - math.exp(-timestep_s / p.derivative_filter_s)
         self._integral_rad = 0.0
-        self._filtered_radps: float | None = None
+        self._filtered_radps = math.nan  # before the first error
 
     def step(self, error_radps: float, saturated: int = 0) -> float:
         """Return the angle of the corrector [rad]; with P alone it has the sign of the error.
@@ -94,19 +107,34 @@ class Corrector:
             saturated: Active limit: 1 if a larger angle is cut off, -1 if a smaller angle is, otherwise 0. The integral
                 then moves away from the limit only.
         """
-        activity = tolerance(error_radps, self._deadband_start_radps, self._deadband_end_radps)
-        angle = self._proportional_gain_s * error_radps
-        if self._integral_fraction:
-            if saturated * error_radps <= 0.0:
-                self._integral_rad += self._integral_fraction * error_radps * activity
-            angle += self._integral_rad
-        if self._derivative_fraction_s:
-            before = error_radps if self._filtered_radps is None else self._filtered_radps
-            self._filtered_radps = before + self._filter_fraction * (error_radps - before)
-            angle += self._derivative_fraction_s * (self._filtered_radps - before)
-        return activity * angle
+        return corrected(self, error_radps, saturated)
 
     def reset(self) -> None:
         """Reset integral and derivative, as while active steering rests."""
-        self._integral_rad = 0.0
-        self._filtered_radps = None
+        reset(self)
+
+
+shared(tolerance)
+
+
+@shared
+def corrected(block: Corrector, error_radps: float, saturated: int) -> float:
+    """Law of `Corrector.step`."""
+    activity = tolerance(error_radps, block._deadband_start_radps, block._deadband_end_radps)
+    angle = block._proportional_gain_s * error_radps
+    if block._integral_fraction:
+        if saturated * error_radps <= 0.0:
+            block._integral_rad += block._integral_fraction * error_radps * activity
+        angle += block._integral_rad
+    if block._derivative_fraction_s:
+        before = error_radps if math.isnan(block._filtered_radps) else block._filtered_radps
+        block._filtered_radps = before + block._filter_fraction * (error_radps - before)
+        angle += block._derivative_fraction_s * (block._filtered_radps - before)
+    return activity * angle
+
+
+@shared
+def reset(block: Corrector) -> None:
+    """Law of `Corrector.reset`."""
+    block._integral_rad = 0.0
+    block._filtered_radps = math.nan

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from activesteer.controllers.corrector import Corrector, cut_off, decide
-from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
+from activesteer.compilation import shared
+from activesteer.controllers.corrector import Corrector, corrected, cut_off, rear_direction, reset
+from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
+from activesteer.native_blocks import NativeBlock
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
 
 
-class FrontSuperposition:
+class FrontSuperposition(NativeBlock):
     """Active front steering (AFS): the corrector of the rear steering with the opposite sign, without prediction."""
 
     reads = ("afs", "desired_yaw_rate")
+    _desired: DesiredYawRate
+    _corrector: Corrector
+    _limit_rad: float
+    _saturated: int
 
     def __init__(self, desired: DesiredYawRate, parameters: FrontSuperpositionParameters, timestep_s: float) -> None:
         """Make the controller of one run.
@@ -35,14 +41,24 @@ class FrontSuperposition:
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the angle to add at the front wheels."""
-        speed = measurement.speed_mps
-        desired = self._desired.step(command.front_steer_demand_rad, speed)
-        if speed < MIN_SPEED_MPS:
-            self._corrector.reset()
-            self._saturated = 0
-            return steering(0.0, 0.0, desired, 0.0, 0.0, False)
-        yaw_rate = measurement.yaw_rate_radps
-        feedback = self._corrector.step(desired - yaw_rate, self._saturated)
-        correction = decide(yaw_rate, feedback).front * abs(feedback)
-        angle, self._saturated = cut_off(correction, self._limit_rad)
-        return steering(0.0, angle, desired, 0.0, correction, self._saturated != 0)
+        return steering(
+            *front_superposition(
+                self, command.front_steer_demand_rad, measurement.speed_mps, measurement.yaw_rate_radps
+            )
+        )
+
+
+@shared
+def front_superposition(
+    block: FrontSuperposition, front_steer_rad: float, speed_mps: float, yaw_rate_radps: float
+) -> tuple[float, float, float, float, float, bool]:
+    """Law of `FrontSuperposition.step`; returns the first fields of an `ActuatorCommand`."""
+    desired = desired_yaw_rate(block._desired, front_steer_rad, speed_mps)
+    if speed_mps < MIN_SPEED_MPS:
+        reset(block._corrector)
+        block._saturated = 0
+        return 0.0, 0.0, desired, 0.0, 0.0, False
+    feedback = corrected(block._corrector, desired - yaw_rate_radps, block._saturated)
+    correction = -rear_direction(feedback) * abs(feedback)
+    angle, block._saturated = cut_off(correction, block._limit_rad)
+    return 0.0, angle, desired, 0.0, correction, block._saturated != 0

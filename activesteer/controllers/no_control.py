@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from activesteer.controllers.desired_yaw_rate import DesiredYawRate
+from activesteer.compilation import shared
+from activesteer.controllers.desired_yaw_rate import DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup
+from activesteer.native_blocks import NativeBlock
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
 
 
-class NoControl:
+class NoControl(NativeBlock):
     """The car without active steering."""
 
     reads = ("desired_yaw_rate",)
+    _desired: DesiredYawRate
 
     def __init__(self, desired: DesiredYawRate) -> None:
         """Take the reference model."""
@@ -25,5 +28,12 @@ class NoControl:
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return no angles; the desired yaw rate is recorded."""
-        desired = self._desired.step(command.front_steer_demand_rad, measurement.speed_mps)
-        return steering(0.0, 0.0, desired, 0.0, 0.0, False)
+        return steering(*no_control(self, command.front_steer_demand_rad, measurement.speed_mps, 0.0))
+
+
+@shared
+def no_control(
+    block: NoControl, front_steer_rad: float, speed_mps: float, _yaw_rate_radps: float
+) -> tuple[float, float, float, float, float, bool]:
+    """Law of `NoControl.step`; returns the first fields of an `ActuatorCommand`."""
+    return 0.0, 0.0, desired_yaw_rate(block._desired, front_steer_rad, speed_mps), 0.0, 0.0, False

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import math
 
-from activesteer.controllers.corrector import Corrector, cut_off, decide
-from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate
+from activesteer.compilation import shared
+from activesteer.controllers.corrector import Corrector, corrected, cut_off, rear_direction, reset
+from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters
+from activesteer.native_blocks import NativeBlock
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
-from activesteer.theory.single_track import SingleTrack
+from activesteer.theory.single_track import SingleTrack, rear_prediction
+
+shared(rear_prediction)
 
 
-class RearPrediction:
+class RearPrediction(NativeBlock):
     """The transfer function G(s) of eq. 5 in the time domain, with coefficients of the present speed.
 
     State form: T_1 dx/dt = delta_V - x, delta_H = K_H x + K_H T_z dx/dt; exact for an input held between steps.
     """
+
+    _single_track: SingleTrack
+    _timestep_s: float
+    _state_rad: float
 
     def __init__(self, single_track: SingleTrack, timestep_s: float) -> None:
         """Take the model.
@@ -35,20 +43,32 @@ class RearPrediction:
             front_steer_rad: The driver's demand at the road wheel [rad].
             speed_mps: Speed > 0 [m/s].
         """
-        gain, lead_s, lag_s = self._single_track.rear_prediction(speed_mps)
-        difference = front_steer_rad - self._state_rad
-        angle = gain * self._state_rad + lead_s / lag_s * difference
-        self._state_rad += (1.0 - math.exp(-self._timestep_s / lag_s)) * difference
-        return angle
+        return predicted(self, front_steer_rad, speed_mps)
 
 
-class RearSteer:
+@shared
+def predicted(block: RearPrediction, front_steer_rad: float, speed_mps: float) -> float:
+    """Law of `RearPrediction.step`."""
+    gain, lead_s, lag_s = rear_prediction(block._single_track, speed_mps)
+    difference = front_steer_rad - block._state_rad
+    angle = gain * block._state_rad + lead_s / lag_s * difference
+    block._state_rad += (1.0 - math.exp(-block._timestep_s / lag_s)) * difference
+    return angle
+
+
+class RearSteer(NativeBlock):
     """Active rear steering (ARS): prediction less correction, limited.
 
     Lag and rate limit belong to the actuator, in the vehicle.
     """
 
     reads = ("ars", "desired_yaw_rate")
+    _desired: DesiredYawRate
+    _prediction: RearPrediction
+    _corrector: Corrector
+    _prediction_gain: float
+    _limit_rad: float
+    _saturated: int
 
     def __init__(
         self,
@@ -85,16 +105,24 @@ class RearSteer:
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the demanded rear angle and its parts."""
-        front_steer, speed = command.front_steer_demand_rad, measurement.speed_mps
-        desired = self._desired.step(front_steer, speed)
-        if speed < MIN_SPEED_MPS:
-            self._corrector.reset()
-            self._saturated = 0
-            return steering(0.0, 0.0, desired, 0.0, 0.0, False)
-        yaw_rate = measurement.yaw_rate_radps
-        prediction = self._prediction_gain * self._prediction.step(front_steer, speed)
-        # The rear wheels turn against the angle of the corrector, so the limit changes its sign too.
-        feedback = self._corrector.step(desired - yaw_rate, -self._saturated)
-        correction = decide(yaw_rate, feedback).rear * abs(feedback)
-        angle, self._saturated = cut_off(prediction + correction, self._limit_rad)
-        return steering(angle, 0.0, desired, prediction, correction, self._saturated != 0)
+        return steering(
+            *rear_steer(self, command.front_steer_demand_rad, measurement.speed_mps, measurement.yaw_rate_radps)
+        )
+
+
+@shared
+def rear_steer(
+    block: RearSteer, front_steer_rad: float, speed_mps: float, yaw_rate_radps: float
+) -> tuple[float, float, float, float, float, bool]:
+    """Law of `RearSteer.step`; returns the first fields of an `ActuatorCommand`."""
+    desired = desired_yaw_rate(block._desired, front_steer_rad, speed_mps)
+    if speed_mps < MIN_SPEED_MPS:
+        reset(block._corrector)
+        block._saturated = 0
+        return 0.0, 0.0, desired, 0.0, 0.0, False
+    prediction = block._prediction_gain * predicted(block._prediction, front_steer_rad, speed_mps)
+    # The rear wheels turn against the angle of the corrector, so the limit changes its sign too.
+    feedback = corrected(block._corrector, desired - yaw_rate_radps, -block._saturated)
+    correction = rear_direction(feedback) * abs(feedback)
+    angle, block._saturated = cut_off(prediction + correction, block._limit_rad)
+    return angle, 0.0, desired, prediction, correction, block._saturated != 0

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from activesteer.compilation import shared
 from activesteer.driver.open_loop import OpenLoopDriver
+from activesteer.native_blocks import NativeBlock
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
 _TIME_CONSTANT_S: Final = 0.5
@@ -13,12 +15,16 @@ _MIN_SPEED_MPS: Final = 1.0
 """Below this speed there is no correction: yaw rate over speed is not the curvature of the path [m/s]."""
 
 
-class ConstantRadiusDriver:
+class ConstantRadiusDriver(NativeBlock):
     """Steering by curvature: Ackermann angle, and the integral of the curvature error.
 
     The measured curvature is yaw rate over speed: the curvature of the path while the sideslip angle is constant. The
     integral stands still while the steering wheel is at its stop.
     """
+
+    _wheelbase_m: float
+    _fraction: float
+    _correction_1pm: float
 
     def __init__(self, robot: OpenLoopDriver, wheelbase_m: float, timestep_s: float) -> None:
         """Make the driver of one run.
@@ -40,9 +46,21 @@ class ConstantRadiusDriver:
         if curvature is None:
             return self.robot.step(setpoint, measurement, motion)
         robot = self.robot
-        angle = robot.steering_ratio * self._wheelbase_m * (curvature + self._correction_1pm)
+        angle = circle_angle(self, robot, curvature)
         command = robot.turn(angle, setpoint, measurement)
-        if command.steering_wheel_demand_rad == angle and measurement.speed_mps > _MIN_SPEED_MPS:
-            error = curvature - measurement.yaw_rate_radps / measurement.speed_mps
-            self._correction_1pm += self._fraction * error
+        if command.steering_wheel_demand_rad == angle:
+            correct_circle(self, curvature, measurement.yaw_rate_radps, measurement.speed_mps)
         return command
+
+
+@shared
+def circle_angle(block: ConstantRadiusDriver, robot: OpenLoopDriver, curvature_1pm: float) -> float:
+    """Return the steering wheel angle for a curvature [rad]."""
+    return robot.steering_ratio * block._wheelbase_m * (curvature_1pm + block._correction_1pm)
+
+
+@shared
+def correct_circle(block: ConstantRadiusDriver, curvature_1pm: float, yaw_rate_radps: float, speed_mps: float) -> None:
+    """Integrate the curvature error; call it only while the steering wheel is not at its stop."""
+    if speed_mps > _MIN_SPEED_MPS:
+        block._correction_1pm += block._fraction * (curvature_1pm - yaw_rate_radps / speed_mps)

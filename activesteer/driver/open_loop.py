@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from activesteer.compilation import shared
 from activesteer.driver.base import DriverSetup
-from activesteer.driver.speed_hold import SpeedHold
+from activesteer.driver.speed_hold import SpeedHold, drive_torque, take_foot_off
 from activesteer.errors import ManeuverError
+from activesteer.native_blocks import NativeBlock
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, new_message
 
 
-class OpenLoopDriver:
+class OpenLoopDriver(NativeBlock):
     """A steering robot and a cruise control.
 
     Attributes:
@@ -16,6 +18,10 @@ class OpenLoopDriver:
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         steering_wheel_limit_rad: Lock angle [rad].
     """
+
+    speed_hold: SpeedHold
+    steering_ratio: float
+    steering_wheel_limit_rad: float
 
     def __init__(
         self,
@@ -60,20 +66,39 @@ class OpenLoopDriver:
 
     def turn(self, angle: float, setpoint: Setpoint, measurement: Measurement) -> DriverCommand:
         """Return the command for a steering wheel angle [rad] in place of the angle of the setpoint."""
-        saturated = False
-        if angle > self.steering_wheel_limit_rad:
-            angle, saturated = self.steering_wheel_limit_rad, True
-        elif angle < -self.steering_wheel_limit_rad:
-            angle, saturated = -self.steering_wheel_limit_rad, True
+        speed_mps, drive = setpoint.speed_demand_mps, self.speed_hold.drive
+        engine_radps, limits_Nm = 0.0, (0.0, 0.0)
         if setpoint.hold_speed:
-            speed_mps, hold = setpoint.speed_demand_mps, self.speed_hold
-            torque = hold.step(speed_mps, measurement)
-            saturated = saturated or hold.saturated
-            gear = 1 if speed_mps >= 0.0 else -1
-        else:
-            self.speed_hold.reset()
-            torque, gear = 0.0, 0
+            engine_radps = drive.speed_radps(measurement.wheel_speed_radps)
+            limits_Nm = drive.limits_Nm(engine_radps, 1 if speed_mps >= 0.0 else -1)
+        angle, torque, saturated, gear = turned(
+            self, angle, setpoint.hold_speed, speed_mps, measurement.speed_mps, engine_radps, *limits_Nm
+        )
         return new_message(DriverCommand, (
             angle, torque, setpoint.brake_pedal, saturated, setpoint.wheel_torques, gear,
             angle / self.steering_ratio, setpoint.parking_brake,
         ))  # fmt: skip
+
+
+@shared
+def turned(
+    robot: OpenLoopDriver,
+    angle: float,
+    hold_speed: bool,
+    speed_demand_mps: float,
+    speed_mps: float,
+    engine_radps: float,
+    low_Nm: float,
+    high_Nm: float,
+) -> tuple[float, float, bool, int]:
+    """Law of `OpenLoopDriver.turn`: steering wheel angle, drive torque, whether a limit is active, gear."""
+    saturated = False
+    if angle > robot.steering_wheel_limit_rad:
+        angle, saturated = robot.steering_wheel_limit_rad, True
+    elif angle < -robot.steering_wheel_limit_rad:
+        angle, saturated = -robot.steering_wheel_limit_rad, True
+    if not hold_speed:
+        take_foot_off(robot.speed_hold)
+        return angle, 0.0, saturated, 0
+    torque = drive_torque(robot.speed_hold, speed_demand_mps, speed_mps, engine_radps, low_Nm, high_Nm)
+    return angle, torque, saturated or robot.speed_hold.saturated != 0, 1 if speed_demand_mps >= 0.0 else -1

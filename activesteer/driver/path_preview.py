@@ -16,15 +16,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.compilation import compiled
+from activesteer.compilation import compiled, shared
 from activesteer.conventions import Array
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
-from activesteer.road.path import Path
+from activesteer.native_blocks import NativeBlock
 from activesteer.road.path_search import PathSearch, nearest, point_at
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
@@ -38,8 +38,10 @@ _WINDOW_M: Final = 5.0
 """Largest distance along the path between two looks, with a margin [m]."""
 _MIN_SPEED_MPS: Final = 3.0
 """Below this speed the driver holds the steering wheel [m/s]."""
-_SPEED_STEP_MPS: Final = 0.5
+SPEED_STEP_MPS: Final = 0.5
 """Step to which the speed is rounded for the gains [m/s]."""
+N_SPEEDS: Final = 402
+"""Number of rounded speeds whose gains compiled code can use: to 200 m/s."""
 _TANGENT: Final = 10
 """Number of looks in the last section of the preview, which gives the straight path beyond."""
 _LEAST_LAG_S: Final = 1e-3
@@ -65,7 +67,7 @@ class SteeringGains(NamedTuple):
     per_path_radpm: Array
 
 
-class PathPreviewDriver:
+class PathPreviewDriver(NativeBlock):
     """Driver that follows a path.
 
     Attributes:
@@ -73,6 +75,16 @@ class PathPreviewDriver:
     """
 
     derived = ("_gains",)
+    _fraction: float
+    _most_change_rad: float
+    _decided_rad: Array
+    _target_rad: float
+    _wheel_rad: float
+    _along_m: float
+    _preview_every_steps: int
+    _steps: int
+    _known: Array
+    _row_size: int
 
     def __init__(
         self, robot: OpenLoopDriver, model: LateralModel, parameters: DriverParameters, timestep_s: float
@@ -88,7 +100,8 @@ class PathPreviewDriver:
         self.robot = robot
         self._model = model
         self._parameters = parameters
-        self._gains: dict[int, SteeringGains] = {}
+        self._gains: dict[int, Array] = {}
+        self._known, self._row_size = np.zeros(N_SPEEDS), 0
         lag_s = parameters.neuromuscular_lag_s
         self._fraction = 1.0 - math.exp(-timestep_s / lag_s) if lag_s > 0.0 else 1.0
         self._most_change_rad = parameters.steering_rate_limit_radps * timestep_s
@@ -99,42 +112,91 @@ class PathPreviewDriver:
         self._preview_every_steps = max(1, round(PREVIEW_INTERVAL_S / timestep_s))
         self._steps = 0
 
-    def _update_preview(self, path: Path, motion: Motion) -> None:
-        """Look at the path ahead, decide on a steering wheel angle, and take up the next decision that waits."""
-        search, decided = PathSearch(path), self._decided_rad
-        if motion.speed_mps < _MIN_SPEED_MPS:
-            self._along_m = search.nearest(motion.x_m, motion.y_m, self._along_m, _WINDOW_M)
-            angle = float(decided[0])
-        else:
-            rounded = round(motion.speed_mps / _SPEED_STEP_MPS)
-            gains = self._gains.get(rounded)
-            if gains is None:
-                speed_mps = rounded * _SPEED_STEP_MPS
-                gains = steering_gains(speed_mps, self._model, self._parameters, self.robot.steering_ratio)
-                self._gains[rounded] = gains
-            self._along_m, angle = _decide(*motion, self._along_m, *search.line, decided, self._wheel_rad, *gains)
-        decided[1:] = decided[:-1]
-        decided[0] = min(max(angle, -self.robot.steering_wheel_limit_rad), self.robot.steering_wheel_limit_rad)
-        self._target_rad = float(decided[-1])
+    def gains_at(self, rounded: int) -> Array:
+        """Return the gains at a rounded speed as one row, and keep them for compiled code.
+
+        Args:
+            rounded: Speed in steps of `SPEED_STEP_MPS`.
+        """
+        row = self._gains.get(rounded)
+        if row is None:
+            gains = steering_gains(rounded * SPEED_STEP_MPS, self._model, self._parameters, self.robot.steering_ratio)
+            row = self._gains[rounded] = np.concatenate([gains[:3], gains.per_waiting, gains.per_path_radpm])
+            self._note(rounded, row)
+        return row
+
+    def _note(self, rounded: int, row: Array) -> None:
+        if 0 <= rounded < N_SPEEDS:
+            self._known.view(np.int64)[rounded] = row.ctypes.data
+            self._row_size = row.size
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over the attributes of a copy, whose gains are elsewhere in memory."""
+        self.__dict__.update(state)
+        self._known = np.zeros(N_SPEEDS)
+        for rounded, row in self._gains.items():
+            self._note(rounded, row)
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
         """Return the command; without a path the driver carries out his last decisions. See `Driver`."""
-        if self._steps % self._preview_every_steps == 0 and setpoint.path is not None:
-            self._update_preview(setpoint.path, motion)
+        path = setpoint.path
+        if self._steps % self._preview_every_steps == 0 and path is not None:
+            decided = self._decided_rad
+            gains = self.gains_at(round(motion.speed_mps / SPEED_STEP_MPS)) if looks(motion.speed_mps) else decided
+            look(self, self.robot.steering_wheel_limit_rad, decided, *motion, *PathSearch(path).line, gains)
         self._steps += 1
-        change = self._fraction * (self._target_rad - self._wheel_rad)
-        most = self._most_change_rad
-        saturated = True
-        if change > most:
-            change = most
-        elif change < -most:
-            change = -most
-        else:
-            saturated = False
-        wheel = self._wheel_rad + change
+        wheel, saturated = moved(self)
         command = self.robot.turn(wheel, setpoint, measurement)
         self._wheel_rad = command.steering_wheel_demand_rad
         return command._replace(saturated=True) if saturated else command
+
+
+@shared
+def looks(speed_mps: float) -> bool:
+    """Return whether a driver looks ahead at a speed [m/s]; otherwise he holds the steering wheel."""
+    return speed_mps >= _MIN_SPEED_MPS
+
+
+@shared
+def look(
+    block, limit_rad, decided, x, y, yaw, speed, lateral_speed, yaw_rate,
+    spacing, xs, ys, heading_first, heading_last, gains,
+):  # fmt: skip
+    """Look at the path ahead, decide on a steering wheel angle, and take up the next decision that waits.
+
+    The arguments are: the `PathPreviewDriver`, the lock angle [rad], the earlier decisions, the members of `Motion` and
+    of `PathSearch.line`, and `PathPreviewDriver.gains_at` the speed, if the driver looks.
+    """
+    if looks(speed):
+        path = 2 + len(decided)  # as many gains as decisions that wait, behind the first three
+        along, angle = _decide(
+            x, y, yaw, speed, lateral_speed, yaw_rate,
+            block._along_m, spacing, xs, ys, heading_first, heading_last,
+            decided, block._wheel_rad, gains[0], gains[1], gains[2], gains[3:path], gains[path:],
+        )  # fmt: skip
+    else:
+        along = nearest(x, y, block._along_m, _WINDOW_M, spacing, xs, ys, heading_first, heading_last)
+        angle = decided[0]
+    block._along_m = along
+    for index in range(len(decided) - 1, 0, -1):
+        decided[index] = decided[index - 1]
+    decided[0] = min(max(angle, -limit_rad), limit_rad)
+    block._target_rad = float(decided[-1])
+
+
+@shared
+def moved(block: PathPreviewDriver) -> tuple[float, bool]:
+    """Return the next steering wheel angle [rad], and whether the arms are at their limit."""
+    change = block._fraction * (block._target_rad - block._wheel_rad)
+    most = block._most_change_rad
+    saturated = True
+    if change > most:
+        change = most
+    elif change < -most:
+        change = -most
+    else:
+        saturated = False
+    return block._wheel_rad + change, saturated
 
 
 @compiled

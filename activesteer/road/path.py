@@ -80,6 +80,8 @@ class Path:
         at = np.interp(s, lengths, fine)
         (px, py), (dx, dy), (ddx, ddy) = curve(at).T, curve(at, 1).T, curve(at, 2).T
         speed = np.hypot(dx, dy)
+        # Native code walks along the points.
+        px, py = np.ascontiguousarray(px), np.ascontiguousarray(py)
         return cls(s, px, py, np.unwrap(np.arctan2(dy, dx)), (dx * ddy - dy * ddx) / speed**3)
 
     @classmethod
@@ -92,6 +94,7 @@ class Path:
         """
         s = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(y_m)))])
         heading = np.unwrap(np.arctan2(np.gradient(y_m, s), np.gradient(x_m, s)))
+        x_m, y_m = np.ascontiguousarray(x_m), np.ascontiguousarray(y_m)
         return cls(s, x_m, y_m, heading, np.gradient(heading, s))
 
     @property

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +16,22 @@ from activesteer.config import Source
 from activesteer.controllers import Controller, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver
+from activesteer.driver.human import HumanDriver
 from activesteer.errors import ManeuverError, ParameterError, shown
 from activesteer.faults import Fault, check_faults
 from activesteer.scenario import Scenario
 from activesteer.scenario.changing import changed
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.control_unit import ControlUnit, control_unit, told_by_sensor
+from activesteer.simulation.native_cars import NativeCars, law_of, tabulate
+from activesteer.simulation.native_loop import STEP_ADDRESS
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.retuning import retuned
 from activesteer.vehicle import Uncopyable, engine_warnings_held
 from activesteer.vehicle.faults import Faults
+
+_PIECE: Final = 1000
+"""Most steps of a native call."""
 
 
 class LoopState(NamedTuple):
@@ -91,6 +98,8 @@ class ClosedLoop(Uncopyable):
         scenario: Scenario,
         controller: Any = "none",
         timestep_s: float = DEFAULT_TIMESTEP_S,
+        *,
+        settled: LoopState | None = None,
     ) -> None:
         """Build the blocks and let the car settle at the speed of the manoeuvre, at the origin of the road.
 
@@ -98,6 +107,7 @@ class ClosedLoop(Uncopyable):
             scenario: Manoeuvre, car and driver.
             controller: The controller; see `activesteer.plugins.find`.
             timestep_s: Step of engine, driver and controller [s].
+            settled: State of a loop with the same inputs, to start from instead of settling.
 
         Raises:
             ModelError: the car cannot be built.
@@ -119,13 +129,15 @@ class ClosedLoop(Uncopyable):
         self.motion, self.step_count = vehicle.motion(), 0
         self.commands = DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()
         self.faults, self._fault_list = Faults(vehicle), ()
-        self.drive(steps, setpoint_at=lambda _: settling)
-        if (estimate := self.commands[1].estimate) is not None:
+        self.drive(0 if settled else steps, setpoint_at=lambda _: settling)
+        if (estimate := (settled or self).commands[1].estimate) is not None:
             vehicle.record_estimate(estimate)
         vehicle.rebase()
         self.fail(maneuver.fault)
         self.measurement = self.measurement._replace(time_s=0.0)
         self.motion, self.step_count = vehicle.motion(), 0
+        if settled:
+            self.restore_state(settled)
 
     @property
     def steps(self) -> int:
@@ -232,7 +244,6 @@ class ClosedLoop(Uncopyable):
         setpoint_at = setpoint_at or self.maneuver.setpoint
         vehicle.follow_model()
         with engine_warnings_held():
-            (driver_command, actuator_command), measurement, motion = self.commands, self.measurement, self.motion
             vehicle.record_on(None if recorder is None else recorder.tape)
             try:
                 for first, last, step_car, angle_fails in self.faults.stretches(
@@ -240,16 +251,48 @@ class ClosedLoop(Uncopyable):
                 ):
                     stretch = range(first, last)
                     unit = told_by_sensor(steering, vehicle.parameters.steering.ratio) if angle_fails else steering
-                    for block in (stretch,) if recorder is None else recorder.blocks(stretch):
+                    native = step_car == vehicle.step and unit is self.controller and driving is self.driver
+                    for block in _pieces(stretch) if recorder is None else recorder.blocks(stretch):
+                        if native and self._drive_natively(block, setpoint_at):
+                            continue
+                        driver_command, actuator_command = self.commands
+                        measurement, motion = self.measurement, self.motion
                         for step in block:
                             setpoint = setpoint_at(step * timestep_s)
                             driver_command = driving.step(setpoint, measurement, motion)
                             actuator_command = unit.step(driver_command, measurement)
                             measurement, motion = step_car(driver_command, actuator_command)
+                        self.step_count, self.commands = block.stop, (driver_command, actuator_command)
+                        self.measurement, self.motion = measurement, motion
             finally:
                 vehicle.record_on(None)
-            self.step_count, self.commands = self.step_count + steps, (driver_command, actuator_command)
-            self.measurement, self.motion = measurement, motion
+
+    @cached_property
+    def _native(self) -> NativeCars:
+        return NativeCars([self])
+
+    def _drive_natively(self, block: range, setpoint_at: Callable[[float], Setpoint]) -> bool:
+        """Drive a block of steps in one native call; see `native_loop`.
+
+        Returns:
+            False, and nothing is driven, if driver, controller or setpoints have no native form.
+        """
+        if not STEP_ADDRESS or type(self.driver) is not HumanDriver or not law_of(self.controller):
+            return False
+        timestep_s, native = self.vehicle.timestep_s, self._native
+        setpoints = [setpoint_at(step * timestep_s) for step in block]
+        table = tabulate(setpoints, self.driver_setup.rack_per_steering_wheel_m)
+        if table is None:
+            return False
+        native.load(0)
+        native.follow(0, table, self.step_count)
+        native.cars["left"] = len(block)
+        try:
+            for error in native.drive().values():
+                raise error
+        finally:
+            native.store(0)
+        return True
 
     def save_state(self) -> LoopState:
         """Return the state from which the loop continues bit-identically."""
@@ -291,6 +334,12 @@ class ClosedLoop(Uncopyable):
             self.controller.read_truth_of(self.vehicle)
         self.measurement, self.motion = state.measurement, state.motion
         self.commands, self.step_count = state.commands, state.step
+
+
+def _pieces(stretch: range) -> Iterator[range]:
+    """Divide steps into pieces whose setpoints need little memory."""
+    for first in range(0, len(stretch), _PIECE):
+        yield stretch[first : first + _PIECE]
 
 
 def _is_sound(state: LoopState) -> bool:

@@ -67,6 +67,16 @@ class ControlUnit:
         self._on_bus.append(self._held)
         return self._on_bus[0]
 
+    def memory(self) -> tuple[int, int, float, ActuatorCommand, list[ActuatorCommand]]:
+        """Return steps between two calls, steps so far, steering ratio or 0, held command, commands on the bus."""
+        return self._every, self._steps, self._steering_ratio or 0.0, self._held, list(self._on_bus)
+
+    def put_memory(self, steps: int, held: ActuatorCommand, on_bus: list[ActuatorCommand]) -> None:
+        """Take over steps so far, the held command and the commands on the bus; see `memory`."""
+        self._steps, self._held = steps, held
+        self._on_bus.clear()
+        self._on_bus.extend(on_bus)
+
     @property
     def uses_truth(self) -> bool:
         """Flag of a controller that gets the truth instead of the sensors' signals."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
+from activesteer.native_blocks import NativeBlock
 
 if TYPE_CHECKING:
     import control
@@ -83,7 +84,7 @@ def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float
     return math.sqrt(wheelbase_m / understeer_gradient_radpmps2) if understeer_gradient_radpmps2 > 0.0 else math.nan
 
 
-class SingleTrack:
+class SingleTrack(NativeBlock):
     """The linear single-track model of a car.
 
     Attributes:
@@ -91,6 +92,15 @@ class SingleTrack:
         wheelbase_m: l [m].
         characteristic_speed_mps: v_ch [m/s]; infinite for a neutral car.
     """
+
+    wheelbase_m: float
+    characteristic_speed_mps: float
+    _stiffness_ratio: float
+    _front_moment_kgm: float
+    _rear_moment_kgm: float
+    _front_moment_Nm: float
+    _rear_moment_Nm: float
+    _yaw_inertia_kgm2: float
 
     def __init__(self, parameters: SingleTrackParameters) -> None:
         """Compute everything that does not depend on speed.
@@ -127,8 +137,7 @@ class SingleTrack:
         Args:
             speed_mps: Speed v [m/s].
         """
-        ratio = speed_mps / self.characteristic_speed_mps
-        return speed_mps / self.wheelbase_m / (1.0 + ratio * ratio)
+        return yaw_rate_gain(self, speed_mps)
 
     def rear_prediction(self, speed_mps: _Speed) -> tuple[_Speed, _Speed, _Speed]:
         """Return the coefficients of the rear angle that keeps the sideslip angle at zero, eq. 5.
@@ -144,13 +153,7 @@ class SingleTrack:
         Returns:
             K_H [-], K_H T_z [s], T_1 [s].
         """
-        # Called in every step of a run; everything that does not depend on speed is computed beforehand.
-        square = speed_mps * speed_mps
-        denominator = self._rear_moment_kgm * square + self._front_moment_Nm
-        ratio = self._stiffness_ratio
-        gain = ratio * (self._front_moment_kgm * square - self._rear_moment_Nm) / denominator
-        lag = self._yaw_inertia_kgm2 * speed_mps / denominator
-        return gain, -ratio * lag, lag
+        return rear_prediction(self, speed_mps)
 
     def state_space(self, speed_mps: float) -> control.StateSpace:
         """Return the model at a speed, eqs. 1 and 2.
@@ -196,3 +199,20 @@ class SingleTrack:
         )
         b = np.array([[cv * lv / jz, -ch * lh / jz], [cv / (m * v), ch / (m * v)]])
         return a, b
+
+
+def yaw_rate_gain(model: SingleTrack, speed_mps: float) -> float:
+    """Return `SingleTrack.yaw_rate_gain`, also in compiled code."""
+    ratio = speed_mps / model.characteristic_speed_mps
+    return speed_mps / model.wheelbase_m / (1.0 + ratio * ratio)
+
+
+def rear_prediction(model: SingleTrack, speed_mps: _Speed) -> tuple[_Speed, _Speed, _Speed]:
+    """Return `SingleTrack.rear_prediction`, also in compiled code."""
+    # Called in every step of a run; everything that does not depend on speed is computed beforehand.
+    square = speed_mps * speed_mps
+    denominator = model._rear_moment_kgm * square + model._front_moment_Nm
+    ratio = model._stiffness_ratio
+    gain = ratio * (model._front_moment_kgm * square - model._rear_moment_Nm) / denominator
+    lag = model._yaw_inertia_kgm2 * speed_mps / denominator
+    return gain, -ratio * lag, lag

@@ -254,6 +254,30 @@ class Vehicle(Uncopyable):
         self._gear = self._forces["gear"] = gear
         self._wheels.engage(gear)
 
+    @property
+    def gear(self) -> float:
+        """Present gear; setting it notes the gear that compiled code has engaged."""
+        return self._gear
+
+    @gear.setter
+    def gear(self, gear: float) -> None:
+        self._gear = gear
+
+    def bound(self) -> dict[str, Any]:
+        """Return what compiled code needs to step this car and to change its gear, by the names of `native_loop.CAR`.
+
+        The addresses are those of this car's memory, which must outlive them.
+        """
+        armature, wheels = self.model.dof_armature, self._wheels
+        return {
+            "bindings": self._address,
+            "gear": self._gear,
+            "gear_address": self._forces["gear"].ctypes.data,
+            "armature": [armature.ctypes.data + dof * armature.strides[0] for dof in wheels.spins],
+            "free_kgm2": wheels.armatures_kgm2(CLUTCH_OPEN),
+            "engaged_kgm2": wheels.armatures_kgm2(1),
+        }
+
     def replay(self, inputs: NDArray[np.float64]) -> None:
         """Advance the engine alone by several steps in one native call, without commands, checks or recording.
 

@@ -16,11 +16,12 @@ Engine and gears turn with the driven wheels and increase their inertia, except 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from numba import types
 
-from activesteer.compilation import compiled, compiled_call
+from activesteer.compilation import compiled, compiled_call, shared
 from activesteer.vehicle.parameters import Powertrain
 
 CLUTCH_OPEN: Final = 0
@@ -71,13 +72,25 @@ def _limits_Nm(speed_radps, gear, numbers):
     return drive_limits(speed_radps, gear, *numbers)
 
 
+@shared
+def engine_speed(fractions: Sequence[float], wheel_speeds_radps: Sequence[float]) -> float:
+    """Return the mean speed of the driven wheels, weighted by their fractions of the torque [rad/s]."""
+    f, w = fractions, wheel_speeds_radps
+    return f[0] * w[0] + f[1] * w[1] + f[2] * w[2] + f[3] * w[3]
+
+
 class Drive:
-    """The drive as its driver knows it: its torque limits at the present speed of the wheels."""
+    """The drive as its driver knows it: its torque limits at the present speed of the wheels.
+
+    Attributes:
+        fractions: Fraction of the torque that each wheel gets.
+        numbers: Last four arguments of `drive_limits`.
+    """
 
     def __init__(self, parameters: Powertrain) -> None:
         """Take limits and fractions from the parameters."""
-        self._share = parameters.wheel_fractions
-        self._limits = (
+        self.fractions = parameters.wheel_fractions
+        self.numbers = (
             parameters.max_torque_Nm,
             parameters.max_power_W,
             parameters.max_wheel_speed_radps,
@@ -90,9 +103,7 @@ class Drive:
         Args:
             wheel_speeds_radps: Speeds of the four wheels [rad/s], order of `CORNERS`.
         """
-        fl, fr, rl, rr = self._share
-        a, b, c, d = wheel_speeds_radps
-        return fl * a + fr * b + rl * c + rr * d
+        return engine_speed(self.fractions, wheel_speeds_radps)
 
     def limits_Nm(self, speed_radps: float, gear: int) -> tuple[float, float]:
         """Return the least and the greatest torque at all wheels together, forward positive [N m].
@@ -101,4 +112,4 @@ class Drive:
             speed_radps: Mean speed of the driven wheels [rad/s].
             gear: 1 forward, -1 reverse.
         """
-        return _limits_Nm(speed_radps, gear, self._limits)
+        return _limits_Nm(speed_radps, gear, self.numbers)

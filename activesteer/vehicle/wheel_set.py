@@ -66,8 +66,12 @@ class WheelSet:
 
     def engage(self, gear: float) -> None:
         """Couple the engine to the driven wheels, each of which then carries its part of the inertia, or free them."""
-        for dof, own, engine in zip(self.spins, self._armature_kgm2, self._engine_kgm2, strict=True):
-            self._model.dof_armature[dof] = own + (0.0 if gear == CLUTCH_OPEN else engine)
+        self._model.dof_armature[self.spins] = self.armatures_kgm2(gear)
+
+    def armatures_kgm2(self, gear: float) -> list[float]:
+        """Return the inertia that each wheel carries in a gear beside its own."""
+        pairs = zip(self._armature_kgm2, self._engine_kgm2, strict=True)
+        return [own + (0.0 if gear == CLUTCH_OPEN else engine) for own, engine in pairs]
 
     def check_driven(self, torques_Nm: Sequence[float]) -> None:
         """Check that no torque is demanded of a wheel without a drive.

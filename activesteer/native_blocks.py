@@ -1,0 +1,69 @@
+"""Blocks whose law compiled code can carry out: a record with the attributes of an object, copied to and fro.
+
+The law of such a block is a function whose first argument is the block (`compilation.shared`). Python passes the
+object, compiled code passes its record. There is one law, and both results are equal to the last bit.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Final, get_type_hints
+
+import numpy as np
+
+from activesteer.conventions import Array
+from activesteer.signals import PerWheel
+
+ARRAY: Final = np.dtype((np.record, [("address", np.intp), ("size", np.intp)]))
+"""Memory of an array of float64 that belongs to the object."""
+_NUMBERS: Final = {float: np.dtype(np.float64), int: np.dtype(np.intp), bool: np.dtype(np.intp)}
+
+
+class NativeBlock:
+    """Base of a block with a record: every attribute that the class annotates is part of it.
+
+    An annotation is `float`, `int`, `bool`, `PerWheel`, `Array`, or another such block.
+    """
+
+
+@functools.cache
+def _members(kind: type[NativeBlock]) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+@functools.cache
+def record_type(kind: type[NativeBlock]) -> np.dtype[Any]:
+    """Return the type of a block's record."""
+    fields: list[tuple[Any, ...]] = []
+    for name, hint in _members(kind).items():
+        if hint in _NUMBERS:
+            fields.append((name, _NUMBERS[hint]))
+        elif hint == PerWheel:
+            fields.append((name, np.float64, (4,)))
+        else:
+            fields.append((name, ARRAY if hint == Array else record_type(hint)))
+    return np.dtype((np.record, fields))
+
+
+def values(block: NativeBlock) -> tuple[Any, ...]:
+    """Return the attributes of a block as its record takes them; the block owns the memory of its arrays."""
+    found: list[Any] = []
+    for name, hint in _members(type(block)).items():
+        value = getattr(block, name)
+        if isinstance(value, NativeBlock):
+            value = values(value)
+        elif hint == Array:
+            assert value.flags.c_contiguous
+            assert value.dtype == np.float64
+            value = value.ctypes.data, value.size
+        found.append(value)
+    return tuple(found)
+
+
+def take(block: NativeBlock, record: tuple[Any, ...]) -> None:
+    """Give a block the attributes of its record, as a tuple; see `values`."""
+    for (name, hint), value in zip(_members(type(block)).items(), record, strict=True):
+        if hint in _NUMBERS:
+            setattr(block, name, hint(value))
+        elif isinstance(part := getattr(block, name), NativeBlock):
+            take(part, value)

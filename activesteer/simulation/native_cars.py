@@ -1,0 +1,267 @@
+"""Closed loops as records that one native call drives: see `native_loop`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import Array
+from activesteer.errors import SimulationDiverged
+from activesteer.native_blocks import take, values
+from activesteer.road.path_search import PathSearch
+from activesteer.signals import (
+    ActuatorCommand,
+    DriverCommand,
+    Measurement,
+    Motion,
+    Setpoint,
+    WheelTorques,
+    message_of,
+    numbers_in,
+    numbers_of,
+    steering,
+)
+from activesteer.simulation import native_loop
+from activesteer.simulation.control_unit import ControlUnit
+from activesteer.simulation.native_loop import (
+    ANGLE,
+    CAR,
+    CURVATURE,
+    GIVEN,
+    HUMAN,
+    INSANE,
+    LAWS,
+    N_STEERING,
+    PATH,
+    SETPOINT,
+    TORQUES,
+)
+
+if TYPE_CHECKING:
+    from activesteer.road.path import Path
+    from activesteer.simulation.closed_loop import ClosedLoop
+
+_SPEED: Final = Motion._fields.index("speed_mps")
+
+
+class SetpointTable(NamedTuple):
+    """Setpoints of successive steps for compiled code; the last one holds on.
+
+    Attributes:
+        rows: Records of `SETPOINT`.
+        torques: Records of `TORQUES`, or empty.
+        path: The path of all steps.
+    """
+
+    rows: NDArray[Any]
+    torques: NDArray[Any]
+    path: Path | None
+
+
+def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | None) -> SetpointTable | None:
+    """Return setpoints as a table; None if compiled code cannot follow them.
+
+    Args:
+        setpoints: Setpoints of successive steps.
+        rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None without a rack.
+    """
+    count = len(setpoints)
+    while count > 1 and setpoints[count - 1] is setpoints[count - 2]:
+        count -= 1
+    rows, torques, path = [], [], setpoints[0].path
+    for angle, speed, pedal, holds, curvature, rack, wheels, own_path, parking in setpoints[:count]:
+        kind, turn = ANGLE, angle
+        if own_path is not None:
+            kind = PATH
+        elif curvature is not None:
+            kind = CURVATURE
+        elif rack is not None:
+            if rack_per_steering_wheel_m is None:
+                return None
+            turn = rack / rack_per_steering_wheel_m
+        if own_path is not path:
+            return None
+        rows.append((turn, speed, pedal, parking, curvature or 0.0, kind, holds, wheels is not None))
+        if wheels is not None:
+            torques.append((*wheels,))
+    if torques and len(torques) != count:
+        return None
+    return SetpointTable(np.array(rows, SETPOINT), np.array(torques, TORQUES), path)
+
+
+def law_of(controller: Any) -> int:
+    """Return the place of a controller in `LAWS`; 0 if compiled code cannot carry it out."""
+    if type(controller) is ControlUnit and not controller.uses_truth:
+        controller = controller.inner
+    return LAWS.index(type(controller)) if type(controller) in LAWS else 0
+
+
+class NativeCars:
+    """The loops of some cars with the same step, driven by one native call.
+
+    While they are driven, the state of driver, controller and loop is in the records. `load` brings it there from the
+    objects, `store` brings it back.
+
+    Attributes:
+        cars: Records of `CAR`.
+        driver_commands: Numbers of the last commands of the drivers, shape (n, numbers).
+        actuator_commands: Numbers of the last commands of the controllers, shape (n, numbers).
+        measurements: Numbers of the present measurements, shape (n, numbers).
+        motions: Present motions, shape (n, 6).
+    """
+
+    def __init__(self, loops: Sequence[ClosedLoop]) -> None:
+        """Bind the cars.
+
+        Args:
+            loops: The loops.
+        """
+        self._loops, count = loops, len(loops)
+        self.cars = np.zeros(count, CAR)
+        kinds = ("driver_command", DriverCommand), ("actuator_command", ActuatorCommand), ("measurement", Measurement)
+        rows: dict[str, Array] = {}
+        for name, kind in (*kinds, ("motion", Motion)):
+            rows[name] = row = np.zeros((count, len(numbers_of(kind))))
+            self.cars[name] = row.ctypes.data + row.strides[0] * np.arange(count)
+        self.driver_commands, self.actuator_commands = rows["driver_command"], rows["actuator_command"]
+        self.measurements, self.motions = rows["measurement"], rows["motion"]
+        self._tables: list[SetpointTable | None] = [None] * count
+        self._buses: list[Array] = [np.zeros(0)] * count
+        for index, loop in enumerate(loops):
+            drive: Any = loop.driver_setup.drive  # the vehicle's own
+            bound = {"drive_fractions": drive.fractions, "drive_numbers": drive.numbers, **loop.vehicle.bound()}
+            for name, value in bound.items():
+                self.cars[name][index] = value
+
+    def load(self, index: int, *, driver: bool = True, controller: bool = True) -> None:
+        """Copy the state of a loop into its record.
+
+        Args:
+            index: Number of the car.
+            driver: Whether its driver acts; otherwise its row of commands holds.
+            controller: Whether its controller acts; otherwise its row of commands holds.
+        """
+        loop, cars = self._loops[index], self.cars
+        cars["gear"][index] = loop.vehicle.gear
+        cars["step"][index] = loop.step_count
+        self.measurements[index], self.motions[index] = numbers_in(loop.measurement), loop.motion
+        self.driver_commands[index], self.actuator_commands[index] = map(numbers_in, loop.commands)
+        cars["driver_kind"][index] = HUMAN if driver else GIVEN
+        if driver:
+            cars["driver"][index] = values(loop.driver)  # type: ignore[arg-type]
+        law = law_of(loop.controller) if controller else 0
+        cars["controller_kind"][index] = law
+        if law:
+            self._load_unit(index, law, loop.controller)
+
+    def _load_unit(self, index: int, law: int, controller: Any) -> None:
+        every, calls, ratio, held, on_bus = 1, 0, 0.0, ActuatorCommand(), []
+        if isinstance(controller, ControlUnit):
+            every, calls, ratio, held, on_bus = controller.memory()
+            controller = controller.inner
+        cars, delay = self.cars, len(on_bus) - 1 if calls else len(on_bus)
+        bus = self._buses[index] = np.zeros((delay + 1, N_STEERING))
+        for back, command in enumerate(reversed(on_bus), 1):
+            bus[(calls - back) % (delay + 1)] = command[:N_STEERING]
+        unit = {
+            "every": every, "calls": calls, "on_bus": delay, "bus": (bus.ctypes.data, bus.size),
+            "held": held[:N_STEERING], "steering_ratio": ratio, f"law_{law}": values(controller),
+        }  # fmt: skip
+        for name, value in unit.items():
+            cars[name][index] = value
+        self.actuator_commands[index, N_STEERING:] = 0.0
+
+    def store(self, index: int) -> None:
+        """Copy the record of a car back into its loop."""
+        loop, cars = self._loops[index], self.cars
+        loop.vehicle.gear = float(cars["gear"][index])
+        step = loop.step_count = int(cars["step"][index])
+        loop.measurement = message_of(Measurement, self.measurements[index].tolist())
+        loop.motion = message_of(Motion, self.motions[index].tolist())
+        driver_command, actuator_command = loop.commands
+        if cars["driver_kind"][index] == HUMAN:
+            take(loop.driver, cars["driver"][index].item())  # type: ignore[arg-type]
+            driver_command = message_of(DriverCommand, self.driver_commands[index].tolist())
+            driver_command = driver_command._replace(wheel_torques=self._torques_of(index, step - 1))
+        if law := int(cars["controller_kind"][index]):
+            controller, calls = loop.controller, int(cars["calls"][index])
+            if isinstance(controller, ControlUnit):
+                bus, length = self._buses[index], len(self._buses[index])
+                on_bus = [_steering(bus[(calls - back) % length]) for back in range(length, 0, -1)]
+                controller.put_memory(calls, _steering(cars["held"][index]), on_bus if calls else on_bus[1:])
+                controller = controller.inner
+            take(controller, cars[f"law_{law}"][index].item())  # type: ignore[arg-type]
+            actuator_command = _steering(self.actuator_commands[index])
+        loop.commands = driver_command, actuator_command
+
+    def follow(self, index: int, table: SetpointTable, first: int) -> None:
+        """Give the driver of a car its setpoints.
+
+        Args:
+            index: Number of the car.
+            table: The setpoints.
+            first: Step of the first one.
+        """
+        if self._tables[index] is not table:
+            self._tables[index] = table
+            given: dict[str, Any] = {
+                "setpoints": table.rows.ctypes.data,
+                "n_setpoints": len(table.rows),
+                "torques": table.torques.ctypes.data,
+            }
+            if table.path is not None:
+                spacing_m, xs, ys, *headings = PathSearch(table.path).line
+                given |= {"spacing_m": spacing_m, "headings_rad": headings}
+                given |= {"path_x_m": (xs.ctypes.data, xs.size), "path_y_m": (ys.ctypes.data, ys.size)}
+            for name, value in given.items():
+                self.cars[name][index] = value
+        self.cars["first"][index] = first
+
+    def drive(self, call: Callable[[NDArray[Any]], None] | None = None) -> dict[int, SimulationDiverged]:
+        """Drive each car for the number of steps in `left`.
+
+        Args:
+            call: The native call for all cars; by default in this thread.
+
+        Returns:
+            Number of each car that has diverged -> its error.
+        """
+        cars, failed = self.cars, {}
+        while True:
+            if call is None:
+                native_loop.drive_cars(cars, 0, len(cars), native_loop.STEP_ADDRESS)
+            else:
+                call(cars)
+            stopped = np.flatnonzero(cars["status"]).tolist() if len(cars) > 1 else [0] if cars["status"][0] else []
+            if not stopped:
+                return failed
+            for index in stopped:
+                try:
+                    if cars["status"][index] == INSANE:
+                        self._loops[index].vehicle.check()
+                    else:
+                        self._prepare(index)
+                except SimulationDiverged as error:
+                    failed[index] = error
+                    cars["left"][index] = 0
+
+    def _prepare(self, index: int) -> None:
+        """Compute the gains of a driver for the present speed."""
+        driver: Any = self._loops[index].driver
+        speed_mps = float(self.motions[index, _SPEED])
+        self.cars["driver"]["_path"]["_row_size"][index] = driver.prepare(speed_mps)
+
+    def _torques_of(self, index: int, step: int) -> WheelTorques | None:
+        table = self._tables[index]
+        if table is None or not len(table.torques):
+            return None
+        row = table.torques[min(step - int(self.cars["first"][index]), len(table.rows) - 1)].tolist()
+        drive, brake = map(tuple, row)
+        return WheelTorques(drive, brake)
+
+
+def _steering(row: Sequence[float]) -> ActuatorCommand:
+    return steering(*map(float, row[: N_STEERING - 1]), bool(row[N_STEERING - 1]))  # type: ignore[arg-type]
