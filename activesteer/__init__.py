@@ -10,12 +10,14 @@ if TYPE_CHECKING:
 
     from activesteer.recording import Recording
     from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, Setpoint
+    from activesteer.simulation.batch import Batch
     from activesteer.simulation.runner import simulate
     from activesteer.simulation.simulation import Simulation
     from activesteer.studies.engine.study import study
 
 __all__ = [
     "ActuatorCommand",
+    "Batch",
     "DriverCommand",
     "Estimate",
     "Measurement",
@@ -30,6 +32,7 @@ __all__ = [
 
 # Imported at first use: engine and compiler take a second, which help and lists of names need not wait for.
 _HOMES = {
+    "Batch": "activesteer.simulation.batch",
     "Recording": "activesteer.recording",
     "DriverCommand": "activesteer.signals",
     "Estimate": "activesteer.signals",

@@ -16,14 +16,13 @@ from activesteer.config import Source
 from activesteer.controllers import Controller, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver
-from activesteer.driver.human import HumanDriver
 from activesteer.errors import ManeuverError, ParameterError, shown
 from activesteer.faults import Fault, check_faults
 from activesteer.scenario import Scenario
 from activesteer.scenario.changing import changed
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.control_unit import ControlUnit, control_unit, told_by_sensor
-from activesteer.simulation.native_cars import NativeCars, law_of, tabulate
+from activesteer.simulation.native_cars import NativeCars, has_law, law_of, tabulate
 from activesteer.simulation.native_loop import STEP_ADDRESS
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.retuning import retuned
@@ -47,6 +46,16 @@ class LoopState(NamedTuple):
     commands: tuple[DriverCommand, ActuatorCommand]
     step: int
     changes: tuple[tuple[str, Any, float], ...]
+
+
+class Given(NamedTuple):
+    """A driver or controller that repeats one command."""
+
+    command: Any
+
+    def step(self, *_: Any, **__: Any) -> Any:
+        """Return the command."""
+        return self.command
 
 
 class OneAtATime:
@@ -277,7 +286,7 @@ class ClosedLoop(Uncopyable):
         Returns:
             False, and nothing is driven, if driver, controller or setpoints have no native form.
         """
-        if not STEP_ADDRESS or type(self.driver) is not HumanDriver or not law_of(self.controller):
+        if not STEP_ADDRESS or not has_law(self.driver) or not law_of(self.controller):
             return False
         timestep_s, native = self.vehicle.timestep_s, self._native
         setpoints = [setpoint_at(step * timestep_s) for step in block]

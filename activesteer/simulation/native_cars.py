@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array
+from activesteer.driver.human import HumanDriver
 from activesteer.errors import SimulationDiverged
 from activesteer.native_blocks import take, values
 from activesteer.road.path_search import PathSearch
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
     from activesteer.simulation.closed_loop import ClosedLoop
 
 _SPEED: Final = Motion._fields.index("speed_mps")
+
+_STEPS: Final = {kind: kind.step for kind in (HumanDriver, *LAWS[1:]) if kind is not None}
 
 
 class SetpointTable(NamedTuple):
@@ -96,7 +99,17 @@ def law_of(controller: Any) -> int:
     """Return the place of a controller in `LAWS`; 0 if compiled code cannot carry it out."""
     if type(controller) is ControlUnit and not controller.uses_truth:
         controller = controller.inner
-    return LAWS.index(type(controller)) if type(controller) in LAWS else 0
+    return LAWS.index(type(controller)) if type(controller) in LAWS and _is_own(controller) else 0
+
+
+def has_law(driver: Any) -> bool:
+    """Return whether compiled code can carry out a driver."""
+    return type(driver) is HumanDriver and _is_own(driver)
+
+
+def _is_own(block: Any) -> bool:
+    """Return whether nobody has replaced the method of a block, for example to watch it."""
+    return "step" not in vars(block) and type(block).step is _STEPS[type(block)]
 
 
 class NativeCars:
@@ -136,24 +149,18 @@ class NativeCars:
             for name, value in bound.items():
                 self.cars[name][index] = value
 
-    def load(self, index: int, *, driver: bool = True, controller: bool = True) -> None:
-        """Copy the state of a loop into its record.
-
-        Args:
-            index: Number of the car.
-            driver: Whether its driver acts; otherwise its row of commands holds.
-            controller: Whether its controller acts; otherwise its row of commands holds.
-        """
+    def load(self, index: int) -> None:
+        """Copy the state of a loop into its record; its native driver and controller act, other commands hold."""
         loop, cars = self._loops[index], self.cars
         cars["gear"][index] = loop.vehicle.gear
         cars["step"][index] = loop.step_count
         self.measurements[index], self.motions[index] = numbers_in(loop.measurement), loop.motion
         self.driver_commands[index], self.actuator_commands[index] = map(numbers_in, loop.commands)
-        cars["driver_kind"][index] = HUMAN if driver else GIVEN
-        if driver:
+        cars["driver_kind"][index] = GIVEN
+        if has_law(loop.driver):
+            cars["driver_kind"][index] = HUMAN
             cars["driver"][index] = values(loop.driver)  # type: ignore[arg-type]
-        law = law_of(loop.controller) if controller else 0
-        cars["controller_kind"][index] = law
+        cars["controller_kind"][index] = law = law_of(loop.controller)
         if law:
             self._load_unit(index, law, loop.controller)
 
@@ -162,7 +169,7 @@ class NativeCars:
         if isinstance(controller, ControlUnit):
             every, calls, ratio, held, on_bus = controller.memory()
             controller = controller.inner
-        cars, delay = self.cars, len(on_bus) - 1 if calls else len(on_bus)
+        cars, delay = self.cars, max(len(on_bus) - 1, 0) if calls else len(on_bus)
         bus = self._buses[index] = np.zeros((delay + 1, N_STEERING))
         for back, command in enumerate(reversed(on_bus), 1):
             bus[(calls - back) % (delay + 1)] = command[:N_STEERING]
@@ -181,12 +188,13 @@ class NativeCars:
         step = loop.step_count = int(cars["step"][index])
         loop.measurement = message_of(Measurement, self.measurements[index].tolist())
         loop.motion = message_of(Motion, self.motions[index].tolist())
-        driver_command, actuator_command = loop.commands
-        if cars["driver_kind"][index] == HUMAN:
+        driver_command = message_of(DriverCommand, self.driver_commands[index].tolist())
+        if has_law(loop.driver):
             take(loop.driver, cars["driver"][index].item())  # type: ignore[arg-type]
-            driver_command = message_of(DriverCommand, self.driver_commands[index].tolist())
-            driver_command = driver_command._replace(wheel_torques=self._torques_of(index, step - 1))
-        if law := int(cars["controller_kind"][index]):
+            if cars["driver_kind"][index] == HUMAN:
+                driver_command = driver_command._replace(wheel_torques=self._torques_of(index, step - 1))
+        loop.commands = driver_command, message_of(ActuatorCommand, self.actuator_commands[index].tolist())
+        if law := law_of(loop.controller):
             controller, calls = loop.controller, int(cars["calls"][index])
             if isinstance(controller, ControlUnit):
                 bus, length = self._buses[index], len(self._buses[index])
@@ -194,8 +202,6 @@ class NativeCars:
                 controller.put_memory(calls, _steering(cars["held"][index]), on_bus if calls else on_bus[1:])
                 controller = controller.inner
             take(controller, cars[f"law_{law}"][index].item())  # type: ignore[arg-type]
-            actuator_command = _steering(self.actuator_commands[index])
-        loop.commands = driver_command, actuator_command
 
     def follow(self, index: int, table: SetpointTable, first: int) -> None:
         """Give the driver of a car its setpoints.

@@ -25,7 +25,7 @@ from activesteer.recording.events import MAX_EVENTS, Event, tables_of
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
-from activesteer.simulation.closed_loop import ClosedLoop, LoopState
+from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
 from activesteer.simulation.pickling import pickled, unpickled
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import RecordedRows, Recorder
@@ -55,15 +55,6 @@ class Portable(NamedTuple):
     timestep_s: float
     state: SavedState
     model: mujoco.MjModel
-
-
-class _Given(NamedTuple):
-    """A driver or controller that repeats one command."""
-
-    command: Any
-
-    def step(self, *_: Any, **__: Any) -> Any:
-        return self.command
 
 
 class Simulation:
@@ -212,9 +203,9 @@ class Simulation:
             raise ManeuverError(f"{end}; {steps} more steps were requested, {left} are left", value=steps, allowed=left)
         driver = controller = None
         if driver_command is not None:
-            driver = _Given(DRIVER.checked(driver_command, "", loop.driver_setup, _GIVEN))
+            driver = Given(DRIVER.checked(driver_command, "", loop.driver_setup, _GIVEN))
         if actuator_command is not None:
-            controller = _Given(CONTROLLER.checked(actuator_command, "", loop.controller_setup, _GIVEN))
+            controller = Given(CONTROLLER.checked(actuator_command, "", loop.controller_setup, _GIVEN))
         rows = self._recorder.rows
         with self._watched():
             try:

@@ -397,6 +397,7 @@ class Vehicle(Uncopyable):
         length = size + sum(part.size for part in memory) + 1
         if not isinstance(state, np.ndarray) or state.dtype != np.float64 or state.shape != (length,):
             raise ParameterError(f"is {shown(state)}; a state of this car is needed", key="state", value=state)
+        self.data.warning.number[:] = 0
         mujoco.mj_setState(self.model, self.data, state[:size], _STATE)
         for part in memory:
             part[:] = state[size : size + part.size]

@@ -1,0 +1,514 @@
+"""Many cars at once: each with its own numbers, driven by one native call without Python's lock."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from itertools import pairwise
+from typing import Any, Final, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from activesteer.controllers import CONTROLLER, find_controller
+from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
+from activesteer.driver import DRIVER
+from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, shown
+from activesteer.plugins import Kind
+from activesteer.resources import DEFAULT_DRIVER
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.signals import (
+    ActuatorCommand,
+    DriverCommand,
+    Measurement,
+    Motion,
+    new_message,
+    numbers_of,
+    widths_of,
+)
+from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState, OneAtATime
+from activesteer.simulation.native_cars import NativeCars, SetpointTable, has_law, law_of, tabulate
+from activesteer.simulation.native_loop import GIVEN, HUMAN, N_STEERING, STEP_ADDRESS, drive_cars
+from activesteer.simulation.preparation import prepared
+from activesteer.vehicle import engine_warnings_held
+
+MAX_CARS: Final = 100_000
+"""Most cars of a batch."""
+_WINDOW: Final = 250
+"""Steps whose setpoints are tabulated at a time."""
+_MAX_TABLES: Final = 64
+"""Tables that are kept for cars that share a manoeuvre."""
+_LEAST_STEPS: Final = 40
+"""Car-steps below which a second thread costs more than it saves."""
+_MOST: Final = 1e12
+"""Largest number of a command without a range of its own."""
+_WHEEL, _FRONT = (
+    [number.name for number in numbers_of(DriverCommand)].index(name)
+    for name in ("steering_wheel_demand_rad", "front_steer_demand_rad")
+)
+_Message = TypeVar("_Message", bound=tuple[Any, ...])
+
+
+class Batch:
+    """N independent cars in one manoeuvre, each with its own overrides.
+
+    All inputs and outputs are arrays whose first axis is the car. The trajectory of each car is equal to the last bit
+    to that of a `Simulation` with the same inputs, for any number of cars and threads.
+
+    The package's driver with any manoeuvre, held commands, and the controllers `none`, `ars` and `afs` run in native
+    code. Every other driver or controller, and a car with a faulty sensor, is driven in Python, car by car.
+
+    Attributes:
+        scenarios: Manoeuvre, car and driver of each car.
+        loops: The closed loops; read them after `sync`.
+        threads: Number of threads.
+        failures: Number of each car that has diverged -> its error. The car stands still until it is reset.
+
+    Example:
+        >>> import numpy as np
+        >>> import activesteer
+        >>> batch = activesteer.Batch("sine_with_dwell", 3, overrides={"road.mu": np.array([0.3, 0.6, 0.9])})
+        >>> measurement = batch.advance(1500)
+        >>> measurement.yaw_rate_radps.shape
+        (3,)
+        >>> measurement = batch.advance(10, actuator_command=activesteer.ActuatorCommand(
+        ...     rear_steer_demand_rad=-0.1 * measurement.yaw_rate_radps))
+    """
+
+    scenarios: list[Scenario]
+    loops: list[ClosedLoop]
+    failures: dict[int, SimulationDiverged]
+
+    def __init__(
+        self,
+        maneuver: FileOrTable | Scenario,
+        n: int,
+        controller: Any = "none",
+        vehicle: FileOrTable = "compact",
+        overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+        *,
+        driver: Any = DEFAULT_DRIVER,
+        timestep_s: float = DEFAULT_TIMESTEP_S,
+        threads: int | None = None,
+    ) -> None:
+        """Build the cars and let them settle. Cars with the same inputs settle once.
+
+        Args:
+            maneuver: Name, path, or table of a manoeuvre; or a `Scenario`, which includes vehicle and driver.
+            n: Number of cars.
+            controller: Name of a controller, or your own.
+            vehicle: Name, path, or table of a vehicle.
+            overrides: Dotted key -> value, or array with a value for each car; or a list with overrides of each car.
+            driver: Name, path or table of a driver, or your own code.
+            timestep_s: Step of engine, driver and controller [s].
+            threads: Number of threads; by default as many as there are processors.
+
+        Raises:
+            ActiveSteerError: an input is wrong, or a car does not settle; a note names the car.
+        """
+        if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MAX_CARS:
+            raise ParameterError(f"is {shown(n)}; a number of cars from 1 to {MAX_CARS} is needed", key="n", value=n)
+        if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+            raise ParameterError(f"is {shown(threads)}; at least 1 is needed", key="threads", value=threads)
+        self.threads = threads or os.cpu_count() or 1
+        self._controller, self._timestep_s = find_controller(controller), timestep_s
+        inputs = [maneuver] * n if isinstance(maneuver, Scenario) else []
+        if inputs and (overrides or vehicle != "compact" or driver != DEFAULT_DRIVER):
+            raise ParameterError(
+                "a Scenario already includes vehicle, driver and overrides", key="vehicle, overrides, driver"
+            )
+        self.scenarios = inputs or [
+            scenario for scenario in self._resolved(maneuver, vehicle, each_overrides(overrides, n), driver)
+        ]
+        self._build({})
+
+    def _resolved(
+        self, maneuver: Any, vehicle: Any, overrides: Sequence[Mapping[str, Any]], driver: Any
+    ) -> Iterator[Scenario]:
+        known: dict[str, Scenario] = {}
+        for car, changes in enumerate(overrides):
+            key = repr(sorted(changes.items()))
+            if key not in known:
+                with _named(car):
+                    known[key] = prepared(resolve(maneuver, vehicle, changes, driver), self._timestep_s)
+            yield known[key]
+
+    def _build(self, starts: dict[int, LoopState]) -> None:
+        """Build the loops, from the settled states of the scenarios that are known already."""
+        self._starts, self.loops = starts, []
+        for car, scenario in enumerate(self.scenarios):
+            with _named(car):
+                loop = ClosedLoop(scenario, self._controller, self._timestep_s, settled=starts.get(id(scenario)))
+            if id(scenario) not in starts:
+                starts[id(scenario)] = loop.save_state()
+            self.loops.append(loop)
+        self.failures = {}
+        self._in_use = OneAtATime()
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self._native = NativeCars(self.loops)
+        for car in range(len(self)):
+            self._native.load(car)
+        # The objects of a loop are behind its record after it has been driven natively.
+        self._behind = np.zeros(len(self), dtype=bool)
+        self._last = np.array([loop.steps for loop in self.loops])
+        self._laws = np.array([law_of(loop.controller) for loop in self.loops])
+        self._ratios = np.array([loop.driver_setup.steering_ratio for loop in self.loops])
+        self._faulty = [car for car, scenario in enumerate(self.scenarios) if scenario.maneuver.fault]
+        self._human = np.array([has_law(loop.driver) for loop in self.loops])
+        # The first step behind the table of setpoints that a car has, and the tables of cars that share a manoeuvre.
+        self._table_ends = np.zeros(len(self), dtype=np.intp)
+        self._tables: dict[tuple[int, int], SetpointTable | None] = {}
+
+    def __len__(self) -> int:
+        """Number of cars."""
+        return len(self.scenarios)
+
+    @property
+    def steps(self) -> NDArray[np.intp]:
+        """Number of steps of each car's manoeuvre."""
+        return self._last.copy()
+
+    @property
+    def step_count(self) -> NDArray[np.intp]:
+        """Number of steps that each car has made."""
+        return self._native.cars["step"].copy()
+
+    @property
+    def time_s(self) -> Array:
+        """Present time of each car, from the start of the manoeuvre [s]."""
+        return self._native.cars["step"] * self._timestep_s
+
+    @property
+    def done(self) -> NDArray[np.bool_]:
+        """True for each car at the end of its manoeuvre, and for each car that has diverged."""
+        done = self._native.cars["step"] >= self._last
+        done[list(self.failures)] = True
+        return done
+
+    @property
+    def measurement(self) -> Any:
+        """Present signals of the sensors, a `Measurement`; each field has shape (n,), or (n, 4) for the wheels."""
+        return arrays_of(Measurement, self._native.measurements.copy())
+
+    @property
+    def motion(self) -> Any:
+        """Present positions and motions as the drivers see them, a `Motion`; each field has shape (n,)."""
+        return arrays_of(Motion, self._native.motions.copy())
+
+    @property
+    def driver_command(self) -> Any:
+        """Last commands of the drivers, a `DriverCommand`; each field has shape (n,)."""
+        return arrays_of(DriverCommand, self._native.driver_commands.copy())
+
+    @property
+    def actuator_command(self) -> Any:
+        """Last commands of the controllers, an `ActuatorCommand`; each field has shape (n,), for the wheels (n, 4)."""
+        return arrays_of(ActuatorCommand, self._native.actuator_commands.copy())
+
+    def advance(
+        self,
+        steps: int | ArrayLike = 1,
+        driver_command: DriverCommand | None = None,
+        actuator_command: ActuatorCommand | None = None,
+        cars: ArrayLike | None = None,
+    ) -> Any:
+        """Drive some steps, each car at most to the end of its manoeuvre.
+
+        If you supply a command, the block it replaces is not called and its state is frozen.
+
+        Args:
+            steps: Number of steps, or one for each car.
+            driver_command: Commands that replace the drivers; each field is a number, or an array of shape (n,).
+            actuator_command: Commands that replace the controllers; each field is a number, or an array of shape (n,),
+                for the wheels (n, 4).
+            cars: Numbers of the cars to drive, or a mask; by default all.
+
+        Returns:
+            The measurement of all cars.
+
+        Raises:
+            ParameterError: an argument is wrong; nothing was driven.
+            ActiveSteerError: your own driver or controller failed. A car that diverges raises nothing: see `failures`.
+        """
+        left = np.broadcast_to(np.asarray(steps), len(self))
+        if not np.issubdtype(left.dtype, np.integer) or (left < 0).any():
+            raise ParameterError(f"is {shown(steps)}; a whole number of steps, 0 or more, is needed", key="steps")
+        drivers = None if driver_command is None else _columns(DRIVER, driver_command, len(self))
+        if drivers is not None:
+            drivers[:, _FRONT] = drivers[:, _WHEEL] / self._ratios
+        controllers = None if actuator_command is None else _columns(CONTROLLER, actuator_command, len(self))
+        with self._in_use, engine_warnings_held():
+            left = np.minimum(left, self._last - self._native.cars["step"])
+            left[~self._mask(cars) | self.done] = 0
+            self._drive(left, drivers, controllers)
+        return self.measurement
+
+    def _drive(self, left: NDArray[np.intp], drivers: Array | None, controllers: Array | None) -> None:
+        native, records, moving = self._native, self._native.cars, left > 0
+        records["driver_kind"] = GIVEN if drivers is not None else HUMAN
+        records["controller_kind"] = 0 if controllers is not None else self._laws
+        if drivers is not None:
+            native.driver_commands[moving] = drivers[moving]
+        if controllers is not None:
+            native.actuator_commands[moving] = controllers[moving]
+        else:
+            native.actuator_commands[np.ix_(moving, np.arange(N_STEERING, native.actuator_commands.shape[1]))] = 0.0
+        slow = np.zeros(len(self), dtype=bool) if STEP_ADDRESS else np.ones(len(self), dtype=bool)
+        slow |= ~self._human & (drivers is None)
+        slow |= (self._laws == 0) & (controllers is None)
+        while left.any():
+            natively = np.where(slow, 0, left)
+            in_python = np.where(slow, left, 0)
+            for car in self._faulty:
+                step = int(records["step"][car])
+                if left[car] and not slow[car]:
+                    # Faults that begin or end now change the model.
+                    stretch = next(self.loops[car].faults.stretches(step, step + int(left[car])))
+                    count, watched = stretch.last - stretch.first, stretch.step != self.loops[car].vehicle.step
+                    natively[car], in_python[car] = (0, count) if watched else (count, 0)
+            if drivers is None:
+                for car in np.flatnonzero((natively > 0) & (records["step"] >= self._table_ends)).tolist():
+                    if not self._tabulate(car):
+                        slow[car] = True
+                        natively[car], in_python[car] = 0, left[car]
+                natively = np.minimum(natively, np.maximum(self._table_ends - records["step"], 0))
+            for car in np.flatnonzero(in_python).tolist():
+                self._drive_in_python(car, int(in_python[car]), drivers is not None, controllers is not None)
+            records["left"] = natively
+            self._behind |= natively > 0
+            self.failures |= native.drive(self._call)
+            left = left - natively - in_python
+            left[list(self.failures)] = 0
+
+    def _call(self, records: NDArray[Any]) -> None:
+        """Drive all cars natively, divided among the threads by their steps."""
+        done = np.cumsum(records["left"])
+        parts = self.threads if self._pool is not None and done[-1] >= _LEAST_STEPS else 1
+        ends = [*np.searchsorted(done, done[-1] * np.arange(1, parts) / parts).tolist(), len(records)]
+        futures: list[Future[None]] = []
+        for first, last in pairwise([0, *ends]):
+            if last == len(records):
+                drive_cars(records, first, last, STEP_ADDRESS)
+            elif self._pool is not None:
+                futures.append(self._pool.submit(drive_cars, records, first, last, STEP_ADDRESS))
+        for future in futures:
+            future.result()
+
+    def _tabulate(self, car: int) -> bool:
+        """Give a car the setpoints of its next steps; False if compiled code cannot follow them."""
+        loop, window = self.loops[car], int(self._native.cars["step"][car]) // _WINDOW
+        key = id(self.scenarios[car]), window
+        if key not in self._tables:
+            while len(self._tables) >= _MAX_TABLES:
+                del self._tables[next(iter(self._tables))]
+            times = (step * self._timestep_s for step in range(window * _WINDOW, (window + 1) * _WINDOW))
+            setpoints = [loop.maneuver.setpoint(time_s) for time_s in times]
+            self._tables[key] = tabulate(setpoints, loop.driver_setup.rack_per_steering_wheel_m)
+        table = self._tables[key]
+        if table is None:
+            return False
+        self._native.follow(car, table, window * _WINDOW)
+        self._table_ends[car] = (window + 1) * _WINDOW
+        return True
+
+    def _drive_in_python(self, car: int, steps: int, driver_given: bool, controller_given: bool) -> None:
+        self.sync([car])
+        loop = self.loops[car]
+        driver_command, actuator_command = loop.commands
+        driver = Given(driver_command) if driver_given else None
+        controller = Given(actuator_command) if controller_given else None
+        try:
+            loop.drive(steps, driver=driver, controller=controller)
+        except SimulationDiverged as error:
+            self.failures[car] = error
+        self._load(car)
+
+    def _load(self, car: int) -> None:
+        self._native.load(car)
+        self.loops[car].vehicle.follow_model()
+        self._behind[car], self._table_ends[car] = False, 0
+
+    def sync(self, cars: ArrayLike | None = None) -> None:
+        """Bring the loops of some cars up to date, so that `loops` can be read. Do not change their state.
+
+        Args:
+            cars: Numbers of the cars, or a mask; by default all.
+        """
+        for car in np.flatnonzero(self._mask(cars)).tolist():
+            if self._behind[car]:
+                self._native.store(car)
+                self._behind[car] = False
+
+    def save_state(self, cars: ArrayLike | None = None) -> list[LoopState]:
+        """Return the states of some cars, from which they continue bit-identically.
+
+        Args:
+            cars: Numbers of the cars, or a mask; by default all.
+        """
+        with self._in_use:
+            self.sync(cars)
+            return [self.loops[car].save_state() for car in np.flatnonzero(self._mask(cars)).tolist()]
+
+    def restore_state(self, states: Sequence[LoopState], cars: ArrayLike | None = None) -> None:
+        """Bring some cars back to saved states of themselves, or of cars with the same inputs.
+
+        Args:
+            states: A state for each of these cars, in the order of their numbers.
+            cars: Numbers of the cars, or a mask; by default all.
+
+        Raises:
+            ParameterError: the number of states is wrong, or a state belongs to another car.
+        """
+        chosen = np.flatnonzero(self._mask(cars)).tolist()
+        if len(states) != len(chosen):
+            raise ParameterError(f"are {len(states)}; one for each of {len(chosen)} cars is needed", key="states")
+        with self._in_use:
+            for car, state in zip(chosen, states, strict=True):
+                with _named(car):
+                    self.loops[car].restore_state(state)
+                self.failures.pop(car, None)
+                self._load(car)
+
+    def reset(self, cars: ArrayLike | None = None) -> Any:
+        """Bring some cars back to the start of their manoeuvre, and return the measurement of all.
+
+        Args:
+            cars: Numbers of the cars, or a mask; by default all.
+        """
+        chosen = np.flatnonzero(self._mask(cars)).tolist()
+        self.restore_state([self._starts[id(self.scenarios[car])] for car in chosen], chosen)
+        return self.measurement
+
+    def copy(self) -> Self:
+        """Return an independent batch that continues bit-identically."""
+        return self._rebuilt(*self._portable())
+
+    def _portable(self) -> tuple[Any, ...]:
+        self.sync()
+        states = [loop.save_state() for loop in self.loops]
+        models = [loop.vehicle.model for loop in self.loops]
+        return self.scenarios, self._controller, self._timestep_s, self.threads, states, models, dict(self.failures)
+
+    @classmethod
+    def _rebuilt(
+        cls, scenarios: Any, controller: Any, timestep_s: float, threads: int, states: Any, models: Any, failures: Any
+    ) -> Self:
+        other = cls.__new__(cls)
+        other.scenarios, other._controller, other._timestep_s, other.threads = (
+            scenarios,
+            controller,
+            timestep_s,
+            threads,
+        )
+        other._build({})
+        for loop, model in zip(other.loops, models, strict=True):
+            loop.vehicle.adopt_model(model)
+        other.restore_state(states)
+        other.failures = failures
+        return other
+
+    def __copy__(self) -> Self:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self.copy()
+
+    def __reduce_ex__(self, _protocol: Any) -> tuple[Any, ...]:
+        return self._rebuilt, self._portable()
+
+    def _mask(self, cars: ArrayLike | None) -> NDArray[np.bool_]:
+        """Return the mask of given cars."""
+        chosen = np.zeros(len(self), dtype=bool)
+        try:
+            chosen[slice(None) if cars is None else np.asarray(cars, dtype=None if np.size(cars) else np.intp)] = True
+        except (IndexError, TypeError, ValueError) as reason:
+            needed = f"numbers from 0 to {len(self) - 1}, or a mask of {len(self)}, are needed"
+            raise ParameterError(f"is {shown(cars)}; {needed}", key="cars", value=cars) from reason
+        return chosen
+
+
+def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None, n: int) -> list[dict[str, Any]]:
+    """Return the overrides of each car.
+
+    Args:
+        overrides: Key -> value, or array with a value for each car; or a list with overrides of each car.
+        n: Number of cars.
+
+    Raises:
+        ParameterError: a list or an array has another length.
+    """
+    if overrides is None or isinstance(overrides, Mapping):
+        table = dict(overrides or {})
+        arrays = {key: value for key, value in table.items() if isinstance(value, np.ndarray) and value.ndim}
+        for key, value in arrays.items():
+            if len(value) != n:
+                raise ParameterError(f"has {len(value)} values; one for each of {n} cars is needed", key=key)
+        return [table | {key: value[car].tolist() for key, value in arrays.items()} for car in range(n)]
+    if isinstance(overrides, (str, bytes)) or not all(isinstance(changes, Mapping) for changes in overrides):
+        raise ParameterError(f"is {shown(overrides)}; a table, or a list of tables, is needed", key="overrides")
+    if len(overrides) != n:
+        raise ParameterError(f"has {len(overrides)} entries; one for each of {n} cars is needed", key="overrides")
+    return [dict(changes) for changes in overrides]
+
+
+def arrays_of(kind: type[_Message], rows: Array) -> _Message:
+    """Return a message whose fields are arrays, from rows of its numbers; a field without numbers is None.
+
+    Args:
+        kind: Class of the message.
+        rows: Shape (n, numbers).
+
+    Returns:
+        The message; a field has shape (n,), or (n, 4) for the wheels.
+    """
+    ends = np.cumsum(widths_of(kind)).tolist()
+    parts = [
+        None if not width else rows[:, end - 1] if width == 1 else rows[:, end - width : end]
+        for end, width in zip(ends, widths_of(kind), strict=True)
+    ]
+    return new_message(kind, parts)
+
+
+def _columns(kind: Kind, message: Any, n: int) -> Array:
+    """Return the rows of a message of arrays, after checking them.
+
+    Raises:
+        ActiveSteerError: of the kind's type: a field has a wrong shape, a value is not finite or out of its range.
+    """
+    if not isinstance(message, kind.result):
+        raise kind.fail("", f"is {shown(message)}; an activesteer.{kind.result.__name__} of arrays is needed", message)
+    rows = np.zeros((n, len(numbers_of(kind.result))))
+    place = 0
+    for name, width, value in zip(message._fields, widths_of(kind.result), message, strict=True):
+        if not width:
+            if value is not None:
+                raise kind.fail("", f"{name} cannot be given to a batch", value)
+            continue
+        try:
+            rows[:, place : place + width] = np.reshape(value, (-1, width)) if np.ndim(value) else value
+        except (TypeError, ValueError) as reason:
+            shape = f"({n},)" if width == 1 else f"({n}, {width})"
+            raise kind.fail(
+                "", f"{name} is {shown(value)}; a number, or an array of shape {shape}, is needed"
+            ) from reason
+        given, limits = rows[:, place : place + width], kind.ranges.get(name)
+        low, high = (-_MOST, _MOST) if limits is None else (limits.low, limits.high)
+        if name != "front_steer_demand_rad" and not ((given >= low) & (given <= high)).all():
+            wrong = int(np.argmin(((given >= low) & (given <= high)).all(axis=1)))
+            raise kind.fail(
+                "", f"{name} of car {wrong} is {shown(given[wrong].tolist())}; {low:g} to {high:g} is allowed"
+            )
+        place += width
+    return rows
+
+
+@contextmanager
+def _named(car: int) -> Iterator[None]:
+    """Add the number of the car to an error."""
+    try:
+        yield
+    except ActiveSteerError as error:
+        error.add_note(f"car {car} of the batch")
+        raise

@@ -1,0 +1,141 @@
+"""Many cars at once: each equals a simulation of its own to the last bit."""
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import activesteer
+from activesteer import ActuatorCommand, Batch, DriverCommand, Simulation
+from activesteer.controllers import NoControl
+from activesteer.errors import ControllerError, ParameterError
+from activesteer.signals import numbers_in
+
+FRICTIONS = np.array([0.7, 0.8, 0.9])
+STEPS = 700
+
+
+def numbers(simulation: Simulation) -> list[float]:
+    return [*numbers_in(simulation.measurement), *simulation.motion]
+
+
+def row(batch: Batch, car: int) -> list[float]:
+    batch.sync()
+    return [*numbers_in(batch.loops[car].measurement), *batch.loops[car].motion]
+
+
+@pytest.mark.parametrize(
+    ("maneuver", "controller"), [("sine_with_dwell", "none"), ("slalom", "ars"), ("brake_in_turn", "afs")]
+)
+def test_each_car_equals_its_simulation_for_any_number_of_threads_and_chunks(maneuver: str, controller: str) -> None:
+    overrides = {"road.mu": FRICTIONS, "sensors.preset": "production", "controllers.bus_delay_s": 0.004}
+    if controller == "none":
+        del overrides["controllers.bus_delay_s"]
+    two, one = (Batch(maneuver, 3, controller, overrides=overrides, threads=threads) for threads in (2, 1))
+    two.advance(STEPS)
+    for chunk in (1, 249, 7, STEPS - 257):
+        one.advance(chunk)
+    for car, friction in enumerate(FRICTIONS):
+        alone = Simulation(maneuver, controller, overrides=overrides | {"road.mu": friction})
+        alone.advance(STEPS)
+        assert row(two, car) == row(one, car) == numbers(alone)
+        assert one.loops[car].commands == alone.loop.commands
+        assert (one.loops[car].vehicle.save_state() == alone.loop.vehicle.save_state()).all()
+
+
+def test_given_commands_replace_the_blocks() -> None:
+    batch = Batch("step_steer", 2, "ars", overrides={"speed_kmh": 80.0}, threads=1)
+    rear: Any = np.array([-0.02, 0.03])
+    wheel: Any = np.array([0.2, -0.4])
+    drivers = DriverCommand(steering_wheel_demand_rad=wheel, drive_torque_demand_Nm=300.0)
+    batch.advance(300, actuator_command=ActuatorCommand(rear_steer_demand_rad=rear))
+    batch.advance(200, drivers)
+    batch.advance(100)
+    for car in range(2):
+        alone = Simulation("step_steer", "ars", overrides={"speed_kmh": 80.0})
+        alone.advance(300, actuator_command=ActuatorCommand(rear_steer_demand_rad=rear[car]))
+        alone.advance(200, DriverCommand(steering_wheel_demand_rad=wheel[car], drive_torque_demand_Nm=300.0))
+        alone.advance(100)
+        assert row(batch, car) == numbers(alone)
+
+
+def test_a_fault_acts_at_its_time_in_its_car() -> None:
+    fault = {"part": "rear", "kind": "stuck", "start_s": 0.3, "end_s": 0.5}
+    noisy = {"part": "yaw_rate_sensor", "kind": "offset", "size_degps": 5.0, "start_s": 0.2}
+    faults = [[], [fault], [noisy]]
+    batch = Batch("sine_with_dwell", 3, "ars", overrides=[{"fault": each} for each in faults])
+    batch.advance(900)
+    for car, each in enumerate(faults):
+        alone = Simulation("sine_with_dwell", "ars", overrides={"fault": each})
+        alone.advance(900)
+        assert row(batch, car) == numbers(alone)
+
+
+@pytest.mark.parametrize("twin", [copy.deepcopy, lambda batch: pickle.loads(pickle.dumps(batch))])
+def test_states_and_copies_continue_bit_identically(twin) -> None:
+    batch = Batch("double_lane_change", 2, "ars", overrides={"road.mu": np.array([0.5, 0.9])}, threads=1)
+    batch.advance(1100)
+    (state,), other = batch.save_state([1]), twin(batch)
+    expected = batch.advance(400).yaw_rate_radps
+    assert (other.advance(400).yaw_rate_radps == expected).all()
+    batch.restore_state([state], [1])
+    assert batch.step_count.tolist() == [1500, 1100]
+    assert batch.advance(400, cars=[1]).yaw_rate_radps[1] == expected[1]
+    batch.reset([0])
+    batch.advance(1500, cars=[True, False])
+    assert batch.measurement.yaw_rate_radps[0] == expected[0]
+
+
+def test_every_controller_and_driver_can_be_driven() -> None:
+    class Damper:
+        def step(self, _command, measurement):
+            return ActuatorCommand(rear_steer_demand_rad=0.05 * measurement.yaw_rate_radps)
+
+    for controller in (Damper(), "lqr"):
+        batch, alone = Batch("step_steer", 2, controller), Simulation("step_steer", controller)
+        batch.advance(120)
+        alone.advance(120)
+        assert row(batch, 1) == numbers(alone)
+
+
+def test_a_diverging_car_stops_alone() -> None:
+    batch = Batch("straight_line", 2, overrides={"duration_s": 3.0}, threads=1)
+    batch.loops[0].vehicle.data.qvel[2] = np.nan
+    batch.advance(100)
+    assert list(batch.failures) == [0]
+    assert batch.done.tolist() == [True, False]
+    batch.advance(100)
+    assert batch.step_count[1] == 200
+    batch.reset([0])
+    batch.advance(100)
+    assert not batch.failures
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"n": 0}, "from 1 to"),
+        ({"n": 2, "threads": 0}, "at least 1"),
+        ({"n": 2, "overrides": {"road.mu": FRICTIONS}}, "3 values; one for each of 2 cars"),
+        ({"n": 2, "overrides": [{}]}, "1 entries"),
+        ({"n": 2, "overrides": [{}, {"rod.mu": 1.0}]}, "rod.mu"),
+    ],
+)
+def test_wrong_inputs_are_refused(arguments: dict, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        Batch("straight_line", **arguments)
+
+
+def test_wrong_commands_are_refused_before_anything_is_driven() -> None:
+    batch = Batch("straight_line", 2)
+    rear: Any
+    for rear, words in ((np.zeros(3), r"shape \(2,\)"), (np.array([0.0, 3.0]), "car 1"), (np.nan, "car 0")):
+        with pytest.raises(ControllerError, match=words):
+            batch.advance(1, actuator_command=ActuatorCommand(rear_steer_demand_rad=rear))
+    with pytest.raises(ParameterError, match="mask of 2"):
+        batch.advance(1, cars=[5])
+    assert batch.step_count.tolist() == [0, 0]
+    assert isinstance(batch.loops[0].controller, NoControl)
+    assert activesteer.Batch is Batch
