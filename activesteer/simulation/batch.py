@@ -48,6 +48,9 @@ _WHEEL, _FRONT = (
     [number.name for number in numbers_of(DriverCommand)].index(name)
     for name in ("steering_wheel_demand_rad", "front_steer_demand_rad")
 )
+_WHEEL_TORQUES: Final = [
+    place for place, number in enumerate(numbers_of(ActuatorCommand)) if number.field == "wheel_torque_demand_Nm"
+]
 _Message = TypeVar("_Message", bound=tuple[Any, ...])
 
 
@@ -132,7 +135,9 @@ class Batch:
             key = repr(sorted(changes.items()))
             if key not in known:
                 with _named(car):
-                    known[key] = prepared(resolve(maneuver, vehicle, changes, driver), self._timestep_s)
+                    known[key] = prepared(
+                        resolve(maneuver, vehicle, changes, driver, [self._controller]), self._timestep_s
+                    )
             yield known[key]
 
     def _build(self, starts: dict[int, LoopState]) -> None:
@@ -239,6 +244,10 @@ class Batch:
         if drivers is not None:
             drivers[:, _FRONT] = drivers[:, _WHEEL] / self._ratios
         controllers = None if actuator_command is None else _columns(CONTROLLER, actuator_command, len(self))
+        if controllers is not None:
+            for car in np.flatnonzero(controllers[:, _WHEEL_TORQUES].any(axis=1)).tolist():
+                with _named(car):
+                    self.loops[car].vehicle.check_driven(controllers[car, _WHEEL_TORQUES].tolist())
         with self._in_use, engine_warnings_held():
             left = np.minimum(left, self._last - self._native.cars["step"])
             left[~self._mask(cars) | self.done] = 0

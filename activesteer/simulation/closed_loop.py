@@ -22,7 +22,7 @@ from activesteer.scenario import Scenario
 from activesteer.scenario.changing import changed
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.control_unit import ControlUnit, control_unit, told_by_sensor
-from activesteer.simulation.native_cars import NativeCars, has_law, law_of, tabulate
+from activesteer.simulation.native_cars import NativeCars, has_law, is_own, law_of, tabulate
 from activesteer.simulation.native_loop import STEP_ADDRESS
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.retuning import retuned
@@ -286,7 +286,7 @@ class ClosedLoop(Uncopyable):
         Returns:
             False, and nothing is driven, if driver, controller or setpoints have no native form.
         """
-        if not STEP_ADDRESS or not has_law(self.driver) or not law_of(self.controller):
+        if not (STEP_ADDRESS and is_own(self.vehicle) and has_law(self.driver) and law_of(self.controller)):
             return False
         timestep_s, native = self.vehicle.timestep_s, self._native
         setpoints = [setpoint_at(step * timestep_s) for step in block]

@@ -40,6 +40,7 @@ from activesteer.simulation.native_loop import (
     SETPOINT,
     TORQUES,
 )
+from activesteer.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from activesteer.road.path import Path
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 
 _SPEED: Final = Motion._fields.index("speed_mps")
 
-_STEPS: Final = {kind: kind.step for kind in (HumanDriver, *LAWS[1:]) if kind is not None}
+_STEPS: Final = {kind: kind.step for kind in (Vehicle, HumanDriver, *LAWS[1:]) if kind is not None}
 
 
 class SetpointTable(NamedTuple):
@@ -99,15 +100,15 @@ def law_of(controller: Any) -> int:
     """Return the place of a controller in `LAWS`; 0 if compiled code cannot carry it out."""
     if type(controller) is ControlUnit and not controller.uses_truth:
         controller = controller.inner
-    return LAWS.index(type(controller)) if type(controller) in LAWS and _is_own(controller) else 0
+    return LAWS.index(type(controller)) if type(controller) in LAWS and is_own(controller) else 0
 
 
 def has_law(driver: Any) -> bool:
     """Return whether compiled code can carry out a driver."""
-    return type(driver) is HumanDriver and _is_own(driver)
+    return type(driver) is HumanDriver and is_own(driver)
 
 
-def _is_own(block: Any) -> bool:
+def is_own(block: Any) -> bool:
     """Return whether nobody has replaced the method of a block, for example to watch it."""
     return "step" not in vars(block) and type(block).step is _STEPS[type(block)]
 

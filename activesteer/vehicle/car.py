@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -222,7 +222,7 @@ class Vehicle(Uncopyable):
             if self._estimate_memory is not None and (estimate := actuator_command.estimate) is not None:
                 write_estimate(self._estimate_memory, 0, *estimate)
             if (added := actuator_command.wheel_torque_demand_Nm) is not NO_TORQUES:
-                self._wheels.check_driven(added)
+                self.check_driven(added)
             torques = driver_command.wheel_torques
             gear = driver_command.gear if torques is None else CLUTCH_OPEN
             if gear != self._gear:
@@ -253,6 +253,10 @@ class Vehicle(Uncopyable):
             raise ValueError(f"gear {gear!r} is not one of {_GEARS}")
         self._gear = self._forces["gear"] = gear
         self._wheels.engage(gear)
+
+    def check_driven(self, torques_Nm: Sequence[float]) -> None:
+        """Check that no torque is demanded of a wheel without a drive; see `WheelSet.check_driven`."""
+        self._wheels.check_driven(torques_Nm)
 
     @property
     def gear(self) -> float:
