@@ -308,7 +308,7 @@ class Batch:
     def _tabulate(self, car: int) -> bool:
         """Give a car the setpoints of its next steps; False if compiled code cannot follow them."""
         loop, window = self.loops[car], int(self._native.cars["step"][car]) // _WINDOW
-        key = id(self.scenarios[car]), window
+        key = id(loop.maneuver), window
         if key not in self._tables:
             while len(self._tables) >= _MAX_TABLES:
                 del self._tables[next(iter(self._tables))]
