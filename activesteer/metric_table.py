@@ -36,10 +36,11 @@ RELATIVE_TOLERANCE: Final = 0.01
 """Fraction of a value by which it may always differ between two versions of the program."""
 _TOLERANCES: Final = {
     "radps": 1e-3, "mps2": 0.02, "rad": 2e-4, "s": 0.005, "srad": 2e-5, "m": 0.01, "mps": 0.02, "radpmps2": 1e-5,
-    "1ps": 0.005, "mps2prad": 0.05, "radprad": 0.001, "Hz": 0.02, "Pa": 1e4, "": 0.01,
+    "1ps": 0.005, "mps2prad": 0.05, "radprad": 0.001, "Hz": 0.02, "Pa": 1e4, "N": 50.0, "": 0.01,
 }  # fmt: skip
 """Declared unit of a metric -> smallest difference between two versions of the program that a reader would notice."""
 
+TYRE_USE: Final = ("tyre_use_max", "tyre_use_mean")
 CONES_HIT: Final = "cones_hit"
 CONES_MISSED: Final = "cones_missed"
 LANE_OVERSTEP: Final = "lane_overstep_m"
@@ -217,6 +218,8 @@ METRICS: Final = {
         *_declare("radprad", "roll_gain"),
         *_declare("Hz", "yaw_rate_peak_gain", "yaw_rate_45deg", "yaw_rate_bandwidth"),
         *_declare("Pa", "brake_pressure_peak"),
+        *_declare("s", "two_wheel_lift_time", better=_SMALLER),
+        *_declare("N", "wheel_load_min"),
         *_pure("yaw_rate_overshoot", better=_LOWER, unit=_PERCENT),
         *_pure("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
         *_pure(
@@ -224,7 +227,7 @@ METRICS: Final = {
             "added_angles_opposite_share", unit=_PERCENT,
         ),
         *_pure(
-            "friction_used_max", "tyre_use_max", "tyre_use_mean", "yaw_rate_peak_gain_ratio", "coherence_min",
+            "tyre_use_max", "tyre_use_mean", "yaw_rate_peak_gain_ratio", "coherence_min",
             "added_angles_correlation",
         ),
         *_declare("", CONES_HIT, CONES_MISSED, better=_SMALLER, unit=_PURE, form=Form.COUNT),

@@ -67,6 +67,7 @@ PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
     "standstill": (DISTANCE, *LOADS),
     "hill_hold": (DISTANCE, at_wheel("fl_brake_torque_Nm"), *LOADS),
     "drive_off_and_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
+    "start_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
     "straight_braking": (
         SPEED, quantity_of("ax_mps2"), at_wheel("fl_brake_pressure_Pa"), at_wheel("rl_brake_pressure_Pa"),
     ),

@@ -1,4 +1,4 @@
-"""Metrics for every manoeuvre: peaks, root mean squares, and the friction that the tyres use."""
+"""Metrics for every manoeuvre: peaks, root mean squares, and the fraction of their friction that the tyres use."""
 
 from __future__ import annotations
 
@@ -14,9 +14,6 @@ from activesteer.errors import RecordingError
 SIGNALS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"))
 """Channels that are evaluated: name and unit suffix."""
 
-MIN_LOAD_N: Final = 100.0
-"""Vertical load below which the force ratio of a tyre does not count [N]."""
-
 KEY_METRICS: Final = (
     "yaw_rate_peak_abs_radps", "yaw_rate_rms_radps", "ay_peak_abs_mps2", "ay_rms_mps2", "sideslip_peak_abs_rad",
     "sideslip_rms_rad", "roll_peak_abs_rad", "roll_rms_rad", "steering_wheel_peak_abs_rad", "speed_end_mps",
@@ -29,8 +26,8 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
 
     Returns:
         `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip and roll; the
-        largest steering wheel angle; `friction_used_max`, the largest ratio of horizontal to vertical force of any
-        tyre; and `speed_end_mps`.
+        largest steering wheel angle; `tyre_use_max`, the largest fraction of its available friction that any tyre
+        uses; and `speed_end_mps`.
 
     Raises:
         RecordingError: a channel is missing.
@@ -39,7 +36,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     for name, unit in SIGNALS:
         values |= _size(recording, name, unit)
     values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
-    values["friction_used_max"] = max(_friction_used(recording, corner) for corner in CORNERS)
+    values["tyre_use_max"] = max(float(recording[f"{corner}_friction_utilisation"].max()) for corner in CORNERS)
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     return values
 
@@ -63,11 +60,3 @@ def _size(recording: RecordingLike, name: str, unit: str) -> dict[str, float]:
         f"{name}_peak_abs_{unit}": float(np.abs(channel).max()),
         f"{name}_rms_{unit}": float(np.sqrt(np.mean(channel**2))),
     }
-
-
-def _friction_used(recording: RecordingLike, corner: str) -> float:
-    fx_N, fy_N, fz_N = (np.asarray(recording[f"{corner}_tyre_f{axis}_N"], dtype=np.float64) for axis in "xyz")
-    loaded = fz_N > MIN_LOAD_N
-    if not loaded.any():
-        return 0.0
-    return float((np.hypot(fx_N, fy_N)[loaded] / fz_N[loaded]).max())

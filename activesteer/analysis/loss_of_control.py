@@ -4,12 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from typing import Final
 
 from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
-from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS, STAYS_IN_LANES
+from activesteer.metric_table import (
+    CONES_HIT,
+    CONES_MISSED,
+    LANE_OVERSTEP,
+    SIDESLIP_PEAKS,
+    STAYS_IN_LANES,
+    recorded_metric,
+)
 
 Metrics = Mapping[str, float | None]
 """Metrics of a run; a value that is not defined is None or nan."""
+
+
+TURNED_ROUND_RAD: Final = math.radians(90.0)
+"""Sideslip angle beyond which the car slides backwards, and its metrics say nothing [rad]."""
+LOST: Final = "lost"
+"""Text in place of the metrics of a car that has turned round."""
 
 
 def has_spun(metrics: Metrics) -> bool:
@@ -54,6 +68,16 @@ def kept(metrics: Mapping[str, float]) -> Iterator[str]:
         yield "passes all cones"
     if metrics.get(CONES_HIT) == 0.0:
         yield "hits no cone"
+
+
+def shown(name: str, metrics: Mapping[str, float], text: str) -> str:
+    """Return the text of a metric, or `lost` if it says nothing because the car has turned round.
+
+    The driver's steering, counts and verdicts remain.
+    """
+    turned = any(abs(metrics.get(peak, 0.0)) > TURNED_ROUND_RAD for peak in SIDESLIP_PEAKS)
+    remains = recorded_metric(name).whole or name.startswith("steering_wheel") or name not in metrics
+    return text if remains or not turned else LOST
 
 
 def _cones(count: float) -> str:

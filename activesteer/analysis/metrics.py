@@ -11,6 +11,7 @@ from activesteer.analysis import (
     general,
     handling,
     path_following,
+    rollover,
     sine_with_dwell,
     slow_ramp,
     step_response,
@@ -50,6 +51,7 @@ EVALUATIONS: Final[dict[str, Evaluation]] = {
     "slalom": _evaluation(path_following.metrics, path_following.SLALOM_KEY_METRICS),
     "follow_path": _evaluation(path_following.metrics, path_following.PATH_KEY_METRICS),
     "brake_in_turn": _evaluation(brake_in_turn.metrics, brake_in_turn.KEY_METRICS),
+    "phases": _evaluation(rollover.metrics, rollover.KEY_METRICS),
     "straight_braking": _evaluation(straight_braking.metrics, straight_braking.KEY_METRICS),
     "measured": _evaluation(general.measured_metrics, general.KEY_METRICS),
 }

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Final
 
-from activesteer.metric_table import recorded_metric
+from activesteer.analysis.loss_of_control import LOST, shown
+from activesteer.metric_table import TYRE_USE, recorded_metric
 
 Paint = Callable[[str, float, float, str], str]
 """Function from the name of a metric, its value in a run and in the first run, and its text to the text as shown."""
+
+TYRE_USE_NOTE: Final = (
+    "tyre use is the force of a tyre relative to its peaks along and across, each alone; combined slip and shifts of "
+    "the tyre file let it exceed 1"
+)
 
 
 def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = None) -> str:
@@ -19,22 +26,32 @@ def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = No
 
     Returns:
         Lines without a newline at the end: name, unit, then the values. A value that the run does not define (nan) is
-        shown as `-`.
+        shown as `-`; a value of a car that has turned round as `lost`.
     """
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [["", "", *runs]]
     for name in names:
         metric = recorded_metric(name)
-        numbers = [metric.text(metrics[name]) if name in metrics else "" for metrics in runs.values()]
+        numbers = [
+            shown(name, metrics, metric.text(metrics[name])) if name in metrics else "" for metrics in runs.values()
+        ]
         rows.append([metric.label, metric.unit.name, *numbers])
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     cells = [_cells(row, widths) for row in rows]
     first = next(iter(runs.values()), {})
     for row, name in zip(cells[1:], names, strict=True):
         for place, metrics in enumerate(list(runs.values())[1:], start=3):
-            if paint is not None and name in metrics and name in first:
+            painted = paint is not None and name in metrics and name in first and LOST not in row[2:]
+            if paint is not None and painted:
                 row[place] = paint(name, metrics[name], first[name], row[place])
-    return "\n".join("  ".join(row).rstrip() for row in cells)
+    lines = ["  ".join(row).rstrip() for row in cells]
+    return "\n".join((*lines, *notes(runs)))
+
+
+def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """Return explanations of values that a reader may take for an error."""
+    above = any(metrics.get(name, 0.0) > 1.0 for metrics in runs.values() for name in TYRE_USE)
+    return [TYRE_USE_NOTE] if above else []
 
 
 def _cells(row: list[str], widths: list[int]) -> list[str]:

@@ -92,6 +92,10 @@ class Maneuver(ABC):
         """Path, lanes and cones; None if the manoeuvre sets the steering wheel angle instead."""
         return None
 
+    def sequence(self) -> Any:
+        """Return what follows the car through the phases of one run; None if setpoints depend on time alone."""
+        return None
+
     @property
     def ground(self) -> Road:
         """The road as the car drives on it: its friction laid along the path of the course if it follows that path."""

@@ -14,6 +14,7 @@ from activesteer.maneuver.constant_radius import ConstantRadius
 from activesteer.maneuver.follow_path import FollowPath
 from activesteer.maneuver.lane_change import LaneChange
 from activesteer.maneuver.open_loop import OpenLoop
+from activesteer.maneuver.phases import Phases
 from activesteer.maneuver.random_steer import RandomSteer
 from activesteer.maneuver.sine_sweep import SineSweep
 from activesteer.maneuver.sine_with_dwell import SineWithDwell
@@ -35,6 +36,7 @@ KINDS: Final[dict[str, type[Maneuver]]] = {
     "lane_change": LaneChange,
     "slalom": Slalom,
     "follow_path": FollowPath,
+    "phases": Phases,
 }
 """Value of `kind` in a file -> class."""
 

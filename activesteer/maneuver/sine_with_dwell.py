@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, ClassVar, Final
@@ -20,6 +21,15 @@ _REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
 _RAMP: Final = SlowRamp(start_s=0.5, rate_radps=math.radians(13.5), end_rad=math.radians(270.0))
 """The slow ramp of FMVSS 126, S7.6: 13.5 deg/s."""
 _RAMP_S: Final = 20.5
+
+
+def reference_angle_search(maneuver: Maneuver, accept: Callable[[float], Maneuver]) -> RampAngle:
+    """Return the search for A, the steering wheel angle at 0.3 g, at the speed and on the road of a manoeuvre."""
+    probe = SlowlyIncreasingSteer(
+        kind="slowly_increasing_steer", name=f"{maneuver.name} (slow ramp to 0.3 g)", speed_mps=maneuver.speed_mps,
+        duration_s=_RAMP_S, settle_s=maneuver.settle_s, road=maneuver.road, steer=_RAMP,
+    )  # fmt: skip
+    return RampAngle(probe, _REFERENCE_MPS2, accept)
 
 
 @dataclass(frozen=True)
@@ -92,11 +102,7 @@ class SineWithDwell(Maneuver):
         factor = self.steer.amplitude_factor
         if self.steer.steering_wheel_rad is not None or factor is None:
             return None
-        probe = SlowlyIncreasingSteer(
-            kind="slowly_increasing_steer", name=f"{self.name} (slow ramp to 0.3 g)", speed_mps=self.speed_mps,
-            duration_s=_RAMP_S, settle_s=self.settle_s, road=self.road, steer=_RAMP,
-        )  # fmt: skip
-        return RampAngle(probe, _REFERENCE_MPS2, lambda angle: self.with_amplitude(factor * angle))
+        return reference_angle_search(self, lambda angle: self.with_amplitude(factor * angle))
 
     def with_amplitude(self, steering_wheel_rad: float) -> SineWithDwell:
         """Return the manoeuvre with an amplitude [rad]; the factor stays on record."""

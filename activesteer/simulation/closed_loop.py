@@ -18,6 +18,7 @@ from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import Driver
 from activesteer.errors import ManeuverError, ParameterError, shown
 from activesteer.faults import Fault, check_faults
+from activesteer.maneuver.phases import seen_of
 from activesteer.scenario import Scenario
 from activesteer.scenario.changing import changed
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
@@ -46,6 +47,7 @@ class LoopState(NamedTuple):
     commands: tuple[DriverCommand, ActuatorCommand]
     step: int
     changes: tuple[tuple[str, Any, float], ...]
+    sequence: Any
 
 
 class Given(NamedTuple):
@@ -89,6 +91,7 @@ class ClosedLoop(Uncopyable):
         scenario: Manoeuvre, car and driver, with the changes made on the way.
         changes: Keys changed on the way and their values, and the times of the changes [s].
         maneuver: Source of the setpoints.
+        sequence: Phases of the manoeuvre in this run; None without phases.
         driver: The driver.
         controller: The active steering, inside a control unit if it needs one.
         vehicle: The car.
@@ -124,7 +127,7 @@ class ClosedLoop(Uncopyable):
             DriverError: the driver cannot be created, or fails while the car settles.
             SimulationDiverged: the car does not settle.
         """
-        self.scenario, self._plugin = scenario, find_controller(controller)
+        self.scenario, self._plugin, self.sequence = scenario, find_controller(controller), None
         self._start, self.changes = scenario, ()
         self.maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.ground, timestep_s)
@@ -143,6 +146,7 @@ class ClosedLoop(Uncopyable):
             vehicle.record_estimate(estimate)
         vehicle.rebase()
         self.fail(maneuver.fault)
+        self.sequence = maneuver.sequence()
         self.measurement = self.measurement._replace(time_s=0.0)
         self.motion, self.step_count = vehicle.motion(), 0
         if settled:
@@ -201,6 +205,8 @@ class ClosedLoop(Uncopyable):
         if scenario.maneuver is not self.scenario.maneuver:
             self.vehicle.change_road(scenario.maneuver.ground)
         self.scenario, self.maneuver = scenario, scenario.maneuver
+        if self.sequence is not None:
+            self.sequence.maneuver = scenario.maneuver
         self.vehicle.limit_hands(scenario.driver.parameters.steering_torque_limit_Nm)
 
     def _changed_by(self, changes: Sequence[tuple[str, Any, float]]) -> Scenario:
@@ -250,7 +256,14 @@ class ClosedLoop(Uncopyable):
         vehicle, timestep_s = self.vehicle, self.vehicle.timestep_s
         driving: Driver = driver or self.driver
         steering: Controller = controller or self.controller
-        setpoint_at = setpoint_at or self.maneuver.setpoint
+        if setpoint_at is None:
+            setpoint_at = self.maneuver.setpoint
+            if (sequence := self.sequence) is not None:
+
+                def setpoint_at(time_s: float) -> Setpoint:
+                    truth = measurement if vehicle.sensors is None else vehicle.truth()[0]
+                    return sequence.setpoint(time_s, seen_of(truth, motion, vehicle.roll_rate_radps))
+
         vehicle.follow_model()
         with engine_warnings_held():
             vehicle.record_on(None if recorder is None else recorder.tape)
@@ -316,6 +329,7 @@ class ClosedLoop(Uncopyable):
             self.commands,
             self.step_count,
             self.changes,
+            copy.deepcopy(self.sequence),
         )
 
     def restore_state(self, state: LoopState) -> None:
@@ -343,6 +357,7 @@ class ClosedLoop(Uncopyable):
             self.controller.read_truth_of(self.vehicle)
         self.measurement, self.motion = state.measurement, state.motion
         self.commands, self.step_count = state.commands, state.step
+        self.sequence = copy.deepcopy(state.sequence)
 
 
 def _pieces(stretch: range) -> Iterator[range]:

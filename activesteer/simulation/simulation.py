@@ -139,7 +139,8 @@ class Simulation:
     @property
     def setpoint(self) -> Setpoint:
         """Present demand of the manoeuvre on the driver."""
-        return self.loop.maneuver.setpoint(self.time_s)
+        sequence = self.loop.sequence
+        return self.loop.maneuver.setpoint(self.time_s) if sequence is None else sequence.present
 
     @property
     def measurement(self) -> Measurement:
@@ -211,6 +212,7 @@ class Simulation:
             try:
                 loop.drive(int(steps), self._recorder, driver, controller)
             finally:
+                self._note_phases()
                 for word, given in (("driver", driver), ("controller", controller)):
                     if given is not None:
                         self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
@@ -278,12 +280,18 @@ class Simulation:
             later = "" if fault.start_s <= self.time_s + 1e-9 and fault.end_s is None else f"@{fault.start_s:g}"
             self._note("fail", f"{fault.name}{later}{'' if fault.end_s is None else f'-{fault.end_s:g}'}")
 
-    def _note(self, kind: str, what: str) -> None:
+    def _note(self, kind: str, what: str, time_s: float | None = None) -> None:
         if len(self.events) >= MAX_EVENTS:
             raise RecordingError(f"a recording has at most {MAX_EVENTS} events", allowed=MAX_EVENTS)
-        self.events = (*self.events, Event(self.time_s, kind, what))
+        self.events = (*self.events, Event(self.time_s if time_s is None else time_s, kind, what))
         if self._writer is not None:
             self._writer.write_events(self.events[-1:])
+
+    def _note_phases(self) -> None:
+        """Note the phases that have begun since the last call."""
+        known = sum(event.kind == "phase" for event in self.events)
+        for time_s, name in self.loop.sequence.began[known:] if self.loop.sequence is not None else ():
+            self._note("phase", name, time_s)
 
     def _check_going_on(self) -> None:
         if self._failure is not None:

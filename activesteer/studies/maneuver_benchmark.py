@@ -1,4 +1,4 @@
-"""A benchmark of the paper's manoeuvres: key metrics against a stored baseline, time and memory.
+"""A benchmark of the paper's manoeuvres and of those in phases: key metrics against a stored baseline, time and memory.
 
 The baseline, `maneuver_baseline.json` beside this file, is shipped with the package: it holds the key metrics of each
 scenario and system as they were when it was last renewed on purpose.
@@ -27,6 +27,12 @@ from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
 
 BASELINE: Final = Path(__file__).with_name("maneuver_baseline.json")
+
+DRIVEN: Final = {
+    **dict.fromkeys((*SCENARIOS, "fishhook", "j_turn", "brake_in_turn_release"), SYSTEMS),
+    "start_stop": ("none",),
+}
+"""Manoeuvre -> controllers that drive it."""
 
 Baseline = dict[str, dict[str, dict[str, float]]]
 """Manoeuvre -> controller -> name of the metric -> value [SI], nan where the run does not define one."""
@@ -107,7 +113,7 @@ class Drift(NamedTuple):
 
 
 def bench_maneuvers() -> Benchmark:
-    """Drive the paper's five scenarios with its three systems, one after the other in this process, without files.
+    """Drive the paper's five scenarios and the manoeuvres in phases, one after the other in this process.
 
     Steering amplitudes are searched anew; the search counts to `search_s` and to no run.
 
@@ -117,7 +123,7 @@ def bench_maneuvers() -> Benchmark:
     # The metrics load it at their first use; that is no time of a run.
     import_module("scipy.signal")
     runs, search_s = [], {}
-    for name in SCENARIOS:
+    for name, systems in DRIVEN.items():
         scenario = resolve(name)
         with searched_anew():
             start = time.perf_counter()
@@ -125,7 +131,7 @@ def bench_maneuvers() -> Benchmark:
             if scenario.maneuver.search is not None:
                 search_s[name] = time.perf_counter() - start
         simulated_s = scenario.maneuver.settle_s + scenario.maneuver.duration_s
-        for system in SYSTEMS:
+        for system in systems:
             start = time.perf_counter()
             recording = run_scenario(found, system)
             wall_s = time.perf_counter() - start

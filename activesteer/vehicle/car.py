@@ -132,6 +132,7 @@ class Vehicle(Uncopyable):
         self._forces = fb.header_of(model)
         self._hands = model.actuator("steering_wheel").id
         self._velocimeter = data.sensor("cg_velocimeter").data
+        self._gyro = data.sensor("cg_gyro").data
         self._gear: float = CLUTCH_OPEN
 
     def _place(self) -> None:
@@ -336,6 +337,11 @@ class Vehicle(Uncopyable):
         """
         truth, _ = self.truth()
         return truth if self._sensors is None else self._sensors.measurement(truth.time_s)
+
+    @property
+    def roll_rate_radps(self) -> float:
+        """Roll rate at the start of the last step, positive when the left side rises [rad/s]."""
+        return float(self._gyro[0])
 
     def motion(self) -> Motion:
         """Return position and motion at the start of the last step, with the yaw rate at its end."""

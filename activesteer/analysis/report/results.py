@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from activesteer.analysis.loss_of_control import kept, losses
+from activesteer.analysis.loss_of_control import LOST, kept, losses, shown
 from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.report.significance import Change, is_near, significance
 from activesteer.analysis.report.tables import difference_text, number
@@ -115,7 +115,9 @@ def _chosen(group: Group) -> Iterator[tuple[KeyFigure, str]]:
 def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> Figure:
     sizes = abs if recorded_metric(name).better is Better.SMALLER else float
     value = sizes(metrics.get(name, math.nan))
-    text = number(name, value)
+    text = shown(name, metrics, number(name, value))
+    if LOST in (text, shown(name, first or {}, "")):
+        return Figure(text)
     before = math.nan if first is None else sizes(first.get(name, math.nan))
     if not math.isfinite(value - before):
         return Figure(text)

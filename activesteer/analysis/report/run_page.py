@@ -23,6 +23,7 @@ from activesteer.analysis.report.tables import (
     metric_titles,
     verdict_counts,
 )
+from activesteer.analysis.tables import notes
 from activesteer.display_units import typeset
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
@@ -124,6 +125,7 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
         number_lines=number_lines,
         typeset=typeset,
         percent=percent,
+        tyre_use_notes=lambda runs: notes({run.name: run.recording.metrics for run in runs}),
         names=[f"{group.name} {run.name}" if several else run.name for group in groups for run in group.runs],
         vehicle=rows(every, "vehicle"),
         versions=rows(every, "versions"),

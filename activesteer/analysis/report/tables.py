@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
+from activesteer.analysis.loss_of_control import LOST, shown
 from activesteer.analysis.report.groups import Group, Run, entry
 from activesteer.display_units import parameter_label, typeset
 from activesteer.metric_table import recorded_metric
@@ -77,9 +78,11 @@ def metric_rows(group: Group) -> list[MetricRow]:
     for name in dict.fromkeys(name for metrics in values for name in metrics):
         metric = recorded_metric(name)
         first, *others = (metrics.get(name, math.nan) for metrics in values)
-        cells = [Cell(number(name, first))]
-        for value in others:
-            cells += [Cell(number(name, value)), difference_text(name, value, first)]
+        texts = [shown(name, run, number(name, run.get(name, math.nan))) for run in values]
+        cells = [Cell(texts[0])]
+        for value, text in zip(others, texts[1:], strict=True):
+            compared = difference_text(name, value, first) if LOST not in (text, texts[0]) else Cell("\N{EN DASH}")
+            cells += [Cell(text), compared]
         rows.append(MetricRow(metric.label, metric.unit_name, tuple(cells)))
     return rows
 

@@ -31,6 +31,7 @@ def wave(kind: str = "open_loop") -> SyntheticRun:
     for corner in CORNERS:
         channels |= {f"{corner}_tyre_f{axis}_N": np.zeros_like(TIME_S) for axis in "xy"}
         channels[f"{corner}_tyre_fz_N"] = np.full_like(TIME_S, 4000.0)
+        channels[f"{corner}_friction_utilisation"] = np.full_like(TIME_S, 0.5)
     return SyntheticRun(TIME_S, channels, kind)
 
 
@@ -76,13 +77,20 @@ def test_peaks_and_root_mean_squares_of_a_sine():
     assert values["speed_end_mps"] == pytest.approx(19.0)
 
 
-def test_friction_used_is_the_largest_force_ratio_of_a_loaded_tyre():
+def test_tyre_use_is_the_largest_fraction_of_its_friction_that_a_tyre_uses():
     run = wave()
-    run.channels["rl_tyre_fx_N"] = np.where(TIME_S > 1.0, 1200.0, 0.0)
-    run.channels["rl_tyre_fy_N"] = np.where(TIME_S > 1.0, -1600.0, 0.0)
-    run.channels["fr_tyre_fz_N"] = np.where(TIME_S > 1.0, 0.0, 4000.0)
-    run.channels["fr_tyre_fy_N"] = np.where(TIME_S > 1.0, 1.0, 0.0)
-    assert metrics(run)["friction_used_max"] == pytest.approx(0.5)
+    run.channels["rl_friction_utilisation"] = np.where(TIME_S > 1.0, 0.7, 0.0)
+    assert metrics(run)["tyre_use_max"] == 0.7
+
+
+def test_wheels_of_a_side_that_are_lifted_together_count_as_two_wheel_lift():
+    run = wave("phases")
+    run.channels["fl_tyre_fz_N"] = np.where(TIME_S > 1.0, 0.0, 4000.0)
+    run.channels["rl_tyre_fz_N"] = np.where((TIME_S > 0.5) & (TIME_S < 1.2005), 0.0, 4000.0)
+    run.channels["rr_tyre_fz_N"] = np.where(TIME_S < 0.3, 0.0, 4000.0)
+    values = metrics(run)
+    assert values["two_wheel_lift_time_s"] == pytest.approx(0.2, abs=1e-3)
+    assert values["wheel_load_min_N"] == 0.0
 
 
 def test_a_recording_without_kind_is_refused():
