@@ -28,3 +28,18 @@ def test_what_does_not_exist_is_a_dash_and_what_is_missing_a_blank():
 def test_table_of_real_metrics_has_a_line_for_each():
     values = step_response.metrics(step_steer())
     assert len(comparison({"none": values}).splitlines()) == len(values) + 1
+
+
+def test_a_car_that_has_turned_round_has_lost_metrics_but_its_verdicts_remain():
+    spun = {"sideslip_peak_abs_rad": math.pi, "ay_rms_mps2": 3.0, "stays_in_lanes": 0.0, "steering_wheel_rms_rad": 1.0}
+    fine = {**spun, "sideslip_peak_abs_rad": 0.5, "stays_in_lanes": 1.0}
+    rows = {line.split()[0]: line.split()[-2:] for line in comparison({"none": spun, "ars": fine}).splitlines()[1:]}
+    assert rows["sideslip"] == ["lost", "28.648"]
+    assert rows["lateral"] == ["lost", "3.000"]
+    assert rows["stays"] == ["no", "yes"]
+    assert rows["steering"] == ["57.296", "57.296"]
+
+
+def test_a_tyre_use_above_1_is_explained():
+    assert "combined slip" in comparison({"none": {"tyre_use_max": 1.06}}).splitlines()[-1]
+    assert len(comparison({"none": {"tyre_use_max": 0.9}}).splitlines()) == 2
