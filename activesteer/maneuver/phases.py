@@ -6,6 +6,7 @@ the car: the fishhook steers back when the roll rate has died away.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -253,6 +254,11 @@ class PhaseSequence:
         )
         self._ready_s = max(length for _, _, length in self._ramps)
         self.began.append((time_s, phase.name))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> PhaseSequence:
+        other = copy.copy(self)
+        other.began = list(self.began)
+        return other
 
     @property
     def _phase(self) -> Phase:

@@ -256,14 +256,13 @@ class ClosedLoop(Uncopyable):
         vehicle, timestep_s = self.vehicle, self.vehicle.timestep_s
         driving: Driver = driver or self.driver
         steering: Controller = controller or self.controller
-        if setpoint_at is None:
-            setpoint_at = self.maneuver.setpoint
-            if (sequence := self.sequence) is not None:
+        sequence: Any = self.sequence if setpoint_at is None else None
 
-                def setpoint_at(time_s: float) -> Setpoint:
-                    truth = measurement if vehicle.sensors is None else vehicle.truth()[0]
-                    return sequence.setpoint(time_s, seen_of(truth, motion, vehicle.roll_rate_radps))
+        def of_phase(time_s: float) -> Setpoint:
+            truth = measurement if vehicle.sensors is None else vehicle.truth()[0]
+            return sequence.setpoint(time_s, seen_of(truth, motion, vehicle.roll_rate_radps))
 
+        setpoint_at = setpoint_at or (self.maneuver.setpoint if sequence is None else of_phase)
         vehicle.follow_model()
         with engine_warnings_held():
             vehicle.record_on(None if recorder is None else recorder.tape)
