@@ -11,12 +11,13 @@ import rerun as rr
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed
 from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.direction_of_motion import direction_of_motion
 from activesteer.drawing.ghosts import share_seen
 from activesteer.playback.geometry import about_vertical, xyzw
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 from activesteer.recording import Primitive, ScenePart
-from activesteer.road.footprint import footprint_of
+from activesteer.road.footprint import Footprint, footprint_of
 
 _GHOST_OPACITY: Final = 0.4
 _GHOST_EVERY: Final = 5
@@ -26,7 +27,9 @@ _CUTAWAY_OPACITY: Final = 0.25
 
 
 def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> None:
-    """Send bodies, their solids and the frame `NAME/chase`, which follows the car and its heading but stays level.
+    """Send bodies, their solids, and two level frames that move with the car.
+
+    `NAME/car_frame` has the heading of the car, and `NAME/chase`, the frame of the camera, the direction of motion.
 
     Args:
         stream: Target of the data.
@@ -43,13 +46,17 @@ def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> 
         stream.send_columns(body_path(run, body), when, moved)
     chassis = poses.names.index(CHASSIS)
     place = poses.positions_m[run.poses, chassis] * (1.0, 1.0, 0.0)
-    turn = about_vertical(yaw_of(poses.quaternions[run.poses, chassis]))
-    stream.send_columns(
-        f"{run.name}/chase",
-        when,
-        rr.Transform3D.columns(translation=place.astype(np.float32), quaternion=turn.astype(np.float32)),
-    )
-    parts, panels = dressed(run.recording.scene, footprint_of(run.recording.metadata))
+    size = footprint_of(run.recording.metadata)
+    heading = yaw_of(poses.quaternions[run.poses, chassis])
+    back = 0.5 * (size or Footprint()).wheelbase_m
+    middle = place[:, :2] - back * np.column_stack([np.cos(heading), np.sin(heading)])
+    direction = direction_of_motion(poses.time_s[run.poses], middle, heading)
+    for frame, angle in (("car_frame", heading), ("chase", direction)):
+        moved = rr.Transform3D.columns(
+            translation=place.astype(np.float32), quaternion=about_vertical(angle).astype(np.float32)
+        )
+        stream.send_columns(f"{run.name}/{frame}", when, moved)
+    parts, panels = dressed(run.recording.scene, size)
     for body, solids in _bodies(run, parts).items():
         _send_solids(stream, f"{body_path(run, body)}/solid", solids, [_colour(solid, run.colour) for solid in solids])
     for panel in panels:

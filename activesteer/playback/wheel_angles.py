@@ -62,7 +62,7 @@ def send_wheel_angles(stream: rr.RecordingStream, run: Run, runs: Sequence[Run])
 
 def wedges_path(run: Run) -> str:
     """Return the entity of the wedges beside the car of a run."""
-    return f"{run.name}/chase/wheel_angles"
+    return f"{run.name}/car_frame/wheel_angles"
 
 
 def plan_view(runs: Sequence[Run]) -> rrb.Spatial2DView:

@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager
 from typing import Any, Final, NamedTuple, Protocol
 
 from activesteer.display_units import quantity_of
+from activesteer.drawing.direction_of_motion import SLOWEST_MPS
 from activesteer.maneuver import Maneuver
 from activesteer.road.footprint import Footprint
 from activesteer.simulation.appearance import scene_of
@@ -23,7 +24,7 @@ _MAX_S: Final = 0.1
 """Maximum time between two pictures [s]. If drawing or simulating takes longer, the drive becomes slower than the clock
 instead of jerky."""
 _TURN_S: Final = 0.4
-"""Time constant of the camera's heading behind the car's [s]."""
+"""Time constant of the camera's direction behind the car's direction of motion [s]."""
 
 
 class Viewer(Protocol):
@@ -169,18 +170,19 @@ class _Follow:
 
     def __init__(self, simulation: ClosedLoop) -> None:
         self._simulation = simulation
-        self._heading_rad: float | None = None
+        self._direction_rad: float | None = None
         self._time_s = 0.0
 
     def __call__(self, camera: Any, time_s: float) -> None:
         motion = self._simulation.vehicle.motion()
-        if self._heading_rad is None:
-            self._heading_rad = motion.yaw_rad
+        if self._direction_rad is None:
+            self._direction_rad = motion.yaw_rad
             camera.distance, camera.elevation, camera.azimuth = 9.0, -17.0, math.degrees(motion.yaw_rad)
-        turn = math.remainder(motion.yaw_rad - self._heading_rad, math.tau) * -math.expm1(
-            (self._time_s - time_s) / _TURN_S
-        )
-        self._heading_rad += turn
+        wanted = self._direction_rad
+        if math.hypot(motion.speed_mps, motion.lateral_speed_mps) > SLOWEST_MPS:
+            wanted = motion.yaw_rad + math.atan2(motion.lateral_speed_mps, motion.speed_mps)
+        turn = math.remainder(wanted - self._direction_rad, math.tau) * -math.expm1((self._time_s - time_s) / _TURN_S)
+        self._direction_rad += turn
         self._time_s = time_s
         camera.azimuth += math.degrees(turn)
         camera.lookat[:] = motion.x_m, motion.y_m, 0.5

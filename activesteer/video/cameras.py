@@ -58,13 +58,16 @@ def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
 
 
 def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
-    """Place the camera behind and above the car, looking over the roof at the road ahead."""
+    """Place the camera behind and above the car, seen in its direction of motion, looking over the roof at the road.
+
+    A car that slides turns in the picture.
+    """
 
     def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
-        heading = track.heading(time_s, steady=True)
-        ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+        direction = track.direction(time_s)
+        ahead = np.array([math.cos(direction), math.sin(direction), 0.0])
         camera.lookat = track.middle(time_s) + 0.9 * ahead + np.array([0.0, 0.0, 0.15])
-        camera.distance, camera.elevation, camera.azimuth = 8.3, -20.0, math.degrees(heading)
+        camera.distance, camera.elevation, camera.azimuth = 8.3, -20.0, math.degrees(direction)
 
     return aim
 

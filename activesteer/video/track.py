@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS
+from activesteer.drawing.direction_of_motion import direction_of_motion
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
-
-_STEADY_S: Final = 0.35
-"""Standard deviation of the window over which the camera's heading is averaged [s]. The camera follows a bend, but no
-quick yaw motion, which therefore stays visible."""
 
 
 class Track:
@@ -46,8 +41,10 @@ class Track:
         self._quaternions = poses.quaternions[whole]
         self.start_s, self.end_s = float(self._time_s[0]), float(self._time_s[-1])
         self._heading_rad = np.unwrap(yaw_of(self._quaternions[:, poses.names.index(CHASSIS)]))
-        self._steady_rad = _smooth(self._time_s, self._heading_rad)
         self._middle_m = -0.5 * (footprint_of(recording.metadata) or Footprint()).wheelbase_m
+        forward = np.column_stack([np.cos(self._heading_rad), np.sin(self._heading_rad)])
+        middle_m = self._positions_m[:, poses.names.index(CHASSIS), :2] + self._middle_m * forward
+        self._direction_rad = direction_of_motion(self._time_s, middle_m, self._heading_rad)
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
         """Return the poses at an instant: the first pose before the recording, the last pose after it.
@@ -70,9 +67,13 @@ class Track:
         turned = (1.0 - fraction) * first + fraction * sign * second
         return positions, turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
-    def heading(self, time_s: float, *, steady: bool = False) -> float:
-        """Return the continuous heading of the chassis at an instant [rad], left positive; averaged if `steady`."""
-        return float(np.interp(time_s, self._time_s, self._steady_rad if steady else self._heading_rad))
+    def heading(self, time_s: float) -> float:
+        """Return the continuous heading of the chassis at an instant [rad], left positive."""
+        return float(np.interp(time_s, self._time_s, self._heading_rad))
+
+    def direction(self, time_s: float) -> float:
+        """Return the averaged direction of motion at an instant [rad]; see `direction_of_motion`."""
+        return float(np.interp(time_s, self._time_s, self._direction_rad))
 
     def middle(self, time_s: float) -> Array:
         """Return the point on the road below the midpoint of the axles [m], shape (3,)."""
@@ -101,17 +102,3 @@ class Track:
         """Return the point on the road below the chassis origin [m], shape (3,)."""
         positions, _ = self.poses(time_s)
         return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
-
-
-def _smooth(time_s: Array, values: Array) -> Array:
-    """Return a moving average with Gaussian weights and no phase shift; the end values are continued at both ends."""
-    if len(time_s) < 2:
-        return values
-    step = float(np.median(np.diff(time_s)))
-    reach = round(4.0 * _STEADY_S / step)
-    offsets = np.arange(-reach, reach + 1) * step
-    weights = np.exp(-0.5 * (offsets / _STEADY_S) ** 2)
-    # Poses are evenly spaced except for gaps in a damaged file.
-    even = np.arange(time_s[0] - reach * step, time_s[-1] + (reach + 1) * step, step)
-    averaged = np.convolve(np.interp(even, time_s, values), weights / weights.sum(), mode="same")
-    return np.asarray(np.interp(time_s, even, averaged), np.float64)

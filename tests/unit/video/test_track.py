@@ -55,15 +55,6 @@ def test_heading_counts_turns():
     assert track.heading(9.0) == pytest.approx(9.0 * math.pi)
 
 
-def test_steady_heading_follows_a_bend_without_lag_and_ignores_a_twitch():
-    time_s = np.arange(1001) * 0.01
-    bend = Track(turning(0.3 * time_s), "bend")
-    assert bend.heading(5.0, steady=True) == pytest.approx(1.5, abs=1e-3)
-    twitch = Track(turning(0.1 * np.sin(2.0 * math.pi * 2.0 * time_s)), "twitch")
-    swing = [abs(twitch.heading(at, steady=True)) for at in np.arange(3.0, 7.0, 0.03)]
-    assert max(swing) < 0.01
-
-
 def test_wheel_place_is_in_the_frame_of_the_car():
     track = Track(circle(), "circle")
     for corner, (x, y) in WHEELS.items():
@@ -94,5 +85,5 @@ def test_recording_without_a_car_is_refused(count):
 
 def test_single_pose_is_enough():
     track = Track(turning(np.array([0.7])), "one")
-    assert track.heading(0.0, steady=True) == pytest.approx(0.7)
+    assert track.direction(0.0) == pytest.approx(0.7)
     assert track.poses(0.0)[0].shape == (1, 3)
