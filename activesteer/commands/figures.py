@@ -27,6 +27,10 @@ def add_to(commands: Any) -> None:
         help="recordings of `activesteer reproduce -o DIR` (default: driven now, into the folder runs of -o)",
     )  # fmt: skip
     add_vehicle(parser)
+    parser.add_argument(
+        "--setting", choices=("paper", "human"),
+        help="setting of the driven runs, as for `reproduce` (default: paper, with another car human)",
+    )  # fmt: skip
     add_jobs(parser)
     parser.set_defaults(action=_figures)
 
@@ -35,14 +39,16 @@ def _figures(options: argparse.Namespace) -> int:
     from activesteer.studies.paper.reproduction import recordings_in, reproduce
 
     if options.recordings is not None:
-        if options.jobs is not None:
-            raise ParameterError("has no effect with --recordings: nothing is driven", key="--jobs")
+        for key in ("jobs", "setting"):
+            if getattr(options, key) is not None:
+                raise ParameterError("has no effect with --recordings: nothing is driven", key=f"--{key}")
         recordings = recordings_in(options.recordings)
     else:
         with ProgressBar("runs", quiet=False) as bar:
             result = reproduce(
                 options.output / "runs",
                 options.vehicle,
+                setting=options.setting or ("paper" if options.vehicle == "compact" else "human"),
                 jobs=options.jobs,
                 progress=lambda what, done, total: bar(done / total, what),
             )

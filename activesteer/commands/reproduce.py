@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.arguments import add_json, add_output, add_vehicle, add_workers
 from activesteer.commands.output import print_entry, print_json, print_wrapped
@@ -14,7 +15,11 @@ from activesteer.commands.progress import ProgressBar, RunCounter
 from activesteer.errors import ParameterError
 
 if TYPE_CHECKING:
+    from activesteer.analysis.claims.scorecard import Judged
     from activesteer.studies.paper.reproduction import Reproduction
+
+SETTINGS: Final = {"paper": "paper's setting", "human": "human driver"}
+"""As in `activesteer.analysis.claims.setting`, which takes too long to import for `--help`."""
 
 
 def add_to(commands: Any) -> None:
@@ -23,6 +28,11 @@ def add_to(commands: Any) -> None:
     words = "folder for recordings, report and figures (default: runs, comparison or population)"
     add_output(parser, "DIR", words)
     add_vehicle(parser)
+    parser.add_argument(
+        "--setting", action="append", dest="settings", choices=list(SETTINGS),
+        help="paper: the most plausible numbers found for what the paper leaves open, selected by the verdicts; human: "
+        "the nominal car with a driver from published ranges (default). Both may be given",
+    )  # fmt: skip
     add_workers(parser)
     parser.add_argument("--all", action="store_true", help="also print every claim with its numbers")
     parser.add_argument("--figures", action="store_true", help="also draw the figures")
@@ -46,6 +56,8 @@ def _reproduce(options: argparse.Namespace) -> int:
     given = {"comparison": options.controllers, "population": options.population}
     default = "_".join(name for name, value in given.items() if value is not None) or "runs"
     options.output = options.output or Path(default)
+    if options.settings and default != "runs":
+        raise ParameterError("--setting is for the 15 runs of the paper; leave out --population and --controllers")
     if options.population is not None:
         options.how_to_resume = "; the same command resumes it"
         return _population(options)
@@ -54,56 +66,124 @@ def _reproduce(options: argparse.Namespace) -> int:
             raise ParameterError(f"--{name} belongs to --population")
     if options.controllers is not None:
         return _compare(options)
-    from activesteer.studies.paper.reproduction import reproduce
+    return _settings(options)
 
-    folder = options.output
-    with ProgressBar("reproduce", quiet=options.json) as bar:
 
-        def show(what: str, done: int, total: int) -> None:
-            bar(done / total, what)
-            if not options.json and not sys.stderr.isatty():
-                print(f"{done}/{total} {what}", file=sys.stderr)
-
-        result = reproduce(folder, options.vehicle, jobs=options.jobs, progress=show)
-    for (scenario, system), problem in result.failures.items():
-        print(f"{scenario} {system} failed: {problem}", file=sys.stderr)
-    files = [str(path) for systems in result.paths.values() for path in systems.values()]
-    report = _report(result, folder)
+def _settings(options: argparse.Namespace) -> int:
+    """Drive the 15 runs in every setting asked for, and tell the verdicts."""
+    settings = list(dict.fromkeys(options.settings or ["human"]))
+    folders = {name: options.output / name if len(settings) > 1 else options.output for name in settings}
+    results = _driven(options, folders)
+    for result in results.values():
+        for (scenario, system), problem in result.failures.items():
+            print(f"{scenario} {system} failed: {problem}", file=sys.stderr)
+    report = _report(results.values(), options.output)
     figures: list[Path] = []
     if options.figures:
         from activesteer.commands.figures import draw_all
 
-        figures = draw_all(result.recordings(), folder / "figures", options.vehicle)
+        figures = draw_all(results[settings[0]].recordings(), options.output / "figures", options.vehicle)
+    status = max(result.exit_status for result in results.values())
     if options.json:
-        failures = {f"{scenario} {system}": problem for (scenario, system), problem in result.failures.items()}
-        table = {**result.scorecard.to_json(), "files": files, "figures": [str(path) for path in figures]}
-        table["report"] = None if report is None else str(report)
-        print_json({**table, "failures": failures, "exit_status": result.exit_status})
-        return result.exit_status
-    if options.all:
-        print_wrapped(result.scorecard.to_text())
-    print(f"recordings: {len(files)} MCAP files in {folder}")
+        tables = [_json(result) for result in results.values()]
+        about = {"figures": list(map(str, figures)), "report": None if report is None else str(report)}
+        print_json({**(tables[0] if len(tables) == 1 else {"settings": tables}), **about, "exit_status": status})
+        return status
+    _tell(results, folders, options, report, figures)
+    return status
+
+
+def _driven(options: argparse.Namespace, folders: Mapping[str, Path]) -> dict[str, Reproduction]:
+    from activesteer.studies.paper.reproduction import reproduce
+
+    results: dict[str, Reproduction] = {}
+    with ProgressBar("reproduce", quiet=options.json) as bar:
+
+        def show(what: str, done: int, total: int) -> None:
+            begun = len(results)
+            bar((begun + done / total) / len(folders), what)
+            if not options.json and not sys.stderr.isatty():
+                print(f"{begun * total + done}/{len(folders) * total} {what}", file=sys.stderr)
+
+        for name, folder in folders.items():
+            results[name] = reproduce(folder, options.vehicle, setting=name, jobs=options.jobs, progress=show)
+    return results
+
+
+def _tell(
+    results: Mapping[str, Reproduction],
+    folders: Mapping[str, Path],
+    options: argparse.Namespace,
+    report: Path | None,
+    figures: list[Path],
+) -> None:
+    for name, result in results.items():
+        if options.all:
+            if len(results) > 1:
+                print(f"{SETTINGS[name]}:")
+            print_wrapped(result.scorecard.to_text())
+        print(f"recordings: {3 * len(result.paths)} MCAP files in {folders[name]}")
     if report is not None:
         print(f"report: {report}")
     if figures:
         print(f"figures: {len(figures)} files in {options.output / 'figures'}")
-    _print_scenarios(result)
-    return result.exit_status
+    if len(results) > 1:
+        _print_settings(results)
+    else:
+        _print_scenarios(next(iter(results.values())))
+
+
+def _json(result: Reproduction) -> dict[str, Any]:
+    failures = {f"{scenario} {system}": problem for (scenario, system), problem in result.failures.items()}
+    files = [str(path) for systems in result.paths.values() for path in systems.values()]
+    return {**result.scorecard.to_json(), "files": files, "failures": failures}
 
 
 def _print_scenarios(result: Reproduction) -> None:
     """Print a line for each scenario: how many claims are reproduced, and the verdicts of all others."""
-    from activesteer.analysis.claims import SCENARIO_OF, Verdict
+    from activesteer.analysis.claims import Verdict
 
     width = max(map(len, result.paths), default=0)
     for scenario in result.paths:
-        judged = [item for item in result.scorecard.judged if SCENARIO_OF[item.claim.id] == scenario]
+        judged = _judged(result, scenario)
         passed = sum(item.claim.passed for item in judged)
         words = f"{passed} of {len(judged)} claims reproduced" if judged else "not judged: a run failed"
         for verdict, name in ((Verdict.FAILED, "FAILED"), (Verdict.NOT_REPRODUCED, "not")):
             if claims := [item.claim.id for item in judged if item.verdict is verdict]:
                 words += f"; {name}: {' '.join(claims)}"
         print_entry(f"{scenario:{width}}  ", words, hanging=width + 2)
+
+
+def _judged(result: Reproduction, scenario: str) -> list[Judged]:
+    from activesteer.analysis.claims import SCENARIO_OF
+
+    return [item for item in result.scorecard.judged if SCENARIO_OF[item.claim.id] == scenario]
+
+
+def _print_settings(results: Mapping[str, Reproduction]) -> None:
+    """Print a line for each scenario: claims that hold in each setting, and their share of the population."""
+    from activesteer.theory.proportions import percent
+
+    scenarios = list(next(iter(results.values())).paths)
+    width = max(map(len, scenarios))
+    print(f"\n{'claims that hold':{width}}" + "".join(f"  {SETTINGS[name]:>15}" for name in results) + "  population")
+    total: dict[str, list[Judged]] = {name: [] for name in results}
+    for scenario in [*scenarios, "all"]:
+        line, shares = f"{scenario:{width}}", []
+        for name, result in results.items():
+            judged = total[name] if scenario == "all" else _judged(result, scenario)
+            total[name] = judged if scenario == "all" else total[name] + judged
+            count = f"{sum(item.claim.passed for item in judged)} of {len(judged)}" if judged else "not judged"
+            line += f"  {count:>15}"
+            shares += [item.proportion.share for item in judged if item.proportion is not None]
+        print(line + (f"  {percent(sum(shares) / len(shares)):>8} %" if shares else ""))
+    for name, result in results.items():
+        failed = [item.claim.id for item in result.scorecard.judged if not item.claim.passed]
+        print_entry(f"not in the {SETTINGS[name]}: ", " ".join(failed) or "-", hanging=4)
+    print_wrapped(
+        "The paper's setting was selected by its verdicts, within ranges of everything that the paper leaves open; the "
+        "population varies the setting with the human driver (mean share of the claims)."
+    )
 
 
 def _compare(options: argparse.Namespace) -> int:
@@ -133,20 +213,21 @@ def _compare(options: argparse.Namespace) -> int:
     return 1 if made.failures else 0
 
 
-def _report(result: Reproduction, folder: Path) -> Path | None:
+def _report(results: Iterable[Reproduction], folder: Path) -> Path | None:
     """Write a page with all runs, including those that ended early; return None if no run made a step."""
     from activesteer.analysis.report import write_report
     from activesteer.errors import RecordingError
     from activesteer.recording import Recording
 
     recordings: dict[str, Recording] = {}
-    for scenario, systems in result.paths.items():
-        for system, path in systems.items():
-            with suppress(RecordingError):
-                recording = Recording.open(path, recover=True)
-                # A complete file of a run that failed now is left from an earlier call.
-                if len(recording) and recording.metadata["complete"] is ((scenario, system) not in result.failures):
-                    recordings[str(path)] = recording
+    for result in results:
+        for scenario, systems in result.paths.items():
+            for system, path in systems.items():
+                with suppress(RecordingError):
+                    recording = Recording.open(path, recover=True)
+                    # A complete file of a run that failed now is left from an earlier call.
+                    if len(recording) and recording.metadata["complete"] is ((scenario, system) not in result.failures):
+                        recordings[str(path)] = recording
     return write_report(recordings, folder / "report.html") if recordings else None
 
 

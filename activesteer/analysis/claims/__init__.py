@@ -13,6 +13,7 @@ from typing import Final
 from activesteer.analysis.claims.claim import SYSTEMS, Claim, Fake, Kind, Statement
 from activesteer.analysis.claims.scenarios import SCENARIO_OF, SCENARIOS, STATEMENTS, Claims
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict, not_reproduced, scorecard
+from activesteer.analysis.claims.setting import HUMAN, PAPER, SETTINGS, Setting, read_setting, setting_of
 from activesteer.analysis.source import RecordingLike
 
 _NO_SETTING: Final = frozenset({"vehicle", "duration_s", "settle_s", "title"})
@@ -24,7 +25,8 @@ def claims_for(recording: RecordingLike) -> Claims | None:
 
     Args:
         recording: The run. The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a
-            user's step steer is a step steer. The paper has no claims about a manoeuvre with other settings.
+            user's step steer is a step steer. The paper has no claims about a manoeuvre with other settings, except
+            those of `setting`.
 
     Returns:
         Function that checks them; None if the paper has no claims about the manoeuvre.
@@ -32,7 +34,7 @@ def claims_for(recording: RecordingLike) -> Claims | None:
     maneuver = recording.metadata.get("maneuver")
     if not isinstance(maneuver, Mapping):
         return None
-    if any(
+    if setting_of(recording) != PAPER and any(
         _is_of_maneuver(key, recording.metadata.get("vehicle")) for key in recording.metadata.get("overrides") or ()
     ):
         return None
@@ -49,8 +51,11 @@ def _is_of_maneuver(key: str, vehicle: object) -> bool:
 
 
 __all__ = [
+    "HUMAN",
+    "PAPER",
     "SCENARIOS",
     "SCENARIO_OF",
+    "SETTINGS",
     "STATEMENTS",
     "SYSTEMS",
     "Claim",
@@ -58,9 +63,12 @@ __all__ = [
     "Fake",
     "Kind",
     "Scorecard",
+    "Setting",
     "Statement",
     "Verdict",
     "claims_for",
     "not_reproduced",
+    "read_setting",
     "scorecard",
+    "setting_of",
 ]

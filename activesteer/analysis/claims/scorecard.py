@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 from activesteer.analysis.claims.claim import SYSTEMS, Claim
 from activesteer.analysis.claims.population import ClaimProportion, Population, stored_population
 from activesteer.analysis.claims.scenarios import STATEMENTS
+from activesteer.analysis.claims.setting import HUMAN, PAPER, read_setting
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import finite
 from activesteer.metric_table import recorded_metric
@@ -55,10 +56,12 @@ class Scorecard:
     Attributes:
         judged: All of them, in the order given.
         population: The stored population of the car; None without one.
+        setting: Setting of the runs; see `setting`.
     """
 
     judged: tuple[Judged, ...]
     population: Population | None = None
+    setting: str = HUMAN
 
     @property
     def exit_status(self) -> int:
@@ -68,6 +71,7 @@ class Scorecard:
     def to_json(self) -> dict[str, Any]:
         """Return the scorecard as JSON values; an undefined number (nan) is None."""
         return {
+            "setting": self.setting,
             "claims": [
                 {
                     "id": item.claim.id,
@@ -136,6 +140,7 @@ def scorecard(
     *,
     known: Mapping[str, str] | None = None,
     population: Population | None = None,
+    setting: str = HUMAN,
 ) -> Scorecard:
     """Judge claims with the list of claims that are not reproduced.
 
@@ -144,6 +149,7 @@ def scorecard(
         vehicle: Name of the vehicle, for its list (see `not_reproduced`) and its stored population.
         known: Number -> reason of the claims that are not reproduced, in place of the list.
         population: Population in place of the stored one.
+        setting: Setting of the runs. The paper's has a list of its own, and no population.
 
     Returns:
         The scorecard.
@@ -151,13 +157,15 @@ def scorecard(
     Raises:
         ParameterError: the list is wrong.
     """
+    if setting == PAPER:
+        known, vehicle = read_setting(PAPER).fails, ""
     reasons = not_reproduced(vehicle) if known is None else known
     stored = population or stored_population(vehicle)
     judged = (
         Judged(claim, _verdict(claim, reasons), reasons.get(claim.id, ""), stored.of(claim.id) if stored else None)
         for claim in claims
     )
-    return Scorecard(tuple(judged), stored)
+    return Scorecard(tuple(judged), stored, setting)
 
 
 def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:

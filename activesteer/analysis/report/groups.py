@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.analysis.claims import SCENARIOS
+from activesteer.analysis.claims import PAPER, SCENARIOS, SETTINGS, setting_of
 from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
@@ -73,7 +73,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
 
 
 def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
-    """Return the runs by manoeuvre: first the paper's manoeuvres in its order, then the others.
+    """Return the runs by manoeuvre: first the paper's manoeuvres in its order, then the others; its setting apart.
 
     Args:
         recordings: Recordings by their origin.
@@ -84,14 +84,15 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
     """
     if not 1 <= len(recordings) <= MAX_RUNS:
         raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}", allowed=MAX_RUNS)
-    by_maneuver: dict[str, dict[str, Recording]] = {}
+    by_maneuver: dict[tuple[str, bool], dict[str, Recording]] = {}
     for source, recording in recordings.items():
         if len(recording) == 0:
             raise RecordingError(f"{source} has no rows: nothing was recorded before the run ended", value=source)
-        by_maneuver.setdefault(entry(recording, "maneuver", "name") or "run", {})[source] = recording
-    ordered = [name for name in SCENARIOS if name in by_maneuver]
-    ordered += [name for name in by_maneuver if name not in SCENARIOS]
-    return [_group(name, by_maneuver[name]) for name in ordered]
+        key = entry(recording, "maneuver", "name") or "run", setting_of(recording) == PAPER
+        by_maneuver.setdefault(key, {})[source] = recording
+    ordered = [(name, paper) for name in SCENARIOS for paper in (True, False) if (name, paper) in by_maneuver]
+    ordered += [key for key in by_maneuver if key not in ordered]
+    return [_group(name, by_maneuver[name, paper], paper=paper) for name, paper in ordered]
 
 
 def entry(recording: Recording, table: str, key: str) -> str:
@@ -100,7 +101,8 @@ def entry(recording: Recording, table: str, key: str) -> str:
     return str(values.get(key, "")) if isinstance(values, Mapping) else ""
 
 
-def _group(name: str, recordings: Mapping[str, Recording]) -> Group:
+def _group(name: str, recordings: Mapping[str, Recording], *, paper: bool) -> Group:
     named = dict(zip(run_names(list(recordings), recordings.values()), recordings.items(), strict=True))
     runs = tuple(Run(*named[run], run, look) for run, look in run_looks(named).items())
-    return Group(name, entry(runs[0].recording, "maneuver", "title") or name, runs)
+    title = entry(runs[0].recording, "maneuver", "title") or name
+    return Group(name, f"{title}: {SETTINGS[PAPER]}" if paper else title, runs)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from activesteer.analysis.claims import SYSTEMS, Scorecard, claims_for, scorecard
+from activesteer.analysis.claims import HUMAN, SYSTEMS, Scorecard, claims_for, scorecard, setting_of
 from activesteer.analysis.report.groups import Group, entry
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording
@@ -42,7 +42,8 @@ def judge(group: Group) -> Judgement:
     if not (_same(systems, "maneuver") and _same(systems, "vehicle")):
         return Judgement(nothing, "the three runs differ in manoeuvre or vehicle; see the parameters")
     try:
-        return Judgement(scorecard(check(recordings), entry(systems[0], "vehicle", "name")))
+        claims, setting = check(recordings), setting_of(systems[0])
+        return Judgement(scorecard(claims, entry(systems[0], "vehicle", "name"), setting=setting or HUMAN))
     except ActiveSteerError as error:
         return Judgement(nothing, str(error))
 

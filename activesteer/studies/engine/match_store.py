@@ -63,8 +63,13 @@ class MatchStore:
         known: (manoeuvre, digest of its overrides) -> evaluation.
     """
 
-    def __init__(self, folder: Path, study_toml: str) -> None:
+    def __init__(self, folder: Path, study_toml: str, *, reads: bool = False) -> None:
         """Open the folder, or resume the search in it.
+
+        Args:
+            folder: The folder.
+            study_toml: The study as it runs, behind a line with the digest of everything that decides its results.
+            reads: Whether the search is only read, which another version may do too.
 
         Raises:
             StudyError: the folder cannot be written, or holds another search.
@@ -74,9 +79,11 @@ class MatchStore:
         self.evaluations = 0
         make_folder(folder, StudyError)
         path = folder / _STUDY
-        if path.exists() and path.read_text(encoding="utf-8", errors="replace") != study_toml:
+        given = path.read_text(encoding="utf-8", errors="replace") if path.exists() else study_toml
+        if given != study_toml and not (reads and given.partition("\n")[2] == study_toml.partition("\n")[2]):
             raise StudyError(f"{folder} holds another search; use a new folder", value=folder)
-        write_text(path, study_toml, StudyError)
+        if not reads:
+            write_text(path, study_toml, StudyError)
         self._path = folder / FILE
         for line in self._lines():
             self._take(line)

@@ -160,17 +160,17 @@ def read_match(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Match
     Raises:
         ActiveSteerError: the study is wrong, or the folder holds another search.
     """
-    return _Search(read_study(study_file, "match"), Path(folder), None).result
+    return _Search(read_study(study_file, "match"), Path(folder), None, reads=True).result
 
 
 class _Search:
     """A search, its store and its workers."""
 
-    def __init__(self, study: StudyFile, folder: Path, progress: Progress | None) -> None:
+    def __init__(self, study: StudyFile, folder: Path, progress: Progress | None, *, reads: bool = False) -> None:
         self.study, self.progress = study, progress
         self.statements = Statements(study)
         self.plan, self.prior = Plan(study), Prior(study)
-        self.store = MatchStore(folder, f"# {self.plan.digest}\n{study.to_toml()}")
+        self.store = MatchStore(folder, f"# {self.plan.digest}\n{study.to_toml()}", reads=reads)
         self.names = [label_of(item) for item in study.maneuvers]
         self.all = [claim for name in self.names for claim in self.statements.of[name]]
         self.queue: Any = None

@@ -12,7 +12,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Scorecard, scorecard
+from activesteer.analysis.claims import (
+    HUMAN,
+    PAPER,
+    SCENARIOS,
+    SYSTEMS,
+    Claim,
+    Scorecard,
+    read_setting,
+    scorecard,
+)
+from activesteer.analysis.claims.setting import VEHICLE
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.files import make_folder
 from activesteer.recording import Recording, check_target
@@ -34,11 +44,13 @@ class Reproduction:
         paths: Scenario -> system -> MCAP file.
         failures: (scenario, system) -> reason why that run ended early; its file holds the rows up to then.
         scorecard: Claims of the scenarios whose three runs are complete.
+        setting: Setting of all runs.
     """
 
     paths: dict[str, dict[str, Path]] = field(default_factory=dict)
     failures: dict[tuple[str, str], str] = field(default_factory=dict)
     scorecard: Scorecard = field(default_factory=lambda: scorecard([]))
+    setting: str = HUMAN
 
     @property
     def exit_status(self) -> int:
@@ -59,6 +71,7 @@ def reproduce(
     vehicle: FileOrTable = "compact",
     overrides: Mapping[str, Any] | None = None,
     *,
+    setting: str = HUMAN,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Reproduction:
@@ -71,6 +84,7 @@ def reproduce(
         folder: Folder of the recordings SCENARIO-SYSTEM.mcap; it is made if it does not exist.
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, for all runs; see `simulate`.
+        setting: `human` or `paper`; see `activesteer.analysis.claims.setting`.
         jobs: Number of processes; default: the number of processors.
         progress: Called after every run.
 
@@ -80,9 +94,15 @@ def reproduce(
     Raises:
         ActiveSteerError: an input is wrong. A failed run stops no other run; `failures` names it.
     """
-    scenarios = {name: resolve(name, vehicle, overrides) for name in SCENARIOS}
+    if setting == PAPER and vehicle != VEHICLE:
+        raise ParameterError(
+            f"is a setting of the {VEHICLE}; leave out --vehicle", key=f"--setting {PAPER}", value=vehicle
+        )
+    numbers = read_setting(setting)
+    scenarios = {name: resolve(name, vehicle, {**numbers.overrides(name), **(overrides or {})}) for name in SCENARIOS}
     target = make_folder(folder, ParameterError)
-    result = Reproduction({name: {system: _path(target, name, system) for system in SYSTEMS} for name in scenarios})
+    paths = {name: {system: _path(target, name, system) for system in SYSTEMS} for name in scenarios}
+    result = Reproduction(paths, setting=setting)
     for systems in result.paths.values():
         for path in systems.values():
             check_target(path)
@@ -93,7 +113,7 @@ def reproduce(
         if progress is not None:
             progress(f"{name} {system}" + (" FAILED" if problem else ""), done, total)
     claims = [claim for name, runs in result.recordings().items() for claim in SCENARIOS[name](runs)]
-    result.scorecard = scorecard(claims, _name_of(scenarios))
+    result.scorecard = scorecard(claims, _name_of(scenarios), setting=setting)
     return result
 
 
