@@ -6,10 +6,11 @@ are those of the stored population.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from activesteer.analysis.claims import STATEMENTS, Kind, not_reproduced
+from activesteer.analysis.claims import PAPER, SCENARIO_OF, STATEMENTS, Kind, not_reproduced, read_setting
 from activesteer.analysis.claims.population import Population, stored_population
 from activesteer.theory.proportions import percent
 
@@ -22,17 +23,45 @@ VEHICLE: Final = "compact"
 def table() -> str:
     """Return the table in Markdown: statements about the systems alone, then statements with a driver."""
     known, population = not_reproduced(VEHICLE), stored_population(VEHICLE)
-    lines = []
+    fails = read_setting(PAPER).fails
+    lines = [*summary(), ""]
     for kind in Kind:
         lines += [f"**{kind.value.capitalize()}**", ""]
-        lines += ["| | statement | nominal run | population | depends most on |", "|---|---|---|---|---|"]
+        lines += [
+            "| | statement | paper's setting | human driver | population | depends most on |",
+            "|---|---|---|---|---|---|",
+        ]
         for statement in STATEMENTS.values():
             if statement.kind is kind:
                 nominal = "not reproduced" if statement.id in known else "reproduced"
-                cells = (statement.id, statement.text, nominal, *_proportion(population, statement.id))
+                paper = "fails" if statement.id in fails else "holds"
+                cells = (statement.id, statement.text, paper, nominal, *_proportion(population, statement.id))
                 lines.append("| " + " | ".join(cells) + " |")
         lines.append("")
     return "\n".join(lines)
+
+
+def summary() -> list[str]:
+    """Return the statements that hold, by scenario, as lines of Markdown."""
+    known, population, fails = not_reproduced(VEHICLE), stored_population(VEHICLE), read_setting(PAPER).fails
+    lines = [
+        "| scenario | the paper's statements | paper's setting | human driver | population, ideal sensors | "
+        "population, production sensors |",
+        "|---|---|---|---|---|---|",
+    ]
+    for scenario in [*dict.fromkeys(SCENARIO_OF.values()), ""]:
+        own = [claim for claim, name in SCENARIO_OF.items() if scenario in ("", name)]
+        shares = [_mean(population, own, f"sensors.preset = {preset}") for preset in ("ideal", "production")]
+        counts = (sum(claim not in listed for claim in own) for listed in (fails, known))
+        cells = (scenario.replace("_", " ") or "all", len(own), *counts, *shares)
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return lines
+
+
+def _mean(population: Population | None, claims: Sequence[str], at: str) -> str:
+    """Return the mean share of claims at a value of a choice, in words."""
+    found = [claim.at[at] for claim in population.claims if claim.id in claims] if population else []
+    return f"{percent(sum(found) / len(found))} %" if found else ""
 
 
 def _proportion(population: Population | None, number: str) -> tuple[str, str]:

@@ -1,0 +1,42 @@
+"""The paper's setting: its runs give the verdicts that its file lists, and fakes do not pass in it either."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from activesteer import simulate
+from activesteer.analysis.claims import PAPER, SCENARIO_OF, SCENARIOS, SYSTEMS, Fake, read_setting
+from activesteer.recording import Recording
+from tests.reproduction.test_fakes import passed, turned_round
+
+
+def driven(scenario: str, controllers: dict[str, Any]) -> dict[str, Recording]:
+    overrides = read_setting(PAPER).overrides(scenario)
+    return {name: simulate(scenario, controller, overrides=overrides) for name, controller in controllers.items()}
+
+
+def check(scenario: str) -> None:
+    fails = {claim for claim in read_setting(PAPER).fails if SCENARIO_OF[claim] == scenario}
+    claims = SCENARIOS[scenario](driven(scenario, dict(zip(SYSTEMS, SYSTEMS, strict=True))))
+    assert {claim.id for claim in claims if not claim.passed} == fails
+
+
+def test_the_step_steer_gives_the_listed_verdicts() -> None:
+    check("step_steer")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", [name for name in SCENARIOS if name != "step_steer"])
+def test_the_other_scenarios_give_the_listed_verdicts(scenario: str) -> None:
+    check(scenario)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_a_system_turned_round_has_none_of_the_effects(scenario: str) -> None:
+    runs = driven(scenario, {"none": "none", **{system: turned_round(system) for system in SYSTEMS[1:]}})
+    assert passed(SCENARIOS[scenario](runs), Fake.REVERSED) == []
+    none = runs["none"]
+    assert passed(SCENARIOS[scenario](dict.fromkeys(SYSTEMS, none)), Fake.NONE_AS_BOTH) == []
