@@ -20,7 +20,7 @@ import numpy as np
 from activesteer.config import toml_text
 from activesteer.conventions import Array
 from activesteer.resources import models_dir
-from activesteer.studies.linear.identification import RADIUS_TEST, identify, write_single_track
+from activesteer.studies.linear.identification import RADIUS_TEST, identify, write_identified
 from activesteer.vehicle_builder import new_vehicle
 
 SOURCE: Final = "TUMFTM/VVUQ-Framework; Danquah et al., Applied Sciences 11 (2021) 3, and Danquah's dissertation (TUM)"
@@ -71,9 +71,9 @@ def main() -> None:
 
 
 def tell_controllers(file: Path) -> None:
-    """Write single-track model and controllers from runs of the car, by the rules in `models/vehicles/compact.toml`."""
+    """Write what controllers and estimators know of the car, from its runs, by the rules in the compact's file."""
     found = identify(NAME)
-    write_single_track(file, found, "python tools/make_tesla_model_s.py", datetime.date.today().isoformat())
+    write_identified(file, found, "python tools/make_tesla_model_s.py", datetime.date.today().isoformat())
     text = file.read_text(encoding="utf-8")
     start = text.index("# Controllers of the compact")
     controllers = re.sub(r"^#.*\n", "", text[start:], flags=re.MULTILINE).replace(

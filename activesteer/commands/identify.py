@@ -1,4 +1,4 @@
-"""`activesteer identify`: steady-state handling by ISO 4138, and the single-track model of the controllers."""
+"""`activesteer identify`: steady-state handling by ISO 4138, and what controllers and estimators know of the car."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from activesteer.errors import ParameterError
 
 def add_to(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("identify", help="understeer, limits and single-track model of a vehicle (ISO 4138)")
+    parser = commands.add_parser("identify", help="understeer, limits and controller models of a vehicle (ISO 4138)")
     add_car(parser)
     parser.add_argument(
-        "--write", action="store_true", help="also write the result into [single_track] of the vehicle file"
+        "--write",
+        action="store_true",
+        help="also write [single_track] and [two_track] of the vehicle file",
     )
     add_json(parser)
     parser.set_defaults(action=_identify)
@@ -25,7 +27,7 @@ def add_to(commands: Any) -> None:
 
 def _identify(options: argparse.Namespace) -> int:
     from activesteer.resources import check_own, find_vehicle
-    from activesteer.studies.linear.identification import identify, write_single_track
+    from activesteer.studies.linear.identification import identify, write_identified
 
     def progress(test: str) -> None:
         if not options.json:
@@ -45,7 +47,7 @@ def _identify(options: argparse.Namespace) -> int:
     if options.write:
         vehicle = f" --vehicle {options.vehicle}" if options.vehicle != "compact" else ""
         command = f"activesteer identify{vehicle} --write"
-        write_single_track(file, result, command, datetime.date.today().isoformat())
+        write_identified(file, result, command, datetime.date.today().isoformat())
         if not options.json:
             print(f"written to {file}")
     return 0

@@ -24,8 +24,8 @@ _SAME: Final = {"characteristic_speed_mps": "characteristic_speed_kmh"}
 def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], command: str, date: str) -> None:
     """Replace values in a table of a vehicle file.
 
-    Keys keep their place and their comments; missing keys are added at the end of the table. A comment below the header
-    of the table names command and date.
+    Keys keep their place and their comments; missing keys are added at the end of the table, and a missing table at the
+    end of the file. A comment below the header of the table names command and date.
 
     Args:
         vehicle_file: The file.
@@ -35,17 +35,14 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
         date: Date, such as 2026-11-21.
 
     Raises:
-        ParameterError: the file cannot be read or written, is not TOML, or has no such table.
+        ParameterError: the file cannot be read or written, or is not TOML.
     """
     before, source = read_toml(vehicle_file)
     lines = source.text.splitlines()
     header = next((number for number, line in enumerate(lines) if _is_header(line, table)), None)
     if header is None:
-        raise ParameterError(
-            "there is no such table; add its header to the file",
-            file=str(vehicle_file),
-            key=f"[{table}]",
-        )
+        lines += ["", f"[{table}]"]
+        header, before = len(lines) - 1, {**before, table: {}}
     end = next((number for number in range(header + 1, len(lines)) if _is_header(lines[number])), len(lines))
     # Blank lines and comments above the next header belong to the next table.
     while end > header + 1 and not re.match(r"\s*[\w\"'-]+\s*=", lines[end - 1]):
@@ -68,7 +65,7 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     except tomllib.TOMLDecodeError:
         after = {}
     kept = {key: value for key, value in before[table].items() if key not in {*values, *_SAME}}
-    if {**before, table: None} != {**after, table: None} or kept.items() - after[table].items():
+    if not after or {**before, table: None} != {**after, table: None} or kept.items() - after[table].items():
         raise ParameterError(
             "needs one key per line; reformat it, or edit it by hand",
             file=str(vehicle_file),

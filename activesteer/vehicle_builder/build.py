@@ -12,9 +12,11 @@ from pathlib import Path
 
 import mujoco
 
-from activesteer.errors import ParameterError, TyreFileError, nearest_names, shown
+from activesteer.errors import ActiveSteerError, ParameterError, TyreFileError, nearest_names, shown
 from activesteer.files import is_file, user_path, writing
 from activesteer.resources import models_dir
+from activesteer.simulation.runner import run_scenario
+from activesteer.simulation.two_track_search import two_track_of
 from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle_builder.axle_kinds import AxleKind
@@ -40,7 +42,7 @@ class NewVehicle:
         vehicle_file: Vehicle file, as for `--vehicle`.
         assumptions: Values that the table does not give.
         trimmed: Values from the standing car.
-        questions: Unusual measurements.
+        questions: Unusual measurements, and what the car cannot drive.
     """
 
     folder: Path
@@ -121,12 +123,13 @@ def new_vehicle(
         _write(files, car, trimmed, final=True)
         text, keyframes = keyframe_xml(files / f"{name}.toml")
         keyframes.write_text(text, encoding="utf-8")
+        questions = [*car.questions, *_drive(files, car, trimmed)]
         shutil.copyfile(table_path, files / f"table{table_path.suffix.lower()}")
         readme = readme_text(car, trimmed, f"table{table_path.suffix.lower()}")
         (files / "README.md").write_text(readme, encoding="utf-8")
         with writing(target, ParameterError):
             shutil.copytree(files, target, dirs_exist_ok=True)
-    return NewVehicle(target, target / f"{name}.toml", tuple(car.assumptions), trimmed, car.questions)
+    return NewVehicle(target, target / f"{name}.toml", tuple(car.assumptions), trimmed, tuple(questions))
 
 
 def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None) -> KcTables | None:
@@ -142,11 +145,26 @@ def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None)
     return None if kc is None else read_kc(Path(kc), guided)
 
 
+def _drive(folder: Path, car: Car, trimmed: Trimmed) -> list[str]:
+    """Drive the standing car, and write its two-track properties; return why that is impossible."""
+    file = folder / f"{car.name}.toml"
+    try:
+        found = two_track_of(file, run_scenario)
+    except ActiveSteerError as reason:
+        return [f"no [two_track], which estimators need: {reason}"]
+    file.write_text(vehicle_text(car, trimmed, _compiled(folder, car), found), encoding="utf-8")
+    return []
+
+
+def _compiled(folder: Path, car: Car) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(folder / f"{car.name}.xml"))
+
+
 def _write(folder: Path, car: Car, trimmed: Trimmed, *, final: bool = False) -> Path:
     """Write MJCF and vehicle file; only the final file holds the single-track model of the car itself."""
     for name, text in mjcf_files(car, trimmed).items():
         (folder / name).write_text(text, encoding="utf-8")
-    model = mujoco.MjModel.from_xml_path(str(folder / f"{car.name}.xml")) if final else None
+    model = _compiled(folder, car) if final else None
     file = folder / f"{car.name}.toml"
     file.write_text(vehicle_text(car, trimmed, model), encoding="utf-8")
     return file

@@ -10,6 +10,8 @@ import mujoco
 from activesteer.config import read_toml, to_table, toml_text
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.resources import find_vehicle
+from activesteer.simulation.two_track_search import two_track_lines
+from activesteer.theory.two_track import TwoTrackParameters
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle_builder.design import Car
@@ -36,6 +38,7 @@ _REMARKS: Final = {
     "powertrain": (
         "At the wheels: torques in first gear, power, rev limit in top gear; of axles with motors, limits of the pedal."
     ),
+    "two_track": "For estimators, from drives of the car: steps of the steering wheel at 80 km/h, 2 m/s2, and braking.",
     "controllers.desired_yaw_rate": (
         "Controllers of the compact as a start; their gains belong to that car. Adapt them to the lateral acceleration "
         "that\nthis car reaches without control (max_lateral_acceleration_mps2) and to the lags of its servos; see the "
@@ -45,13 +48,16 @@ _REMARKS: Final = {
 """Comments above tables, equal for every car."""
 
 
-def vehicle_text(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> str:
+def vehicle_text(
+    car: Car, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None = None
+) -> str:
     """Return the text of the vehicle file.
 
     Args:
         car: The car.
         trimmed: Result of the trim.
         model: Compiled car, for its single-track model; None for a placeholder during the trim.
+        two_track: Result of drives of the car.
     """
     remarks = _REMARKS | {
         "steering": f"Ratio at the centre without load; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
@@ -62,13 +68,16 @@ def vehicle_text(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> st
         ),
     }
     made = "Made by `activesteer vehicle new`; README.md lists the assumptions."
-    text = toml_text(_table(car, trimmed, model), remarks)
+    text = toml_text(_table(car, trimmed, model, two_track), remarks)
     return f"# {car.name}: properties that its MJCF does not define. {made}\n{text}"
 
 
-def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str, Any]:
+def _table(
+    car: Car, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None
+) -> dict[str, Any]:
     """Return the vehicle file as a table; tables in the form of a vehicle file are copied with all keys."""
     compact, _ = read_toml(find_vehicle("compact"))
+    lines = two_track_lines(two_track) if two_track is not None else {}
     limit_rad = 0.99 * car.rack_limit_m / trimmed.pinion_radius_m
     return {
         "mjcf": f"{car.name}.xml",
@@ -97,6 +106,7 @@ def _table(car: Car, trimmed: Trimmed, model: mujoco.MjModel | None) -> dict[str
         "aerodynamics": to_table(car.aerodynamics, defaults=False),
         **hardware_tables(car.table),
         "single_track": _single_track(car, model),
+        **({"two_track": {key: float(value) for key, value in lines.items()}} if lines else {}),
         "controllers": compact["controllers"],
     }
 

@@ -32,7 +32,9 @@ from activesteer.simulation.single_track_search import (
     fitted,
     handling_in,
 )
+from activesteer.simulation.two_track_search import two_track_lines, two_track_of
 from activesteer.theory.single_track import SingleTrack
+from activesteer.theory.two_track import TwoTrackParameters
 
 RADIUS_TEST: Final = "100 m"
 """The test on a circle."""
@@ -53,20 +55,27 @@ class Identification:
         vehicle: Name of the vehicle.
         tests: Name of a test -> steady-state handling in it.
         single_track: The matching single-track model.
+        two_track: Load transfer, roll and pitch.
     """
 
     vehicle: str
     tests: dict[str, Handling]
     single_track: SingleTrackParameters
+    two_track: TwoTrackParameters
 
     def table(self) -> str:
-        """Return both as text: a column per test, then the keys of [single_track]."""
+        """Return all as text: a column per test, then the keys of [single_track] and [two_track]."""
         shown = comparison({name: handling._asdict() for name, handling in self.tests.items()})
-        keys = "\n".join(f"{key} = {value}" for key, value in single_track_lines(self.single_track).items())
-        return f"{shown}\n\n[single_track]\n{keys}"
+        for name, lines in self.lines().items():
+            shown += "\n".join([f"\n\n[{name}]", *(f"{key} = {value}" for key, value in lines.items())])
+        return shown
+
+    def lines(self) -> dict[str, dict[str, str]]:
+        """Return the tables of the vehicle file: name -> key -> value as text."""
+        return {"single_track": single_track_lines(self.single_track), "two_track": two_track_lines(self.two_track)}
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values: `metrics` with name, test, value, unit, band, inside, source; `single_track` in SI."""
+        """Return JSON values: `metrics` with name, test, value, unit, band, inside, source; both models in SI."""
         metrics = []
         for test, handling in self.tests.items():
             for name, value in handling._asdict().items():
@@ -84,7 +93,7 @@ class Identification:
                     }
                 )  # fmt: skip
         known = {key: value for key, value in vars(self.single_track).items() if value is not None}
-        return {"vehicle": self.vehicle, "metrics": metrics, "single_track": known}
+        return {"vehicle": self.vehicle, "metrics": metrics, "single_track": known, "two_track": vars(self.two_track)}
 
 
 def identify(
@@ -100,7 +109,7 @@ def identify(
         progress: Called with the name of every test before its drive.
 
     Returns:
-        Steady-state handling and the single-track model.
+        Steady-state handling, the single-track model and the two-track properties.
 
     Raises:
         ActiveSteerError: an input is wrong, or the car cannot drive the tests.
@@ -120,7 +129,10 @@ def identify(
             progress(name)
         tests[name] = handling_in(scenario, body, run_scenario)
     found = fitted(body, [tests[name] for name in CONSTANT_SPEED_TESTS])
-    return Identification(scenarios[RADIUS_TEST].car.name, tests, found)
+    if progress is not None:
+        progress("roll and pitch")
+    two_track = two_track_of(vehicle, run_scenario, overrides)
+    return Identification(scenarios[RADIUS_TEST].car.name, tests, found, two_track)
 
 
 def single_track_lines(parameters: SingleTrackParameters) -> dict[str, str]:
@@ -139,8 +151,8 @@ def single_track_lines(parameters: SingleTrackParameters) -> dict[str, str]:
     return lines
 
 
-def write_single_track(vehicle_file: Path, result: Identification, command: str, date: str) -> None:
-    """Write the single-track model into a vehicle file, and keep everything else in it.
+def write_identified(vehicle_file: Path, result: Identification, command: str, date: str) -> None:
+    """Write [single_track] and [two_track] into a vehicle file, and keep everything else in it.
 
     Args:
         vehicle_file: The file, as from `resources.find_vehicle`.
@@ -149,9 +161,10 @@ def write_single_track(vehicle_file: Path, result: Identification, command: str,
         date: Date of the identification, such as 2026-11-21, kept in the comment.
 
     Raises:
-        ParameterError: the file cannot be read or written, or has no table [single_track].
+        ParameterError: the file cannot be read or written.
     """
-    write_values(vehicle_file, "single_track", single_track_lines(result.single_track), command, date)
+    for table, lines in result.lines().items():
+        write_values(vehicle_file, table, lines, command, date)
 
 
 def single_track_response(

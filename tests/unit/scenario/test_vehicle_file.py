@@ -53,6 +53,12 @@ def test_command_and_date_stand_beside_the_values_and_only_once(tmp_path):
     assert "2026-01-01" not in text
 
 
+def test_missing_table_is_added(tmp_path):
+    text = written(tmp_path, "a = 1\n", times=2)
+    assert tomllib.loads(text)["single_track"]["cg_to_rear_m"] == 1.5
+    assert text.count("[single_track]") == 1
+
+
 def test_table_at_the_end_of_the_file_is_found(tmp_path):
     text = written(tmp_path, "[single_track]\nmass_kg = 1")
     assert tomllib.loads(text)["single_track"]["cg_to_rear_m"] == 1.5
@@ -61,7 +67,7 @@ def test_table_at_the_end_of_the_file_is_found(tmp_path):
 @pytest.mark.parametrize(
     ("text", "key"),
     [
-        ("a = 1\n", "[single_track]"),
+        ('"single_track".mass_kg = 1\n', "[single_track]"),
         ("[single_track\n", None),
         ('[single_track]\nnote = """\nmass_kg = 1\n"""\n', "[single_track]"),
     ],

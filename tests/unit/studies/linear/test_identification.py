@@ -15,8 +15,9 @@ from activesteer.controllers import SingleTrackParameters
 from activesteer.files import json_text
 from activesteer.resources import find_vehicle
 from activesteer.scenario import load_car
-from activesteer.studies.linear.identification import Identification, single_track_response, write_single_track
+from activesteer.studies.linear.identification import Identification, single_track_response, write_identified
 from activesteer.theory.single_track import SingleTrack
+from activesteer.theory.two_track import TwoTrackParameters
 from tests.unit.analysis.synthetic import step_steer
 
 DEGPG = math.radians(1.0) / 9.81
@@ -35,7 +36,8 @@ HANDLING = Handling(
     steering_wheel_gain_mps2prad=math.nan,
     limit_acceleration_mps2=8.0,
 )
-RESULT = Identification("made up", {"100 m": HANDLING}, PARAMETERS)
+TWO_TRACK = TwoTrackParameters(0.6, 1.51, 1.52, 0.55, 0.009, 2.0, 0.3, 0.4, 0.005, 1.1)
+RESULT = Identification("made up", {"100 m": HANDLING}, PARAMETERS, TWO_TRACK)
 
 
 def test_json_says_what_is_inside_its_band_and_leaves_out_what_is_not_defined():
@@ -60,12 +62,13 @@ def test_table_shows_tests_and_parameters():
 def test_vehicle_file_takes_the_parameters(tmp_path):
     path = tmp_path / "mine.toml"
     shutil.copy(find_vehicle("compact"), path)
-    write_single_track(path, RESULT, "activesteer identify --vehicle mine.toml", "2026-11-21")
+    write_identified(path, RESULT, "activesteer identify --vehicle mine.toml", "2026-11-21")
     found = load_car(path).config
     assert found.single_track.front_stiffness_Nprad == 90e3
     assert found.single_track.characteristic_speed_mps == pytest.approx(23.0)
-    other, _ = read_toml(find_vehicle("compact"))
-    assert read_toml(path)[0] | {"single_track": None} == other | {"single_track": None}
+    assert found.two_track == TWO_TRACK
+    others = dict.fromkeys(("single_track", "two_track"))
+    assert read_toml(path)[0] | others == read_toml(find_vehicle("compact"))[0] | others
 
 
 def test_single_track_model_beside_a_run_ends_at_its_steady_state():
