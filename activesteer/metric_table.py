@@ -178,6 +178,7 @@ METRICS: Final = {
             "rad", "rear_steer_steady_state", "superposition_steady_state", "added_rear_steer_steady_state",
             "added_superposition_steady_state", significance=STEER_RAD,
         ),
+        *_declare("rad", "heading_end", better=_SMALLER),
         *_declare("rad", "steering_wheel_peak_abs", significance=STEERING_WHEEL_RAD, better=_SMALLER),
         *_declare(
             "rad", "steering_wheel_steady_state", "steering_wheel_rms", "steering_wheel_gates_rms",

@@ -42,7 +42,6 @@ from activesteer.studies.engine.run_task import CLAIM, CURVE, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
 from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.studies.paper.comparison_population import comparison_text
-from activesteer.studies.paper.comparison_targets import REFERENCES
 from activesteer.studies.paper.population import population, summarise
 from activesteer.studies.paper.population_studies import STUDY, population_study
 from activesteer.theory.proportions import percent
@@ -129,17 +128,19 @@ def comparison_page(text: str, found: Population | None) -> str:
 def _comparison(found: Population) -> list[str]:
     names = found.controllers
     versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
+    scenarios = dict.fromkeys(effect.scenario for effect in found.systems)
+    totals = [found.total(name) for name in names]
     lines = [
         f"{found.samples} samples of the {found.vehicle}, seed {found.seed}; driven with {versions}.",
         "",
-        _row(f"peak of the sideslip below the lowest of {', '.join(REFERENCES)}", [f"`{name}`" for name in names]),
+        _row("runs with harm", [f"`{name}`" for name in names]),
         "|---|" + "---|" * len(names),
     ]
-    for scenario in dict.fromkeys(effect.scenario for effect in found.systems):
+    for scenario in scenarios:
         own = [effect for effect in found.systems if effect.scenario == scenario]
-        lines.append(_row(scenario.replace("_", " "), [str(effect.lower) for effect in own]))
-    totals = [found.total(name) for name in names]
-    lines.append(_row("**all scenarios**", [str(total.lower) for total in totals]))
+        lines.append(_row(scenario.replace("_", " "), [str(effect.harmed) for effect in own]))
+    lines.append(_row("**all scenarios**", [str(total.harmed) for total in totals]))
+    lines.append(_row("worst harm of the track, m", [f"{total.worst_track_m:.2f}" for total in totals]))
     lines.append(_row("lost without control, saved", [str(total.saved) for total in totals]))
     lines.append(_row("not lost without control, spoiled", [str(total.spoiled) for total in totals]))
     return [*lines, "", "![Proportions by scenario and controller](pictures/comparison_population.png)"]

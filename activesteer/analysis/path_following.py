@@ -87,7 +87,8 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
       these but roll.
     - Lag behind the steering wheel up to the last gate: `yaw_rate_lag_s`, `ay_lag_s`.
     - Steering effort: `steering_wheel_peak_abs_rad`, `steering_wheel_rms_rad`, and the same of its rate.
-    - Distance of the front axle centre from the path: `track_deviation_max_m`, `track_deviation_rms_m`.
+    - Distance of the front axle centre from the path: `track_deviation_max_m`, `track_deviation_rms_m`; heading at the
+      end of the run against the path, `heading_end_rad`.
     - Lanes: `lane_overstep_m`, the largest distance of the body beyond a lane (below 0: smallest distance from a side),
       `stays_in_lanes` (1 or 0), `cones_hit`, `cone_distance_min_m`.
     - Tyres: `tyre_use_max`, `tyre_use_mean`, the fraction of the available friction that all wheels use.
@@ -175,6 +176,7 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
     """Return the metrics of the car's distances from path, lanes and cones."""
     deviation = track.path_distance(*track.front_axle(recording), course.path.x_m, course.path.y_m)
     values = {"track_deviation_max_m": float(np.abs(deviation).max()), "track_deviation_rms_m": rms(deviation)}
+    values["heading_end_rad"] = track.heading_at_end(recording, course.path.x_m, course.path.y_m)
     if not course.lanes and not len(course.cones_m):
         return values
     car = read_footprint(recording)

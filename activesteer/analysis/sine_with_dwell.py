@@ -118,7 +118,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         - `lateral_displacement_m`: displacement of the centre of gravity 1.07 s after the beginning of steer, across
           the heading at that beginning, positive to the side of the first half.
         - `lateral_displacement_by_ay_m`: the same from the lateral acceleration, as in the standards.
-        - `<name>_peak_abs_<unit>`: over the whole run.
+        - `<name>_peak_abs_<unit>`: over the whole run; `heading_end_rad`, against its first sample.
 
         A value is nan if the run ends before it.
 
@@ -148,6 +148,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     for name, unit in PEAKS:
         values[f"{name}_peak_abs_{unit}"] = float(np.abs(recording[f"{name}_{unit}"]).max())
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
+    values["heading_end_rad"] = float(recording["yaw_rad"][-1] - recording["yaw_rad"][0])
     return values
 
 

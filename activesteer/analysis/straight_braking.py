@@ -38,7 +38,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
           the same distance, g sum(mu F_z) / sum(F_z); drag counts as braking.
         - `wheel_slip_max`: largest slip of a wheel as a fraction of the car's speed, above 15 km/h; 1 is locked.
         - `brake_pressure_peak_Pa`, and until standstill `yaw_rate_peak_abs_radps`, `lateral_deviation_max_m` from the
-          straight line, `steering_wheel_peak_abs_rad`.
+          straight line, `steering_wheel_peak_abs_rad`; `heading_end_rad` there, against the straight line.
 
         A value is nan if the car does not get so far.
 
@@ -62,7 +62,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         efficiency = deceleration / _allowed(recording, way, fast, slow)
     end = len(speed) if stop is None else stop + 1
     braked = slice(begin, end)
-    heading = recording["yaw_rad"][begin]
+    heading = float(recording["yaw_rad"][begin])
     aside = math.cos(heading) * (y[braked] - y[begin]) - math.sin(heading) * (x[braked] - x[begin])
     return {
         "braking_begin_time_s": float(time_s[begin]),
@@ -74,6 +74,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         "brake_pressure_peak_Pa": max(float(recording[f"{corner}_brake_pressure_Pa"].max()) for corner in CORNERS),
         "yaw_rate_peak_abs_radps": float(np.abs(recording["yaw_rate_radps"][braked]).max()),
         "lateral_deviation_max_m": float(np.abs(aside).max()),
+        "heading_end_rad": math.remainder(float(recording["yaw_rad"][end - 1]) - heading, 2.0 * math.pi),
         "steering_wheel_peak_abs_rad": float(np.abs(recording["steering_wheel_rad"][braked]).max()),
     }
 

@@ -61,6 +61,18 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
     return signed
 
 
+def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -> float:
+    """Return the heading of the car at the end of a run against the nearest piece of a path, -pi to pi [rad].
+
+    A car that turned around several times has its whole turns left out.
+    """
+    x, y = (channel[-1] for channel in front_axle(recording))
+    nearest = int(np.argmin(np.hypot(path_x_m - x, path_y_m - y)))
+    begin = min(nearest, len(path_x_m) - 2)
+    along = math.atan2(path_y_m[begin + 1] - path_y_m[begin], path_x_m[begin + 1] - path_x_m[begin])
+    return math.remainder(float(recording["yaw_rad"][-1]) - along, 2.0 * math.pi)
+
+
 def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
     """Return world y of the front axle centre at its first passage of each x, interpolated.
 

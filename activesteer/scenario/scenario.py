@@ -82,7 +82,8 @@ def resolve(
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, such as `speed_kmh`, `road.mu` or `controllers.ars.limit_deg`. Start the key
             with `maneuver.` or `vehicle.` if both have it, and with `driver.` for keys of the driver. Parameters of
-            your own code have keys such as `controllers.YawBeta.k_beta` and `driver.Cautious.preview_s`.
+            your own code have keys such as `controllers.YawBeta.k_beta` and `driver.Cautious.preview_s`. The key `driver` replaces the
+            driver.
         driver: Name, path or table of a driver, or your own code; see `find_driver`.
         controllers: Controllers whose parameters `overrides` may set, as for `simulate`; needed for your own code only.
 
@@ -109,6 +110,7 @@ def resolve(
         # A given table may come from a recording, which holds both an input and the value derived from it.
         check_overruled(kind, table, source, leaf_keys(table))
     changes = plain(overrides)
+    driver = changes.pop("driver", driver)
     sorted_out: dict[str, list[Override]] = {part: [] for part in (*_PARTS, "controllers")}
     owned = own_controllers(controllers) if any(map(own_path, changes)) else {}
     for key, value in changes.items():

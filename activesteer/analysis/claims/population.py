@@ -76,14 +76,16 @@ class ClaimProportion:
 
 @dataclass(frozen=True)
 class Change:
-    """Change of the magnitude of a metric by a system, relative to the same sample without control.
+    """Change of the magnitude of a metric or a measure by a system, relative to the same sample without control.
 
     Attributes:
-        metric: The metric.
+        metric: The metric, or the name of one of `harm.MEASURES`.
         number: Number of samples in which both runs have the metric.
         low: 5 % quantile of the changes.
         median: Median of the changes.
         high: 95 % quantile of the changes.
+        largest: Largest change; infinite if a run with the system alone does not define the value.
+        harmed: Number of samples in which the change is harm.
     """
 
     metric: str
@@ -91,6 +93,35 @@ class Change:
     low: float
     median: float
     high: float
+    largest: float = math.nan
+    harmed: int = 0
+
+
+@dataclass(frozen=True)
+class WorstRun:
+    """A run with much harm.
+
+    Attributes:
+        controller: The controller.
+        scenario: The manoeuvre.
+        sample: Number of the sample.
+        severity: Largest growth of a measure, in multiples of its size.
+        growth: Measure -> growth [SI], for the measures that are harmed.
+        command: Command line that repeats the run; with `-c none` it repeats the run without control.
+    """
+
+    controller: str
+    scenario: str
+    sample: int
+    severity: float
+    growth: Mapping[str, float]
+    command: str
+
+    @classmethod
+    def from_json(cls, table: dict[str, Any]) -> WorstRun:
+        """Return the run from JSON values, in which an infinite growth is None."""
+        growth = {name: math.inf if value is None else value for name, value in table["growth"].items()}
+        return cls(**table | {"growth": growth, "severity": table["severity"] or math.inf})
 
 
 @dataclass(frozen=True)
@@ -110,6 +141,9 @@ class SystemEffect:
         spun: Number of samples in which the car with the controller spins; None if it is not stored.
         lower: Samples with a lower peak sideslip angle than the lowest of the reference controllers; no samples if the
             controller is not compared with them.
+        harmed: Samples with harm; see `analysis.harm`.
+        growth: Distribution of each measure of harm.
+        worst_track_m: Largest growth of lane overstep or path error [m]; nan without such a measure.
     """
 
     controller: str
@@ -120,6 +154,9 @@ class SystemEffect:
     spun_without: int | None = None
     spun: int | None = None
     lower: Proportion = Proportion()
+    harmed: Proportion = Proportion()
+    growth: tuple[Change, ...] = ()
+    worst_track_m: float = math.nan
 
     def median_change(self, metrics: Sequence[str]) -> float:
         """Return the median change of the first metric that the scenario has; nan if it has none of them."""
@@ -133,16 +170,20 @@ class SystemEffect:
     @classmethod
     def from_json(cls, table: dict[str, Any]) -> SystemEffect:
         """Return the effect that `to_json` described."""
-        read: dict[str, Any] = {name: Proportion(table[name]["count"], table[name]["number"]) for name in _PROPORTIONS}
+        read: dict[str, Any] = {
+            name: Proportion(table[name]["count"], table[name]["number"]) for name in _PROPORTIONS if name in table
+        }
         nan: dict[str, Any] = dict.fromkeys(("low", "median", "high"), math.nan)
-        read["changes"] = tuple(
-            Change(**nan | {key: value for key, value in change.items() if value is not None})
-            for change in table["changes"]
-        )
-        return cls(**table | read)
+        for name in ("changes", "growth"):
+            read[name] = tuple(
+                Change(**nan | {key: value for key, value in change.items() if value is not None})
+                for change in table.get(name, ())
+            )
+        known = {key: value for key, value in table.items() if value is not None or key.startswith("spun")}
+        return cls(**known | read)
 
 
-_PROPORTIONS: Final = ("saved", "spoiled", "lower")
+_PROPORTIONS: Final = ("saved", "spoiled", "lower", "harmed")
 
 
 @dataclass(frozen=True)
@@ -159,6 +200,7 @@ class Population:
         failed: Number of incomplete runs; each counts as lost.
         table: Median of every metric over the samples: `scenario`, `controller`, `metric`, `value`. Empty for a
             population with claims, and not stored.
+        worst: The runs with the most harm, of each controller.
     """
 
     samples: int
@@ -169,6 +211,7 @@ class Population:
     systems: tuple[SystemEffect, ...]
     failed: int = 0
     table: tuple[Mapping[str, Any], ...] = ()
+    worst: tuple[WorstRun, ...] = ()
 
     def of(self, claim: str) -> ClaimProportion | None:
         """Return the proportion of a claim; None for an unknown claim."""
@@ -182,8 +225,9 @@ class Population:
     def total(self, controller: str) -> SystemEffect:
         """Return the effect of a controller in all scenarios together, without changes."""
         own = [effect for effect in self.systems if effect.controller == controller]
-        saved, spoiled, lower = (sum((getattr(effect, name) for effect in own), Proportion()) for name in _PROPORTIONS)
-        return SystemEffect(controller, TOTAL, saved, spoiled, lower=lower)
+        sums = {name: sum((getattr(effect, name) for effect in own), Proportion()) for name in _PROPORTIONS}
+        tracks = [effect.worst_track_m for effect in own if not math.isnan(effect.worst_track_m)]
+        return SystemEffect(controller, TOTAL, **sums, worst_track_m=max(tracks, default=math.nan))
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -191,6 +235,7 @@ class Population:
             **asdict(self),
             "claims": [claim.to_json() for claim in self.claims],
             "systems": [effect.to_json() for effect in self.systems],
+            "worst": finite([asdict(run) for run in self.worst]),
         }
 
     @classmethod
@@ -208,8 +253,10 @@ class Population:
                 "claims": tuple(claims),
                 "systems": tuple(SystemEffect.from_json(effect) for effect in table["systems"]),
                 "table": tuple(table["table"]),
+                "worst": tuple(map(WorstRun.from_json, table.get("worst", ()))),
             }
-            return cls(**{field.name: read.get(field.name, table[field.name]) for field in fields(cls)})
+            known = {**table, **read}
+            return cls(**{field.name: known[field.name] for field in fields(cls) if field.name in known})
         except (KeyError, TypeError, AttributeError) as reason:
             raise StudyError(f"the stored population is damaged: {reason}") from reason
 

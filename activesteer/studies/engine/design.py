@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -36,6 +36,9 @@ class DesignTable:
     """Size of the sample; for `saltelli` the base sample (D + 2 runs each), for `morris` trajectories (D + 1 each)."""
     paired: bool = True
     """Whether all controllers are driven with the same sample."""
+    maneuvers: str = "all"
+    """`all`: every sample drives every manoeuvre. `one`: every sample drives one of them, drawn at random, all equally
+    often."""
 
 
 @dataclass(frozen=True)
@@ -183,6 +186,8 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
         ActiveSteerError: parts of the design contradict each other.
     """
     all_grids = all(factor.kind == "grid" for factor in factors)
+    if table.maneuvers not in ("all", "one"):
+        raise source.fail(("design", "maneuvers"), f"{shown(table.maneuvers)} is neither all nor one", table.maneuvers)
     kind = table.kind or ("list" if has_cases else "grid" if all_grids else "sobol")
     where = ("design", "kind")
     if kind not in DESIGNS:
@@ -199,9 +204,11 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
         if table.samples:
             raise source.fail(("design", "samples"), f"belongs to a sample, not to a {kind}")
         _check_size(factors, 1, source)
-        return DesignTable(kind, 0, table.paired)
+        return replace(table, kind=kind, samples=0)
     if all_grids:
         raise source.fail(where, f"is {kind}, but every factor is a grid; leave it out, or give a distribution")
+    if kind in FOR_INDICES and table.maneuvers == "one":
+        raise source.fail(("design", "maneuvers"), f"{kind} needs every sample in every manoeuvre")
     if kind in FOR_INDICES and any(factor.kind == "grid" for factor in factors):
         raise source.fail(where, f"{kind} samples every factor; write choice in place of grid")
     if not table.samples:
@@ -210,7 +217,7 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
         raise source.fail(("design", "samples"), f"is {table.samples}; saltelli needs a power of 2")
     points = {"saltelli": len(factors) + 2, "morris": len(factors) + 1}.get(kind, 1) * table.samples
     _check_size(factors, points, source)
-    return DesignTable(kind, table.samples, table.paired)
+    return replace(table, kind=kind)
 
 
 def _check_size(factors: Sequence[Factor], points: int, source: Source) -> None:

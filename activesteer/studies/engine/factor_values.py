@@ -59,6 +59,11 @@ class FactorValues:
                     )
                 if value not in self._factors[other].values:
                     raise study.source.fail(place, f"{shown(value)} is no value of that factor", value)
+            for other in factor.grows_with:
+                if other not in self._factors or self._factors[other].nominal or self._factors[other].values:
+                    ranges = [key for key, of in self._factors.items() if not (of.nominal or of.values)]
+                    place = ("factors", factor.key, "grows_with", other)
+                    raise study.source.fail(place, f"is no other range; {nearest_names(other, ranges)}", other)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the overrides of a run.
@@ -84,8 +89,12 @@ class FactorValues:
             if factor is not None and any(values.get(other) != needed for other, needed in factor.when.items()):
                 continue
             if factor is not None and factor.nominal:
-                nominal = found.get(factor.of, self._nominal_of(maneuver, vehicle)[key])
+                nominals = self._nominal_of(maneuver, vehicle)
+                nominal = found.get(factor.of, nominals[key])
                 found[key] = nominal * value if factor.nominal == "times" else nominal + value
+                for other, power in factor.grows_with.items():
+                    if other in nominals and values.get(other) is not None:
+                        found[key] *= (values[other] / nominals[other]) ** power
             else:
                 found[key] = value
         return found
@@ -98,11 +107,10 @@ class FactorValues:
             label = label_of(study.maneuvers[maneuver])
             items = study.maneuvers[maneuver], study.vehicles[vehicle]
             scenario = resolve(*items, study.overrides, study.driver, study.controllers)
-            relative = {
-                key: value_of(scenario, key, study.controllers)
-                for key, factor in self._factors.items()
-                if factor.nominal and (not factor.maneuvers or label in factor.maneuvers)
-            }
+            here = {key: of for key, of in self._factors.items() if not of.maneuvers or label in of.maneuvers}
+            needed = {key for key, of in here.items() if of.nominal}
+            needed |= {other for of in here.values() for other in of.grows_with if other in here}
+            relative = {key: value_of(scenario, key, study.controllers) for key in self._factors if key in needed}
             for key, value in relative.items():
                 if not isinstance(value, int | float) or isinstance(value, bool):
                     raise study.source.fail(

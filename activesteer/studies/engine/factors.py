@@ -17,7 +17,7 @@ from activesteer.errors import nearest_names, shown
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """Kinds of factors; a factor's table has exactly one of these keys."""
 _OPTIONS: Final = {"choice": ("weights",), "normal": ("truncate",)}
-_ANYWHERE: Final = ("nominal", "of", "maneuvers", "when")
+_ANYWHERE: Final = ("nominal", "of", "grows_with", "maneuvers", "when")
 """Keys that every kind allows."""
 NOMINAL: Final = ("times", "plus")
 """Ways in which a factor may be relative to the value of the files."""
@@ -43,6 +43,8 @@ class Factor:
         deviation: Standard deviation of a normal distribution before truncation.
         nominal: One of `NOMINAL` if the values multiply the value of the files or are added to it; else empty.
         of: Earlier factor to whose value the values are relative, in place of the value of the files; empty for none.
+        grows_with: Other factor -> exponent. The value is also multiplied by that factor, over its value in the
+            files, to the power of the exponent.
         maneuvers: Names of the manoeuvres in which the factor varies; empty for all.
         when: Values of other factors with which the factor varies; empty for all.
     """
@@ -57,6 +59,7 @@ class Factor:
     deviation: float = 0.0
     nominal: str = ""
     of: str = ""
+    grows_with: Mapping[str, float] = field(default_factory=dict)
     maneuvers: tuple[str, ...] = ()
     when: Mapping[str, Value] = field(default_factory=dict)
 
@@ -99,6 +102,8 @@ class Factor:
             table["nominal"] = self.nominal
         if self.of:
             table["of"] = self.of
+        if self.grows_with:
+            table["grows_with"] = dict(self.grows_with)
         if self.maneuvers:
             table["maneuvers"] = list(self.maneuvers)
         if self.when:
@@ -115,7 +120,8 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
             `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`. Without bounds,
             a normal distribution is truncated at three standard deviations. With `nominal = "times"` the values
             multiply the value of the files, with `nominal = "plus"` they are added to it; `of = "KEY"` takes the value
-            of an earlier factor in place of that of the files. With
+            of an earlier factor in place of that of the files. With `grows_with = { "road.mu" = 0.5 }` the values also
+            grow with the root of the friction. With
             `maneuvers = ["slalom"]` the key varies in these manoeuvres only, with
             `when = { "sensors.preset" = "production" }` only where another factor has that value.
         source: Source of the study, for error messages.
@@ -153,8 +159,14 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
     when = table.get("when", {})
     if not isinstance(when, Mapping) or ("when" in table and not when):
         raise source.fail((*where, "when"), f"{shown(when)} is no table of other factors and their values", when)
-    names = tuple(map(str, maneuvers))
-    return replace(_read(key, kind, table, source), nominal=nominal, of=of, maneuvers=names, when=dict(when))
+    grows_with = table.get("grows_with", {})
+    if not isinstance(grows_with, Mapping) or not all(map(_is_number, grows_with.values())):
+        problem = f"{shown(grows_with)} is no table of other factors and their exponents"
+        raise source.fail((*where, "grows_with"), problem, grows_with)
+    if grows_with and nominal != "times":
+        raise source.fail((*where, "grows_with"), 'belongs to nominal = "times"', grows_with)
+    other = {"of": of, "grows_with": dict(grows_with), "maneuvers": tuple(map(str, maneuvers)), "when": dict(when)}
+    return replace(_read(key, kind, table, source), nominal=nominal, **other)
 
 
 def _read(key: str, kind: str, table: Mapping[str, Any], source: Source) -> Factor:

@@ -74,13 +74,17 @@ class Plan:
             if key not in (*labelled, "title", "tune", "match", "fit")
         }
         table["design"] = [samples.columns for samples in self.samples]
+        self._maneuver_of: list[int] | None = None
+        if study.design.maneuvers == "one":
+            order = np.random.default_rng([study.seed, len(study.maneuvers)]).permutation(len(self.samples[0]))
+            table["maneuver_of"] = self._maneuver_of = (order % len(study.maneuvers)).tolist()
         table |= {key: [label for label, _ in labelled[key]] for key in labelled}
         self.digest = digest({"study": table, "inputs": self.settings.expected})
 
     def __len__(self) -> int:
         """Number of runs."""
-        shared = self.settings
-        return len(shared.maneuvers) * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
+        shared, driven = self.settings, len(self.settings.maneuvers) if self._maneuver_of is None else 1
+        return driven * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
 
     def _named(self) -> Iterator[tuple[int, int, dict[str, Any]]]:
         """Return indices of manoeuvre and vehicle with overrides, for every combination of texts that may be driven."""
@@ -103,6 +107,8 @@ class Plan:
         place, controller = divmod(run, len(shared.controllers))
         place, sample = divmod(place, len(self.samples[0]))
         maneuver, vehicle = divmod(place, len(shared.vehicles))
+        if self._maneuver_of is not None:
+            maneuver = self._maneuver_of[sample]
         samples = self.samples[controller if len(self.samples) > 1 else 0]
         return self.request_with(run, sample, (maneuver, vehicle, controller), samples[sample])
 

@@ -107,6 +107,8 @@ class StudyFile:
             "overrides": dict(self.overrides),
         }
         design: dict[str, Any] = {"kind": self.design.kind, "paired": self.design.paired}
+        if self.design.maneuvers != "all":
+            design["maneuvers"] = self.design.maneuvers
         if self.design.samples:
             design["samples"] = self.design.samples
         if self.case_list is not None:

@@ -13,7 +13,7 @@ from activesteer.analysis.report.significance import Change, significance
 from activesteer.metric_table import metric as declared
 from activesteer.plotting import Heat, Picture, draw, save
 from activesteer.studies.paper.comparison import Comparison
-from activesteer.studies.paper.comparison_targets import REFERENCES, short
+from activesteer.studies.paper.comparison_targets import short
 from activesteer.theory.proportions import percent
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _COLOURS: Final = (_WORSE, _NEUTRAL, _BETTER)
 _PALEST: Final = 0.2
 """Least depth of the colour of a better or worse value, so that it is seen to be one [-]."""
 _PROPORTIONS: Final = {
-    "lower": (f"sideslip below all\nof {', '.join(REFERENCES)} [%]", -1.0, 1.0),
+    "harmed": ("runs with harm [%]", 0.0, -1.0),
     "saved": ("lost without control,\nsaved [%]", 0.0, 1.0),
     "spoiled": ("fine without control,\nspoiled [%]", 0.0, -1.0),
 }

@@ -14,10 +14,10 @@ from activesteer.metric_table import metric
 NONE: Final = "none"
 REFERENCES: Final = ("ars", "afs", "esc")
 """Reference controllers: the paper's two systems, and the system that the law requires."""
-LOWER_PROPORTION: Final = 0.8
-"""Smallest proportion of a population with a lower peak sideslip angle than the lowest of `REFERENCES`."""
-SPOILED_PROPORTION: Final = 0.01
-"""Largest proportion of runs that are lost with a controller, of those that are not lost without control."""
+HARMED_PROPORTION: Final = 0.01
+"""Largest proportion of runs of a population that a controller harms; see `analysis.harm`."""
+TRACK_HARM_M: Final = 0.10
+"""Largest growth of a lane overstep or path error by a controller in any run [m]."""
 
 
 class Target(NamedTuple):

@@ -15,14 +15,25 @@ import numpy as np
 import pyarrow as pa
 
 from activesteer.analysis.claims import Claim
-from activesteer.analysis.claims.population import NO_FACTOR, Change, ClaimProportion, Population, SystemEffect
+from activesteer.analysis.claims.population import (
+    NO_FACTOR,
+    Change,
+    ClaimProportion,
+    Population,
+    SystemEffect,
+    WorstRun,
+)
+from activesteer.analysis.harm import MEASURES, harms, severity, track_harm_m
+from activesteer.analysis.harm import changes as growth_of
 from activesteer.analysis.loss_of_control import has_spun, is_lost
+from activesteer.conventions import Array
 from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.dependence import strongest
-from activesteer.studies.engine.factor_values import label_of
+from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
+from activesteer.studies.engine.run_command import run_command
 from activesteer.studies.engine.run_identity import versions
 from activesteer.studies.engine.run_task import CLAIM, CURVE, Row
 from activesteer.studies.engine.study import StudyProgress, study
@@ -41,6 +52,8 @@ CHANGES: Final = (
 )
 """Metrics whose change by a system is reported: peak sideslip angle, remaining oscillation, steering effort."""
 _RANGE: Final = (0.05, 0.5, 0.95)
+_WORST: Final = 10
+"""Number of the worst runs of a controller."""
 
 
 def population(
@@ -96,15 +109,17 @@ def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()
     rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
     names = [label_of(controller) for controller in planned.controllers]
     without = [row for row in rows if row["controller"] == NONE]
+    systems = [name for name in names if name != NONE]
     return Population(
         samples=len({row["sample"] for row in rows}),
         seed=planned.seed,
         vehicle=label_of(planned.vehicles[0]),
         versions=versions(),
         claims=tuple(_proportion(claim.id, claim.passed, without, planned.factors) for claim in nominal),
-        systems=tuple(_effects(rows, [name for name in names if name != NONE])),
+        systems=tuple(_effects(rows, systems)),
         failed=sum(row["status"] != "ok" for row in rows),
         table=() if planned.claims else tuple(_medians(rows, planned)),
+        worst=() if planned.claims else tuple(_worst(rows, planned, systems)),
     )
 
 
@@ -138,7 +153,7 @@ def _effects(rows: Sequence[Row], systems: Sequence[str]) -> Iterator[SystemEffe
     """Yield the effect of each system in each scenario, relative to the same samples without control."""
     for scenario in dict.fromkeys(row["maneuver"] for row in rows):
         driven = [row for row in rows if row["maneuver"] == scenario]
-        has = [name for name in driven[0] if any(row[name] is not None for row in driven)]
+        has = _metrics_of(scenario, rows)
         runs = {(row["controller"], row["sample"]): {name: row[name] for name in has} for row in driven}
         samples = dict.fromkeys(row["sample"] for row in driven)
         for system in systems:
@@ -149,6 +164,8 @@ def _effects(rows: Sequence[Row], systems: Sequence[str]) -> Iterator[SystemEffe
             ]
             lost = [(is_lost(without), is_lost(row)) for without, row in both]
             lowest = [_has_lowest_peak(runs, system, sample) for sample in samples if (system, sample) in runs]
+            grown = [growth_of(*pair) for pair in both]
+            tracks = [track_harm_m(growth) for growth in grown]
             yield SystemEffect(
                 system,
                 scenario,
@@ -157,7 +174,10 @@ def _effects(rows: Sequence[Row], systems: Sequence[str]) -> Iterator[SystemEffe
                 changes=tuple(_change(name, both) for name in CHANGES if name in has),
                 spun_without=sum(has_spun(row) for row, _ in both),
                 spun=sum(has_spun(row) for _, row in both),
-                lower=_count(lowest if asked([system]) else ()),
+                lower=_count(lowest if asked([system]) and {*REFERENCES} <= {*systems} else ()),
+                harmed=_count(bool(harms(growth)) for growth in grown),
+                growth=tuple(_distribution(name, [growth[name] for growth in grown]) for name in (grown or [{}])[0]),
+                worst_track_m=max((track for track in tracks if not math.isnan(track)), default=math.nan),
             )
 
 
@@ -178,10 +198,48 @@ def _has_lowest_peak(runs: Mapping[tuple[str, int], Row], system: str, sample: i
 
 def _change(metric: str, both: Sequence[tuple[Row, Row]]) -> Change:
     pairs = np.array([[row[metric] for row in pair] for pair in both], dtype=np.float64)
-    change = np.diff(np.abs(pairs), axis=1)[:, 0]
-    change = change[np.isfinite(change)]
-    low, median, high = np.quantile(change, _RANGE).tolist() if len(change) else [float("nan")] * 3
-    return Change(metric, len(change), low, median, high)
+    return _distribution(metric, np.diff(np.abs(pairs), axis=1)[:, 0])
+
+
+def _distribution(name: str, values: Sequence[float] | Array) -> Change:
+    change = np.asarray(values, dtype=np.float64)
+    finite = change[np.isfinite(change)]
+    low, median, high = np.quantile(finite, _RANGE).tolist() if len(finite) else [float("nan")] * 3
+    largest = float(np.nanmax(change)) if np.isfinite(change).any() or np.isposinf(change).any() else math.nan
+    return Change(
+        name,
+        len(finite),
+        low,
+        median,
+        high,
+        largest,
+        sum(bool(harms({name: one})) for one in values) if name in MEASURES else 0,
+    )
+
+
+def _worst(rows: Sequence[Row], planned: StudyFile, systems: Sequence[str]) -> Iterator[WorstRun]:
+    """Yield the `_WORST` runs with the most harm of each system, the worst first."""
+    values, labels = FactorValues(planned), [label_of(item) for item in planned.maneuvers]
+    without = {(row["maneuver"], row["sample"]): row for row in rows if row["controller"] == NONE}
+    has = {name: _metrics_of(name, rows) for name in labels}
+    for system in systems:
+        found = []
+        for row in rows:
+            key = row["maneuver"], row["sample"]
+            if row["controller"] == system and key in without:
+                growth = growth_of(*({name: one[name] for name in has[key[0]]} for one in (without[key], row)))
+                if names := harms(growth):
+                    found.append((severity(growth), {name: growth[name] for name in names}, row))
+        for size, growth, row in sorted(found, key=lambda one: -one[0])[:_WORST]:
+            place = labels.index(row["maneuver"])
+            overrides = planned.overrides | values.overrides(place, 0, {key: row[key] for key in planned.keys})
+            command = run_command(planned.maneuvers[place], system, planned.vehicles[0], overrides, planned.driver)
+            yield WorstRun(system, row["maneuver"], row["sample"], size, growth, command)
+
+
+def _metrics_of(scenario: str, rows: Sequence[Row]) -> list[str]:
+    driven = [row for row in rows if row["maneuver"] == scenario]
+    return [name for name in (driven[0] if driven else ()) if any(row[name] is not None for row in driven)]
 
 
 def _medians(rows: Sequence[Row], planned: StudyFile) -> Iterator[dict[str, Any]]:

@@ -1,0 +1,159 @@
+"""Harm: the change of a run for the worse by a controller, against the same car, driver, road and sensors without it.
+
+A controller *harms* a run if one of `MEASURES` grows by more than its size. The sizes were written down before the
+first run of a comparison. A measure without a size is reported and not counted. A measure of 0 is as good as can be:
+moving within the lane is no harm, and an error within `FREE_SIDE_M` of a path is none either.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
+
+from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
+from activesteer.analysis.loss_of_control import Metrics
+from activesteer.display_units import DisplayUnit
+from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS
+
+FREE_SIDE_M: Final = 0.6
+"""Path error that is no harm, where no lanes limit the path [m]: a car 1.8 m wide in a lane of 3.0 m. Chosen."""
+NEEDED_DISPLACEMENT_M: Final = 1.83
+"""Displacement of a sine with dwell below which a car turns too little [m]; FMVSS 126, S5.2.3."""
+_DEGREE: Final = math.pi / 180.0
+_STEERING: Final = "steering_wheel_rms_rad"
+_DWELL: Final = "yaw_rate_after_1750ms_share"
+TRACK: Final = ("lane", "path")
+"""Measures of the track, for the worst harm in metres."""
+
+
+class Measure(NamedTuple):
+    """A measure of a run that shall not grow.
+
+    Attributes:
+        words: Meaning.
+        unit: Unit for display.
+        size: Growth above which it is harm [SI]; None if it is not counted.
+        value: Function from the metrics of a run to the measure [SI]: None if the manoeuvre has none, nan if the run
+            does not define it.
+    """
+
+    words: str
+    unit: DisplayUnit
+    size: float | None
+    value: Callable[[Metrics], float | None]
+
+
+def _of(metrics: Metrics, name: str) -> float | None:
+    """Return a metric: None if the manoeuvre has none, nan if the run does not define it."""
+    if name not in metrics:
+        return None
+    value = metrics[name]
+    return math.nan if value is None else float(value)
+
+
+def _size(name: str) -> Callable[[Metrics], float | None]:
+    return lambda metrics: None if (value := _of(metrics, name)) is None else abs(value)
+
+
+def _beyond(value: float | None, limit: float) -> float | None:
+    # max(nan, 0) is nan, max(0, nan) is not.
+    return None if value is None else max(value - limit, 0.0)
+
+
+def _path(metrics: Metrics) -> float | None:
+    if LANE_OVERSTEP in metrics or CONES_MISSED in metrics:
+        return None
+    names = "track_deviation_max_m", "lateral_deviation_max_m", "path_deviation_after_1000ms_m"
+    return next((_beyond(abs(found), FREE_SIDE_M) for name in names if (found := _of(metrics, name)) is not None), None)
+
+
+def _cones(metrics: Metrics) -> float | None:
+    hit = _of(metrics, CONES_HIT)
+    return None if hit is None else hit + (_of(metrics, CONES_MISSED) or 0.0)
+
+
+def _heading(metrics: Metrics) -> float | None:
+    return None if _DWELL in metrics else _size("heading_end_rad")(metrics)
+
+
+def _heading_open_loop(metrics: Metrics) -> float | None:
+    return _size("heading_end_rad")(metrics) if _DWELL in metrics else None
+
+
+def _yaw_rate_left(metrics: Metrics) -> float | None:
+    share, peak = _of(metrics, _DWELL), _of(metrics, "yaw_rate_reversal_peak_radps")
+    if share is not None and peak is not None:
+        return abs(share * peak)
+    return _of(metrics, "yaw_rate_after_gates_rms_radps")
+
+
+def _displacement(metrics: Metrics) -> float | None:
+    value = _of(metrics, "lateral_displacement_m")
+    return None if value is None else _beyond(NEEDED_DISPLACEMENT_M - value, 0.0)
+
+
+def _lost(metrics: Metrics) -> float:
+    """Return 1 for a car that spins, does not get through its course, misses a cone or does not stop."""
+    limits = {**dict.fromkeys(SIDESLIP_PEAKS, LOST_SIDESLIP_RAD), LANE_OVERSTEP: math.inf, CONES_MISSED: 0.0}
+    limits |= {"stopping_distance_m": math.inf}
+    limits |= {} if any(name in metrics for name in SIDESLIP_PEAKS) else {"heading_end_rad": LOST_SIDESLIP_RAD}
+    known = {name: found for name in limits if (found := _of(metrics, name)) is not None}
+    return float(not known or any(not abs(value) <= limits[name] for name, value in known.items()))
+
+
+_M, _DEG, _COUNT = DisplayUnit("m", 1.0), DisplayUnit("deg", 1.0 / _DEGREE), DisplayUnit("", 1.0)
+_DEGPS: Final = DisplayUnit("deg/s", 1.0 / _DEGREE)
+MEASURES: Final[dict[str, Measure]] = {
+    "lane": Measure(
+        "largest distance of the body beyond its lane", _M, 0.05, lambda m: _beyond(_of(m, LANE_OVERSTEP), 0.0)
+    ),
+    "path": Measure("largest path error beyond the free side of a lane", _M, 0.05, _path),
+    "cones": Measure("cones hit or missed", _COUNT, 1.0, _cones),
+    "stopping": Measure("stopping distance", _M, 0.5, lambda m: _of(m, "stopping_distance_m")),
+    "heading": Measure("heading at the end against path or straight line", _DEG, 2.0 * _DEGREE, _heading),
+    "yaw_rate": Measure("yaw rate left at the end", _DEGPS, 1.0 * _DEGREE, _yaw_rate_left),
+    "displacement": Measure("lateral displacement that FMVSS 126 misses", _M, 0.10, _displacement),
+    "lost": Measure("car lost", _COUNT, 0.5, _lost),
+    "heading_open_loop": Measure("heading at the end of a sine with dwell", _DEG, None, _heading_open_loop),
+    "steering": Measure("steering wheel, root mean square", _DEG, None, _size(_STEERING)),
+}
+"""Name -> measure. Sizes of heading and displacement: 2 deg are 0.8 m/s of drift at 80 km/h; 0.10 m is 5 % of the
+displacement that the law asks for."""
+
+
+def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
+    """Return the growth of each measure by a controller [SI], for the measures that the manoeuvre has.
+
+    Args:
+        without: Metrics of the run without control; empty for a run that failed.
+        controlled: Metrics of the same run with the controller; empty for a run that failed.
+
+    Returns:
+        Name of the measure -> growth: infinite if the run with the controller alone does not define the measure, 0 if
+        both do not, minus infinity if only the run without control does not.
+    """
+    found = {}
+    for name, measure in MEASURES.items():
+        before, after = measure.value(without), measure.value(controlled)
+        if before is None and after is None:
+            continue
+        before, after = (math.inf if value is None or math.isnan(value) else value for value in (before, after))
+        found[name] = 0.0 if before == after else after - before
+    return found
+
+
+def harms(change: Mapping[str, float]) -> list[str]:
+    """Return the measures that grew by more than their size."""
+    return [name for name, growth in change.items() if (size := MEASURES[name].size) is not None and growth > size]
+
+
+def severity(change: Mapping[str, float]) -> float:
+    """Return the largest growth of a counted measure, in multiples of its size."""
+    sizes = ((growth, MEASURES[name].size) for name, growth in change.items())
+    return max((growth / size for growth, size in sizes if size), default=0.0)
+
+
+def track_harm_m(change: Mapping[str, float]) -> float:
+    """Return the growth of lane overstep or path error [m]; nan if the manoeuvre has neither."""
+    return max((change[name] for name in TRACK if name in change), default=math.nan)

@@ -1,0 +1,74 @@
+"""Harm: what counts, by its size, and what does not."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from activesteer.analysis.harm import changes, harms, severity, track_harm_m
+
+LANE = {
+    "lane_overstep_m": 0.12, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.05, "heading_end_rad": 0.01,
+    "yaw_rate_after_gates_rms_radps": 0.02, "steering_wheel_rms_rad": 0.5, "track_deviation_max_m": 1.0,
+}  # fmt: skip
+
+
+def test_a_car_that_leaves_its_lane_further_is_harmed_and_one_that_moves_within_it_is_not():
+    worse = changes(LANE, LANE | {"lane_overstep_m": 2.45})
+    assert harms(worse) == ["lane"]
+    assert track_harm_m(worse) == pytest.approx(2.33)
+    assert severity(worse) == pytest.approx(2.33 / 0.05)
+    inside = LANE | {"lane_overstep_m": -0.4}
+    assert harms(changes(inside, LANE | {"lane_overstep_m": 0.049})) == []
+    assert harms(changes(inside, LANE | {"lane_overstep_m": 0.051})) == ["lane"]
+    assert "path" not in worse  # lanes limit the path
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "harmed"),
+    [
+        ("cones_hit", 3.0, []),  # one cone, not more than one
+        ("cones_hit", 4.0, ["cones"]),
+        ("heading_end_rad", -math.radians(3.0), ["heading"]),
+        ("yaw_rate_after_gates_rms_radps", 0.02 + math.radians(1.1), ["yaw_rate"]),
+        ("steering_wheel_rms_rad", 5.0, []),  # reported, not counted
+        ("sideslip_peak_abs_rad", 0.4, ["lost"]),
+        ("lane_overstep_m", math.nan, ["lane", "lost"]),  # it does not get through the lanes
+    ],
+)
+def test_each_measure_has_its_size(key: str, value: float, harmed: list[str]):
+    assert harms(changes(LANE, LANE | {key: value})) == harmed
+    assert harms(changes(LANE | {key: value}, LANE)) == []
+
+
+def test_a_run_that_fails_is_harm_and_two_that_fail_are_none():
+    failed = dict.fromkeys(LANE)
+    assert "lost" in harms(changes(LANE, failed))
+    assert harms(changes(failed, failed)) == []
+    assert harms(changes(failed, LANE)) == []
+
+
+def test_a_car_that_does_not_turn_is_not_safe():
+    dwell = {
+        "yaw_rate_after_1750ms_share": 0.1, "yaw_rate_reversal_peak_radps": -0.5, "lateral_displacement_m": 2.5,
+        "sideslip_peak_abs_rad": 0.1, "heading_end_rad": 0.3,
+    }  # fmt: skip
+    assert harms(changes(dwell, dwell | {"lateral_displacement_m": 1.84})) == []
+    assert harms(changes(dwell, dwell | {"lateral_displacement_m": 1.72})) == ["displacement"]
+    # 0.1 of 0.5 rad/s are left, then 0.15: 1.4 deg/s more.
+    assert harms(changes(dwell, dwell | {"yaw_rate_after_1750ms_share": 0.15})) == ["yaw_rate"]
+    assert harms(changes(dwell, dwell | {"heading_end_rad": 3.0})) == []
+
+
+def test_a_path_without_lanes_leaves_the_free_side_of_a_lane():
+    path = {"track_deviation_max_m": 0.3, "sideslip_peak_abs_rad": 0.02}
+    assert harms(changes(path, path | {"track_deviation_max_m": 0.64})) == []
+    assert harms(changes(path, path | {"track_deviation_max_m": 0.66})) == ["path"]
+
+
+def test_a_longer_stop_is_harm_and_no_stop_is_a_lost_car():
+    stop = {"stopping_distance_m": 40.0, "lateral_deviation_max_m": 0.2, "heading_end_rad": 0.0}
+    assert harms(changes(stop, stop | {"stopping_distance_m": 40.4})) == []
+    assert harms(changes(stop, stop | {"stopping_distance_m": 40.6})) == ["stopping"]
+    assert harms(changes(stop, stop | {"stopping_distance_m": math.nan})) == ["stopping", "lost"]
