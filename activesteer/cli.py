@@ -76,6 +76,7 @@ def all_commands() -> Commands:
         driver,
         envelope,
         explore,
+        falsify,
         fault_map,
         figures,
         fit,
@@ -109,7 +110,7 @@ def all_commands() -> Commands:
         "drive": (listing, run, watch, explore),
         "recordings": (info, report, compare, replay, video, import_, recover),
         "car": (vehicle, tyre, kc),
-        "study": (study, tune, match, fit, envelope, fault_map, identify, linearise, driver, margins),
+        "study": (study, tune, falsify, match, fit, envelope, fault_map, identify, linearise, driver, margins),
         "verify": (reproduce, test, figures, validate, bench),
     }.items():
         commands.begin_group(title)

@@ -11,10 +11,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
-from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
-from activesteer.analysis.loss_of_control import Metrics
+from activesteer.analysis.loss_of_control import Metrics, has_spun
 from activesteer.display_units import DisplayUnit
-from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS
+from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP
 
 FREE_SIDE_M: Final = 0.6
 """Path error that is no harm, where no lanes limit the path [m]: a car 1.8 m wide in a lane of 3.0 m. Chosen."""
@@ -95,11 +94,9 @@ def _displacement(metrics: Metrics) -> float | None:
 
 def _lost(metrics: Metrics) -> float:
     """Return 1 for a car that spins, does not get through its course, misses a cone or does not stop."""
-    limits = {**dict.fromkeys(SIDESLIP_PEAKS, LOST_SIDESLIP_RAD), LANE_OVERSTEP: math.inf, CONES_MISSED: 0.0}
-    limits |= {"stopping_distance_m": math.inf}
-    limits |= {} if any(name in metrics for name in SIDESLIP_PEAKS) else {"heading_end_rad": LOST_SIDESLIP_RAD}
-    known = {name: found for name in limits if (found := _of(metrics, name)) is not None}
-    return float(not known or any(not abs(value) <= limits[name] for name, value in known.items()))
+    ends = (_of(metrics, LANE_OVERSTEP), _of(metrics, "stopping_distance_m"))
+    undefined = any(value is not None and math.isnan(value) for value in ends)
+    return float(has_spun(metrics) or undefined or (_of(metrics, CONES_MISSED) or 0.0) != 0.0)
 
 
 _M, _DEG, _COUNT = DisplayUnit("m", 1.0), DisplayUnit("deg", 1.0 / _DEGREE), DisplayUnit("", 1.0)

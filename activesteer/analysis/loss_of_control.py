@@ -27,8 +27,12 @@ LOST: Final = "lost"
 
 
 def has_spun(metrics: Metrics) -> bool:
-    """Return whether the sideslip exceeded `LOST_SIDESLIP_RAD`, or whether the run ended too early to tell."""
-    peaks = [abs(_number(metrics, name)) for name in SIDESLIP_PEAKS if metrics.get(name) is not None]
+    """Return whether the sideslip exceeded `LOST_SIDESLIP_RAD`, or whether the run ended too early to tell.
+
+    Where the manoeuvre has no peak of the sideslip, as in straight braking, the heading at the end counts.
+    """
+    names = SIDESLIP_PEAKS if any(name in metrics for name in SIDESLIP_PEAKS) else ("heading_end_rad",)
+    peaks = [abs(_number(metrics, name)) for name in names if metrics.get(name) is not None]
     return not peaks or not peaks[0] <= LOST_SIDESLIP_RAD
 
 

@@ -71,7 +71,7 @@ class Plan:
         table = {
             key: value
             for key, value in study.to_table().items()
-            if key not in (*labelled, "title", "tune", "match", "fit")
+            if key not in (*labelled, "title", "tune", "match", "fit", "falsify")
         }
         table["design"] = [samples.columns for samples in self.samples]
         self._maneuver_of: list[int] | None = None
@@ -93,7 +93,8 @@ class Plan:
         for samples in self.samples:
             columns = {key: values for key, values in samples.columns.items() if _has_text(values)}
             rows: Iterable[tuple[Any, ...]] = dict.fromkeys(zip(*columns.values(), strict=True))
-            if study.tune is not None or study.match is not None:  # a search combines values as it proceeds
+            searches = study.tune, study.match, study.falsify
+            if any(found is not None for found in searches):  # a search combines values as it proceeds
                 columns = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
                 rows = itertools.product(*columns.values())
             for row in rows if columns else ():

@@ -21,12 +21,13 @@ from activesteer.studies.engine.factors import Factor, read_factor
 
 _KEYS: Final = (
     "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
-    "recordings", "curves", "claims", "timestep_s", "tune", "fit", "match",
+    "recordings", "curves", "claims", "timestep_s", "tune", "fit", "match", "falsify",
 )  # fmt: skip
 _SEARCHES: Final = {
     "tune": "it says what is to be made small",
     "match": "it says which statements should hold",
     "fit": "it says which channels are compared, and how noisy they are",
+    "falsify": "it says what shall hold",
 }
 """Tables of searches, which choose the factor values themselves; each with a hint for a missing table."""
 _KEPT: Final = ("none", "failed", "all")
@@ -54,6 +55,7 @@ class StudyFile:
         tune: The table [tune], unparsed; see `tuning`.
         match: The table [match], unparsed; see `match_file`.
         fit: The table [fit], unparsed; see `measured.fit_file`.
+        falsify: The table [falsify], unparsed; see `falsification`.
         title: One line for the report.
         source: For error messages.
     """
@@ -75,6 +77,7 @@ class StudyFile:
     tune: dict[str, Any] | None = None
     match: dict[str, Any] | None = None
     fit: dict[str, Any] | None = None
+    falsify: dict[str, Any] | None = None
     title: str = ""
     source: Source = Source("study")
 
@@ -141,7 +144,7 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
     Args:
         given: Name of a study of the package, a path, or a table. Relative paths in a file start at its folder, those
             in a table at the working directory.
-        search: `tune`, `match` or `fit` if the study must have that table.
+        search: `tune`, `match`, `fit` or `falsify` if the study must have that table.
 
     Returns:
         The study.

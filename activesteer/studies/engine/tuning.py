@@ -7,24 +7,20 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Final
 
 from activesteer.config import Range, build
-from activesteer.errors import StudyError, nearest_names, not_installed
+from activesteer.errors import StudyError, nearest_names
 from activesteer.files import make_folder, write_text
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.effects import without_effect
 from activesteer.studies.engine.factor_values import label_of
-from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_settings import Request, prepare
-from activesteer.studies.engine.run_task import Row, Status, drive
+from activesteer.studies.engine.run_task import Row, Status
+from activesteer.studies.engine.search import Judgement, claim_folder, import_optuna, search
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.engine.task_queue import TaskQueue
 from activesteer.studies.engine.workers import workers_for
 
-_JOURNAL: Final = "tune.journal"
 _VIOLATION: Final = "violation"
 
 
@@ -150,51 +146,28 @@ def tune(
     """
     study = read_study(study_file, "tune")
     table = _table(study)
-    try:
-        import optuna  # noqa: PLC0415 - an extra
-        from optuna.storages import JournalStorage, journal  # noqa: PLC0415
-    except ImportError as reason:
-        raise not_installed(StudyError, "activesteer tune", "optuna", "study") from reason
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna = import_optuna("tune")
     plan = Plan(study)
     folder = make_folder(output, StudyError)
-    _claim_folder(folder, study, plan)
+    claim_folder(folder, "tune", plan)
+    seen: list[Sequence[Row]] = []
+
+    def judge(rows: Sequence[Row]) -> Judgement:
+        if any(row["status"] != Status.OK for row in rows):
+            return Judgement(None)
+        if not seen:
+            _check_metrics(study, table, rows)
+        seen[:] = [rows]
+        values, violation = _judged(table, rows)
+        return Judgement(values, {_VIOLATION: violation}, violation if table.constraints else None)
+
+    def sampler(seed: int) -> Any:
+        return optuna.samplers.TPESampler(seed=seed, constant_liar=True)
+
     wanted = table.trials if trials is None else trials
-    path = str(folder / _JOURNAL)
-    storage = JournalStorage(journal.JournalFileBackend(path, lock_obj=journal.JournalFileOpenLock(path)))
-    directions: list[Any] = ["minimize"] * len(table.objectives)
-    made = optuna.create_study(storage=storage, study_name="tune", load_if_exists=True, directions=directions)
-    for left in made.get_trials(deepcopy=False, states=(optuna.trial.TrialState.RUNNING,)):  # left by a killed process
-        made.tell(left.number, state=optuna.trial.TrialState.FAIL)
-    begun = len(made.trials)
-    made.sampler = optuna.samplers.TPESampler(seed=study.seed + begun, constant_liar=True)
     with workers_for(jobs, client=client, scheduler=scheduler) as workers:
-        prepare(workers, plan.settings)
-
-        def tasks() -> Any:
-            for _ in range(wanted - begun):
-                trial = made.ask()
-                values = {factor.key: _suggest(trial, factor) for factor in study.factors}
-                yield trial, drive, plan.settings, _requests(plan, trial.number, values)
-
-        judged: Sequence[Row] = ()
-        for place, (trial, rows, error) in enumerate(TaskQueue(workers).outcomes(tasks()), begun + 1):
-            values, violation = (None, 0.0)
-            if error is None and all(row["status"] == Status.OK for row in rows):
-                if not judged:
-                    _check_metrics(study, table, rows)
-                judged = rows
-                values, violation = _judged(table, rows)
-            if values is None:
-                made.tell(trial, state=optuna.trial.TrialState.FAIL)
-            else:
-                trial.set_user_attr(_VIOLATION, violation)
-                if table.constraints:
-                    trial.set_constraint(_VIOLATION, violation)
-                made.tell(trial, values)
-            if progress is not None:
-                progress(place, wanted)
-    result = _result(optuna, made, table, without_effect(plan, judged))
+        made = search(plan, folder, "tune", sampler, len(table.objectives), wanted, judge, workers, progress)
+    result = _result(optuna, made, table, without_effect(plan, seen[-1] if seen else ()))
     write_text(folder / "front.json", json.dumps([vars(trial) for trial in result.front], indent=2) + "\n", StudyError)
     return result
 
@@ -231,31 +204,6 @@ def _check_metrics(study: StudyFile, table: TuneTable, rows: Sequence[Row]) -> N
             if part.metric not in row:
                 known = [name for name, value in row.items() if isinstance(value, float) and name not in study.keys]
                 raise study.source.fail((*place, "metric"), nearest_names(part.metric, known), part.metric)
-
-
-def _claim_folder(folder: Path, study: StudyFile, plan: Plan) -> None:
-    path = folder / "tune.toml"
-    text = f"# {plan.digest}\n{study.to_toml()}"
-    if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
-        raise StudyError(f"{folder} holds another search; use a new folder", value=folder)
-    write_text(path, text, StudyError)
-
-
-def _suggest(trial: Any, factor: Factor) -> Any:
-    if factor.values:
-        return trial.suggest_categorical(factor.key, factor.values)
-    return trial.suggest_float(factor.key, factor.low, factor.high, log=factor.kind == "log_uniform")
-
-
-def _requests(plan: Plan, number: int, values: dict[str, Any]) -> list[Request]:
-    settings = plan.settings
-    places = [
-        (maneuver, vehicle, controller)
-        for maneuver in range(len(settings.maneuvers))
-        for vehicle in range(len(settings.vehicles))
-        for controller in range(len(settings.controllers))
-    ]
-    return [plan.request_with(run, number, place, values) for run, place in enumerate(places)]
 
 
 def _judged(table: TuneTable, rows: Sequence[Row]) -> tuple[list[float] | None, float]:
