@@ -82,8 +82,8 @@ def resolve(
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, such as `speed_kmh`, `road.mu` or `controllers.ars.limit_deg`. Start the key
             with `maneuver.` or `vehicle.` if both have it, and with `driver.` for keys of the driver. Parameters of
-            your own code have keys such as `controllers.YawBeta.k_beta` and `driver.Cautious.preview_s`. The key `driver`
-            replaces the driver.
+            your own code have keys such as `controllers.YawBeta.k_beta` and `driver.Cautious.preview_s`. The key
+            `driver` replaces the driver.
         driver: Name, path or table of a driver, or your own code; see `find_driver`.
         controllers: Controllers whose parameters `overrides` may set, as for `simulate`; needed for your own code only.
 
