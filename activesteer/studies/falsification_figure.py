@@ -63,5 +63,5 @@ def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     """Return the magnitude of Spearman's rank correlation; 0 for a constant."""
     if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0
-    ranks = [np.argsort(np.argsort(values)) for values in (x, y)]
-    return float(abs(np.corrcoef(*ranks)[0, 1]))
+    first, second = (np.argsort(np.argsort(values)) for values in (x, y))
+    return float(abs(np.corrcoef(first, second)[0, 1]))

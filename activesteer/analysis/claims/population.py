@@ -179,7 +179,9 @@ class SystemEffect:
                 Change(**nan | {key: value for key, value in change.items() if value is not None})
                 for change in table.get(name, ())
             )
-        known = {key: value for key, value in table.items() if value is not None or key.startswith("spun")}
+        known: dict[str, Any] = {
+            key: value for key, value in table.items() if value is not None or key.startswith("spun")
+        }
         return cls(**known | read)
 
 
@@ -225,7 +227,9 @@ class Population:
     def total(self, controller: str) -> SystemEffect:
         """Return the effect of a controller in all scenarios together, without changes."""
         own = [effect for effect in self.systems if effect.controller == controller]
-        sums = {name: sum((getattr(effect, name) for effect in own), Proportion()) for name in _PROPORTIONS}
+        sums: dict[str, Any] = {
+            name: sum((getattr(effect, name) for effect in own), Proportion()) for name in _PROPORTIONS
+        }
         tracks = [effect.worst_track_m for effect in own if not math.isnan(effect.worst_track_m)]
         return SystemEffect(controller, TOTAL, **sums, worst_track_m=max(tracks, default=math.nan))
 

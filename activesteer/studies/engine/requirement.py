@@ -27,7 +27,7 @@ ANY: Final = "controller"
 """Name in a requirement for the controller that is examined."""
 _LONGEST: Final = 1000
 """Largest number of characters of a requirement."""
-_FUNCTIONS: Final[dict[str, Callable[..., float]]] = {"min": min, "max": max, "abs": abs}
+_FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {"min": min, "max": max, "abs": abs}
 _OPERATORS: Final[dict[type, Callable[[float, float], float]]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
 }  # fmt: skip

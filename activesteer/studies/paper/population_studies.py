@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 from activesteer.errors import ParameterError
 from activesteer.scenario import FileOrTable
@@ -65,7 +65,7 @@ def comparison_study(
 def _changed(
     name: str, samples: int | None, seed: int | None, vehicle: FileOrTable | None, **changes: object
 ) -> StudyFile:
-    table = read_study(name).to_table() | changes
+    table: dict[str, Any] = read_study(name).to_table() | changes
     if samples is not None:
         table["design"]["samples"] = samples
     if seed is not None:

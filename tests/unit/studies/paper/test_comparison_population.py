@@ -132,7 +132,7 @@ def only_braking(monkeypatch: pytest.MonkeyPatch) -> None:
     study = comparison_study
 
     def shortened(*given: Any) -> StudyFile:
-        table = study(*given).to_table() | {"maneuvers": ["brake_in_turn"]}
+        table: dict[str, Any] = study(*given).to_table() | {"maneuvers": ["brake_in_turn"]}
         keys = ("factors.mass", "road.mu", "turn.lateral_acceleration_mps2")
         table["factors"] = {key: table["factors"][key] | {"maneuvers": ["brake_in_turn"]} for key in keys}
         return read_study(table)
