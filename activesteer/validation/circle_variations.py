@@ -90,7 +90,7 @@ def _turned_toe(compliance: Array) -> None:
     compliance[:, _TOE] *= -1.0
 
 
-def _ratio(factor: float) -> Change:
+def ratio(factor: float) -> Change:
     """Return a change that multiplies the steer angle of the rack."""
 
     def change(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -111,7 +111,9 @@ def _progressive(at_lock: float, lock_m: float) -> Change:
     return change
 
 
-def _combined(*changes: Change) -> Change:
+def combined(*changes: Change) -> Change:
+    """Return a change that makes all of these."""
+
     def change(table: Mapping[str, Any]) -> dict[str, Any]:
         return functools.reduce(lambda result, each: each(result), changes, dict(table))
 
@@ -140,7 +142,7 @@ _TOE_EFFECTS: Final[dict[str, Change]] = {
 
 EFFECTS: Final[dict[str, Change]] = {
     **_TOE_EFFECTS,
-    "all six effects on toe": _combined(*_TOE_EFFECTS.values()),
+    "all six effects on toe": combined(*_TOE_EFFECTS.values()),
     "camber over side force, front": _compliance("front", _stiff_camber),
     "camber over side force, rear": _compliance("rear", _stiff_camber),
     "static camber, front": _static("front", "camber_deg"),
@@ -150,18 +152,19 @@ EFFECTS: Final[dict[str, Change]] = {
 }
 """Effect -> change of the vehicle file that removes it."""
 
-_WITHOUT_ALIGNING: Final = _combined(_compliance("front", _least_toe), _compliance("rear", _least_toe))
+WITHOUT_ALIGNING: Final = combined(_compliance("front", _least_toe), _compliance("rear", _least_toe))
+"""Change that removes the assumed compliance to aligning moment of both axles."""
 
 DECISIONS: Final[dict[str, Change]] = {
-    "no toe over aligning moment (assumed: the compact's)": _WITHOUT_ALIGNING,
-    "isteerR as given (used: the mirror image of isteerL)": _ratio(0.5 * (0.0646 + 0.070055) / 0.0646),
-    "isteer_skalar for both wheels (used: isteerL and its mirror image)": _ratio(0.070055 / 0.0646),
-    "steering ratio of the maker's circle between kerbs, everywhere": _ratio(_KERB),
+    "no toe over aligning moment (assumed: the compact's)": WITHOUT_ALIGNING,
+    "isteerR as given (used: the mirror image of isteerL)": ratio(0.5 * (0.0646 + 0.070055) / 0.0646),
+    "isteer_skalar for both wheels (used: isteerL and its mirror image)": ratio(0.070055 / 0.0646),
+    "steering ratio of the maker's circle between kerbs, everywhere": ratio(_KERB),
     "the same ratio at the lock, unchanged at the centre": _progressive(_KERB, _LOCK_M),
     "anti-roll bars twice as stiff (used: rate of an axle, like springs)": _keys("factors", anti_roll_bar=2.0),
     "springs and bars twice as stiff (used: rates of an axle)": _keys("factors", anti_roll_bar=2.0, spring_rate=2.0),
     "elkin_y_toe of the front axle reversed (used: toe-out)": _compliance("front", _turned_toe),
-    "elkin_y_toe of both axles reversed (used: understeering)": _combined(
+    "elkin_y_toe of both axles reversed (used: understeering)": combined(
         _compliance("front", _turned_toe), _compliance("rear", _turned_toe)
     ),
 }

@@ -1,15 +1,17 @@
 """Steering wheel angle of a car on a circle, compared with the angle measured on a real car.
 
-No parameter of the car is fitted to the measurement. The uncertain values (mass, lateral acceleration, tyre, radius)
-are sampled. Each effect that contributes to the angle is switched off alone, and each decision that the car's data
-leave open is reversed alone, to show its influence (`circle_variations`).
+No parameter of the car is fitted to the measurement. The main prediction uses measured kinematics and compliance only; a
+second one adds compliances that are assumed. What varies from lap to lap (mass, lateral acceleration, radius) is
+sampled, and what has one unknown value spans a probability box (`circle_box`). Each effect that contributes to the
+angle is switched off alone, and each decision that the car's data leave open is reversed alone, to show its influence
+(`circle_variations`).
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -21,8 +23,9 @@ from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.files import is_file
 from activesteer.resources import find_vehicle, models_dir
-from activesteer.simulation.runner import simulate
+from activesteer.simulation.simulation import Simulation
 from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.validation.circle_box import Box, Case, Step, at_end, intervals, measured_only, waterfall
 from activesteer.validation.circle_variations import DECISIONS, EFFECTS
 
 DATA: Final = "measured_circle.json"
@@ -31,8 +34,8 @@ SAMPLES: Final = 200
 TOLERANCE_DEG: Final = 5.0
 TOLERANCE_FRACTION: Final = 0.03
 """Tolerance of the steering wheel angle in ISO 19364: 5 deg plus 3 % of the measured value."""
-_SIGMAS: Final = {"mass": 0.01, "tyre": 0.05, "ay_mps2": 0.1, "radius": 0.01}
-"""Standard deviations: mass 1 % (assumed), tyre side force 5 %, lateral acceleration 0.1 m/s2, radius 1 % (assumed)."""
+_SIGMAS: Final = {"mass": 0.01, "ay_mps2": 0.1, "radius": 0.01}
+"""Standard deviations from lap to lap: mass 1 % (assumed), lateral acceleration 0.1 m/s2, radius 1 % (assumed)."""
 _SEED: Final = 20121121
 _ENTRY_S: Final = 3.0
 _SETTLED_S: Final = 2.0
@@ -59,18 +62,24 @@ class CircleResult:
     Attributes:
         vehicle: The car.
         measured_deg: Measured steering wheel angles, shape (n,).
-        nominal_deg: Our angle with the mean of every uncertain value.
-        samples_deg: Our angles of the samples, shape (m,).
-        effects: The angles with one effect each switched off.
-        decisions: The angles with one open decision each reversed.
+        nominal_deg: Main prediction: our angle with measured kinematics and compliance only.
+        samples_deg: The same for the samples of mass, lateral acceleration and radius, shape (m,).
+        assumed_deg: Second prediction: our angle with the assumed compliances too.
+        effects: The angles of the second prediction with one effect each switched off.
+        decisions: The angles of the second prediction with one open decision each reversed.
+        steps: The waterfall from geometry to the second prediction.
+        box: The probability box; None if it was not driven.
     """
 
     vehicle: str
     measured_deg: Array
     nominal_deg: float
     samples_deg: Array
-    effects: tuple[Variation, ...]
-    decisions: tuple[Variation, ...]
+    assumed_deg: float
+    effects: tuple[Variation, ...] = ()
+    decisions: tuple[Variation, ...] = ()
+    steps: tuple[Step, ...] = ()
+    box: Box | None = None
 
     @property
     def difference_deg(self) -> float:
@@ -106,8 +115,8 @@ class CircleResult:
         return float(least.sum() * (grid[1] - grid[0]))
 
     def contribution_deg(self, effect: Variation) -> float:
-        """Return the contribution of an effect to the nominal angle."""
-        return self.nominal_deg - effect.angle_deg
+        """Return the contribution of an effect to the angle of the second prediction."""
+        return self.assumed_deg - effect.angle_deg
 
     def as_table(self) -> dict[str, Any]:
         """Return the JSON values."""
@@ -120,6 +129,9 @@ class CircleResult:
                 "nominal": self.nominal_deg, "mean": self.samples_deg.mean(), "std": self.samples_deg.std(ddof=1),
                 "n": len(self.samples_deg),
             },
+            "with_assumptions_deg": self.assumed_deg,
+            "box": None if self.box is None else self.box.as_table(self.measured_deg),
+            "waterfall": [step._asdict() for step in self.steps],
             "difference_deg": self.difference_deg, "tolerance_deg": self.tolerance_deg, "inside": self.inside,
             "area_metric_deg": self.area_metric_deg, "overlap": self.overlap,
             "effects": {effect.name: self.contribution_deg(effect) for effect in self.effects},
@@ -133,16 +145,32 @@ class CircleResult:
             f"{self.vehicle}: steering wheel angle on the measured circle",
             f"  measured   {theirs.mean():7.1f} +- {theirs.std(ddof=1):.1f} deg  ({len(theirs)} values)",
             f"  predicted  {ours.mean():7.1f} +- {ours.std(ddof=1):.1f} deg  ({len(ours)} samples, nominal "
-            f"{self.nominal_deg:.1f})",
+            f"{self.nominal_deg:.1f}): measured kinematics and compliance only",
+            f"             {self.assumed_deg:7.1f} deg with the assumed compliances too",
             f"  difference {self.difference_deg:+7.1f} deg, tolerance of ISO 19364 {self.tolerance_deg:.1f} deg: "
             + ("inside" if self.inside else "OUTSIDE"),
             f"  area metric {self.area_metric_deg:.1f} deg, overlap of the distributions {100.0 * self.overlap:.0f} %",
-            "contribution of each effect, switched off alone:",
+            *self._box_lines(),
+            "contribution of each effect to the second prediction, switched off alone:",
             *(f"  {effect.name:66} {self.contribution_deg(effect):+7.1f} deg" for effect in self.effects),
             "angle with each open decision reversed, one at a time:",
             *(f"  {decision.name:66} {decision.angle_deg:7.1f} deg" for decision in self.decisions),
         ]
         return "\n".join(lines)
+
+    def _box_lines(self) -> list[str]:
+        if self.box is None:
+            return []
+        box, count = self.box, len(self.measured_deg)
+        known = [f"  {name:48} {low:7.1f} to {high:5.1f} deg  ({source})" for name, source, low, high in box.ends_deg]
+        return [
+            f"probability box {box.low_deg:.1f} to {box.high_deg:.1f} deg, {box.high_deg - box.low_deg:.1f} deg wide: "
+            f"{box.inside(self.measured_deg)} of {count} measured angles inside",
+            "second prediction with the ends of each interval alone:",
+            *known,
+            "from geometry to the second prediction:",
+            *(f"  {step.name:48} {step.angle_deg:7.1f} deg  ({step.kind})" for step in self.steps),
+        ]
 
 
 def is_measured(name: str) -> bool:
@@ -179,53 +207,90 @@ def validate_circle(
             f"{samples} samples make no distribution; at least 10 are needed", key="samples", value=samples
         )
     data = json.loads((models_dir() / "reference" / name / DATA).read_text(encoding="utf-8"))
-    ay, radius = float(data["ay_mean_mps2"]), float(data["radius_m"])
+    measured = np.array(data["steering_wheel_deg"])
     table, _ = read_toml(find_vehicle(name))
-    table["name"] = name
-    draws = np.random.default_rng(_SEED).normal(size=(samples, 4))
+    assumed = Case({**table, "name": name}, float(data["radius_m"]), float(data["ay_mean_mps2"]))
+    main = measured_only(assumed)
+    roll = _roll_rad(main)
+    known = intervals(roll)
+    draws = np.random.default_rng(_SEED).normal(size=(samples, 3))
     variations = [*EFFECTS.items(), *DECISIONS.items()]
-    calls = [(changed, radius, ay, 1.0, 1.0) for changed in (table, *(change(table) for _, change in variations))]
-    calls += [
-        (table, radius * (1.0 + _SIGMAS["radius"] * r), ay + _SIGMAS["ay_mps2"] * a, 1.0 + _SIGMAS["mass"] * m,
-         1.0 + _SIGMAS["tyre"] * t)
-        for m, t, a, r in draws.tolist()
-    ]  # fmt: skip
-    angles = in_parallel(
-        steering_wheel_deg, calls, jobs, lambda _place, done: progress(done / len(calls), "circle"), scheduler=scheduler
+    falls = waterfall(assumed)
+    parts = {
+        "nominal": [main, assumed],
+        "varied": [assumed._replace(table=change(assumed.table)) for _, change in variations],
+        "falls": [case for _, _, case in falls],
+        "ends": [end(assumed) for interval in known for end in (interval.low, interval.high)],
+        "samples": [_drawn(main, draw) for draw in draws],
+        "lower": [at_end(_drawn(assumed, draw), known, high=False) for draw in draws[::2]],
+        "upper": [at_end(_drawn(assumed, draw), known, high=True) for draw in draws[::2]],
+    }
+    calls = [(case,) for cases in parts.values() for case in cases]
+    driven = iter(
+        in_parallel(
+            steering_wheel_deg, calls, jobs, lambda _, done: progress(done / len(calls), "circle"), scheduler=scheduler
+        )
     )
-    varied, sampled = angles[1 : 1 + len(variations)], np.array(angles[1 + len(variations) :])
-    found = [Variation(what, angle) for (what, _), angle in zip(variations, varied, strict=True)]
-    effects, decisions = tuple(found[: len(EFFECTS)]), tuple(found[len(EFFECTS) :])
-    return CircleResult(name, np.array(data["steering_wheel_deg"]), angles[0], sampled, effects, decisions)
+    angles = {part: [next(driven) for _ in cases] for part, cases in parts.items()}
+    found = tuple(Variation(what, angle) for (what, _), angle in zip(variations, angles["varied"], strict=True))
+    ends = zip(known, angles["ends"][::2], angles["ends"][1::2], strict=True)
+    return CircleResult(
+        name, measured, angles["nominal"][0], np.array(angles["samples"]), angles["nominal"][1],
+        found[: len(EFFECTS)], found[len(EFFECTS) :],
+        tuple(Step(what, kind, angle) for (what, kind, _), angle in zip(falls, angles["falls"], strict=True)),
+        Box(
+            tuple((interval.name, interval.source, low, high) for interval, low, high in ends),
+            np.sort(angles["lower"]), np.sort(angles["upper"]),
+        ),
+    )  # fmt: skip
 
 
-def steering_wheel_deg(table: Mapping[str, Any], radius_m: float, ay_mps2: float, mass: float, tyre: float) -> float:
-    """Return the steering wheel angle that holds a laterally symmetric car on a circle.
+def _drawn(case: Case, draw: Array) -> Case:
+    """Return a case of another lap: mass, lateral acceleration and radius from standard normal numbers."""
+    mass, ay, radius = draw.tolist()
+    return case._replace(
+        mass=case.mass * (1.0 + _SIGMAS["mass"] * mass),
+        ay_mps2=case.ay_mps2 + _SIGMAS["ay_mps2"] * ay,
+        radius_m=case.radius_m * (1.0 + _SIGMAS["radius"] * radius),
+    )
 
-    Args:
-        table: The vehicle file.
-        radius_m: Radius [m].
-        ay_mps2: Lateral acceleration [m/s2].
-        mass: Factor on the mass.
-        tyre: Factor on the tyres' side force: on friction and cornering stiffness.
 
-    Returns:
-        The angle [deg].
-    """
-    slow, fast = (math.sqrt((ay_mps2 + beside) * radius_m) for beside in (-0.4, 0.2))
+def steering_wheel_deg(case: Case) -> float:
+    """Return the steering wheel angle that holds a laterally symmetric car on a circle [deg]."""
+    simulation, late = _driven(case)
+    run = simulation.recording()
+    angle = run["steering_wheel_rad"]
+    if case.stiff_column:
+        rack_m = simulation.loop.vehicle.rack_per_steering_wheel_m
+        assert rack_m is not None
+        angle = run["rack_m"] / rack_m
+    # The speed range is narrow, so the angle over lateral acceleration is a straight line.
+    line = np.polyfit(np.abs(run["ay_mps2"][late]), np.degrees(np.abs(angle[late])), 1)
+    return float(np.polyval(line, case.ay_mps2)) + case.zero_deg
+
+
+def _roll_rad(case: Case) -> float:
+    """Return the size of the roll angle on the circle [rad]."""
+    simulation, late = _driven(case)
+    run = simulation.recording()
+    line = np.polyfit(np.abs(run["ay_mps2"][late]), np.abs(run["roll_rad"][late]), 1)
+    return float(np.polyval(line, case.ay_mps2))
+
+
+def _driven(case: Case) -> tuple[Simulation, slice]:
+    """Return a run through the lateral acceleration of the circle, and its rows after the entry."""
+    slow, fast = (math.sqrt((case.ay_mps2 + beside) * case.radius_m) for beside in (-0.4, 0.2))
     overrides = {
-        "circle.radius_m": radius_m,
+        "circle.radius_m": case.radius_m,
         "circle.entry_s": _ENTRY_S,
         "circle.acceleration_mps2": _RISE_MPS2,
         "speed_mps": slow,
         "circle.end_speed_mps": fast,
         "duration_s": _ENTRY_S + (fast - slow) / _RISE_MPS2 + 0.5,
-        "factors.mass": mass,
-        "factors.tyre_friction": tyre,
-        "factors.tyre_cornering_stiffness": tyre,
+        "factors.mass": case.mass,
+        "factors.tyre_friction": case.tyre,
+        "factors.tyre_cornering_stiffness": case.tyre,
     }
-    run = simulate("constant_radius", "none", dict(table), overrides)
-    late = run.time_s > _ENTRY_S + _SETTLED_S
-    # The speed range is narrow, so the angle over lateral acceleration is a straight line.
-    line = np.polyfit(np.abs(run["ay_mps2"][late]), np.degrees(np.abs(run["steering_wheel_rad"][late])), 1)
-    return float(np.polyval(line, ay_mps2))
+    simulation = Simulation("constant_radius", "none", dict(case.table), overrides)
+    simulation.run()
+    return simulation, slice(round((_ENTRY_S + _SETTLED_S) / simulation.loop.vehicle.timestep_s), None)

@@ -16,13 +16,14 @@ import pytest
 from activesteer.config import read_toml
 from activesteer.errors import ParameterError
 from activesteer.resources import find_vehicle, models_dir
+from activesteer.validation.circle_box import Box, Case, intervals, measured_only
 from activesteer.validation.circle_variations import DECISIONS, EFFECTS
 from activesteer.validation.measured_circle import CircleResult, is_measured, steering_wheel_deg, validate_circle
 from tests.raising import raises
 
 
 def result(ours: np.ndarray, measured: np.ndarray) -> CircleResult:
-    return CircleResult("car", measured, float(ours.mean()), ours, (), ())
+    return CircleResult("car", measured, float(ours.mean()), ours, 0.0)
 
 
 def test_the_area_between_shifted_distributions_is_the_shift(rng: np.random.Generator) -> None:
@@ -108,7 +109,7 @@ def test_without_changes_of_toe_the_angle_is_that_of_geometry_and_tyres() -> Non
     """Tyres add some degrees to the Ackermann angle of 87: the front carries more load and more roll moment."""
     table, _ = read_toml(find_vehicle("tesla_model_s"))
     changed = EFFECTS["all six effects on toe"]({**table, "name": "tesla_model_s"})
-    angle = steering_wheel_deg(changed, 30.0, 5.65, 1.0, 1.0)
+    angle = steering_wheel_deg(Case(changed, 30.0, 5.65))
     assert 88.0 < angle < 98.0
 
 
@@ -116,6 +117,32 @@ def test_without_changes_of_toe_the_angle_is_that_of_geometry_and_tyres() -> Non
 def test_without_lateral_acceleration_the_angle_is_that_of_ackermann() -> None:
     """A line through two low accelerations must reach 5.64 deg at the wheels (30 m) times the ratio of 15.5."""
     table, _ = read_toml(find_vehicle("tesla_model_s"))
-    low, high = (steering_wheel_deg({**table, "name": "tesla_model_s"}, 30.0, ay, 1.0, 1.0) for ay in (0.6, 1.2))
+    low, high = (steering_wheel_deg(Case({**table, "name": "tesla_model_s"}, 30.0, ay)) for ay in (0.6, 1.2))
     assert low < high
     assert 2.0 * low - high == pytest.approx(15.48 * math.degrees(math.atan(2.96 / 30.0)), rel=0.02)
+
+
+def test_the_box_lies_between_the_ends_of_the_intervals_and_counts_what_is_inside() -> None:
+    box = Box((), np.linspace(80.0, 90.0, 101), np.linspace(110.0, 120.0, 101))
+    assert box.low_deg == pytest.approx(80.25)
+    assert box.high_deg == pytest.approx(119.75)
+    assert box.inside(np.array([80.0, 81.0, 100.0, 119.0, 120.0])) == 3
+    assert box.as_table(np.array([94.0]))["measured_deg"] == 94.0
+
+
+def test_a_tilted_accelerometer_shows_more_than_the_horizontal_acceleration() -> None:
+    """By hand: a cos(phi) + g sin(phi) = 5.65 with phi = 0.0458 rad * a / 5.65 gives 5.24 m/s2."""
+    tilt = next(interval for interval in intervals(0.0458) if "tilt" in interval.name)
+    assert tilt.low(Case({}, 30.0, 5.65)).ay_mps2 == pytest.approx(5.238, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_without_the_assumed_compliances_the_angle_is_smaller_and_a_quicker_ratio_makes_it_smaller_still() -> None:
+    table, _ = read_toml(find_vehicle("tesla_model_s"))
+    case = Case({**table, "name": "tesla_model_s"}, 30.0, 5.65)
+    main = measured_only(case)
+    quick = next(interval for interval in intervals(0.05) if interval.name == "steering ratio").low(main)
+    angles = [steering_wheel_deg(each) for each in (quick, main, case)]
+    assert angles[2] - angles[1] == pytest.approx(8.2, abs=0.3)  # 10.4 - 5.3 + 3.1 deg
+    # The wheels need the same angle, so the steering wheel turns less in proportion to the ratio.
+    assert angles[0] == pytest.approx(angles[1] * 14.27 / 15.48, rel=0.01)
