@@ -186,8 +186,8 @@ _MEASURED: Final = {
     "toe over travel (roll steer)": ("roll steer, front", "roll steer, rear"),
     "toe over side force": ("toe over side force, front", "toe over side force, rear"),
 }
-"""Step of the waterfall -> effects that it adds; all are in the source. Toe over side force is last: without the assumed
-compliance to aligning moment, an axle cannot have it and no camber over side force."""
+"""Step of the waterfall -> effects that it adds; all are in the source. Toe over side force is last: without the
+assumed compliance to aligning moment, an axle cannot have it and no camber over side force."""
 
 
 def waterfall(case: Case) -> list[tuple[str, str, Case]]:
