@@ -1,8 +1,8 @@
 """Steering wheel angle of a car on a circle, compared with the angle measured on a real car.
 
 No parameter of the car is fitted to the measurement. The main prediction uses measured kinematics and compliance
-only; a second one adds compliances that are assumed. What varies from lap to lap (mass, lateral acceleration, radius) is
-sampled, and what has one unknown value spans a probability box (`circle_box`). Each effect that contributes to the
+only; a second one adds compliances that are assumed. What varies from lap to lap (mass, lateral acceleration, radius)
+is sampled, and what has one unknown value spans a probability box (`circle_box`). Each effect that contributes to the
 angle is switched off alone, and each decision that the car's data leave open is reversed alone, to show its influence
 (`circle_variations`).
 """
