@@ -79,7 +79,7 @@ def _box_sections(result: CircleResult) -> list[Section]:
     head = ["interval", "low end, deg", "high end, deg", "source"]
     steps = Table("", ["with", "origin", "deg"], falls, kind="comparisons")
     return [
-        Section("Probability box", [text], tables=[Table("", head, ends, kind="comparisons")]),
+        Section("Probability box", [text], tables=[Table("", head, ends)]),
         Section("From geometry to the second prediction", pictures=[as_svg(draw(_waterfall(result)))], tables=[steps]),
     ]
 
