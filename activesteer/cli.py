@@ -76,6 +76,7 @@ def all_commands() -> Commands:
         driver,
         envelope,
         explore,
+        export,
         falsify,
         fault_map,
         figures,
@@ -109,7 +110,7 @@ def all_commands() -> Commands:
     for title, modules in {
         "drive": (listing, run, watch, explore),
         "recordings": (info, report, compare, replay, video, import_, recover),
-        "car": (vehicle, tyre, kc),
+        "car": (vehicle, tyre, kc, export),
         "study": (study, tune, falsify, match, fit, envelope, fault_map, identify, linearise, driver, margins),
         "verify": (reproduce, test, figures, validate, bench),
     }.items():

@@ -125,8 +125,13 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def add_car(parser: argparse.ArgumentParser) -> None:
-    """Add `--vehicle`, `--set` and `--overrides`; `overrides_of` reads the last two."""
+    """Add `--vehicle`, `--set` and `--overrides`."""
     add_vehicle(parser)
+    add_overrides(parser)
+
+
+def add_overrides(parser: argparse.ArgumentParser) -> None:
+    """Add `--set` and `--overrides`, which `overrides_of` reads."""
     parser.add_argument(
         "--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE",
         help="replace a parameter, such as road.mu=0.4 or controllers.ars.limit_deg=2",

@@ -35,6 +35,7 @@ class SensorBlock:
         chains: Constants of each sensor, records of `CHAIN`.
         memory: Memory of all sensors as one array; a run continues from it bit for bit.
         outputs: Current readings: the members of `Measurement` without its time, a view of the memory.
+        bias_rms: Standard deviation of the offset of each sensor.
     """
 
     def __init__(self, sensors: Sensors, timestep_s: float) -> None:
@@ -47,6 +48,7 @@ class SensorBlock:
         # The speed comes from the wheels; every other number has the sensor that its field is named after.
         every = [sensors.all()[number.field.rpartition("_")[0]] for number in MEASURED[1:]]
         self.chains = np.zeros(len(every), CHAIN)
+        self.bias_rms = [sensor.amount("bias") for sensor in every]
         place = len(MEASURED)
         for index, sensor in enumerate(every):
             self.chains[index] = _chain(sensor, place, sensors.seed or 0, index, timestep_s)

@@ -419,6 +419,31 @@ class Vehicle(Uncopyable):
         sensors = [] if self._sensors is None else [self._sensors.memory]
         return [self._brake_row, self._electric.state, self.data.sensordata, self.rows.estimate, *sensors]
 
+    @property
+    def wheels(self) -> WheelSet:
+        """The wheels in the engine."""
+        return self._wheels
+
+    def native_parts(self) -> dict[str, NDArray[Any]]:
+        """Return the memory of the native step apart from the engine's, by name, as views.
+
+        An address in one of these records points into one of these arrays, into an array or a struct of the engine, or
+        to a function of the engine.
+        """
+        sensors = self._sensors
+        return {
+            "bindings": self._bindings,
+            **self._implicit.parts(),
+            "brake_setup": self._brake_setup,
+            "brake_state": self._brake_state,
+            "motors": self._electric.motors,
+            "battery": self._electric.battery,
+            "electric_state": self._electric.state,
+            "commands": self.rows.commands,
+            "estimate": self.rows.estimate,
+            **({} if sensors is None else {"sensors": sensors.chains, "sensor_memory": sensors.memory}),
+        }
+
     def adopt_model(self, model: mujoco.MjModel) -> None:
         """Take over all numbers of another model of the same car, such as a mass changed at run time.
 

@@ -134,6 +134,11 @@ class ImplicitPlan:
         self._memory = memory
         self._freeze()
 
+    def parts(self) -> dict[str, NDArray[Any]]:
+        """Return the plan and the memory that it points to, by name."""
+        names = [*_TABLES, "factor", "right_side"] if self._memory else []
+        return {"plan": self.plan, **{f"plan_{name}": part for name, part in zip(names, self._memory, strict=True)}}
+
     def _freeze(self) -> None:
         """Keep a copy of what the plan was made from."""
         model = self._model

@@ -167,8 +167,8 @@ def sense(bindings_address):
     return _sense(carray(_bindings_pointer(bindings_address), (1,))[0])
 
 
-@compiled_call(_SENSED, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND, types.boolean)
-def step(bindings_address, driver_command, actuator_command, torques_set):
+@inlined
+def carry_out(bindings_address, driver_command, actuator_command, torques_set):
     """Carry out the commands, advance the engine by one step, record it and read the sensors.
 
     The commands stay in the first recorded array after the engine's. The step is recorded on the tape of the bindings,
@@ -236,6 +236,12 @@ def step(bindings_address, driver_command, actuator_command, torques_set):
     chains = carray(_chain_pointer(bindings.sensors), (bindings.n_sensors,))
     memory = carray(f64_pointer(bindings.sensor_memory), (bindings.sensor_memory_size,))
     return sane, measured(chains, memory, bindings.wheel_radii_m, bindings.timestep_s, truth), motion
+
+
+@compiled_call(_SENSED, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND, types.boolean)
+def step(bindings_address, driver_command, actuator_command, torques_set):
+    """Make one step, called from Python; see `carry_out`."""
+    return carry_out(bindings_address, driver_command, actuator_command, torques_set)
 
 
 @compiled_call(types.void, types.intp, types.Array(types.float64, 2, "C"))

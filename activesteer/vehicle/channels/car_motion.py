@@ -13,9 +13,9 @@ from activesteer.conventions import Array
 from activesteer.signals import Channel
 from activesteer.vehicle.channels.raw_rows import Column, sensor
 
-_STANDSTILL_MPS: Final = 0.2
+STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
-_ROCKS_BACK_MPS: Final = 1.0
+ROCKS_BACK_MPS: Final = 1.0
 """Limit for driving backwards, for a stopped car that swings back on suspension and tyres [m/s]."""
 
 _EXACT: Final = ("x_m", "y_m", "yaw_rad", "front_axle_x_m", "front_axle_y_m")
@@ -136,5 +136,5 @@ class CarMotion:
         _in_the_road_plane(columns, np.sin(angles), np.cos(angles), gravity_mps2, turned)
         self.vx_mps, self.vy_mps, self.ax_mps2, self.ay_mps2, self.az_mps2, self.yaw_rate_radps = turned.T
         self.speed_mps = np.hypot(columns[:, 4], columns[:, 5])
-        slowest = np.where(self.vx_mps < 0.0, _ROCKS_BACK_MPS, _STANDSTILL_MPS)
+        slowest = np.where(self.vx_mps < 0.0, ROCKS_BACK_MPS, STANDSTILL_MPS)
         self.sideslip_rad = np.where(self.speed_mps > slowest, np.arctan2(self.vy_mps, self.vx_mps), 0.0)

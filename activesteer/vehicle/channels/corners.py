@@ -59,8 +59,7 @@ _BRAKES: Final = (
 
 def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
     """Yield the signals of each wheel: its tyre, and its position relative to the chassis."""
-    at_rest = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, at_rest)
+    heights_m = design_heights_m(model)
     outputs = _TYRE if fb.header_of(model)["n_surfaces"][0] == 0.0 else (*_TYRE, *_ROAD)
     for index, (corner, words) in enumerate(CORNERS_IN_WORDS.items()):
 
@@ -75,7 +74,7 @@ def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
         axis = sensor(model, f"{corner}_wheel_axis")
         (speed,) = sensor(model, f"{corner}_wheel_speed")
         damper = Column("userdata", len(CORNERS) * fb.USERDATA_PER_WHEEL + index)
-        travel, steer, camber = _against_chassis(height, _design_height(model, at_rest, corner), axis)
+        travel, steer, camber = _against_chassis(height, heights_m[index], axis)
         yield of("wheel_speed_radps", "rad/s", "rotational speed", speed)
         yield of("travel_m", "m", "wheel travel from the design position, bump positive", travel)
         yield of("steer_rad", "rad", "steer angle of the wheel against the chassis, left positive", steer)
@@ -108,8 +107,11 @@ def _against_chassis(height: Column, design_m: float, axis: tuple[Column, ...]) 
     )
 
 
-def _design_height(model: mujoco.MjModel, at_rest: mujoco.MjData, corner: str) -> float:
-    """Return the height of a wheel centre in vehicle axes in the design position [m]."""
+def design_heights_m(model: mujoco.MjModel) -> list[float]:
+    """Return the heights of the wheel centres in vehicle axes in the design position, order of `CORNERS` [m]."""
+    at_rest = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, at_rest)
     chassis = model.body("chassis").id
-    offset = at_rest.xpos[model.body(f"{corner}_wheel").id] - at_rest.xpos[chassis]
-    return float((at_rest.xmat[chassis].reshape(3, 3).T @ offset)[2])
+    axes, place = at_rest.xmat[chassis].reshape(3, 3), at_rest.xpos[chassis]
+    wheels = (at_rest.xpos[model.body(f"{corner}_wheel").id] for corner in CORNERS)
+    return [float((axes.T @ (wheel - place))[2]) for wheel in wheels]

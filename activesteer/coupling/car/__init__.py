@@ -1,0 +1,5 @@
+"""The car as a library without Python: an FMU, or a shared library with a C header."""
+
+from activesteer.coupling.car.export import Export, export_fmu, export_library
+
+__all__ = ["Export", "export_fmu", "export_library"]

@@ -1,0 +1,182 @@
+"""Variables of an exported car: inputs, outputs, and parameters before the start."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from activesteer.controllers import CONTROLLER
+from activesteer.conventions import CORNERS
+from activesteer.driver import DRIVER
+from activesteer.signals import CORNERS_IN_WORDS, Measurement, numbers_in, numbers_of
+from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, Column, RawRows
+from activesteer.vehicle.command_row import CARRIED_OUT, COMMANDS
+from activesteer.vehicle.parameters import Factors
+
+INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
+FROM_RESULT, FROM_FORCE, FROM_LIMIT, FROM_MOTION, FROM_INPUT = range(17, 22)
+"""Sources of a value beside the arrays of `RawRows`, whose places are 0 to 15; as in car.c."""
+_MAX_TORQUE_NM: Final = 1e5
+_MAX_PRESSURE_PA: Final = 1e8
+MOTION: Final = (
+    "yaw_rad", "roll_rad", "pitch_rad", "vx_mps", "vy_mps", "speed_mps", "yaw_rate_radps", "ax_mps2", "ay_mps2",
+    "az_mps2", "sideslip_rad",
+    *(f"{corner}_{name}" for name in ("steer_rad", "camber_rad", "travel_m") for corner in CORNERS),
+    "front_steer_rad", "rear_steer_rad", "superposition_rad",
+)  # fmt: skip
+"""Channels that car.c computes, in its order; those with a sine may differ from a recording in the last digit."""
+
+
+class Variable(NamedTuple):
+    """A variable of an exported car.
+
+    Attributes:
+        name: Its name.
+        unit: Unit; empty for a pure number.
+        meaning: One line, with the sign convention where it matters.
+        causality: `INPUT`, `OUTPUT` or `PARAMETER`.
+        start: Start value.
+        low: Least value; `high` is the largest.
+        source: Place of its array in `RawRows`, or another source.
+        column: Place in the source.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    causality: str
+    start: float = 0.0
+    low: float = -math.inf
+    high: float = math.inf
+    source: int = FROM_INPUT
+    column: int = 0
+
+
+class Laws(NamedTuple):
+    """Laws of the outputs that are computed.
+
+    Attributes:
+        forces: Axial forces of springs, stops and links.
+        limits: Limits of actuators.
+    """
+
+    forces: list[AxialForce]
+    limits: list[Actuator]
+
+
+_MEANINGS: Final = {
+    "steering_wheel_demand_rad": ("rad", "steering wheel angle demand, left positive"),
+    "gear": ("", "1 forward, -1 reverse, 0 with the clutch open"),
+}
+
+
+def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
+    """Return the inputs; those of the native step come first, in the order of `CARRIED_OUT`.
+
+    Args:
+        loop: The loop at the start; its last commands are the start values.
+        road_mu: Friction of the road.
+    """
+    driver, actuator = loop.commands
+    starts = dict(zip(COMMANDS, (*numbers_in(driver), *numbers_in(actuator)), strict=True))
+    numbers = {number.name: number for command in (driver, actuator) for number in numbers_of(type(command))}
+    ranges = {**CONTROLLER.ranges, **DRIVER.ranges}
+    found = []
+    for name in CARRIED_OUT:
+        recorded = numbers[name].recorded
+        unit, meaning = _MEANINGS.get(name) or (recorded.unit, recorded.meaning)  # pyright: ignore[reportOptionalMemberAccess]
+        low, high = ranges.get(numbers[name].field, (-_MAX_TORQUE_NM, _MAX_TORQUE_NM))
+        found.append(Variable(name, unit, meaning, INPUT, starts[name], low, high))
+    forces = -_MAX_TORQUE_NM, _MAX_TORQUE_NM
+    for ending, unit, words, (low, high) in (
+        ("brake_pressure_request_Pa", "Pa", "brake pressure beside the pedal's", (0.0, _MAX_PRESSURE_PA)),
+        ("drive_torque_Nm", "Nm", "drive torque if wheel_torques_set, forward positive", forces),
+        ("brake_torque_Nm", "Nm", "brake torque if wheel_torques_set, against the rotation", (0.0, _MAX_TORQUE_NM)),
+    ):
+        found += [
+            Variable(f"{corner}_{ending}", unit, f"{words}, {place}", INPUT, 0.0, low, high)
+            for corner, place in CORNERS_IN_WORDS.items()
+        ]
+    meaning = "1 if the torques of the single wheels replace drive torque and pedal, else 0"
+    return [
+        *found,
+        Variable("wheel_torques_set", "", meaning, INPUT, 0.0, 0.0, 1.0),
+        Variable("road_mu", "", "friction of the road outside of patches", INPUT, road_mu, 0.01, 2.0),
+    ]
+
+
+def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], Laws]:
+    """Return the outputs: measurement, motion, and the recorded channels, with the laws of those that are computed.
+
+    Args:
+        loop: The loop at the start.
+        taken: Names of the inputs.
+    """
+    found = [
+        Variable(f"measured_{number.name}", number.recorded.unit, f"{number.recorded.meaning}, measured", OUTPUT,
+                 source=FROM_RESULT, column=1 + place)
+        for place, number in enumerate(numbers_of(Measurement))
+        if number.recorded is not None
+    ]  # fmt: skip
+    about = {channel.name: channel for channel in loop.vehicle.channels.channels}
+    found += [
+        Variable(name, about[name].unit, about[name].meaning.replace("unwrapped", "within half a turn"), OUTPUT,
+                 source=FROM_MOTION, column=place)
+        for place, name in enumerate(MOTION)
+    ]  # fmt: skip
+    laws = Laws([], [])
+    names = taken | {variable.name for variable in found}
+    for channel, values in loop.vehicle.channels.signals():
+        if channel.name in names or (isinstance(values, Column) and values.array == "commands"):
+            continue
+        if isinstance(values, Column):
+            source, column = RawRows._fields.index(values.array), values.column
+        elif isinstance(values, AxialForce):
+            source, column = FROM_FORCE, len(laws.forces)
+            laws.forces.append(values)
+        elif isinstance(values, Actuator):
+            source, column = FROM_LIMIT, len(laws.limits)
+            laws.limits.append(values)
+        else:
+            continue
+        found.append(Variable(channel.name, channel.unit, channel.meaning, OUTPUT, source=source, column=column))
+    return found, laws
+
+
+_FACTORS: Final = ("tyre_friction", "tyre_cornering_stiffness", "front_cornering_stiffness", "rear_cornering_stiffness",
+                   "tyre_slip_stiffness")  # fmt: skip
+_FACTOR_RANGE: Final = (0.2, 3.0)
+SEEDS: Final = 256
+"""Number of sensor seeds that an exported car knows."""
+
+
+def parameters_of(speed_mps: float, seed: int) -> list[Variable]:
+    """Return the parameters, in the order of car.c.
+
+    Args:
+        speed_mps: Speed of the manoeuvre [m/s].
+        seed: Seed of the sensors.
+    """
+    given: tuple[tuple[str, str, str, float, float, float], ...] = (
+        ("start_speed_mps", "m/s", "speed at the start", speed_mps, 1.0, 100.0),
+        ("added_mass_kg", "kg", "mass fixed to the chassis", 0.0, -300.0, 2000.0),
+        ("added_mass_x_m", "m", "its place along the car, in the axes of the model", 0.0, -10.0, 10.0),
+        ("added_mass_y_m", "m", "its place left of the middle", 0.0, -3.0, 3.0),
+        ("added_mass_z_m", "m", "its height over the road in the design position", 0.5, -1.0, 5.0),
+        ("cg_forward_change_m", "m", "shift of the car's centre of gravity forward", 0.0, -0.5, 0.5),
+        ("cg_height_change_m", "m", "shift of the car's centre of gravity upward", 0.0, -0.3, 0.5),
+        *((f"{name}_factor", "", f"factor on the {name.replace('_', ' ')}", 1.0, *_FACTOR_RANGE) for name in _FACTORS),
+        (
+            "sensor_seed",
+            "",
+            f"seed of noise and offsets of the sensors, 0 to {SEEDS - 1}",
+            float(seed),
+            0.0,
+            SEEDS - 1.0,
+        ),
+    )
+    return [Variable(name, unit, words, PARAMETER, start, low, high) for name, unit, words, start, low, high in given]
+
+
+assert {*_FACTORS} <= {*Factors.__dataclass_fields__}
