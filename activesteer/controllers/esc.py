@@ -69,8 +69,8 @@ class Esc:
         if now.speed_mps < p.least_speed_mps:
             return ActuatorCommand(estimate=now)
         desired = self._reference.step(command.front_steer_demand_rad, now.speed_mps, now.friction)
-        error = _beyond(desired - now.yaw_rate_radps, p.yaw_rate_band_radps)
-        slide = _beyond(now.sideslip_rad, p.sideslip_limit_rad)
+        error = beyond(desired - now.yaw_rate_radps, p.yaw_rate_band_radps)
+        slide = beyond(now.sideslip_rad, p.sideslip_limit_rad)
         moment = self._yaw_inertia_kgm2 * (error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2)
         torques = wheel_torques(moment, now.yaw_rate_radps, self._levers, p.torque_limit_Nm)
         limited = max(torques) >= p.torque_limit_Nm
@@ -84,7 +84,7 @@ class Esc:
         )
 
 
-def _beyond(value: float, band: float) -> float:
+def beyond(value: float, band: float) -> float:
     """Return the part of a value beyond a band about 0."""
     return value - band if value > band else value + band if value < -band else 0.0
 

@@ -92,6 +92,27 @@ class EscParameters:
 
 
 @dataclass(frozen=True)
+class TorqueVectoringParameters:
+    """Torque vectoring by electric axles (`tv`)."""
+
+    yaw_rate_time_s: _Lag
+    """T_r: time in which the moment removes the yaw rate error [s]."""
+    sideslip_limit_rad: _Limit
+    """Sideslip angle that causes no action [rad]."""
+    sideslip_time_s: _Lag
+    """T_b: half the time in which the moment, without damping, turns the car back by the sideslip angle beyond its
+    limit [s]."""
+    reference_length_m: _Length
+    """Distance over which the desired yaw rate follows the driver [m]."""
+    friction_fraction: _Fraction
+    """Fraction of the estimated friction that the desired yaw rate, and a wheel in all directions, may use [-]."""
+    least_fraction: _Fraction
+    """Fraction of the friction that stays for the torque in a turn at the limit [-]."""
+    full_speed_mps: Annotated[float, Range(2.0, 50.0)]
+    """Speed from which the controller acts fully [m/s]; below it fades out until walking speed."""
+
+
+@dataclass(frozen=True)
 class IntegratedParameters:
     """Allocation to steering and brakes (`integrated`); [controllers.lqr] gives the feedback.
 

@@ -26,6 +26,10 @@ If an actuator does not follow its demand (`SupervisedActuator`), its measured p
 feedback is then computed for the other actuator alone, about the turn that is still possible. The controller gets no
 message about a fault.
 
+On a car whose electric axles can split their torque (`tv`), the difference of each axle is a further unknown, as the
+force D that the right wheel gets and the left one loses, at the cost D^2 / F_0^2 and without a threshold: the motors
+act before the brakes, within the limits that `tv` has.
+
 B neglects the side force that a wheel loses while it brakes.
 
 Sources: T. A. Johansen and T. I. Fossen, Control allocation - A survey, Automatica 49 (2013); M. Abe, Vehicle Handling
@@ -45,10 +49,13 @@ from activesteer.controllers.file_gains import IntegratedParameters
 from activesteer.controllers.lqr import Lqr, Turn
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.quadratic_programme import solver
+from activesteer.controllers.split_axles import SplitTorques
 from activesteer.controllers.supervised_actuator import SupervisedActuator
 from activesteer.conventions import Array
 from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Measurement
 
+_FORCES = 6
+"""Number of angles and brake forces; after them come the differences of electric axles."""
 _KILO = 1e3
 """Brake forces are in kN, so that all unknowns have a similar size."""
 
@@ -78,7 +85,10 @@ class Integrated:
         self._loads_N = np.repeat(self._slopes.loads_N, 2)
         self._weights = np.array([1.0 / p.moment_scale_Nm, 1.0 / p.force_scale_N])
         self._brake_cost = _KILO * 2.0 * p.brake_threshold_Nm * half_m[0] * self._weights[0] ** 2
-        self._stay = np.diag([p.angle_scale_rad**-2] * 2 + [p.brake_scale_N**-2 * _KILO**2] * 4)
+        self._torques = SplitTorques(setup, setup.gains.tv.friction_fraction, setup.gains.tv.least_fraction)
+        self._tracks_m = 2.0 * half_m[[axle.place // 2 for axle in setup.split_axles]]
+        forces = 4 + len(setup.split_axles)
+        self._stay = np.diag([p.angle_scale_rad**-2] * 2 + [p.brake_scale_N**-2 * _KILO**2] * forces)
         self._demand_rad, self._brakes_Nm = np.zeros(2), NO_BRAKES
         per_pressure_Nm = np.array(known.brake_torque_per_pressure_NmpPa) / self._radii_m
         self._side_moment_m3 = float(per_pressure_Nm @ np.abs(self._arms_m)) / 2.0
@@ -120,14 +130,23 @@ class Integrated:
         hessian = 2.0 * (effects.T @ effects + self._stay)
         gradient = -2.0 * (effects.T @ target)
         gradient[:2] -= 2.0 * np.diag(self._stay)[:2] * demand_rad
-        gradient[2:] += self._brake_cost
+        gradient[2:_FORCES] += self._brake_cost
         most_kN = p.brake_fraction * now.friction * self._loads_N / _KILO
-        bounds = np.concatenate([lower, np.zeros(4)]), np.concatenate([upper, most_kN])
-        solution = self._solve(hessian, gradient, np.zeros((0, 6)), *bounds)
+        ranges = self._torques.ranges(command, measurement, now)
+        least_kN, greatest_kN = (
+            [side * each.largest_Nm(side) / (2.0 * _KILO * self._radii_m[each.place]) for each in ranges]
+            for side in (-1.0, 1.0)
+        )
+        bounds = np.concatenate([lower, np.zeros(4), least_kN]), np.concatenate([upper, most_kN, greatest_kN])
+        solution = self._solve(hessian, gradient, np.zeros((0, len(gradient))), *bounds)
         self._demand_rad = solution[:2]
         added, rear = solution[:2].tolist()
         self._lqr.apply(added, rear)
-        self._brakes_Nm = fl, fr, rl, rr = tuple((_KILO * solution[2:] * self._radii_m).tolist())
+        self._brakes_Nm = fl, fr, rl, rr = tuple((_KILO * solution[2:_FORCES] * self._radii_m).tolist())
+        differences_Nm = [
+            2.0 * _KILO * force * self._radii_m[each.place]
+            for force, each in zip(solution[_FORCES:].tolist(), ranges, strict=True)
+        ]
         return ActuatorCommand(
             rear_steer_demand_rad=rear,
             superposition_demand_rad=added,
@@ -141,6 +160,7 @@ class Integrated:
             side_difference_Pa=self._side_difference(
                 turn, np.where(stuck, 0.0, self._limits_rad - abs(at_rad)), slopes
             ),
+            wheel_torque_demand_Nm=self._torques.of_differences(differences_Nm, ranges, command, measurement),
         )
 
     def _side_difference(self, turn: Turn, remaining_rad: Array, slopes: tuple[float, float]) -> float:
@@ -153,11 +173,16 @@ class Integrated:
         return min(max(1.0 - off, 0.0) * p.side_difference_Pa, moment_Nm / self._side_moment_m3)
 
     def _effects(self, front_slope: float, rear_slope: float) -> np.ndarray:
-        """Return yaw moment [Nm] and side force [N] per angle [rad] and per brake force [kN], shape (2, 6)."""
+        """Return yaw moment [Nm] and side force [N] per angle [rad], brake force and torque difference [kN]."""
         car = self._car
         front, rear = front_slope * car.front_stiffness_Nprad, rear_slope * car.rear_stiffness_Nprad
-        moments = front * car.cg_to_front_m, -rear * car.cg_to_rear_m, *(_KILO * self._arms_m)
-        return np.array([moments, (front, rear, 0.0, 0.0, 0.0, 0.0)])
+        moments = (
+            front * car.cg_to_front_m,
+            -rear * car.cg_to_rear_m,
+            *(_KILO * self._arms_m),
+            *(_KILO * self._tracks_m),
+        )
+        return np.array([moments, (front, rear, *(0.0 for _ in moments[2:]))])
 
 
 def _missing_moment(desired_Nm: float, demanded_Nm: float, reached_Nm: float) -> float:

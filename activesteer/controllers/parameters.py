@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from activesteer.config import Range
 from activesteer.controllers.file_gains import (
@@ -15,6 +15,7 @@ from activesteer.controllers.file_gains import (
     LqrParameters,
     MpcParameters,
     SideslipRearSteerParameters,
+    TorqueVectoringParameters,
     file_gains,
 )
 from activesteer.errors import ControllerError
@@ -125,6 +126,8 @@ class ControllerParameters:
     """Steering and brakes together."""
     mpc: MpcParameters = field(default_factory=partial(file_gains, "mpc", MpcParameters))
     """Both axles within an envelope."""
+    tv: TorqueVectoringParameters = field(default_factory=partial(file_gains, "tv", TorqueVectoringParameters))
+    """Torque vectoring."""
     estimator: EstimatorParameters = EstimatorParameters()
     """Speed, sideslip and friction, for controllers that use an estimator."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None
@@ -132,6 +135,26 @@ class ControllerParameters:
     `interval_s`, or every step."""
     bus_delay_s: Annotated[float, Range(0.0, 0.1)] = 0.0
     """Delay of a command on its way to the actuators, in whole steps of the simulation [s]."""
+
+
+class SplitAxle(NamedTuple):
+    """An electric axle whose left and right torques can differ, as controllers know it.
+
+    Attributes:
+        place: Its left wheel in the order of `CORNERS`: 0 in front, 2 at the rear.
+        torque_Nm: Largest torque of one wheel [Nm].
+        power_W: Largest power of one wheel [W].
+        regeneration: Fraction of both that the motors can absorb [-].
+        difference_Nm: Largest difference of the torques, right less left [Nm].
+        efficiency: Efficiency in both directions [-].
+    """
+
+    place: int
+    torque_Nm: float
+    power_W: float
+    regeneration: float
+    difference_Nm: float
+    efficiency: float
 
 
 @dataclass(frozen=True)
@@ -146,6 +169,8 @@ class ControllerSetup:
         overridden: Dotted keys of the gains that were overridden for this run.
         estimation: The car as an estimator knows it; None if its file has no table [two_track].
         own: Overrides of the parameters of users' controllers: class -> name -> value.
+        split_axles: Electric axles whose left and right torques can differ.
+        battery_power_W: Largest power that the battery takes and gives [W].
     """
 
     single_track: SingleTrackParameters
@@ -155,6 +180,8 @@ class ControllerSetup:
     overridden: frozenset[str] = frozenset()
     estimation: EstimatorSetup | None = None
     own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
+    split_axles: tuple[SplitAxle, ...] = ()
+    battery_power_W: tuple[float, float] = (math.inf, math.inf)
 
     def estimator(self) -> Estimator:
         """Make an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.

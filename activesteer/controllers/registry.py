@@ -22,6 +22,7 @@ from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.observer import Observer
 from activesteer.controllers.rear_steer import RearSteer
 from activesteer.controllers.sideslip_rear_steer import SideslipRearSteer
+from activesteer.controllers.torque_vectoring import TorqueVectoring
 
 CONTROLLERS: Final[dict[str, type[Any]]] = {
     "none": NoControl,
@@ -33,6 +34,7 @@ CONTROLLERS: Final[dict[str, type[Any]]] = {
     "lqr": Lqr,
     "mpc": Mpc,
     "integrated": Integrated,
+    "tv": TorqueVectoring,
 }
 """Name -> class."""
 WITHOUT_FILE: Final = {name: kind for name, kind in CONTROLLERS.items() if not hasattr(kind, "gains")}

@@ -18,6 +18,7 @@ from activesteer.plugins import Plugin
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.driver import ChosenDriver, driver_with
+from activesteer.scenario.electric import battery_power_W, split_axles
 from activesteer.scenario.estimation import estimator_setup
 from activesteer.scenario.gains import gain_paths
 from activesteer.scenario.overrides import Override, applied, plain
@@ -51,7 +52,7 @@ class Scenario:
         car, replaced = self.car.config, frozenset(map(".".join, gain_paths(self.overrides).values()))
         return ControllerSetup(
             car.single_track, car.controllers, car.steering.ratio, timestep_s, replaced, estimator_setup(self.car),
-            self.own,
+            self.own, split_axles(car.motors), battery_power_W(car.battery),
         )  # fmt: skip
 
     def driver_setup(

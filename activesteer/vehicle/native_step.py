@@ -219,7 +219,8 @@ def carry_out(bindings_address, driver_command, actuator_command, torques_set):
             ctrl[bindings.brakes[wheel]] = commands.parking_brake * setup.parking_torque_Nm[wheel]
         ctrl[bindings.brakes[wheel]] += setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
     if bindings.n_motors != 0:
-        if not torques_set and commands.gear != CLUTCH_OPEN:
+        if not torques_set:
+            # A motor has no clutch: with it open, only the driver's torque is missing.
             for wheel in range(_N_WHEELS):
                 if bindings.driven_by[wheel] == MOTOR:
                     ctrl[bindings.drives[wheel]] += _with_grip(setup, state, wheel, added_Nm[wheel])
