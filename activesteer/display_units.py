@@ -40,6 +40,7 @@ _BY_SUFFIX: Final = {
     "_mps": DisplayUnit("km/h", 3.6),
     "_Nm": DisplayUnit("Nm", 1.0),
     "_Pa": DisplayUnit("bar", 1e-5),
+    "_J": DisplayUnit("kJ", 1e-3),
     "_N": DisplayUnit("N", 1.0),
     "_m": DisplayUnit("m", 1.0),
     "_s": DisplayUnit("s", 1.0),

@@ -36,7 +36,7 @@ RELATIVE_TOLERANCE: Final = 0.01
 """Fraction of a value by which it may always differ between two versions of the program."""
 _TOLERANCES: Final = {
     "radps": 1e-3, "mps2": 0.02, "rad": 2e-4, "s": 0.005, "srad": 2e-5, "m": 0.01, "mps": 0.02, "radpmps2": 1e-5,
-    "1ps": 0.005, "mps2prad": 0.05, "radprad": 0.001, "Hz": 0.02, "Pa": 1e4, "N": 50.0, "": 0.01,
+    "1ps": 0.005, "mps2prad": 0.05, "radprad": 0.001, "Hz": 0.02, "Pa": 1e4, "N": 50.0, "J": 100.0, "": 0.01,
 }  # fmt: skip
 """Declared unit of a metric -> smallest difference between two versions of the program that a reader would notice."""
 
@@ -221,6 +221,7 @@ METRICS: Final = {
         *_declare("Pa", "brake_pressure_peak"),
         *_declare("s", "two_wheel_lift_time", better=_SMALLER),
         *_declare("N", "wheel_load_min"),
+        *_declare("J", "battery_energy", "steering_energy", "brake_energy", better=_LOWER),
         *_pure("yaw_rate_overshoot", better=_LOWER, unit=_PERCENT),
         *_pure("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
         *_pure(

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from activesteer.analysis import (
     brake_in_turn,
+    energy,
     frequency_response,
     general,
     handling,
@@ -89,7 +90,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
             than two rows, or the run is not what its kind promises.
         ParameterError: the evaluation returns a metric that `metric_table` does not declare.
     """
-    values = evaluation_of(recording).metrics(Evaluable(recording))
+    values = evaluation_of(recording).metrics(Evaluable(recording)) | energy.metrics(recording)
     for name in values:
         metric(name)
     return values

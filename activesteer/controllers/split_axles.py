@@ -66,7 +66,6 @@ class SplitTorques:
         known, car = setup.estimation, setup.single_track
         assert known is not None  # an estimator exists
         self._radius_m, self._drive = known.rolling_radius_m, known.drive_fractions
-        self._brake_NmpPa = known.brake_torque_per_pressure_NmpPa
         tracks_m = known.two_track.front_track_m, known.two_track.rear_track_m
         weight_N = car.mass_kg * GRAVITY_MPS2 / (car.cg_to_front_m + car.cg_to_rear_m)
         shares = known.two_track.front_load_transfer_fraction, 1.0 - known.two_track.front_load_transfer_fraction
@@ -101,6 +100,10 @@ class SplitTorques:
         """
         if not self._axles:
             return []
+        if command.brake_pedal > 0.0:
+            # The brakes use the friction, and the anti-lock system needs wheels that nothing else drives.
+            nothing = 0.0, 0.0
+            return [Range(axle.place, self._levers[axle.place // 2], nothing, nothing, 0.0) for axle in self._axles]
         use, least = self._fractions
         used = measurement.ay_mps2 / (GRAVITY_MPS2 * max(now.friction, 0.05))
         grip = now.friction * max(math.sqrt(max(use**2 - used**2, 0.0)), least)
@@ -112,13 +115,12 @@ class SplitTorques:
                 wheel = axle.place + side
                 shift_N = self._shift_kg[axle.place // 2] * measurement.ay_mps2 * _SIDES[wheel]
                 road_Nm = self._radius_m[wheel] * grip * max(self._load_N[axle.place // 2] + shift_N, 0.0)
-                brake_Nm = self._brake_NmpPa[wheel] * measurement.brake_pressure_Pa[wheel]
                 speed = measurement.wheel_speed_radps[wheel]
                 most = min(axle.torque_Nm, axle.power_W / max(abs(speed), _LEAST_RADPS))
                 driver = self._drive[wheel] * drive_Nm
                 drives, absorbs = (most, axle.regeneration * most) if speed >= 0.0 else (axle.regeneration * most, most)
                 high[side] = max(min(drives, road_Nm) - driver, 0.0)
-                low[side] = min(-min(absorbs, max(road_Nm - brake_Nm, 0.0)) - driver, 0.0)
+                low[side] = min(-min(absorbs, road_Nm) - driver, 0.0)
             lever = self._levers[axle.place // 2]
             found.append(Range(axle.place, lever, (low[0], low[1]), (high[0], high[1]), axle.difference_Nm))
         return found

@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.analysis.claims import SCENARIOS
+from activesteer.analysis.energy import METRICS as ENERGIES
 from activesteer.controllers import find_controller
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder
@@ -104,11 +105,11 @@ class Comparison:
     failures: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def shown(self) -> list[tuple[str, str, dict[str, float]]]:
-        """Yield scenario, metric and its value by controller, for the metrics of `SHOWN`."""
+        """Yield scenario, metric and its value by controller, for the metrics of `SHOWN` and the energies."""
         known = {(row.scenario, row.metric, row.controller): row.value for row in self.rows}
         lines = []
         for scenario in CASES:
-            for metric in SHOWN[scenario]:
+            for metric in (*SHOWN[scenario], *ENERGIES):
                 keys = {name: (scenario, metric, name) for name in self.controllers}
                 values = {name: known[key] for name, key in keys.items() if key in known}
                 if values:

@@ -31,6 +31,7 @@ def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:
             and model.actuator_trntype[index] != int(mujoco.mjtTrn.mjTRN_TENDON)
             and not _has_motor(model, name)
         ):
+            yield signal("vehicle", f"{name}_torque_Nm", "Nm", f"torque of the servo of {name}", force)
             meaning = f"1 if {name} is at its angle, rate or torque limit"
             yield signal("vehicle", f"{name}_saturated", "", meaning, _limits(model, index))
 
