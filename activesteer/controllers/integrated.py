@@ -64,7 +64,7 @@ class Integrated:
     """State feedback, with allocation of its corrections to steering and brakes."""
 
     interval_s = 0.005
-    reads = (*Lqr.reads, "integrated")
+    reads = (*Lqr.reads, "integrated", "tv")
     gains = IntegratedParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
@@ -144,7 +144,7 @@ class Integrated:
         self._lqr.apply(added, rear)
         self._brakes_Nm = fl, fr, rl, rr = tuple((_KILO * solution[2:_FORCES] * self._radii_m).tolist())
         differences_Nm = [
-            2.0 * _KILO * force * self._radii_m[each.place]
+            2.0 * _KILO * force * float(self._radii_m[each.place])
             for force, each in zip(solution[_FORCES:].tolist(), ranges, strict=True)
         ]
         return ActuatorCommand(

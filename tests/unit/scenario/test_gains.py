@@ -30,7 +30,7 @@ class Asked:
 
 @pytest.mark.parametrize("name", sorted({*CONTROLLERS, *list_controller_variants()}))
 def test_controller_says_what_it_reads(name, monkeypatch):
-    setup = resolve("straight_line").controller_setup(0.01)
+    setup = resolve("straight_line", "compact_electric").controller_setup(0.01)
     asked = Asked(setup.gains)
     monkeypatch.setattr(Variant, "gains_in", lambda _, setup: setup.gains)
     find_controller(name).make(replace(setup, gains=asked))  # pyright: ignore[reportArgumentType]
