@@ -8,7 +8,6 @@ from typing import Final, NamedTuple
 
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import GRAVITY_MPS2
-from activesteer.errors import ControllerError
 from activesteer.signals import NO_TORQUES, DriverCommand, Estimate, Measurement, PerWheel
 
 _SIDES: Final = (-1.0, 1.0, -1.0, 1.0)
@@ -75,20 +74,6 @@ class SplitTorques:
             for share, track_m in zip(shares, tracks_m, strict=True)
         ]
         self._levers = [0.5 * track_m / self._radius_m[2 * axle] for axle, track_m in enumerate(tracks_m)]
-
-    def refuse_none(self) -> None:
-        """Refuse a car without such an axle.
-
-        Raises:
-            ControllerError: there is none.
-        """
-        if not self._axles:
-            raise ControllerError(
-                "needs an electric axle whose left and right torques can differ: motors.rl and motors.rr (or fl and "
-                'fr), or differential = "splitting" of motors.rear or motors.front, as models/vehicles/'
-                "compact_electric.toml has it",
-                key="motors",
-            )
 
     def ranges(self, command: DriverCommand, measurement: Measurement, now: Estimate) -> list[Range]:
         """Return the ranges of the electric axles for the present motion.

@@ -34,6 +34,7 @@ from activesteer.controllers.file_gains import TorqueVectoringParameters
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.split_axles import SplitTorques
 from activesteer.controllers.turn_reference import TurnReference
+from activesteer.errors import ControllerError
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 
 if TYPE_CHECKING:
@@ -74,9 +75,14 @@ class TorqueVectoring:
         Raises:
             ControllerError: the car has no axle whose torques can differ, or no table [two_track].
         """
+        if not setup.split_axles:
+            raise ControllerError(
+                "needs an electric axle whose left and right torques can differ: motors.rl and motors.rr (or fl and "
+                'fr), or differential = "splitting" of motors.rear or motors.front, as compact_electric has it',
+                key="motors",
+            )
         p, estimator = setup.gains.tv, setup.estimator()
         torques = SplitTorques(setup, p.friction_fraction, p.least_fraction)
-        torques.refuse_none()
         reference = TurnReference(setup.single_track, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         return cls(reference, estimator, p, setup.single_track.yaw_inertia_kgm2, torques)
 

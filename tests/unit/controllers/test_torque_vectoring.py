@@ -110,7 +110,7 @@ def test_a_wheel_at_its_limit_leaves_the_rest_to_the_other_one():
 
 def test_a_car_that_cannot_split_its_torque_is_refused():
     for car in ("compact", "tesla_model_s"):
-        with raises(ControllerError, key="motors" if car == "compact" else "two_track"):
+        with raises(ControllerError, key="motors"):
             load_controller("tv", resolve("straight_line", car).controller_setup(0.005))
 
 
