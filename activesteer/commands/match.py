@@ -22,6 +22,10 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--least", type=int, metavar="K", help="draw settings in which at least K statements hold, after a search"
     )
+    parser.add_argument(
+        "--neighbours", type=float, metavar="PERCENT",
+        help="drive settings whose numbers differ by up to PERCENT from those of the best one, after a search",
+    )  # fmt: skip
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_match)
@@ -37,6 +41,7 @@ def _match(options: argparse.Namespace) -> int:
             options.output,
             evaluations=options.evaluations,
             least=options.least,
+            neighbours=None if options.neighbours is None else options.neighbours / 100.0,
             jobs=options.jobs,
             scheduler=options.scheduler,
             progress=lambda done, total, best, of: bar(
@@ -44,7 +49,8 @@ def _match(options: argparse.Namespace) -> int:
             ),
         )
     if options.json:
-        print_json(found.to_json())
+        quantiles = {} if options.least is None else found.quantiles(options.least)
+        print_json({**found.to_json(), "quantiles": {key: list(ends) for key, ends in quantiles.items()}})
     else:
-        print("\n".join(lines_of(found)))
+        print("\n".join(lines_of(found, options.least)))
     return 0

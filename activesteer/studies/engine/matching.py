@@ -44,6 +44,9 @@ Progress = Callable[[int, int, int, int], None]
 """Called with the evaluations done, their total, and the best count of the number of statements."""
 _GIVEN_UP: Final = 0.7
 """Cost of each statement of a scenario that was not driven."""
+_SAMPLE: Final = "sample"
+_NEIGHBOUR: Final = "neighbour of "
+"""Origins of settings."""
 _SCALE: Final = 0.35
 """Factor on the spread of the settings found, for a proposal of `sample`."""
 
@@ -92,9 +95,47 @@ class Match:
                 front.append(one)
         return front
 
+    @property
+    def never_together(self) -> list[tuple[str, str]]:
+        """Pairs of statements that each hold in some setting, and in none of the settings together."""
+        held = [set(one.holding) for one in self.complete]
+        ever = [claim for claim in self.statements if any(claim in own for own in held)]
+        return [
+            (one, other)
+            for one, other in itertools.combinations(ever, 2)
+            if not any(one in own and other in own for own in held)
+        ]
+
+    def quantiles(self, least: int) -> dict[str, tuple[float, float, float]]:
+        """Return the 5, 50 and 95 % quantiles of each number in the settings in which enough statements hold.
+
+        Settings drawn by `sample` under this condition count alone, if there are any: they are a posterior. The others
+        only show where the search has been.
+        """
+        kept = [one for one in self.complete if len(one.holding) >= least]
+        drawn = [one for one in kept if one.origin == f"{_SAMPLE}{least}"] or kept
+        found = {}
+        for factor in self.prior.searched if drawn else ():
+            if not factor.values:
+                low, middle, high = np.quantile([one.values[factor.key] for one in drawn], (0.05, 0.5, 0.95)).tolist()
+                found[factor.key] = low, middle, high
+        return found
+
+    @property
+    def robustness(self) -> tuple[int, int]:
+        """Number of neighbours in which at most one statement fewer holds than in their setting, and of neighbours."""
+        near = [one for one in self.complete if one.origin.startswith(_NEIGHBOUR)]
+        by_number = {one.number: one for one in self.candidates}
+        origins = [by_number[int(one.origin.removeprefix(_NEIGHBOUR))] for one in near]
+        kept = sum(len(one.holding) >= len(at.holding) - 1 for one, at in zip(near, origins, strict=True))
+        return kept, len(near)
+
     def to_json(self) -> dict[str, Any]:
         """Return the result as JSON values."""
+        kept, neighbours = self.robustness
         return {
+            "never_together": [list(pair) for pair in self.never_together],
+            "robustness": {"kept": kept, "neighbours": neighbours},
             "statements": list(self.statements),
             "evaluations": self.evaluations,
             "settings": len(self.candidates),
@@ -122,6 +163,7 @@ def match(
     *,
     evaluations: int | None = None,
     least: int | None = None,
+    neighbours: float | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
@@ -133,6 +175,8 @@ def match(
         output: Folder of the search.
         evaluations: Total number of evaluations; default: the number in the file.
         least: Draw settings in which at least this number of statements hold, in place of the search.
+        neighbours: Drive settings whose numbers differ from those of the best one by up to this fraction, in place of
+            the search.
         jobs: Number of processes; default: the number of processors.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
         progress: Called after every evaluation.
@@ -147,10 +191,12 @@ def match(
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, search.plan.settings)
         search.queue = TaskQueue(workers)
-        if least is None:
-            search.run(total)
-        else:
+        if neighbours is not None:
+            search.neighbours(total, neighbours)
+        elif least is not None:
             search.sample(total, least)
+        else:
+            search.run(total)
     return search.result
 
 
@@ -257,7 +303,7 @@ class _Search:
         chosen = rng.choice(len(good), min(len(good), self.statements.table.population), replace=False)
         chains = [self.prior.point(good[place].values) for place in chosen]
         spread = np.std([self.prior.point(one.values) for one in good], axis=0) + 0.01
-        origin = f"sample{least}"
+        origin = f"{_SAMPLE}{least}"
         while self.store.evaluations < total:
             moves = rng.normal(size=(len(chains), len(spread))) * spread * _SCALE
             moves *= rng.random(moves.shape) < max(0.3, 4.0 / len(spread))  # some numbers at a time
@@ -272,6 +318,23 @@ class _Search:
                     one = self.store.candidates[next(numbers)]
                     if len(one.distances) == len(self.all) and len(one.holding) >= least:
                         chains[place] = proposed[place]
+
+    def neighbours(self, total: int, fraction: float) -> None:
+        """Drive settings around the best one, each number multiplied by up to 1 +- `fraction`."""
+        self.total = total
+        best = self.result.best
+        if best is None:
+            raise StudyError("no setting is complete; search first")
+        rng = np.random.default_rng([self.study.seed, len(self.store.candidates)])
+        while self.store.evaluations < total:
+            points = []
+            for _ in range(self.statements.table.population):
+                moved = {
+                    key: value * rng.uniform(1.0 - fraction, 1.0 + fraction) if isinstance(value, float) else value
+                    for key, value in best.values.items()
+                }
+                points.append(self.prior.point(moved))
+            self.evaluate(points, [f"{_NEIGHBOUR}{best.number}"] * len(points))
 
     def evaluate(
         self, points: Sequence[Point], origins: Sequence[str], limit: float = np.inf, most: int | None = None
@@ -353,8 +416,8 @@ class _Search:
             self.progress(self.store.evaluations, self.total, self.best, len(self.all))
 
 
-def lines_of(found: Match) -> Iterator[str]:
-    """Yield the result for a terminal."""
+def lines_of(found: Match, least: int | None = None) -> Iterator[str]:
+    """Yield the result for a terminal; with `least`, the quantiles of the numbers too."""
     yield f"{found.evaluations} evaluations of {len(found.candidates)} settings"
     for one in found.front:
         about = found.described(one)
@@ -369,3 +432,12 @@ def lines_of(found: Match) -> Iterator[str]:
         for key, value in found.best.values.items():
             shown = f"{value:.4g}" if isinstance(value, float) else str(value)
             yield f"  {key} = {shown}" + (f"  ({distances[key]:+.2f})" if key in distances else "")
+    if pairs := found.never_together:
+        yield f"hold alone and never together: {', '.join('+'.join(pair) for pair in pairs)}"
+    kept, neighbours = found.robustness
+    if neighbours:
+        yield f"{kept} of {neighbours} neighbours keep all statements but one"
+    if least is not None:
+        yield f"5, 50 and 95 % of the settings in which at least {least} hold:"
+        for key, quantiles in found.quantiles(least).items():
+            yield f"  {key}: " + ", ".join(f"{value:.4g}" for value in quantiles)

@@ -55,6 +55,10 @@ def test_settings_are_drawn_in_which_enough_statements_hold(tmp_path):
     drawn = match(TABLE, tmp_path, jobs=1, evaluations=18, least=2)
     kept = [one for one in drawn.candidates if one.origin == "sample2" and len(one.holding) == 2]
     assert kept
+    low, middle, high = drawn.quantiles(2)[WHEEL]
+    assert 5.0 <= low <= middle <= high <= 60.0
+    near = match(TABLE, tmp_path, jobs=1, evaluations=22, neighbours=0.001)
+    assert near.robustness[0] == near.robustness[1] >= 4
     with raises(StudyError):
         match({**TABLE, "seed": 3}, tmp_path / "empty", jobs=1, evaluations=4, least=2)
 
@@ -69,6 +73,7 @@ def test_a_hopeless_setting_is_given_up_before_its_other_scenarios(tmp_path):
     assert any(len(one.scenarios) == 1 for one in found.candidates)
     assert found.best is not None
     assert len(found.best.holding) == 2
+    assert found.never_together == []
 
 
 @pytest.mark.parametrize(
