@@ -27,16 +27,18 @@ from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.analysis.linear_plots import driver_loops_figure
 from activesteer.display_units import DisplayUnit, Quantity, quantity_of
-from activesteer.plotting import new_figure
+from activesteer.plotting import Heat, Picture, draw, new_figure
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
+from activesteer.studies.engine.run_task import CLAIM
 from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops
 from activesteer.studies.paper.comparison import compare
 from activesteer.studies.paper.comparison_figure import comparison_figure, comparison_population_figure
 from activesteer.studies.paper.envelope import envelope
 from activesteer.studies.paper.envelope_figure import envelope_figure
+from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
 
 if TYPE_CHECKING:
@@ -97,6 +99,7 @@ def main(names: Sequence[str]) -> None:
         "driver": _driver,
         "stepping": _stepping,
         "rear_steer_gains": _rear_steer_gains,
+        "reference_and_band": _reference_and_band,
         "sensors": _sensors,
         "tyres": _tyres,
         "brakes": _brakes,
@@ -244,6 +247,30 @@ def _rear_steer_gains() -> dict[str, Figure]:
     axes[1].set_xlabel("prediction gain [-]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
     return {"rear_steer_gains": figure}
+
+
+def _reference_and_band() -> dict[str, Figure]:
+    """Statements of the step steer and the sine with dwell that hold, over reference error and tolerance band."""
+    speed, band = "single_track.characteristic_speed_kmh", "controllers.ars.corrector.deadband_start_degps"
+    rows = [row for row in study("reference_and_band", jobs=2).to_pylist() if row["controller"] == "none"]
+    bands, speeds = (sorted({row[key] for row in rows}) for key in (band, speed))
+    held: dict[tuple[float, float], list[str]] = {(b, v): [] for b in bands for v in speeds}
+    errors: dict[float, float] = {}
+    for row in rows:
+        held[row[band], row[speed]] += [key[6:] for key, value in row.items() if key[:6] == CLAIM and value == 1.0]
+        if row["maneuver"] == "step_steer":
+            car = resolve("step_steer", overrides={speed: row[speed]})
+            gain = SingleTrack(car.car.config.single_track).yaw_rate_gain(car.maneuver.speed_mps)
+            wheel = row["steering_wheel_steady_state_rad"] / car.car.config.steering.ratio
+            errors[row[speed]] = gain * wheel / row["yaw_rate_steady_state_radps"] - 1.0
+    panels = []
+    for letter, what in (("S", "step steer: of 5 statements hold"), ("D", "sine with dwell: of 5 statements hold")):
+        counts = [[sum(claim[0] == letter for claim in held[b, v]) for v in speeds] for b in bands]
+        texts = [[str(count) for count in row] for row in counts]
+        columns = [f"{100.0 * errors[v]:+.0f} %" for v in speeds]
+        names = [f"{b:g} deg/s" for b in bands]
+        panels.append(Heat(counts, texts, columns, names, (0.0, 5.0), ("#f4f4f4", "#5b9fd0"), what, "reference error"))
+    return {"reference_and_band": draw(Picture("", panels, None, 2, 9.0, 2.8))}
 
 
 def _tyres() -> dict[str, Figure]:
