@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError
 
-_ORDER: Final = 6
-"""Order of one pass; both passes together have the twelve poles of the standards."""
 _ENDS_PERIODS: Final = 6.0
 """Time in which the filter dies away, in periods of the cut-off frequency."""
 
 
-def low_pass(values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float) -> NDArray[np.float64]:
-    """Apply a Butterworth filter of twelve poles without phase: six poles forwards, the same six backwards.
+def low_pass(
+    values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float, poles: int = 12
+) -> NDArray[np.float64]:
+    """Apply a Butterworth filter without phase: half of its poles forwards, the same backwards.
 
     Both passes have the given cut-off frequency; together they halve a sine of this frequency.
 
@@ -24,6 +24,7 @@ def low_pass(values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float)
         values: Samples at equal distances, shape (n,).
         timestep_s: Interval between the samples [s].
         cut_off_Hz: Cut-off frequency [Hz], below half the sampling frequency.
+        poles: Number of poles of both passes together, even.
 
     Returns:
         Filtered samples, shape (n,).
@@ -50,6 +51,6 @@ def low_pass(values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float)
             f"it needs {1.0 / cut_off_Hz:.3g} s of signal",
             value=len(values),
         )
-    sections = butter(_ORDER, cut_off_Hz, fs=1.0 / timestep_s, output="sos")
+    sections = butter(poles // 2, cut_off_Hz, fs=1.0 / timestep_s, output="sos")
     filtered = sosfiltfilt(sections, np.asarray(values, dtype=np.float64), padlen=ends)
     return np.asarray(filtered, dtype=np.float64)

@@ -29,6 +29,15 @@ def add_to(commands: Any) -> None:
         help="iso19364: cross plots over the lateral acceleration, for steady-state driving; iso19365: over time "
         "(default)",
     )  # fmt: skip
+    parser.add_argument(
+        "--filter", choices=("iso15037", "fmvss126", "none"), default="iso15037",
+        help="zero-phase Butterworth filter of both sides: iso15037 (8 poles, 10.1 Hz; default), fmvss126 (12 poles, "
+        "6 Hz, steering wheel 10 Hz), or none",
+    )  # fmt: skip
+    parser.add_argument(
+        "--noise", choices=("estimate", "none"), default="estimate",
+        help="widen the corridor by the noise of the measurement, estimated from it (default), or not",
+    )  # fmt: skip
     add_output(parser, "FILE.html", "the page (default: no page)")
     add_json(parser)
     parser.set_defaults(action=_compare)
@@ -36,12 +45,15 @@ def add_to(commands: Any) -> None:
 
 def _compare(options: argparse.Namespace) -> int:
     from activesteer.measured.comparison import compare, words
+    from activesteer.measured.noise import FILTERS
     from activesteer.recording import Recording
 
     if len(options.files) < 2:
         raise ParameterError("at least two recordings are needed: measured ones, and the simulated one last")
     *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
-    found = compare(measured, simulated, options.standard)
+    found = compare(
+        measured, simulated, options.standard, filtered=options.filter, noise=options.noise == "estimate"
+    )  # fmt: skip
     if options.output is not None:
         from activesteer.measured.comparison_page import write_page
 
@@ -53,9 +65,13 @@ def _compare(options: argparse.Namespace) -> int:
     for file, shift_s in zip(options.files, found.shifts_s, strict=False):
         later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"
         print(f"time shift of {file}: {later}")
+    chosen = FILTERS[found.filtered]
+    print(f"filter of both sides: {'none' if chosen is None else chosen.words()}")
+    for problem in found.unfiltered:
+        print(f"not filtered: {problem}")
     for each in found.quantities:
         label, residual, tolerance, share, _ = words(each)
-        print(f"  {label:24} rms {residual:>14}   {tolerance:>18}   {share:>7} {_verdict(each.inside)}")
+        print(f"  {label:24} rms {residual:>14}   {tolerance:>30}   {share:>7} {_verdict(each.inside)}")
     print(_verdict(found.inside))
     if options.output is not None:
         print(f"page: {options.output}")

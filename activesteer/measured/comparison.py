@@ -19,6 +19,7 @@ from activesteer.conventions import Array
 from activesteer.display_units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.measured.alignment import time_shift
+from activesteer.measured.noise import FILTERS, allowance, filter_table, smooth
 from activesteer.recording import Recording
 
 STANDARDS: Final = {
@@ -78,6 +79,7 @@ class Compared(NamedTuple):
         low: Lower edge of the corridor at x; in a cross plot, of the curve of the simulation.
         high: Upper edge.
         within: Which samples lie in the corridor, shape (n,).
+        noise: Allowance for the noise of the measurement, by which the corridor is wider; 0 if none was made.
     """
 
     channel: str
@@ -89,6 +91,7 @@ class Compared(NamedTuple):
     low: Array
     high: Array
     within: NDArray[np.bool_]
+    noise: float = 0.0
 
     @property
     def residual(self) -> Array:
@@ -113,6 +116,7 @@ class Compared(NamedTuple):
             "confidence_rms": rms(self.confidence),
             "offset": self.tolerance.offset,
             "gain": self.tolerance.gain,
+            "noise_allowance": self.noise,
             "source": self.tolerance.source,
             "share_inside": self.share_inside,
             "inside": self.inside,
@@ -126,11 +130,15 @@ class Comparison(NamedTuple):
         standard: Key of `STANDARDS`.
         shifts_s: Delay of each measured run [s]; nan if unknown, and then not corrected.
         quantities: Channels that all runs have.
+        filtered: Key of `FILTERS`.
+        unfiltered: Channels that could not be filtered, and the reasons.
     """
 
     standard: str
     shifts_s: tuple[float, ...]
     quantities: tuple[Compared, ...]
+    filtered: str = "none"
+    unfiltered: tuple[str, ...] = ()
 
     @property
     def inside(self) -> bool:
@@ -143,13 +151,29 @@ class Comparison(NamedTuple):
             "standard": self.standard,
             "time_shift_s": float(np.mean(self.shifts_s)),
             "time_shifts_s": list(self.shifts_s),
+            "filter": filter_table(self.filtered),
+            "unfiltered": list(self.unfiltered),
             "quantities": [quantity.to_json() for quantity in self.quantities],
             "inside": self.inside,
         }
 
 
-def compare(measured: Sequence[Recording], simulated: Recording, standard: str = "iso19365") -> Comparison:
-    """Compare measured runs of a manoeuvre with its simulation, by a key of `STANDARDS`.
+def compare(
+    measured: Sequence[Recording],
+    simulated: Recording,
+    standard: str = "iso19365",
+    *,
+    filtered: str = "iso15037",
+    noise: bool = True,
+) -> Comparison:
+    """Compare measured runs of a manoeuvre with its simulation.
+
+    Args:
+        measured: The measured runs.
+        simulated: The simulated run.
+        standard: Key of `STANDARDS`.
+        filtered: Key of `FILTERS`; the filter is applied alike to both sides.
+        noise: Whether to widen the corridor by the noise that remains in the measurement, estimated from it.
 
     Raises:
         RecordingError: the runs share no channel or no time.
@@ -170,24 +194,41 @@ def compare(measured: Sequence[Recording], simulated: Recording, standard: str =
     if len(time_s) < 10:
         raise RecordingError(f"the runs have {len(time_s)} samples in common; at least 10 are needed")
 
+    chosen, problems = FILTERS[filtered], list[str]()
+    smoothed = {name: [smooth(run, name, chosen) for run in (*measured, simulated)] for name in names}
+    for name, sides in smoothed.items():
+        if reason := next((side.problem for side in sides if side.problem), ""):
+            problems.append(f"{quantity_of(name).label}: {reason}")
+            smoothed[name] = [smooth(run, name, None) for run in (*measured, simulated)]
+    allowed = {
+        name: allowance([side.noise for side in sides[:-1]]) if noise else 0.0 for name, sides in smoothed.items()
+    }
+
     def mean_of(name: str) -> tuple[Array, Array]:
-        values = np.stack(
-            [np.interp(time_s + shift, run.time_s, run[name]) for run, shift in zip(measured, made_up, strict=True)]
-        )
+        values = np.stack([
+            np.interp(time_s + shift, run.time_s, side.values)
+            for run, side, shift in zip(measured, smoothed[name], made_up, strict=False)
+        ])  # fmt: skip
         return values.mean(axis=0), _confidence(values)
+
+    def simulated_of(name: str) -> Array:
+        return smoothed[name][-1].values
 
     if standard == "iso19364":
         across = mean_of(_ACROSS)[0]
         found = [
-            _crossed(name, across, *mean_of(name), np.asarray(simulated[_ACROSS]), np.asarray(simulated[name]))
+            _crossed(
+                name, across, *mean_of(name), simulated_of(_ACROSS), simulated_of(name), allowed[_ACROSS], allowed[name]
+            )
             for name in names
             if name not in (_ACROSS, "speed_mps")
         ]
     else:
         found = [
-            _timed(name, time_s, *mean_of(name), np.interp(time_s, simulated.time_s, simulated[name])) for name in names
+            _timed(name, time_s, *mean_of(name), np.interp(time_s, simulated.time_s, simulated_of(name)), allowed[name])
+            for name in names
         ]
-    return Comparison(standard, shifts, tuple(found))
+    return Comparison(standard, shifts, tuple(found), filtered, tuple(problems))
 
 
 def _confidence(values: Array) -> Array:
@@ -200,28 +241,44 @@ def _confidence(values: Array) -> Array:
     return t.ppf(0.975, count - 1) * values.std(axis=0, ddof=1) / math.sqrt(count)
 
 
-def _timed(name: str, time_s: Array, measured: Array, confidence: Array, simulated: Array) -> Compared:
+def _timed(name: str, time_s: Array, measured: Array, confidence: Array, simulated: Array, noise: float) -> Compared:
     tolerance = TOLERANCES[name]
-    low, high = corridor(time_s, simulated, tolerance.width(simulated))
+    low, high = corridor(time_s, simulated, tolerance.width(simulated) + noise)
     within = (measured >= low) & (measured <= high)
-    return Compared(name, tolerance, time_s, measured, confidence, simulated, low, high, within)
+    return Compared(name, tolerance, time_s, measured, confidence, simulated, low, high, within, noise)
 
 
 def _crossed(
-    name: str, across: Array, measured: Array, confidence: Array, sim_across: Array, sim_values: Array
+    name: str,
+    across: Array,
+    measured: Array,
+    confidence: Array,
+    sim_across: Array,
+    sim_values: Array,
+    noise_across: float,
+    noise: float,
 ) -> Compared:
     """Compare in a cross plot: inside is a point in the ellipse of both tolerances around a point of the curve."""
     tolerance = TOLERANCES[name]
     rows = np.unique(np.linspace(0, len(across) - 1, min(len(across), _CROSS_POINTS)).astype(int))
     curve = np.unique(np.linspace(0, len(sim_across) - 1, min(len(sim_across), _CROSS_POINTS)).astype(int))
     x, y, px, py = across[rows], measured[rows], sim_across[curve], sim_values[curve]
-    width_x, width_y = TOLERANCES[_ACROSS].width(px), tolerance.width(py)
+    width_x, width_y = TOLERANCES[_ACROSS].width(px) + noise_across, tolerance.width(py) + noise
     distance = ((x[:, None] - px) / width_x) ** 2 + ((y[:, None] - py) / width_y) ** 2
     nearest = distance.argmin(axis=1)
     within = distance[np.arange(len(x)), nearest] <= 1.0
     beside = py[nearest]
     return Compared(
-        name, tolerance, x, y, confidence[rows], beside, beside - width_y[nearest], beside + width_y[nearest], within
+        name,
+        tolerance,
+        x,
+        y,
+        confidence[rows],
+        beside,
+        beside - width_y[nearest],
+        beside + width_y[nearest],
+        within,
+        noise,
     )
 
 
@@ -230,6 +287,7 @@ def words(found: Compared) -> tuple[str, str, str, str, str]:
     shown = quantity_of(found.channel)
     unit, factor = shown.unit.name, shown.factor
     allowed = f"{found.tolerance.offset * factor:.3g} {unit} + {100.0 * found.tolerance.gain:g} %"
+    allowed += f" + noise {found.noise * factor:.2g}" if found.noise else ""
     return (
         shown.label,
         f"{rms(found.residual) * factor:.3g} {unit}",
@@ -245,6 +303,13 @@ def assumptions(found: Comparison) -> list[str]:
     lines = [f"Tolerances of steering wheel angle and lateral acceleration {_QUOTED}."]
     if assumed:
         lines.append(f"Tolerances of {', '.join(assumed)} are assumptions.")
+    if (chosen := FILTERS[found.filtered]) is not None:
+        lines.append(f"Both sides are filtered alike: {chosen.words()}.")
+    lines += [f"Not filtered: {problem}." for problem in found.unfiltered]
+    if any(each.noise for each in found.quantities):
+        lines.append(
+            "The corridor is wider by the noise of the measurement (95 %), estimated from what the filter removes."
+        )
     lines.append(f"A quantity is inside if {100.0 * SHARE_NEEDED:g} % of its samples are; this is an assumption.")
     if found.standard == "iso19365":
         lines.append(f"The corridor reaches {1e3 * TIME_TOLERANCE_S:g} ms to either side, as in activesteer validate.")

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 from activesteer.errors import RecordingError
 from activesteer.measured.comparison import TOLERANCES, compare
+from activesteer.measured.noise import FILTERS, smooth
 from activesteer.recording import Recording
 from activesteer.signals import Channel
 from tests.raising import raises
 
+plain = partial(compare, filtered="none", noise=False)
 TIME_S = np.arange(0.0, 5.0, 0.001)
 
 
@@ -34,7 +37,7 @@ def sine(time_s):
 @pytest.mark.parametrize("interval_s", [0.001, 0.01])
 def test_a_shift_is_found_between_the_samples_and_leaves_no_residual(signal, shift_s, interval_s):
     time_s = np.arange(1.0, 5.0, interval_s)
-    found = compare(
+    found = plain(
         [run(time_s, yaw_rate_radps=0.3 * signal(time_s - shift_s))], run(yaw_rate_radps=0.3 * signal(TIME_S))
     )
     assert found.shifts_s[0] == pytest.approx(shift_s, abs=2e-4)
@@ -44,7 +47,7 @@ def test_a_shift_is_found_between_the_samples_and_leaves_no_residual(signal, shi
 
 def test_clocks_are_compared_by_the_steering_so_that_a_lag_of_the_car_stays():
     measured = run(steering_wheel_rad=step(TIME_S - 0.05), yaw_rate_radps=0.3 * step(TIME_S - 0.25))
-    found = compare([measured], run(steering_wheel_rad=step(TIME_S), yaw_rate_radps=0.3 * step(TIME_S)))
+    found = plain([measured], run(steering_wheel_rad=step(TIME_S), yaw_rate_radps=0.3 * step(TIME_S)))
     assert found.shifts_s[0] == pytest.approx(0.05, abs=1e-4)
     steering, rate = found.quantities
     assert (steering.inside, rate.inside) == (True, False)
@@ -55,7 +58,7 @@ def test_the_corridor_is_offset_and_gain_of_the_simulation():
     constant = 4.0 + 0.0 * TIME_S
     allowed = 0.1 + 0.06 * 4.0
     for size, inside in ((0.99, True), (1.01, False)):
-        found = compare([run(ay_mps2=constant + size * allowed)], run(ay_mps2=constant))
+        found = plain([run(ay_mps2=constant + size * allowed)], run(ay_mps2=constant))
         assert found.inside is inside
         assert found.quantities[0].to_json()["rms"] == pytest.approx(size * allowed)
         assert math.isnan(found.shifts_s[0])  # nothing moves
@@ -63,7 +66,7 @@ def test_the_corridor_is_offset_and_gain_of_the_simulation():
 
 def test_the_share_is_that_of_the_samples():
     wrong = np.where(TIME_S < 1.0, 5.0, 0.0)
-    found = compare([run(ay_mps2=wrong)], run(ay_mps2=0.0 * TIME_S))
+    found = plain([run(ay_mps2=wrong)], run(ay_mps2=0.0 * TIME_S))
     assert found.quantities[0].share_inside == pytest.approx(0.8, abs=1e-3)
 
 
@@ -71,7 +74,7 @@ def test_of_several_runs_the_mean_counts_and_its_interval_is_that_of_student(rng
     truth = 0.3 * step(TIME_S)
     slow_s = TIME_S[::10]  # noise that does not depend on how samples are interpolated
     noise = [np.interp(TIME_S, slow_s, 0.01 * rng.standard_normal(len(slow_s))) for _ in range(4)]
-    found = compare([run(yaw_rate_radps=truth + each) for each in noise], run(yaw_rate_radps=truth)).quantities[0]
+    found = plain([run(yaw_rate_radps=truth + each) for each in noise], run(yaw_rate_radps=truth)).quantities[0]
     assert found.to_json()["rms"] == pytest.approx(0.005 * np.sqrt(2.0 / 3.0), rel=0.1)
     assert np.mean(np.abs(found.residual) < found.confidence) == pytest.approx(0.95, abs=0.03)
 
@@ -84,17 +87,61 @@ def test_cross_plots_know_no_time():
         return gradient * ay_mps2 + 0.002 * ay_mps2**2
 
     simulated = run(ay_mps2=ay, sideslip_rad=angle(ay))
-    assert compare([run(ay_mps2=slower, sideslip_rad=angle(slower))], simulated, "iso19364").inside
-    assert not compare([run(ay_mps2=slower, sideslip_rad=angle(slower))], simulated).inside
+    assert plain([run(ay_mps2=slower, sideslip_rad=angle(slower))], simulated, "iso19364").inside
+    assert not plain([run(ay_mps2=slower, sideslip_rad=angle(slower))], simulated).inside
     # Off by 1.2 tolerances across, on a flat curve.
     flat = run(ay_mps2=ay, sideslip_rad=0.0 * ay)
     for size, inside in ((0.95, True), (1.2, False)):
         off = size * TOLERANCES["sideslip_rad"].offset
-        assert compare([run(ay_mps2=ay, sideslip_rad=0.0 * ay + off)], flat, "iso19364").inside is inside
+        assert plain([run(ay_mps2=ay, sideslip_rad=0.0 * ay + off)], flat, "iso19364").inside is inside
 
 
 def test_runs_with_nothing_in_common_are_an_error():
     with raises(RecordingError, allowed=tuple(TOLERANCES)):
-        compare([run(yaw_rate_radps=TIME_S)], run(ay_mps2=TIME_S))
+        plain([run(yaw_rate_radps=TIME_S)], run(ay_mps2=TIME_S))
     with raises(RecordingError, value="ay_mps2"):
-        compare([run(yaw_rate_radps=TIME_S)], run(yaw_rate_radps=TIME_S), "iso19364")
+        plain([run(yaw_rate_radps=TIME_S)], run(yaw_rate_radps=TIME_S), "iso19364")
+
+
+@pytest.mark.parametrize("filtered", ["iso15037", "fmvss126", "none"])
+def test_the_noise_that_remains_is_estimated_from_the_measurement(rng, filtered):
+    time_s = np.arange(0.0, 20.0, 0.01)
+    noise = 0.06 * rng.standard_normal(len(time_s))
+    clean = 4.0 * np.sin(2.0 * np.pi * 0.5 * time_s)
+    found = smooth(run(time_s, ay_mps2=clean + noise), "ay_mps2", FILTERS[filtered])
+    inside = (time_s > 1.0) & (time_s < 19.0)
+    expected = np.std((found.values - clean)[inside])
+    assert found.noise == pytest.approx(expected, rel=0.25)
+    assert bool(expected < 0.04) is (filtered != "none")
+
+
+def test_a_right_model_with_sensor_noise_is_inside_and_a_wrong_one_is_not(rng):
+    time_s = np.arange(0.0, 20.0, 0.01)
+    clean = 4.0 * np.sin(2.0 * np.pi * 0.5 * time_s)
+    noise = 0.06 * rng.standard_normal(len(time_s))
+    right = compare([run(time_s, ay_mps2=clean + noise)], run(time_s, ay_mps2=clean))
+    wrong = compare([run(time_s, ay_mps2=1.12 * clean + noise)], run(time_s, ay_mps2=clean))
+    assert right.inside
+    assert right.quantities[0].noise == pytest.approx(1.96 * 0.06 * math.sqrt(10.1 / 50.0), rel=0.15)
+    assert not wrong.inside
+    assert right.to_json()["filter"]["poles"] == 8
+    ramp = 0.05 * time_s
+    bare, allowed = (each([run(time_s, ay_mps2=ramp + noise)], run(time_s, ay_mps2=ramp)) for each in (plain, compare))
+    assert bare.quantities[0].noise == 0.0
+    assert bare.quantities[0].share_inside < allowed.quantities[0].share_inside == 1.0
+
+
+def test_a_slow_signal_is_compared_without_a_filter_and_the_reason_is_said():
+    time_s = np.arange(0.0, 20.0, 0.1)
+    values = 4.0 * np.sin(2.0 * np.pi * 0.2 * time_s)
+    found = compare([run(time_s, ay_mps2=values)], run(time_s, ay_mps2=values))
+    assert found.inside
+    assert "10.1 Hz" in found.unfiltered[0]
+
+
+def test_the_filter_of_iso_15037_has_the_width_that_the_standard_requires():
+    for frequency_Hz, low, high in ((5.0, 0.995, 1.0), (9.0, 0.707, 0.75), (20.0, 0.0, 0.01)):
+        time_s = np.arange(0.0, 10.0, 0.001)
+        wave = np.sin(2.0 * np.pi * frequency_Hz * time_s)
+        found = smooth(run(time_s, ay_mps2=wave), "ay_mps2", FILTERS["iso15037"]).values
+        assert low <= np.abs(found[4000:6000]).max() <= high
