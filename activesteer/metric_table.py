@@ -202,7 +202,8 @@ METRICS: Final = {
             "m", "stopping_distance", "path_deviation_after_1000ms", "track_deviation_max", "lateral_deviation_max",
             "track_amplitude", significance=TRACK_M, better=_SMALLER,
         ),
-        *_declare("m", "lane_overstep", significance=TRACK_M, better=_LOWER),
+        *_declare("s", "lap_time", significance=TIME_S, better=_SMALLER),
+        *_declare("m", "lane_overstep", "road_overstep", significance=TRACK_M, better=_LOWER),
         *_declare(
             "m", "lateral_displacement", "lateral_displacement_by_ay", "track_deviation_rms", "cone_distance_min",
             "cone_distance_mean", "radius_begin", "stopping_distance_corrected", "lateral_deviation_after_1000ms",

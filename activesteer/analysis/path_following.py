@@ -18,10 +18,15 @@ from activesteer.analysis.series import Array, lag, largest_rate, rate_rms, rms,
 from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
 from activesteer.conventions import CORNERS
 from activesteer.road.course import Course
+from activesteer.road.path_search import PathSearch
 
 AFTER_S: Final = 3.0
 """Time after the last gate in which the car should settle [s]."""
 LONGEST_LAG_S: Final = 0.6
+_LAP_STEP_S: Final = 0.01
+"""Interval at which the car's place along a path is looked for [s]."""
+_LAP_WINDOW_M: Final = 5.0
+"""Distance to either side of the last place in which it is looked for [m]."""
 """Longest lag [s]: a quarter of the period of a slalom of 36 m at 100 km/h."""
 
 SIGNALS: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("roll", "rad"))
@@ -30,9 +35,8 @@ OSCILLATING: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2")
 """Channels whose root mean squares within and after the gates are metrics."""
 
 PATH_KEY_METRICS: Final = (
-    "track_deviation_max_m", "track_deviation_rms_m", "sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps",
+    "lap_time_s", "track_deviation_max_m", "track_deviation_rms_m", "sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps",
     "ay_peak_abs_mps2", "roll_peak_abs_rad", "steering_wheel_peak_abs_rad", "tyre_use_max", "speed_loss_mps",
-    "speed_end_mps",
 )  # fmt: skip
 """Key metrics of a path without gates, the most telling first."""
 
@@ -93,6 +97,8 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
       `stays_in_lanes` (1 or 0), `cones_hit`, `cone_distance_min_m`.
     - Tyres: `tyre_use_max`, `tyre_use_mean`, the fraction of the available friction that all wheels use.
     - Speed: `speed_loss_mps`, initial less lowest speed; `speed_end_mps`.
+    - A path without gates: `lap_time_s`, the time to its end; and `road_overstep_m`, the largest distance of a side of
+      the car beyond the edge of the road, if the width of the road is known (below 0: the smallest distance from it).
     - Slalom: `track_amplitude_m` (half the distance between the leftmost and the rightmost place of the front axle
       centre between first and last cone), `cone_distance_mean_m`, and `cones_missed` (cones that the car does not reach
       or passes on another side than the path does).
@@ -125,6 +131,8 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
         values[f"{name}_lag_s"] = lag(wheel[windows.approach], follower, step_s, LONGEST_LAG_S)
     values |= _steering_effort(wheel, step_s)
     values |= _places(recording, course)
+    if course.last_gate_x_m is None:
+        values |= _lap(recording, course)
     if maneuver_kind(recording) == "slalom":
         values |= _slalom(recording, course)
     use = np.array([recording[f"{corner}_friction_utilisation"] for corner in CORNERS], dtype=np.float64)
@@ -187,6 +195,28 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
         distances = lanes.cone_distances(recording, course, car)
         values["cones_hit"] = float(np.count_nonzero(distances <= 0.0))
         values["cone_distance_min_m"] = float(distances.min())
+    return values
+
+
+def _lap(recording: RecordingLike, course: Course) -> dict[str, float]:
+    """Return the time to the end of a path, and the largest overstep of its edges; nan for a path without its end."""
+    every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
+    x, y, time_s = (np.asarray(values)[::every] for values in (recording["x_m"], recording["y_m"], recording.time_s))
+    search, length_m = PathSearch(course.path), course.path.length_m
+    along = np.empty(len(x))
+    place = 0.0
+    for index, (px, py) in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
+        along[index] = place = search.nearest(px, py, place, _LAP_WINDOW_M)
+    ended = np.flatnonzero(along >= length_m)
+    values = {"lap_time_s": math.nan}
+    if len(ended) and ended[0] > 0:
+        end = slice(ended[0] - 1, ended[0] + 1)
+        values["lap_time_s"] = float(np.interp(length_m, along[end], time_s[end]))
+    if course.width_m is not None:
+        path_x, path_y = search.at(along)
+        beside = np.hypot(x - path_x, y - path_y)
+        room = 0.5 * np.interp(along, course.path.s_m, course.width_m) - 0.5 * read_footprint(recording).width_m
+        values["road_overstep_m"] = float((beside - room).max())
     return values
 
 

@@ -1,18 +1,22 @@
-"""A user's own path, from a CSV or from the manoeuvre file, at constant speed."""
+"""A user's own path, from a CSV or from the manoeuvre file, at constant speed or at the speeds of its points."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Annotated, Any
 
-from activesteer.config import Source
+import numpy as np
+
+from activesteer.config import Range, Source
+from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
 from activesteer.files import MAX_CSV_BYTES, read_bytes
 from activesteer.maneuver.along_course import AlongCourse
 from activesteer.maneuver.csv_table import find_csv
-from activesteer.maneuver.path_points import check_points, read_csv
+from activesteer.maneuver.path_points import COLUMNS, OPTIONAL, check_points, read_csv
+from activesteer.maneuver.path_speed import PathSpeed
 from activesteer.road.course import Course
 from activesteer.road.path import Path
 
@@ -22,11 +26,16 @@ class PathTable:
     """Points in the order of travel; the car starts at (0, 0), heading along x."""
 
     csv: str | None = None
-    """CSV file with the columns x_m and y_m: a path, or a name in the manoeuvre's folder."""
+    """CSV file with the columns x_m and y_m, and speed_mps (or speed_kmh) and width_m if wanted: a path, or a name in
+    the manoeuvre's folder."""
     x_m: tuple[float, ...] | None = None
     """World x of the points [m]. Default: the points of the CSV."""
     y_m: tuple[float, ...] | None = None
     """World y, left positive [m]."""
+    speed_mps: Annotated[tuple[float, ...] | None, Range(1.0, 100.0)] = None
+    """Speeds at the points [m/s], linear along the path between them. Default: the speed of the manoeuvre."""
+    width_m: Annotated[tuple[float, ...] | None, Range(1.0, 100.0)] = None
+    """Widths of the road at the points [m], the path in its middle; for evaluation."""
 
     def __post_init__(self) -> None:
         """Check that the points make a path.
@@ -37,6 +46,10 @@ class PathTable:
         if self.x_m is None or self.y_m is None:
             raise ManeuverError("csv (a file with the columns x_m and y_m) or both lists x_m and y_m are needed")
         check_points(self.x_m, self.y_m, lambda index: f"point {index + 1}")
+        for key in OPTIONAL:
+            values = getattr(self, key)
+            if values is not None and len(values) != len(self.x_m):
+                raise ManeuverError(f"has {len(values)} values for {len(self.x_m)} points", key=key)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,18 +67,35 @@ class FollowPath(AlongCourse):
         points = table.get("path")
         if not isinstance(points, Mapping) or not isinstance(points.get("csv"), str):
             return dict(table), {}
-        if ("x_m" in points or "y_m" in points) and "path.csv" not in source.overridden:
+        given = [name for name in (*COLUMNS, *OPTIONAL) if name in points]
+        if given and "path.csv" not in source.overridden:
             if folder is None:
                 return dict(table), {}
-            raise source.fail(("path", "csv"), "csv and the lists x_m, y_m both give the points; leave one out")
+            key = "csv" if given[0] in COLUMNS else given[0]
+            raise source.fail(("path", key), f"csv and the list {given[0]} both give the points; leave one out")
         file = find_csv(points["csv"], folder, source, ("path", "csv"))
         try:
-            x_m, y_m, lines = read_csv(file)
-            check_points(x_m, y_m, lambda index: f"{file.name}, line {lines[index]}")
+            columns, lines = read_csv(file)
+            check_points(columns["x_m"], columns["y_m"], lambda index: f"{file.name}, line {lines[index]}")
         except ManeuverError as reason:
             raise source.fail(("path", "csv"), str(reason), reason.value, reason.allowed) from reason
-        filled = {**table, "path": {**points, "x_m": x_m, "y_m": y_m}}
+        filled = {**table, "path": {**points, **columns}}
         return filled, {f"path/{file.name}": read_bytes(file, ManeuverError, MAX_CSV_BYTES)}
 
     def _make_course(self) -> Course:
-        return Course(Path.through(self.path.x_m or (), self.path.y_m or ()))
+        path = Path.through(self.path.x_m or (), self.path.y_m or ())
+        return Course(path, width_m=self._along(path, self.path.width_m))
+
+    def _along(self, path: Path, values: tuple[float, ...] | None) -> Array | None:
+        """Return values at the points of the path, from those at the given points."""
+        if values is None:
+            return None
+        chords = np.hypot(np.diff(self.path.x_m or ()), np.diff(self.path.y_m or ()))
+        at = np.concatenate([[0.0], np.cumsum(chords)])
+        return np.interp(path.s_m, at * (path.length_m / at[-1]), values)
+
+    def sequence(self) -> PathSpeed | None:
+        """Return what follows the speeds along the path; None if it has none."""
+        path = self.course.path
+        speeds_mps = self._along(path, self.path.speed_mps)
+        return None if speeds_mps is None else PathSpeed(self, path, speeds_mps)

@@ -11,7 +11,9 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver.csv_table import read_columns
 
 COLUMNS: Final = ("x_m", "y_m")
-"""Columns that a CSV must have; others are ignored."""
+"""Columns that a CSV must have."""
+OPTIONAL: Final = ("speed_mps", "width_m")
+"""Columns that a CSV may have; others are ignored."""
 
 MIN_POINTS: Final = 4
 _MAX_GAP_M: Final = 20.0
@@ -27,20 +29,19 @@ _MAX_START_RAD: Final = math.radians(15.0)
 """Largest angle of the first section to the car's heading [rad]."""
 
 
-def read_csv(path: Path) -> tuple[list[float], list[float], list[int]]:
-    """Read the points from a CSV with the header x_m,y_m.
+def read_csv(path: Path) -> tuple[dict[str, list[float]], list[int]]:
+    """Read the points from a CSV with the header x_m,y_m, and speed and width there if it has such columns.
 
     Args:
         path: The file.
 
     Returns:
-        x, y [m], and the line number of each point.
+        Values by column, SI, and the line number of each point.
 
     Raises:
         ManeuverError: the file cannot be read, a column is missing, or a value is no number.
     """
-    columns, lines = read_columns(path, COLUMNS)
-    return columns["x_m"], columns["y_m"], lines
+    return read_columns(path, COLUMNS, OPTIONAL)
 
 
 def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[int], str]) -> None:

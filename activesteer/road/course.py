@@ -30,12 +30,14 @@ class Course:
         lanes: Lanes that the car has to stay in, in the order of travel.
         cones_m: World x and y of the cones [m], shape (number of cones, 2).
         last_gate_x_m: World x of the end of the last gate [m]; None for a path without gates.
+        width_m: Width of the road at the points of the path [m]; None if it is not known.
     """
 
     path: Path
     lanes: tuple[Lane, ...] = ()
     cones_m: Array = field(default_factory=lambda: np.empty((0, 2)))
     last_gate_x_m: float | None = None
+    width_m: Array | None = None
 
     @property
     def first_gate_x_m(self) -> float:
@@ -72,6 +74,7 @@ class Course:
             "lanes": [lane._asdict() for lane in self.lanes],
             "cones": self.cones_m.tolist(),
             "last_gate_x_m": self.last_gate_x_m,
+            **({} if self.width_m is None else {"width_m": self.width_m.tolist()}),
         }
 
     @classmethod
@@ -94,12 +97,13 @@ class Course:
         lanes = sequence(course.get("lanes", ()), "course.lanes")
         cones = sequence(course.get("cones", ()), "course.cones")
         places = [numbers(cone, f"course.cones.{index}", count=2) for index, cone in enumerate(cones)]
-        last = course.get("last_gate_x_m")
+        last, widths = course.get("last_gate_x_m"), course.get("width_m")
         return cls(
             Path.between(x_m, y_m),
             tuple(_lane(lane, f"course.lanes.{index}") for index, lane in enumerate(lanes)),
             np.reshape(places, (-1, 2)),
             None if last is None else number(last, "course.last_gate_x_m"),
+            None if widths is None else numbers(widths, "course.width_m", 0.0, count=len(x_m)),
         )
 
 

@@ -273,6 +273,7 @@ class ClosedLoop(Uncopyable):
                     stretch = range(first, last)
                     unit = told_by_sensor(steering, vehicle.parameters.steering.ratio) if angle_fails else steering
                     native = step_car == vehicle.step and unit is self.controller and driving is self.driver
+                    native = native and sequence is None
                     for block in _pieces(stretch) if recorder is None else recorder.blocks(stretch):
                         if native and self._drive_natively(block, setpoint_at):
                             continue
