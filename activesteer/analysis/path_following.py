@@ -18,7 +18,6 @@ from activesteer.analysis.series import Array, lag, largest_rate, rate_rms, rms,
 from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
 from activesteer.conventions import CORNERS
 from activesteer.road.course import Course
-from activesteer.road.path_search import PathSearch
 
 AFTER_S: Final = 3.0
 """Time after the last gate in which the car should settle [s]."""
@@ -97,7 +96,7 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
       `stays_in_lanes` (1 or 0), `cones_hit`, `cone_distance_min_m`.
     - Tyres: `tyre_use_max`, `tyre_use_mean`, the fraction of the available friction that all wheels use.
     - Speed: `speed_loss_mps`, initial less lowest speed; `speed_end_mps`.
-    - A path without gates: `lap_time_s`, the time to its end; and `road_overstep_m`, the largest distance of a side of
+    - A path without gates: `lap_time_s`, the time in which the car covers its length; and `road_overstep_m`, the largest distance of a side of
       the car beyond the edge of the road, if the width of the road is known (below 0: the smallest distance from it).
     - Slalom: `track_amplitude_m` (half the distance between the leftmost and the rightmost place of the front axle
       centre between first and last cone), `cone_distance_mean_m`, and `cones_missed` (cones that the car does not reach
@@ -200,18 +199,21 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
 
 def _lap(recording: RecordingLike, course: Course) -> dict[str, float]:
     """Return the time to the end of a path, and the largest overstep of its edges; nan for a path without its end."""
+    from activesteer.road.path_search import PathSearch  # noqa: PLC0415 - compiled code, which few runs need
+
     every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
-    x, y, time_s = (np.asarray(values)[::every] for values in (recording["x_m"], recording["y_m"], recording.time_s))
+    x, y, time_s = (np.asarray(values)[::every] for values in (*track.front_axle(recording), recording.time_s))
     search, length_m = PathSearch(course.path), course.path.length_m
     along = np.empty(len(x))
     place = 0.0
     for index, (px, py) in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
         along[index] = place = search.nearest(px, py, place, _LAP_WINDOW_M)
-    ended = np.flatnonzero(along >= length_m)
+    end_m = length_m + along[0]  # the front axle starts ahead of the path's beginning
+    ended = np.flatnonzero(along >= end_m)
     values = {"lap_time_s": math.nan}
     if len(ended) and ended[0] > 0:
         end = slice(ended[0] - 1, ended[0] + 1)
-        values["lap_time_s"] = float(np.interp(length_m, along[end], time_s[end]))
+        values["lap_time_s"] = float(np.interp(end_m, along[end], time_s[end]))
     if course.width_m is not None:
         path_x, path_y = search.at(along)
         beside = np.hypot(x - path_x, y - path_y)
