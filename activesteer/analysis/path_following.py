@@ -96,8 +96,9 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
       `stays_in_lanes` (1 or 0), `cones_hit`, `cone_distance_min_m`.
     - Tyres: `tyre_use_max`, `tyre_use_mean`, the fraction of the available friction that all wheels use.
     - Speed: `speed_loss_mps`, initial less lowest speed; `speed_end_mps`.
-    - A path without gates: `lap_time_s`, the time in which the car covers its length; and `road_overstep_m`, the largest distance of a side of
-      the car beyond the edge of the road, if the width of the road is known (below 0: the smallest distance from it).
+    - A path without gates: `lap_time_s`, the time in which the car covers its length; and `road_overstep_m`, the
+      largest distance of a side of the car beyond the edge of the road, if the width of the road is known (below 0: the
+      smallest distance from it).
     - Slalom: `track_amplitude_m` (half the distance between the leftmost and the rightmost place of the front axle
       centre between first and last cone), `cone_distance_mean_m`, and `cones_missed` (cones that the car does not reach
       or passes on another side than the path does).
