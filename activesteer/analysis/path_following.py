@@ -24,10 +24,6 @@ AFTER_S: Final = 3.0
 LONGEST_LAG_S: Final = 0.6
 _LAP_STEP_S: Final = 0.01
 """Interval at which the car's place along a path is looked for [s]."""
-_LAP_WINDOW_M: Final = 5.0
-"""Distance to either side of the last place in which it is looked for [m]."""
-"""Longest lag [s]: a quarter of the period of a slalom of 36 m at 100 km/h."""
-
 SIGNALS: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("roll", "rad"))
 """Channels that are evaluated: name and unit suffix."""
 OSCILLATING: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("steering_wheel", "rad"))
@@ -200,15 +196,10 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
 
 def _lap(recording: RecordingLike, course: Course) -> dict[str, float]:
     """Return the time to the end of a path, and the largest overstep of its edges; nan for a path without its end."""
-    from activesteer.road.path_search import PathSearch  # noqa: PLC0415 - compiled code, which few runs need
-
     every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
     x, y, time_s = (np.asarray(values)[::every] for values in (*track.front_axle(recording), recording.time_s))
-    search, length_m = PathSearch(course.path), course.path.length_m
-    along = np.empty(len(x))
-    place = 0.0
-    for index, (px, py) in enumerate(zip(x.tolist(), y.tolist(), strict=True)):
-        along[index] = place = search.nearest(px, py, place, _LAP_WINDOW_M)
+    along, beside = track.places_along(x, y, course.path)
+    length_m = course.path.length_m
     end_m = length_m + along[0]  # the front axle starts ahead of the path's beginning
     ended = np.flatnonzero(along >= end_m)
     values = {"lap_time_s": math.nan}
@@ -216,10 +207,8 @@ def _lap(recording: RecordingLike, course: Course) -> dict[str, float]:
         end = slice(ended[0] - 1, ended[0] + 1)
         values["lap_time_s"] = float(np.interp(end_m, along[end], time_s[end]))
     if course.width_m is not None:
-        path_x, path_y = search.at(along)
-        beside = np.hypot(x - path_x, y - path_y)
         room = 0.5 * np.interp(along, course.path.s_m, course.width_m) - 0.5 * read_footprint(recording).width_m
-        values["road_overstep_m"] = float((beside - room).max())
+        values["road_overstep_m"] = float((np.abs(beside) - room).max())
     return values
 
 

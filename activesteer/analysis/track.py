@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
+from activesteer.road.path import Path
+
+_NEAR: Final = 10
+"""Points of a path to either side of the last place in which a car is looked for: 5 m."""
 
 
 def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
@@ -71,6 +76,27 @@ def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -
     begin = min(nearest, len(path_x_m) - 2)
     along = math.atan2(path_y_m[begin + 1] - path_y_m[begin], path_x_m[begin + 1] - path_x_m[begin])
     return math.remainder(float(recording["yaw_rad"][-1]) - along, 2.0 * math.pi)
+
+
+def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
+    """Return distance along a path and distance to its left [m] of a car that follows it; the path may cross itself.
+
+    Args:
+        x_m: World x of the car, from the start of the path on [m], shape (n,).
+        y_m: World y of the car [m], shape (n,).
+        path: The path.
+    """
+    along, beside = np.empty(len(x_m)), np.empty(len(x_m))
+    at = 0
+    for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):
+        low = max(at - _NEAR, 0)
+        dx, dy = x - path.x_m[low : at + _NEAR + 1], y - path.y_m[low : at + _NEAR + 1]
+        nearest = int(np.argmin(dx**2 + dy**2))
+        at = low + nearest
+        cos, sin = math.cos(path.heading_rad[at]), math.sin(path.heading_rad[at])
+        along[row] = path.s_m[at] + dx[nearest] * cos + dy[nearest] * sin
+        beside[row] = dy[nearest] * cos - dx[nearest] * sin
+    return along, beside
 
 
 def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
