@@ -12,6 +12,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable
+from itertools import accumulate
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Protocol, TypeAlias, TypeVar, cast, get_type_hints
 
 from activesteer.conventions import CORNERS
@@ -134,6 +135,24 @@ def message_of(kind: type[_Message], row: Iterable[float]) -> _Message:
         else:
             fields.append(tuple(next(numbers) for _ in range(width)) or None)
     return new_message(kind, fields)
+
+
+def arrays_of(kind: type[_Message], rows: Any) -> _Message:
+    """Return a message whose fields are arrays, from rows of its numbers; a field without numbers is None.
+
+    Args:
+        kind: Class of the message.
+        rows: Shape (n, numbers).
+
+    Returns:
+        The message; a field has shape (n,), or (n, 4) for the wheels.
+    """
+    ends = accumulate(widths_of(kind))
+    parts = [
+        None if not width else rows[:, end - 1] if width == 1 else rows[:, end - width : end]
+        for end, width in zip(ends, widths_of(kind), strict=True)
+    ]
+    return new_message(kind, parts)
 
 
 class WheelTorques(NamedTuple):

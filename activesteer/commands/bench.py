@@ -25,6 +25,10 @@ def add_to(commands: Any) -> None:
         help="drive the paper's scenarios instead and compare their key metrics with the stored baseline; "
         "exit with 1 if one has drifted",
     )  # fmt: skip
+    what.add_argument(
+        "--batch", action="store_true",
+        help="measure many cars in one native call instead: car-steps per second, processor time, memory",
+    )  # fmt: skip
     parser.add_argument("--renew", action="store_true", help="with --maneuvers: store the metrics as the new baseline")
     add_output(parser, "SUMMARY.md", "with --maneuvers: write a summary in Markdown")
     add_json(parser)
@@ -44,9 +48,17 @@ def _bench(options: argparse.Namespace) -> int:
         raise ParameterError("has no effect with --maneuvers: each is driven once", key="--rounds")
     if options.maneuvers:
         return _maneuvers(options)
-    results = (bench_tyre if options.tyre else bench)(options.rounds or 5)
+    if options.batch:
+        from activesteer.studies.batch_benchmark import bench_batch, table_of
+
+        results = bench_batch(options.rounds or 5)
+    else:
+        results = (bench_tyre if options.tyre else bench)(options.rounds or 5)
     if options.json:
         print_json(results)
+        return 0
+    if options.batch:
+        print(table_of(results))
         return 0
     for name, value in results.items():
         print(f"{name:28} {value:8.2f}")

@@ -6,13 +6,15 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Final, Self, TypeVar
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from activesteer.controllers import CONTROLLER, find_controller
+from activesteer.controllers.vectorised import Vectorised
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import DRIVER
 from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, shown
@@ -24,7 +26,7 @@ from activesteer.signals import (
     DriverCommand,
     Measurement,
     Motion,
-    new_message,
+    arrays_of,
     numbers_of,
     widths_of,
 )
@@ -51,7 +53,6 @@ _WHEEL, _FRONT = (
 _WHEEL_TORQUES: Final = [
     place for place, number in enumerate(numbers_of(ActuatorCommand)) if number.field == "wheel_torque_demand_Nm"
 ]
-_Message = TypeVar("_Message", bound=tuple[Any, ...])
 
 
 class Batch:
@@ -151,7 +152,7 @@ class Batch:
             self.loops.append(loop)
         self.failures = {}
         self._in_use = OneAtATime()
-        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
         self._native = NativeCars(self.loops)
         for car in range(len(self)):
             self._native.load(car)
@@ -294,13 +295,13 @@ class Batch:
     def _call(self, records: NDArray[Any]) -> None:
         """Drive all cars natively, divided among the threads by their steps."""
         done = np.cumsum(records["left"])
-        parts = self.threads if self._pool is not None and done[-1] >= _LEAST_STEPS else 1
+        parts = self.threads if done[-1] >= _LEAST_STEPS else 1
         ends = [*np.searchsorted(done, done[-1] * np.arange(1, parts) / parts).tolist(), len(records)]
         futures: list[Future[None]] = []
         for first, last in pairwise([0, *ends]):
             if last == len(records):
                 drive_cars(records, first, last, STEP_ADDRESS)
-            elif self._pool is not None:
+            else:
                 futures.append(self._pool.submit(drive_cars, records, first, last, STEP_ADDRESS))
         for future in futures:
             future.result()
@@ -349,6 +350,19 @@ class Batch:
             if self._behind[car]:
                 self._native.store(car)
                 self._behind[car] = False
+
+    def vectorised(self, controller: Any, interval_s: float | None = None) -> Vectorised:
+        """Make a controller of all cars, to call with `driver_command` and `measurement`.
+
+        Args:
+            controller: Name of a controller, or your own.
+            interval_s: Time between two calls [s]; by default a step.
+
+        Raises:
+            ControllerError: there is no such controller, or it cannot be made.
+        """
+        step_s = interval_s or self._timestep_s
+        return Vectorised(controller, [replace(loop.controller_setup, timestep_s=step_s) for loop in self.loops])
 
     def save_state(self, cars: ArrayLike | None = None) -> list[LoopState]:
         """Return the states of some cars, from which they continue bit-identically.
@@ -460,24 +474,6 @@ def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | 
     if len(overrides) != n:
         raise ParameterError(f"has {len(overrides)} entries; one for each of {n} cars is needed", key="overrides")
     return [dict(changes) for changes in overrides]
-
-
-def arrays_of(kind: type[_Message], rows: Array) -> _Message:
-    """Return a message whose fields are arrays, from rows of its numbers; a field without numbers is None.
-
-    Args:
-        kind: Class of the message.
-        rows: Shape (n, numbers).
-
-    Returns:
-        The message; a field has shape (n,), or (n, 4) for the wheels.
-    """
-    ends = np.cumsum(widths_of(kind)).tolist()
-    parts = [
-        None if not width else rows[:, end - 1] if width == 1 else rows[:, end - width : end]
-        for end, width in zip(ends, widths_of(kind), strict=True)
-    ]
-    return new_message(kind, parts)
 
 
 def _columns(kind: Kind, message: Any, n: int) -> Array:

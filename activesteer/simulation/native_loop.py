@@ -12,9 +12,10 @@ import numpy as np
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, call_at, compiled_call, inlined
-from activesteer.controllers.front_superposition import FrontSuperposition, front_superposition
-from activesteer.controllers.no_control import NoControl, no_control
-from activesteer.controllers.rear_steer import RearSteer, rear_steer
+from activesteer.controllers.front_superposition import front_superposition
+from activesteer.controllers.no_control import no_control
+from activesteer.controllers.rear_steer import rear_steer
+from activesteer.controllers.vectorised import LAWS
 from activesteer.driver.constant_radius import circle_angle, correct_circle
 from activesteer.driver.human import HumanDriver
 from activesteer.driver.open_loop import turned
@@ -30,8 +31,6 @@ ANGLE, CURVATURE, PATH = range(3)
 """Kinds of a setpoint: steering wheel angle, curvature, path."""
 GIVEN, HUMAN = range(2)
 """Kinds of drivers: the row of commands holds, or `HumanDriver` decides."""
-LAWS: Final[tuple[type[Any] | None, ...]] = (None, NoControl, RearSteer, FrontSuperposition)
-"""Kinds of controllers, of which `None` is a held row of commands."""
 _NONE, _ARS, _AFS = 1, 2, 3
 DONE, NEEDS_PYTHON, INSANE = range(3)
 """Reasons why a car has stopped: all its steps are made; the next step needs Python, which knows the driver's gains at
