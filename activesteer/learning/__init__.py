@@ -1,0 +1,33 @@
+"""Gymnasium environments on `Batch`; importing this package registers them.
+
+Example:
+    >>> import gymnasium
+    >>> import activesteer.learning
+    >>> env = gymnasium.make("activesteer/SineWithDwell-v0")
+    >>> observation, info = env.reset(seed=1)
+    >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+"""
+
+from __future__ import annotations
+
+from activesteer.errors import ParameterError, not_installed
+
+try:
+    import gymnasium
+except ImportError as reason:
+    raise not_installed(ParameterError, "activesteer.learning", "gymnasium", "gym") from reason
+
+from activesteer.learning.environments import CarEnv, CarVectorEnv, normalised
+from activesteer.learning.episodes import Episodes
+from activesteer.learning.tasks import TASKS, Task
+
+__all__ = ["TASKS", "CarEnv", "CarVectorEnv", "Episodes", "Task", "normalised"]
+
+for _name in TASKS:
+    if (_id := f"activesteer/{_name}-v0") not in gymnasium.registry:
+        gymnasium.register(
+            _id,
+            entry_point="activesteer.learning.environments:CarEnv",
+            vector_entry_point="activesteer.learning.environments:CarVectorEnv",
+            kwargs={"task": _name},
+        )

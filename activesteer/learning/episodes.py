@@ -1,0 +1,307 @@
+"""Episodes of some cars at once: actions in; observations, rewards and ends out. The core of all environments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any, Final, NamedTuple
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import Array
+from activesteer.errors import ParameterError, shown
+from activesteer.learning.tasks import ACTUATORS, HANDS, TASKS, Task, bounds, sampled_overrides
+from activesteer.road.path_search import PathSearch
+from activesteer.signals import ActuatorCommand, DriverCommand
+from activesteer.simulation.batch import Batch
+from activesteer.theory.single_track import SingleTrack, yaw_rate_gain
+
+_MEASURED: Final = (
+    ("speed_mps", -100.0, 100.0),
+    ("yaw_rate_radps", -5.0, 5.0),
+    ("ay_mps2", -30.0, 30.0),
+    ("ax_mps2", -30.0, 30.0),
+    ("steering_wheel_rad", -15.0, 15.0),
+    ("rear_steer_rad", -0.2, 0.2),
+    ("superposition_rad", -0.2, 0.2),
+)
+_SPEEDS: Final = tuple((f"{corner}_wheel_speed_radps", -400.0, 400.0) for corner in ("fl", "fr", "rl", "rr"))
+_DEMANDS: Final = (("front_steer_demand_rad", -1.5, 1.5), ("brake_pedal", 0.0, 1.0))
+_AHEAD_S: Final = (0.3, 0.6, 1.0, 1.5)
+_ROAD: Final = (
+    ("offset_m", -50.0, 50.0),
+    ("heading_error_rad", -math.pi, math.pi),
+    *((f"path_left_{ahead:g}s_m", -100.0, 100.0) for ahead in _AHEAD_S),
+)
+_WINDOW_M: Final = 5.0
+_SIDESLIP_RAD, _RATE_RADPS, _OFFSET_M = math.radians(5.0), math.radians(10.0), 1.0
+"""Errors that cost as much as each other."""
+_SLOW_MPS: Final = 2.0
+"""Below this speed there is no sideslip angle, and a drift has ended [m/s]."""
+_MOST_AY_MPS2: Final = 8.0
+"""Lateral acceleration up to which the desired yaw rate rises, as for the paper's controllers [m/s2]."""
+SENSORS: Final = ("ideal", "production")
+
+
+class Outcome(NamedTuple):
+    """Outcome of a step, for all cars.
+
+    Attributes:
+        observation: Shape (n, numbers), float32.
+        reward: Shape (n,).
+        terminated: Whether the car is lost, has left its course, or the simulation diverged, shape (n,).
+        truncated: Whether the manoeuvre is over, shape (n,).
+        terms: Term of the reward -> its part, shape (n,).
+        sideslip_rad: Shape (n,).
+        end: Reason of the end: "", "lost", "off course", "stopped", "diverged" or "time", shape (n,).
+    """
+
+    observation: NDArray[np.float32]
+    reward: Array
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    terms: dict[str, Array]
+    sideslip_rad: Array
+    end: NDArray[Any]
+
+
+class Episodes:
+    """Episodes of n independent cars.
+
+    The parts of the reward, each times its weight and the time between two decisions:
+
+        sideslip   -(beta / 5 deg)^2                     offset    -(distance from the path / 1 m)^2
+        yaw_rate   -((r - r_desired) / 10 deg/s)^2       braking   deceleration / g
+        effort     -mean square of the actions
+        drift      exp(-((beta - target) / 10 deg)^2)    circle    exp(-(distance from the circle / 3 m)^2)
+        lost       -1 once, without the time, if the episode ends by termination
+
+    Attributes:
+        task: The task.
+        batch: The cars: `cars` of each episode, of which one drives.
+        actions: Name, lower bound and scale of each number of an action: the command is the action times the scale.
+        observations: Name and bounds of each number of an observation.
+        action_space: Space of an action.
+        observation_space: Space of an observation.
+    """
+
+    def __init__(
+        self,
+        task: str | Task,
+        n: int,
+        *,
+        vehicle: Any = "compact",
+        actuators: Sequence[str] | None = None,
+        driver: str | None = None,
+        sensors: str = "ideal",
+        cars: int = 1,
+        cars_seed: int = 0,
+        interval_s: float = 0.01,
+        overrides: Mapping[str, Any] | None = None,
+        threads: int | None = None,
+    ) -> None:
+        """Build the cars.
+
+        Args:
+            task: Name of a task, or your own.
+            n: Number of episodes at a time.
+            vehicle: Name, path, or table of a vehicle.
+            actuators: Actuators that the agent commands: `rear`, `front`, `brakes`; by default those of the task.
+            driver: `driver` or `agent`: who drives; by default as in the task.
+            sensors: `ideal` or `production`.
+            cars: 1 for the nominal car; more for so many cars, roads and drivers from the ranges of the package's
+                population, of which each episode draws one.
+            cars_seed: Seed of these cars.
+            interval_s: Time between two decisions [s].
+            overrides: Dotted key -> value, for all cars.
+            threads: Number of threads; by default as many as there are processors.
+
+        Raises:
+            ActiveSteerError: an input is wrong.
+        """
+        self.task = task = _task(task)
+        used = tuple(task.actuators if actuators is None else actuators)
+        self._agent_drives = _one_of("driver", driver or task.driver, ("driver", "agent")) == "agent"
+        for name in used:
+            _one_of("actuators", name, tuple(ACTUATORS))
+        _one_of("sensors", sensors, SENSORS)
+        self.actions = (*(HANDS if self._agent_drives else ()), *(part for name in used for part in ACTUATORS[name]))
+        if not self.actions:
+            raise ParameterError("the agent commands nothing; give actuators, or driver = 'agent'", key="actuators")
+        common = {**task.overrides, **(overrides or {})}
+        if sensors != "ideal":
+            common["sensors.preset"] = sensors
+        if isinstance(cars, bool) or not isinstance(cars, int) or cars < 1:
+            raise ParameterError(f"is {shown(cars)}; at least 1 is needed", key="cars", value=cars)
+        drawn = [{}] if cars == 1 else sampled_overrides(task, vehicle, cars, cars_seed)
+        each = [{**one, **common} for one in drawn] * n
+        self.batch = Batch(task.maneuver, n * cars, "none", vehicle, each, threads=threads)
+        self._n, self._cars = n, cars
+        self._active = np.arange(n) * cars
+        self.interval_s = interval_s
+        self._every = round(interval_s / self.batch.loops[0].vehicle.timestep_s)
+        if self._every < 1 or abs(self._every * self.batch.loops[0].vehicle.timestep_s - interval_s) > 1e-9:
+            raise ParameterError(f"is {shown(interval_s)} s; a whole number of steps is needed", key="interval_s")
+        self._low = np.array([low for _, low, _ in self.actions])
+        paths = [loop.maneuver.setpoint(0.0).path for loop in self.batch.loops]
+        self._lines = [None if path is None else PathSearch(path) for path in paths]
+        self._on_road = task.radius_m > 0.0 or self._lines[0] is not None
+        road = _ROAD if self._on_road and self._agent_drives else ()
+        self.observations = (*_MEASURED, *_SPEEDS, *_DEMANDS, *road)
+        self._bounds = bounds(self.observations)
+        ones = np.ones(len(self.actions), np.float32)
+        self.action_space = gymnasium.spaces.Box(self._low.astype(np.float32), ones)
+        self.observation_space = gymnasium.spaces.Box(*self._bounds)
+        tracks = [SingleTrack(loop.controller_setup.single_track) for loop in self.batch.loops]
+        self._model: Any = SimpleNamespace(
+            characteristic_speed_mps=np.array([track.characteristic_speed_mps for track in tracks]),
+            wheelbase_m=np.array([track.wheelbase_m for track in tracks]),
+        )
+        self._along_m = np.zeros(n * cars)
+        self._started = np.zeros(n, dtype=bool)
+
+    def reset(self, episodes: Sequence[int], generators: Sequence[np.random.Generator]) -> NDArray[np.float32]:
+        """Start some episodes anew, each with a car that its generator draws; return the observations of all.
+
+        Args:
+            episodes: Numbers of the episodes.
+            generators: A generator for each of these episodes.
+        """
+        for episode, generator in zip(episodes, generators, strict=True):
+            car = int(generator.integers(self._cars))
+            self._active[episode] = episode * self._cars + car
+        cars = self._active[list(episodes)]
+        self.batch.reset(cars)
+        self._along_m[cars] = 0.0
+        self._started[list(episodes)] = True
+        return self._observe(self._tracked())
+
+    @property
+    def active(self) -> NDArray[np.intp]:
+        """Number of the car, of those that an episode has, that drives in each episode."""
+        return self._active % self._cars
+
+    def loop(self, episode: int) -> Any:
+        """Return the closed loop of the car that drives in an episode, up to date."""
+        car = int(self._active[episode])
+        self.batch.sync([car])
+        return self.batch.loops[car]
+
+    def step(self, actions: NDArray[Any], episodes: Sequence[int] | NDArray[Any] | None = None) -> Outcome:
+        """Carry out the actions until the next decision.
+
+        Args:
+            actions: Shape (n, numbers); an action beyond its bounds is limited to them.
+            episodes: Mask of the episodes that go on; by default all. The others stand still.
+
+        Raises:
+            ParameterError: an action is not finite, or an episode has not been reset.
+        """
+        chosen = np.ones(self._n, dtype=bool) if episodes is None else np.asarray(episodes, dtype=bool)
+        given = np.asarray(actions, dtype=np.float64).reshape(self._n, len(self.actions))
+        if not np.isfinite(given[chosen]).all():
+            raise ParameterError(f"is {shown(actions)}; finite numbers are needed", key="action")
+        if not self._started[chosen].all():
+            raise ParameterError("reset the environment before its first step", key="step")
+        given = np.clip(np.where(chosen[:, np.newaxis], given, 0.0), self._low, 1.0)
+        self._drive(given, chosen)
+        tracked = self._tracked()
+        terms, sideslip = self._terms(given, tracked)
+        end = np.full(self._n, "", dtype=object)
+        end[self.batch.step_count[self._active] >= self.batch.steps[self._active]] = "time"
+        if self._on_road:
+            end[np.abs(tracked[0]) > self.task.most_offset_m] = "off course"
+        end[np.abs(sideslip) > self.task.most_sideslip_rad] = "lost"
+        if self.task.radius_m:
+            end[self.batch.motion.speed_mps[self._active] < _SLOW_MPS] = "stopped"
+        end[[car in self.batch.failures for car in self._active.tolist()]] = "diverged"
+        terminated = ~np.isin(end, ("", "time"))
+        terms["lost"] = -self.task.weights.get("lost", 0.0) * terminated.astype(np.float64)
+        reward = np.nan_to_num(sum(terms.values(), np.zeros(self._n)), nan=-self.task.weights.get("lost", 0.0))
+        observation = self._observe(tracked)
+        return Outcome(observation, reward, terminated, end == "time", terms, sideslip, end)
+
+    def _drive(self, actions: Array, chosen: NDArray[np.bool_]) -> None:
+        columns: dict[str, Any] = {}
+        for place, (name, _, scale) in enumerate(self.actions):
+            column = columns[name] = np.zeros(len(self.batch))
+            column[self._active] = scale * actions[:, place]
+        brakes = [columns.pop(name) for name, _, _ in ACTUATORS["brakes"] if name in columns]
+        if brakes:
+            columns["brake_torque_demand_Nm"] = np.column_stack(brakes)
+        hands = {name: columns.pop(name) for name, _, _ in HANDS if name in columns}
+        driver = DriverCommand(**hands) if self._agent_drives else None
+        self.batch.advance(self._every, driver, ActuatorCommand(**columns), self._active[chosen])
+
+    def _tracked(self) -> tuple[Array, Array, Array]:
+        """Return distance to the left of the path [m], heading relative to it [rad], and points ahead [m], (n, k)."""
+        offset, error, ahead = np.zeros(self._n), np.zeros(self._n), np.zeros((self._n, len(_AHEAD_S)))
+        if not self._on_road:
+            return offset, error, ahead
+        motion = self.batch.motion
+        for episode, car in enumerate(self._active.tolist()):
+            x, y, yaw = float(motion.x_m[car]), float(motion.y_m[car]), float(motion.yaw_rad[car])
+            if not math.isfinite(x + y + yaw):
+                continue
+            distances = np.array([0.0, 0.1, *(float(motion.speed_mps[car]) * after for after in _AHEAD_S)])
+            if radius := self.task.radius_m:
+                around = math.atan2(x, radius - y)
+                px, py = (
+                    radius * np.sin(around + distances / radius),
+                    radius - radius * np.cos(around + distances / radius),
+                )
+            else:
+                search = self._lines[car]
+                assert search is not None  # the task has a path
+                along = self._along_m[car] = search.nearest(x, y, float(self._along_m[car]), _WINDOW_M)
+                px, py = search.at(along + distances)
+            heading = math.atan2(py[1] - py[0], px[1] - px[0])
+            offset[episode] = math.cos(heading) * (y - py[0]) - math.sin(heading) * (x - px[0])
+            error[episode] = math.remainder(yaw - heading, math.tau)
+            ahead[episode] = math.cos(yaw) * (py[2:] - y) - math.sin(yaw) * (px[2:] - x)
+        return offset, error, ahead
+
+    def _observe(self, tracked: tuple[Array, Array, Array]) -> NDArray[np.float32]:
+        measured, driver, cars = self.batch.measurement, self.batch.driver_command, self._active
+        columns = [getattr(measured, name)[cars] for name, _, _ in _MEASURED]
+        columns += [*measured.wheel_speed_radps[cars].T, *(getattr(driver, name)[cars] for name, _, _ in _DEMANDS)]
+        if len(self.observations) > len(columns):
+            columns += [tracked[0], tracked[1], *tracked[2].T]
+        return np.clip(np.nan_to_num(np.column_stack(columns)).astype(np.float32), *self._bounds)
+
+    def _terms(self, actions: Array, tracked: tuple[Array, Array, Array]) -> tuple[dict[str, Array], Array]:
+        cars, motion, measured = self._active, self.batch.motion, self.batch.measurement
+        speed, rate = motion.speed_mps[cars], motion.yaw_rate_radps[cars]
+        rolls = np.hypot(speed, motion.lateral_speed_mps[cars]) > _SLOW_MPS
+        sideslip = np.where(rolls, np.arctan2(motion.lateral_speed_mps[cars], speed), 0.0)
+        model: Any = SimpleNamespace(**{name: value[cars] for name, value in vars(self._model).items()})
+        most = _MOST_AY_MPS2 / np.maximum(speed, 3.0)
+        front_rad = self.batch.driver_command.front_steer_demand_rad[cars]
+        desired = np.clip(yaw_rate_gain(model, speed) * front_rad, -most, most)
+        task = self.task
+        found = {
+            "sideslip": -((sideslip / _SIDESLIP_RAD) ** 2),
+            "yaw_rate": -(((rate - desired) / _RATE_RADPS) ** 2),
+            "offset": -((tracked[0] / _OFFSET_M) ** 2),
+            "braking": -measured.ax_mps2[cars] / 9.81,
+            "effort": -np.mean(actions**2, axis=1),
+            "drift": np.exp(-(((sideslip - task.sideslip_rad) / math.radians(10.0)) ** 2)),
+            "circle": np.exp(-((tracked[0] / 3.0) ** 2)),
+        }
+        weights = {name: weight for name, weight in task.weights.items() if name in found}
+        return {name: weight * self.interval_s * found[name] for name, weight in weights.items()}, sideslip
+
+
+def _task(task: str | Task) -> Task:
+    if isinstance(task, Task):
+        return task
+    return TASKS[_one_of("task", task, tuple(TASKS))]
+
+
+def _one_of(key: str, value: Any, allowed: tuple[str, ...]) -> Any:
+    if value not in allowed:
+        raise ParameterError(f"is {shown(value)}; one of {', '.join(allowed)} is needed", key=key, value=value)
+    return value

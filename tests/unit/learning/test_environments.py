@@ -1,0 +1,118 @@
+"""Gymnasium environments: valid, repeatable, and many at once equal to one by one."""
+
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from activesteer.errors import ParameterError
+from activesteer.learning import TASKS, CarEnv, CarVectorEnv, normalised
+
+SHORT = {"overrides": {"duration_s": 0.8}, "interval_s": 0.1}
+"""Episodes of eight steps, so that some end while others go on."""
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_each_environment_passes_the_checks_without_a_warning(name: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make(f"activesteer/{name}-v0").unwrapped, skip_render_check=True)
+
+
+def test_an_episode_repeats_to_the_last_bit_with_its_seed() -> None:
+    env = CarEnv("SineWithDwell", actuators=("rear", "brakes"), sensors="production", cars=3)
+    runs = []
+    for _ in range(2):
+        first, info = env.reset(seed=5)
+        env.action_space.seed(5)
+        runs.append([(info["car"], first), *(env.step(env.action_space.sample())[:2] for _ in range(60))])
+    for (one, seen), (other, again) in zip(*runs, strict=True):
+        assert np.array_equal(one, other)
+        assert np.array_equal(seen, again)
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_many_at_once_equal_one_by_one(mode: AutoresetMode) -> None:
+    options: dict[str, Any] = {**SHORT, "cars": 2}
+    makers = [lambda: CarEnv("SplitMuBraking", **options)] * 3
+    alone, together = (
+        SyncVectorEnv(makers, autoreset_mode=mode),
+        CarVectorEnv("SplitMuBraking", 3, mode, threads=2, **options),
+    )
+    assert together.metadata["autoreset_mode"] == mode
+    rng = np.random.default_rng(1)
+    pair = [env.reset(seed=3) for env in (alone, together)]
+    same(pair[0], pair[1])
+    done = np.zeros(3, dtype=bool)
+    for number in range(20):
+        if mode == AutoresetMode.DISABLED and done.any():
+            same(*(env.reset(options={"reset_mask": done.copy()}) for env in (alone, together)))
+        elif number == 2:
+            mask = np.array([False, True, False])
+            same(*(env.reset(options={"reset_mask": mask.copy()}) for env in (alone, together)))
+        actions = rng.uniform(-1.0, 1.0, (3, 1)).astype(np.float32)
+        results = [env.step(actions) for env in (alone, together)]
+        same(*results)
+        done = results[0][2] | results[0][3]
+
+
+def same(one: Any, other: Any) -> None:
+    """Assert that two results of environments are equal, with their infos."""
+    if isinstance(one, dict):
+        assert one.keys() == other.keys()
+        for key in one:
+            same(one[key], other[key])
+    elif isinstance(one, tuple) or (isinstance(one, np.ndarray) and one.dtype == object):
+        for left, right in zip(one, other, strict=True):
+            same(left, right)
+    else:
+        assert np.array_equal(one, other), (one, other)
+
+
+def test_the_registered_name_makes_many_at_once() -> None:
+    env = gymnasium.make_vec("activesteer/Slalom-v0", 2, vectorization_mode="vector_entry_point", interval_s=0.05)
+    assert isinstance(env.unwrapped, CarVectorEnv)
+    env.reset(seed=1)
+    shape = env.unwrapped.single_observation_space.shape
+    assert env.step(np.zeros((2, 1), np.float32))[0].shape == (2, *(shape or ()))
+
+
+def test_the_reward_is_the_sum_of_its_terms_and_ends_have_reasons() -> None:
+    env = CarEnv("Drift")
+    env.reset(seed=1)
+    for _ in range(600):
+        _, reward, terminated, _, info = env.step(np.array([0.5, 1.0, 0.0], np.float32))
+        assert reward == pytest.approx(sum(info["reward_terms"].values()))
+        if terminated:
+            break
+    else:
+        pytest.fail("the episode has no end")
+    assert info["end"] in ("lost", "off course", "stopped")
+
+
+def test_observations_are_normalised_on_request() -> None:
+    env = normalised(CarEnv("SineWithDwell"))
+    first, _ = env.reset(seed=1)
+    assert env.observation_space.contains(first)
+    assert first[0] == pytest.approx(80.0 / 3.6 / 100.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"task": "Parking"}, "SineWithDwell"),
+        ({"actuators": ("wings",)}, "rear, front, brakes"),
+        ({"actuators": ()}, "commands nothing"),
+        ({"sensors": "good"}, "ideal, production"),
+        ({"cars": 0}, "at least 1"),
+        ({"interval_s": 0.0015}, "whole number"),
+        ({"render_mode": "ascii"}, "rgb_array"),
+    ],
+)
+def test_wrong_options_are_refused(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        CarEnv(**options)
