@@ -49,19 +49,24 @@ def _bench(options: argparse.Namespace) -> int:
     if options.maneuvers:
         return _maneuvers(options)
     if options.batch:
-        from activesteer.studies.batch_benchmark import bench_batch, table_of
-
-        results = bench_batch(options.rounds or 5)
-    else:
-        results = (bench_tyre if options.tyre else bench)(options.rounds or 5)
+        return _batch(options)
+    results = (bench_tyre if options.tyre else bench)(options.rounds or 5)
     if options.json:
         print_json(results)
         return 0
-    if options.batch:
-        print(table_of(results))
-        return 0
     for name, value in results.items():
         print(f"{name:28} {value:8.2f}")
+    return 0
+
+
+def _batch(options: argparse.Namespace) -> int:
+    from activesteer.studies.batch_benchmark import bench_batch, table_of
+
+    results = bench_batch(options.rounds or 5)
+    if options.json:
+        print_json(results)
+    else:
+        print(table_of(results))
     return 0
 
 
