@@ -113,11 +113,10 @@ class Cars:
             gain = motion.speed_mps / 2.6 / (1.0 + (motion.speed_mps / 25.0) ** 2)
             most = 8.0 / np.maximum(motion.speed_mps, 3.0)
             wanted = np.clip(gain * front, -most, most)
-            error = np.nan_to_num(measured.yaw_rate_radps - wanted, nan=3.0)
+            error = np.nan_to_num(measured.yaw_rate_radps - wanted, nan=1.0)
             rear = np.nan_to_num(batch.actuator_command.rear_steer_demand_rad)
-            cost += INTERVAL_S * (
-                (sideslip / 0.05) ** 2 + (error / 0.2) ** 2 + 0.02 * (rear / LIMIT_RAD) ** 2 + 10.0 * lost
-            )
+            slid, missed = np.minimum(sideslip, 0.6) / 0.1, np.clip(error, -1.0, 1.0) / 0.2
+            cost += INTERVAL_S * (slid**2 + missed**2 + 0.02 * (rear / LIMIT_RAD) ** 2 + 10.0 * lost)
             peak = np.maximum(peak, sideslip)
             harm = harm + INTERVAL_S * np.abs(error)
         return {"cost": cost, "peak_rad": peak, "lost": lost, "yaw_error_rad": harm}
@@ -151,7 +150,7 @@ def train(minutes: float, seed: int, path: str) -> None:
             print(f"{passed:5.0f} s  round {round_:3d}  cost {cost:7.3f}", flush=True)
         directions = rng.standard_normal((DIRECTIONS, len(weights)))
         tried = np.repeat(np.concatenate([weights + NOISE * directions, weights - NOISE * directions]), CARS, axis=0)
-        costs = sum(np.minimum(fleet.drive(tried)["cost"], 60.0) for fleet in fleets)
+        costs = sum(fleet.drive(tried)["cost"] for fleet in fleets)
         plus, minus = np.asarray(costs).reshape(2, DIRECTIONS, CARS).mean(axis=2)
         chosen = np.argsort(np.minimum(plus, minus))[:BEST]
         spread = np.std(np.concatenate([plus[chosen], minus[chosen]])) + 1e-9
