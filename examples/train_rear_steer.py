@@ -21,11 +21,13 @@ import numpy as np
 from activesteer import ActuatorCommand, Batch
 from activesteer.learning.tasks import TASKS, sampled_overrides  # with the extra [gym]
 
-MANEUVERS = "sine_with_dwell", "double_lane_change"
+MANEUVERS = {"sine_with_dwell": 4.5, "double_lane_change": 7.5}
+"""Manoeuvre -> time after which nothing happens any more [s]."""
 INTERVAL, INTERVAL_S = 10, 0.01
 LIMIT_RAD = math.radians(3.0)
-END_S = 8.0
-DIRECTIONS, BEST, STEP, NOISE, CARS = 8, 4, 0.06, 0.08, 2
+LOST_COST = 60.0
+"""Cost of each second after a car has been lost."""
+DIRECTIONS, BEST, STEP, NOISE, CARS = 8, 4, 0.1, 0.1, 2
 TRAINING, EVALUATION, FINAL = 1, 1001, 2001
 """Seeds of the cars: the last set is used neither for training nor for selection."""
 
@@ -84,9 +86,7 @@ class Cars:
     def __init__(self, maneuver: str, overrides: list[dict[str, Any]], controller: str = "none") -> None:
         """Build the cars, and keep their start."""
         self.batch = Batch(maneuver, len(overrides), controller, overrides=overrides)
-        self._given = controller == "none"
-        path = self.batch.loops[0].maneuver.setpoint(0.0).path
-        self._on_path = path is not None
+        self._end_s = MANEUVERS[maneuver]
 
     def drive(self, weights: Any = None) -> dict[str, Any]:
         """Drive once, and return cost and results of each car.
@@ -97,18 +97,17 @@ class Cars:
         batch, count = self.batch, len(self.batch)
         batch.reset()
         memory = SimpleNamespace(front_rad=np.zeros(count), sideslip_rad=np.zeros(count))
-        cost, peak, harm, measured = np.zeros(count), np.zeros(count), np.zeros(count), batch.measurement
+        cost, peak, measured = np.zeros(count), np.zeros(count), batch.measurement
         lost = np.zeros(count, dtype=bool)
-        while not (batch.done | (batch.time_s > END_S)).all():
+        while (going := ~(batch.done | lost | (batch.time_s > self._end_s))).any():
             command = None
             if weights is not None:
                 rear = angle(weights, features(batch.driver_command.front_steer_demand_rad, measured, memory))
                 command = ActuatorCommand(rear_steer_demand_rad=rear)
-            measured = batch.advance(INTERVAL, actuator_command=command)
+            measured = batch.advance(INTERVAL, actuator_command=command, cars=going)
             motion = batch.motion
             sideslip = np.abs(np.arctan2(motion.lateral_speed_mps, np.maximum(motion.speed_mps, 1.0)))
             sideslip = np.where(np.isfinite(sideslip), sideslip, 1.5)
-            lost |= sideslip > 0.5
             front = batch.driver_command.front_steer_demand_rad
             gain = motion.speed_mps / 2.6 / (1.0 + (motion.speed_mps / 25.0) ** 2)
             most = 8.0 / np.maximum(motion.speed_mps, 3.0)
@@ -116,10 +115,12 @@ class Cars:
             error = np.nan_to_num(measured.yaw_rate_radps - wanted, nan=1.0)
             rear = np.nan_to_num(batch.actuator_command.rear_steer_demand_rad)
             slid, missed = np.minimum(sideslip, 0.6) / 0.1, np.clip(error, -1.0, 1.0) / 0.2
-            cost += INTERVAL_S * (slid**2 + missed**2 + 0.02 * (rear / LIMIT_RAD) ** 2 + 10.0 * lost)
+            cost += going * INTERVAL_S * (slid**2 + missed**2 + 0.02 * (rear / LIMIT_RAD) ** 2)
+            now_lost = going & (sideslip > 0.5)
+            cost += now_lost * LOST_COST * (self._end_s - batch.time_s)
+            lost |= now_lost
             peak = np.maximum(peak, sideslip)
-            harm = harm + INTERVAL_S * np.abs(error)
-        return {"cost": cost, "peak_rad": peak, "lost": lost, "yaw_error_rad": harm}
+        return {"cost": cost, "peak_rad": peak, "lost": lost}
 
 
 def cars_of(maneuver: str, count: int, seed: int) -> list[dict[str, Any]]:
