@@ -34,6 +34,20 @@ def add_to(commands: Any) -> None:
         "--isolate", type=float, nargs="?", const=5.0, metavar="SECONDS",
         help="run each FMU in a process of its own, in which it may crash, or hang for this time (default: 5 s)",
     )  # fmt: skip
+    run.add_argument(
+        "--realtime", type=float, nargs="?", const=1.0, default=False, metavar="FACTOR",
+        help="pace the steps to the clock; 2 is twice as fast (default: 1)",
+    )  # fmt: skip
+    run.add_argument(
+        "--udp", metavar="[HOST:]PORT", help="take commands of another process, on this machine by default"
+    )
+    run.add_argument(
+        "--udp-timeout", type=float, default=0.1, metavar="SECONDS", help="time without a command (default: 0.1)"
+    )
+    run.add_argument(
+        "--udp-reaction", choices=("release", "hold", "stop"), default="release",
+        help="what follows: the run's own driver and controller, the last command, or the end (default: release)",
+    )  # fmt: skip
     run.add_argument("--plot", action="store_true", help="also draw the runs: PNG and PDF")
     add_json(run)
     run.set_defaults(action=_run)
@@ -79,7 +93,7 @@ def _run(options: argparse.Namespace) -> int:
     for controller, path in driving:
         if (label := controller.label) not in failures:
             with failures.caught(label, alone=alone):
-                recordings[label] = _driven(scenario, controller, path, quiet=options.json)
+                recordings[label] = _driven(scenario, controller, path, options)
     if options.json:
         runs = [
             {"controller": controller.name, "file": str(path) if path.is_file() else None}
@@ -97,18 +111,34 @@ def _run(options: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
-def _driven(scenario: Any, controller: Plugin, path: Path, *, quiet: bool) -> Any:
+def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Namespace) -> Any:
     """Drive and record one controller, and return the recording."""
+    from activesteer.coupling.udp import UdpPort
     from activesteer.simulation.runner import run_scenario
 
-    name = f"{scenario.maneuver.name} {controller.label}"
+    name, quiet = f"{scenario.maneuver.name} {controller.label}", options.json
+    udp = None if options.udp is None else UdpPort.read(options.udp, options.udp_timeout, options.udp_reaction)
     with ProgressBar(name, quiet=quiet) as progress:
-        recording = run_scenario(scenario, controller, path=path, progress=progress)
+        recording = run_scenario(
+            scenario, controller, path=path, progress=progress, realtime=options.realtime, udp=udp
+        )  # fmt: skip
     if not quiet:
+        for words in _clock_words(recording.metadata):
+            print(f"{name}: {words}", file=sys.stderr)
         print(f"{name}: {path}", file=sys.stderr)
     if problem := recording.metadata.get("metrics_error"):
         print(f"{name}: no metrics: {problem}", file=sys.stderr)
     return recording
+
+
+def _clock_words(metadata: Mapping[str, Any]) -> Iterator[str]:
+    """Describe pace and messages of a run by the clock."""
+    if (paced := metadata.get("realtime")) is not None:
+        late = ", ".join(f"{word} {1e3 * paced[f'jitter_{word}_s']:.3g} ms" for word in ("p50", "p99", "max"))
+        share = f"{100.0 * paced['late_share']:.3g} % later than 0.2 ms"
+        yield f"{paced['missed_deadlines']} of {paced['steps']} deadlines missed; steps begin late by {late}; {share}"
+    if (told := metadata.get("udp")) is not None:
+        yield "UDP messages: " + ", ".join(f"{number} {word}" for word, number in told.items())
 
 
 def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.coupling.udp import UdpPort
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
@@ -62,6 +63,8 @@ def run_scenario(
     path: Path | None = None,
     timestep_s: float = DEFAULT_TIMESTEP_S,
     progress: Callable[[float], None] | None = None,
+    realtime: bool | float = False,
+    udp: UdpPort | int | None = None,
 ) -> Recording:
     """Run a scenario; if a path is given, write the recording during the run.
 
@@ -71,6 +74,8 @@ def run_scenario(
         path: MCAP file to write.
         timestep_s: Step of the simulation [s].
         progress: Function that is called about every simulated second with the completed fraction, 0 to 1.
+        realtime: Whether to pace the steps to the clock, and how fast; see `Simulation`.
+        udp: Port on which another process gives commands; see `Simulation`.
 
     Returns:
         The recording, with metrics. A run that cannot be evaluated, for example because it is too short, has no
@@ -80,7 +85,8 @@ def run_scenario(
     Raises:
         ActiveSteerError: the run failed. The rows recorded until then are in the file, and in the error's `recording`.
     """
-    return _driven(Simulation(scenario, controller, timestep_s=timestep_s), path, progress)
+    simulation = Simulation(scenario, controller, timestep_s=timestep_s, realtime=realtime, udp=udp)
+    return _driven(simulation, path, progress)
 
 
 def _driven(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import json
+import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
@@ -16,6 +18,7 @@ from activesteer.analysis.metrics import metrics
 from activesteer.config import Source, build
 from activesteer.controllers import CONTROLLER, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.coupling.udp import UdpLink, UdpPort
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
 from activesteer.faults import Fault, fault_table
@@ -26,9 +29,10 @@ from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
+from activesteer.simulation.pacing import Pacer
 from activesteer.simulation.pickling import pickled, unpickled
 from activesteer.simulation.preparation import prepared
-from activesteer.simulation.recorder import RecordedRows, Recorder
+from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder
 from activesteer.simulation.run_context import RunContext
 
 MAX_KEPT_VALUES: Final = 2**25
@@ -87,6 +91,8 @@ class Simulation:
         *,
         driver: Any = DEFAULT_DRIVER,
         timestep_s: float = DEFAULT_TIMESTEP_S,
+        realtime: bool | float = False,
+        udp: UdpPort | int | None = None,
     ) -> None:
         """Build the car and let it settle, with the arguments of `simulate`.
 
@@ -97,6 +103,8 @@ class Simulation:
             overrides: Dotted key -> value.
             driver: Name, path or table of a driver, or your own code.
             timestep_s: Step of engine, driver and controller [s].
+            realtime: Whether each step begins at its instant by the clock; a number is the pace, 2 for twice as fast.
+            udp: Port on which another process gives commands; a number is a port of this machine.
 
         Raises:
             ActiveSteerError: an input is wrong, or the car does not settle.
@@ -114,12 +122,36 @@ class Simulation:
         self.context = RunContext.of(self.scenario, self.loop.vehicle, controller)
         self._given: dict[str, int] = {}
         self.events: tuple[Event, ...] = ()
+        self._pacer = None if realtime is False else Pacer(float(realtime), timestep_s)
+        self._link = None if udp is None else self._linked(UdpPort(udp) if isinstance(udp, int) else udp)
         self._failure: BaseException | None = None
         self._writer: McapWriter | None = None
 
     @cached_property
     def _recorder(self) -> Recorder:
-        return Recorder(self.loop.vehicle, self.steps)
+        return Recorder(self.loop.vehicle, self.steps, interval_s=self._block_s)
+
+    @property
+    def _block_s(self) -> float | None:
+        return None if self._pacer is None and self._link is None else PACED_BLOCK_INTERVAL_S
+
+    def _linked(self, port: UdpPort) -> UdpLink:
+        loop = self.loop
+
+        def of_driver(command: DriverCommand) -> DriverCommand:
+            return DRIVER.checked(command, "", loop.driver_setup, "UDP gave")
+
+        def of_controller(command: ActuatorCommand) -> ActuatorCommand:
+            return CONTROLLER.checked(command, "", loop.controller_setup, "UDP gave")
+
+        link = UdpLink(port, (of_driver, of_controller))
+        weakref.finalize(self, link.close)
+        return link
+
+    @property
+    def udp_address(self) -> tuple[str, int] | None:
+        """Address and port on which another process gives commands; None without one."""
+        return None if self._link is None else self._link.address
 
     @property
     def steps(self) -> int:
@@ -207,18 +239,47 @@ class Simulation:
             driver = Given(DRIVER.checked(driver_command, "", loop.driver_setup, _GIVEN))
         if actuator_command is not None:
             controller = Given(CONTROLLER.checked(actuator_command, "", loop.controller_setup, _GIVEN))
-        rows = self._recorder.rows
         with self._watched():
-            try:
-                loop.drive(int(steps), self._recorder, driver, controller)
-            finally:
-                self._note_phases()
-                for word, given in (("driver", driver), ("controller", controller)):
-                    if given is not None:
-                        self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
+            if self._pacer is None and self._link is None:
+                self._drive(int(steps), driver, controller)
+            else:
+                self._drive_by_the_clock(int(steps), driver, controller)
             if self.done:
                 self._recorder.flush()
         return loop.measurement
+
+    def _drive(self, steps: int, driver: Given | None, controller: Given | None) -> None:
+        rows = self._recorder.rows
+        try:
+            self.loop.drive(steps, self._recorder, driver, controller)
+        finally:
+            self._note_phases()
+            for word, given in (("driver", driver), ("controller", controller)):
+                if given is not None:
+                    self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
+
+    def _drive_by_the_clock(self, steps: int, driver: Given | None, controller: Given | None) -> None:
+        """Drive steps one by one, each at its instant and with the commands that have arrived until then."""
+        pacer, link, loop = self._pacer, self._link, self.loop
+        collects = gc.isenabled()
+        gc.disable()  # a collection takes longer than a step
+        try:
+            for _ in range(steps):
+                if pacer is not None:
+                    pacer.await_step()
+                if link is None:
+                    self._drive(1, driver, controller)
+                    continue
+                given = link.commands()
+                self._drive(
+                    1,
+                    driver or (None if given.driver is None else Given(given.driver)),
+                    controller or (None if given.controller is None else Given(given.controller)),
+                )
+                link.tell(loop.step_count, loop.measurement, loop.motion)
+        finally:
+            if collects:
+                gc.enable()
 
     def set(self, key: str, value: Any) -> None:
         """Change a key from the next step on; the recording keeps the change as an event.
@@ -400,6 +461,10 @@ class Simulation:
         recording.metadata["complete"] = failure is None and self.done
         if self._given:
             recording.metadata["commands_given"] = dict(self._given)
+        if self._pacer is not None:
+            recording.metadata["realtime"] = self._pacer.report()
+        if self._link is not None:
+            recording.metadata["udp"] = dict(self._link.report)
         if self.events:
             recording.metadata["events"] = tables_of(self.events)
         if failure is not None:
@@ -426,7 +491,8 @@ class Simulation:
         assert self.loop.step_count == 0
         with self.context.writer(path) as self._writer:
             keep = self.steps * len(self.context.channels) <= MAX_KEPT_VALUES
-            self._recorder = Recorder(self.loop.vehicle, self.steps, self._writer, keep=keep)
+            recorder = Recorder(self.loop.vehicle, self.steps, self._writer, keep=keep, interval_s=self._block_s)
+            self._recorder = recorder
             yield
 
     def end_file(self, recording: Recording) -> None:
