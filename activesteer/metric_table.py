@@ -168,6 +168,7 @@ METRICS: Final = {
             "ay_begin", "linear_range", "limit_acceleration",
         ),
         *_declare("mps2", "mean_deceleration", better=_HIGHER),
+        *_declare("mps2", "seat_acceleration_rms", better=_SMALLER),
         *_declare("rad", "sideslip_peak", "sideslip_peak_abs", significance=SIDESLIP_RAD, better=_SMALLER),
         *_declare(
             "rad", "sideslip_rms", "sideslip_gates_rms", "sideslip_after_gates_rms", "sideslip_end_rms",
@@ -224,6 +225,8 @@ METRICS: Final = {
         *_declare("N", "wheel_load_min"),
         *_declare("J", "battery_energy", "steering_energy", "brake_energy", better=_LOWER),
         *_pure("yaw_rate_overshoot", better=_LOWER, unit=_PERCENT),
+        *_pure("wheel_load_coefficient_max", "wheel_lift_share", better=_SMALLER, unit=_PERCENT),
+        *_declare("m", "suspension_travel_max", better=_SMALLER),
         *_pure("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
         *_pure(
             "ay_overshoot", "roll_overshoot", "sideslip_overshoot", "braking_efficiency", "wheel_slip_max",

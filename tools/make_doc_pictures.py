@@ -64,12 +64,15 @@ def at_wheel(channel: str) -> Quantity:
 
 LOADS: Final = (at_wheel("fl_tyre_fz_N"), at_wheel("rl_tyre_fz_N"))
 DISTANCE: Final = quantity_of("path_distance_m")._replace(channel="x_m", short="distance", unit=DisplayUnit("mm", 1e3))
+RIDE: Final = (quantity_of("az_mps2"), quantity_of("pitch_rad"), *LOADS)
 PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
     "straight_line": (SPEED, at_wheel("fl_drive_torque_Nm"), *LOADS),
     "standstill": (DISTANCE, *LOADS),
     "hill_hold": (DISTANCE, at_wheel("fl_brake_torque_Nm"), *LOADS),
     "drive_off_and_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
     "start_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
+    **dict.fromkeys(("rough_road", "rough_road_50", "rough_road_120", "cleat", "kerb_strike"), RIDE),
+    "rough_braking": (SPEED, quantity_of("ax_mps2"), at_wheel("fl_brake_pressure_Pa"), *LOADS),
     "straight_braking": (
         SPEED, quantity_of("ax_mps2"), at_wheel("fl_brake_pressure_Pa"), at_wheel("rl_brake_pressure_Pa"),
     ),

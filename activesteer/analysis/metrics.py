@@ -12,6 +12,7 @@ from activesteer.analysis import (
     general,
     handling,
     path_following,
+    ride,
     rollover,
     sine_with_dwell,
     slow_ramp,
@@ -91,6 +92,8 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         ParameterError: the evaluation returns a metric that `metric_table` does not declare.
     """
     values = evaluation_of(recording).metrics(Evaluable(recording)) | energy.metrics(recording)
+    if ride.is_uneven(recording):
+        values |= ride.metrics(Evaluable(recording))
     for name in values:
         metric(name)
     return values

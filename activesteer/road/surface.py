@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from activesteer.conventions import Array
 from activesteer.road.grid import Grid
 from activesteer.road.obstacle import OBSTACLE
 from activesteer.road.road import Road
-from activesteer.road.surface_kernels import ENVELOPING, FOUR_POINT, SINGLE_POINT, SURFACE, heights_at
+from activesteer.road.surface_kernels import COARSE_M, ENVELOPING, FOUR_POINT, SINGLE_POINT, SURFACE, heights_at
 
 _CONTACTS: Final = {"single_point": SINGLE_POINT, "four_point": FOUR_POINT, "enveloping": ENVELOPING}
 _BLEND_M: Final = 2.0
@@ -61,18 +60,23 @@ def surface_of(road: Road) -> Surface | None:
 @functools.lru_cache(maxsize=4)
 def _surface_of(road: Road) -> Surface:
     head = np.zeros(1, SURFACE)
+    head["coarse_m"] = COARSE_M
     grid, slopes = road.grid(), road.cross_slopes()
     numbers = []
     if grid is not None:
         rows, columns = grid.z_m.shape
         head["grid_s_m"], head["grid_per_s"], head["rows"] = grid.s_m, 1.0 / grid.step_s_m, rows
         head["grid_d_m"], head["grid_per_d"], head["columns"] = grid.d_m, 1.0 / grid.step_d_m, columns
-        head["rise_m"] = _rise(grid)
+        per = max(1, int(_REACH_M // grid.step_s_m))
+        head["rise_per_s"], head["rises"] = head["grid_per_s"] / per, -(-rows // per)
+        head["coarse_m"] = min(max(0.7 * grid.step_s_m, COARSE_M), 2.0 * COARSE_M)
         numbers.append(grid.z_m.ravel())
     if slopes is not None:
         start, step, values = slopes
         head["slope_s_m"], head["slope_per_s"], head["slopes"] = start, 1.0 / step, len(values)
         numbers.append(values)
+    if grid is not None:
+        numbers.append(_rises(grid))
     head["contact"], head["blend_m"], head["start_m"] = _CONTACTS[road.contact_used], _BLEND_M, road.start_m
     head["ends"] = road.outside == "error"
     records = [obstacle.record() for obstacle in sorted(road.obstacle, key=lambda it: it.start_m)]
@@ -80,14 +84,12 @@ def _surface_of(road: Road) -> Surface:
     return Surface(head, np.concatenate(numbers) if numbers else np.zeros(1), obstacles)
 
 
-def _rise(grid: Grid) -> float:
-    """Return the largest difference of height within the reach of a tyre [m]."""
-    rows = max(1, math.ceil(_REACH_M / grid.step_s_m))
-    highest, lowest = grid.z_m.copy(), grid.z_m.copy()
-    done = 1
-    while done < rows:
-        shift = min(done, rows - done)
-        np.maximum(highest[:-shift], highest[shift:], out=highest[:-shift])
-        np.minimum(lowest[:-shift], lowest[shift:], out=lowest[:-shift])
-        done += shift
-    return float((highest - lowest).max())
+def _rises(grid: Grid) -> Array:
+    """Return the largest difference of height [m] in the reach of a tyre, for each stretch of `_REACH_M`."""
+    per = max(1, int(_REACH_M // grid.step_s_m))
+    count = -(-len(grid.z_m) // per)
+    padded = np.pad(grid.z_m, ((0, count * per - len(grid.z_m)), (0, 0)), "edge").reshape(count, per, -1)
+    highest, lowest = (np.pad(of(padded, axis=1), ((1, 1), (0, 0)), "edge") for of in (np.max, np.min))
+    # A tyre near the end of a stretch reaches into the next one.
+    high, low = (of([part[:-2], part[1:-1], part[2:]], axis=0) for of, part in ((np.max, highest), (np.min, lowest)))
+    return (high - low).max(axis=1)

@@ -26,20 +26,23 @@ SURFACE: Final = np.dtype(
             (name, np.float64)
             for name in (
                 "contact", "blend_m", "start_m", "grid_s_m", "grid_per_s", "rows", "grid_d_m", "grid_per_d", "columns",
-                "slope_s_m", "slope_per_s", "slopes", "rise_m", "ends",
+                "slope_s_m", "slope_per_s", "slopes", "rise_per_s", "rises", "coarse_m", "ends",
             )
         ],
     )
 )  # fmt: skip
-"""Head of an uneven road. Its numbers are the grid, row by row along s, then the cross slopes.
+"""Head of an uneven road. Its numbers are the grid, row by row along s, the cross slopes, and the rises.
 
 contact: `SINGLE_POINT`, `FOUR_POINT` or `ENVELOPING`.
 blend_m, start_m: Distances between which grid and cross slope are blended in.
 grid_s_m, grid_per_s, rows; grid_d_m, grid_per_d, columns: First place, points per metre and number of points.
-rise_m: Largest rise of the grid within the reach of a tyre.
+rise_per_s, rises: Largest rise of the grid in a tyre's reach, in stretches along s: stretches per metre, their number.
+coarse_m: Distance at which a tyre looks for the road.
 ends: 1 if leaving the grid is an error."""
 SINGLE_POINT, FOUR_POINT, ENVELOPING = 1.0, 2.0, 3.0
 
+COARSE_M: Final = 0.018
+"""Distance at which a tyre looks for an obstacle [m]; a cleat of 20 mm cannot hide between two places."""
 NEAR_M: Final = 1.0
 """Distance within which an obstacle counts for a wheel [m]; a tyre reaches some 0.5 m."""
 
@@ -122,6 +125,41 @@ def near_obstacles(obstacles, s, d):
 
 
 @compiled
+def _on_grid(first, per, count, at):
+    """Return index, fraction and points per metre at a place of a table, which is constant beyond its ends."""
+    place = (at - first) * per
+    if place <= 0.0 or place >= count - 1:
+        place, per = min(max(place, 0.0), count - 1.0), 0.0
+    index = min(int(place), count - 2)
+    return index, place - index, per
+
+
+@compiled
+def level_at(surface, numbers, obstacles, first, last, s, d):
+    """Return the height of the road at a place [m]; see `height_at`."""
+    z = 0.0
+    rows, columns, count = int(surface.rows), int(surface.columns), int(surface.slopes)
+    if s > surface.blend_m:
+        if rows > 0:
+            row, along, _ = _on_grid(surface.grid_s_m, surface.grid_per_s, rows, s)
+            column, across, _ = _on_grid(surface.grid_d_m, surface.grid_per_d, columns, d)
+            place = row * columns + column
+            right = numbers[place] + along * (numbers[place + columns] - numbers[place])
+            left = numbers[place + 1] + along * (numbers[place + columns + 1] - numbers[place + 1])
+            z = right + across * (left - right)
+        if count > 0:
+            place, along, _ = _on_grid(surface.slope_s_m, surface.slope_per_s, count, s)
+            place += rows * columns
+            z += (numbers[place] + along * (numbers[place + 1] - numbers[place])) * d
+        if s < surface.start_m:
+            part = (s - surface.blend_m) / (surface.start_m - surface.blend_m)
+            z *= part * part * (3.0 - 2.0 * part)
+    for index in range(first, last):
+        z += _obstacle_at(obstacles[index], s, d)[0]
+    return z
+
+
+@compiled
 def height_at(surface, numbers, obstacles, first, last, s, d):
     """Return height [m] and slopes along s and d of the road at a place.
 
@@ -135,52 +173,50 @@ def height_at(surface, numbers, obstacles, first, last, s, d):
         d: Distance to the left of its middle [m].
     """
     z, z_s, z_d = 0.0, 0.0, 0.0
-    rows, columns = int(surface.rows), int(surface.columns)
-    if rows > 0 and s > surface.blend_m:
-        along = (s - surface.grid_s_m) * surface.grid_per_s
-        across = (d - surface.grid_d_m) * surface.grid_per_d
-        per_s, per_d = surface.grid_per_s, surface.grid_per_d
-        if along <= 0.0 or along >= rows - 1:
-            along, per_s = min(max(along, 0.0), rows - 1.0), 0.0
-        if across <= 0.0 or across >= columns - 1:
-            across, per_d = min(max(across, 0.0), columns - 1.0), 0.0
-        row, column = min(int(along), rows - 2), min(int(across), columns - 2)
-        along -= row
-        across -= column
-        place = row * columns + column
-        near_right, near_left = numbers[place], numbers[place + 1]
-        far_right, far_left = numbers[place + columns], numbers[place + columns + 1]
-        right = near_right + along * (far_right - near_right)
-        left = near_left + along * (far_left - near_left)
-        z = right + across * (left - right)
-        z_d = per_d * (left - right)
-        z_s = per_s * (far_right - near_right + across * (far_left - near_left - far_right + near_right))
-    count = int(surface.slopes)
-    if count > 0 and s > surface.blend_m:
-        along = (s - surface.slope_s_m) * surface.slope_per_s
-        per_s = surface.slope_per_s
-        if along <= 0.0 or along >= count - 1:
-            along, per_s = min(max(along, 0.0), count - 1.0), 0.0
-        place = min(int(along), count - 2)
-        base = rows * columns + place
-        change = numbers[base + 1] - numbers[base]
-        slope = numbers[base] + (along - place) * change
-        z += slope * d
-        z_d += slope
-        z_s += per_s * change * d
-    if s < surface.start_m and (rows > 0 or count > 0) and s > surface.blend_m:
-        span = surface.start_m - surface.blend_m
-        part = (s - surface.blend_m) / span
-        share = part * part * (3.0 - 2.0 * part)
-        z_s = share * z_s + 6.0 * part * (1.0 - part) / span * z
-        z_d *= share
-        z *= share
+    rows, columns, count = int(surface.rows), int(surface.columns), int(surface.slopes)
+    if s > surface.blend_m:
+        if rows > 0:
+            row, along, per_s = _on_grid(surface.grid_s_m, surface.grid_per_s, rows, s)
+            column, across, per_d = _on_grid(surface.grid_d_m, surface.grid_per_d, columns, d)
+            place = row * columns + column
+            near_right, near_left = numbers[place], numbers[place + 1]
+            far_right, far_left = numbers[place + columns], numbers[place + columns + 1]
+            right = near_right + along * (far_right - near_right)
+            left = near_left + along * (far_left - near_left)
+            z = right + across * (left - right)
+            z_d = per_d * (left - right)
+            z_s = per_s * (far_right - near_right + across * (far_left - near_left - far_right + near_right))
+        if count > 0:
+            place, along, per_s = _on_grid(surface.slope_s_m, surface.slope_per_s, count, s)
+            place += rows * columns
+            change = numbers[place + 1] - numbers[place]
+            slope = numbers[place] + along * change
+            z += slope * d
+            z_d += slope
+            z_s += per_s * change * d
+        if s < surface.start_m:
+            span = surface.start_m - surface.blend_m
+            part = (s - surface.blend_m) / span
+            share = part * part * (3.0 - 2.0 * part)
+            z_s = share * z_s + 6.0 * part * (1.0 - part) / span * z
+            z_d *= share
+            z *= share
     for index in range(first, last):
         more, more_s, more_d = _obstacle_at(obstacles[index], s, d)
         z += more
         z_s += more_s
         z_d += more_d
     return z, z_s, z_d
+
+
+@compiled
+def rise_at(surface, numbers, s):
+    """Return the rise of the grid in a tyre's reach around a place [m]."""
+    count = int(surface.rises)
+    if count == 0:
+        return 0.0
+    place = int((s - surface.grid_s_m) * surface.rise_per_s)
+    return numbers[int(surface.rows * surface.columns + surface.slopes) + min(max(place, 0), count - 1)]
 
 
 @compiled

@@ -31,7 +31,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.compilation import compiled
-from activesteer.road.surface_kernels import ENVELOPING, SINGLE_POINT, height_at, near_obstacles
+from activesteer.road.surface_kernels import (
+    COARSE_M,
+    ENVELOPING,
+    SINGLE_POINT,
+    height_at,
+    level_at,
+    near_obstacles,
+    rise_at,
+)
 from activesteer.tyre.kernels.vertical import contact_patch, effective_rolling_radius
 from activesteer.tyre.tyre_parameters import TyreParameters
 
@@ -40,10 +48,11 @@ BESIDE: Final = 0.3
 CAM_POINTS: Final = 65
 _CAM_STEP_M: Final = 0.006
 """Distance of the tabulated points of a cam [m]: 64 of them reach 0.38 m, beyond any step that a tyre survives."""
-_COARSE_M: Final = 0.018
-"""Distance of the first places at which a cam looks for the road [m]; a cleat of 20 mm cannot hide between two."""
 _FINE_M: Final = 0.0004
-"""Distance of the last ones; a step of 25 mm then changes the height of a cam by 0.1 mm at most [m]."""
+"""Distance of the last places at which a cam looks for an obstacle; a step of 25 mm then changes its height by at most
+0.1 mm [m]."""
+_GRID_M: Final = 0.002
+"""The same for a grid, whose slopes are a tenth of a step's [m]."""
 
 CAM: Final = np.dtype(
     (
@@ -79,7 +88,7 @@ def cam_record(tyre: TyreParameters, pressure_Pa: float) -> NDArray[Any]:
 
 
 @compiled
-def _cam_height(surface, numbers, obstacles, first, last, cam, reach, s, d, ahead_s, ahead_d):
+def _cam_height(surface, numbers, obstacles, first, last, cam, reach, coarse, s, d, ahead_s, ahead_d):
     """Return height of the lowest point of a cam, and its change per metre forwards.
 
     Args:
@@ -90,25 +99,25 @@ def _cam_height(surface, numbers, obstacles, first, last, cam, reach, s, d, ahea
         last: Last one, excluded.
         cam: A `CAM`.
         reach: Distance within which the road may touch the cam [m].
+        coarse: Distance at which to look first [m].
         s: Place of the cam's middle.
         d: Its other coordinate.
         ahead_s: Change of s per metre forwards.
         ahead_d: Change of d per metre forwards.
     """
     best, at = -math.inf, 0.0
-    count = int(reach / _COARSE_M) + 1
+    count = math.ceil(reach / coarse)
     for index in range(-count, count + 1):
-        x = index * _COARSE_M
-        z = height_at(surface, numbers, obstacles, first, last, s + x * ahead_s, d + x * ahead_d)[0]
-        z -= _drop(cam, abs(x))
+        x = index * coarse
+        z = level_at(surface, numbers, obstacles, first, last, s + x * ahead_s, d + x * ahead_d) - _drop(cam, abs(x))
         if z > best:
             best, at = z, x
-    step = 0.5 * _COARSE_M
-    while step > _FINE_M:
+    step, fine = 0.5 * coarse, _GRID_M if first >= last else _FINE_M
+    while step > fine:
         middle = at
         for side in (-1.0, 1.0):
             x = middle + side * step
-            z = height_at(surface, numbers, obstacles, first, last, s + x * ahead_s, d + x * ahead_d)[0]
+            z = level_at(surface, numbers, obstacles, first, last, s + x * ahead_s, d + x * ahead_d)
             z -= _drop(cam, abs(x))
             if z > best:
                 best, at = z, x
@@ -161,28 +170,29 @@ def contact_plane(
         z, z_s, z_d = height_at(surface, numbers, obstacles, first, last, along, across)
         return z, z_s * ahead_s + z_d * ahead_d, z_s * left_s + z_d * left_d, 0.0
     beside = cam.beside_m
-    left = height_at(surface, numbers, obstacles, first, last, along + beside * left_s, across + beside * left_d)[0]
-    right = height_at(surface, numbers, obstacles, first, last, along - beside * left_s, across - beside * left_d)[0]
+    left = level_at(surface, numbers, obstacles, first, last, along + beside * left_s, across + beside * left_d)
+    right = level_at(surface, numbers, obstacles, first, last, along - beside * left_s, across - beside * left_d)
     sideways = (left - right) / (2.0 * beside)
     if surface.contact != ENVELOPING:
         ahead = FOUR_POINT_AHEAD * free_radius
         front = height_at(surface, numbers, obstacles, first, last, along + ahead * ahead_s, across + ahead * ahead_d)[
             0
         ]
-        rear = height_at(surface, numbers, obstacles, first, last, along - ahead * ahead_s, across - ahead * ahead_d)[0]
+        rear = level_at(surface, numbers, obstacles, first, last, along - ahead * ahead_s, across - ahead * ahead_d)
         return 0.25 * (left + right + front + rear), (front - rear) / (2.0 * ahead), sideways, 0.0
-    rise = surface.rise_m + highest
-    reach = 0.0
+    rise = rise_at(surface, numbers, along) + highest
+    coarse = surface.coarse_m if first >= last else COARSE_M
+    reach = coarse
     while reach < cam.reach_m and _drop(cam, reach) < rise:
-        reach += _COARSE_M
+        reach += coarse
     half = 0.5 * cam.distance_m
     front, front_slope = _cam_height(
-        surface, numbers, obstacles, first, last, cam, reach, along + half * ahead_s, across + half * ahead_d, ahead_s,
-        ahead_d,
+        surface, numbers, obstacles, first, last, cam, reach, coarse, along + half * ahead_s, across + half * ahead_d,
+        ahead_s, ahead_d,
     )  # fmt: skip
     rear, rear_slope = _cam_height(
-        surface, numbers, obstacles, first, last, cam, reach, along - half * ahead_s, across - half * ahead_d, ahead_s,
-        ahead_d,
+        surface, numbers, obstacles, first, last, cam, reach, coarse, along - half * ahead_s, across - half * ahead_d,
+        ahead_s, ahead_d,
     )  # fmt: skip
     return 0.5 * (front + rear), (front - rear) / cam.distance_m, sideways, (front_slope - rear_slope) / cam.distance_m
 

@@ -13,9 +13,11 @@ from activesteer.config import key_paths, to_table
 from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.maneuver import Maneuver
 from activesteer.resources import list_maneuvers
+from activesteer.road.road import Road
+from activesteer.road.surface import surface_of
 from activesteer.scenario import resolve
 
-LABELS = ("kind", "name", "title", "steering_csv", "drive_csv", "path.csv")
+LABELS = ("kind", "name", "title", "steering_csv", "drive_csv", "path.csv", "road.crg", "road.profile")
 """Keys that name things."""
 WITHOUT_EFFECT = {
     ("hill_hold", "drive"), ("parking", "drive"), ("slalom", "vehicle_width_m"), ("split_mu_braking", "road.along"),
@@ -40,9 +42,16 @@ def seen(maneuver: Maneuver) -> str:
             frictions.append(inside[-1] if inside else road.mu)
     met: list[Any] = [[maneuver.setpoint(time) for time in times], maneuver.settling_setpoint(), maneuver.settle_s]
     met += [maneuver.duration_s, maneuver.speed_mps, frictions, road.grade]
+    met += [road.bank_rad, *_surface(road)]
     met += [None if course is None else course.to_table()]
     met += [None if search is None else [search.lateral_acceleration_mps2, search.accept(1.0), search.probe]]
     return json.dumps([to_table(one) for one in met], default=str)
+
+
+def _surface(road: Road) -> list[Any]:
+    """Everything that the tyres are told of an uneven surface."""
+    found = surface_of(road)
+    return [] if found is None else [part.tobytes().hex() for part in found]
 
 
 def _inside(area: Any, x: float, y: float) -> bool:
