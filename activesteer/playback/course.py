@@ -10,11 +10,12 @@ import rerun as rr
 
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS
-from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.colours import bytes_of, height_colours
 from activesteer.playback.geometry import rotated
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, course_of
+from activesteer.road.drawn import surface_in
 from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.road.recorded import LIMIT_M
 from activesteer.road.road import road_of
@@ -73,11 +74,20 @@ def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
     low_y = np.floor((around.low_y_m - _BESIDE_M) / _TILE_M) * _TILE_M
     high_y = np.ceil((around.high_y_m + _BESIDE_M) / _TILE_M) * _TILE_M
     far = (low_x - _HORIZON_M, high_x + _HORIZON_M, low_y - _HORIZON_M, high_y + _HORIZON_M)
-    stream.log(f"{ROAD}/surface", _plane(*far, 0.0, _ASPHALT), static=True)
+    lowest = (
+        0.0 if (drawn := surface_in(runs[0].recording.metadata)) is None else min(0.0, float(drawn.z_m.min())) - 0.02
+    )
+    stream.log(f"{ROAD}/surface", _plane(*far, lowest, _ASPHALT), static=True)
     across = [[(x, low_y, 0.005), (x, high_y, 0.005)] for x in np.arange(low_x, high_x + 1.0, _TILE_M)]
     along = [[(low_x, y, 0.005), (high_x, y, 0.005)] for y in np.arange(low_y, high_y + 1.0, _TILE_M)]
     stream.log(f"{ROAD}/grid", rr.LineStrips3D(across + along, colors=[_MARKING], radii=[0.03]), static=True)
     road = road_of(runs[0].recording.metadata)
+    if drawn is not None:
+        corners, triangles = drawn.mesh(road)
+        # The wheels stand on the surface, so heights are drawn to scale; colour shows what the eye misses.
+        colours = height_colours(corners[:, 2])
+        mesh = rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, vertex_colors=colours)
+        stream.log(f"{ROAD}/surface_heights_to_scale", mesh, static=True)
     pieces, areas = road.pieces(low_x, high_x, low_y, high_y), road.areas()
     for index in sorted({piece.area for piece in pieces}):
         quads = np.array([piece.corners_m for piece in pieces if piece.area == index])

@@ -15,6 +15,7 @@ from activesteer.errors import RecordingError
 from activesteer.files import MAX_NUMBER
 from activesteer.recording.events import events_of
 from activesteer.road.course import course_of
+from activesteer.road.drawn import surface_in
 from activesteer.road.footprint import footprint_of
 from activesteer.road.recorded import fail, table_of, text
 from activesteer.road.road import road_of
@@ -141,6 +142,7 @@ def check_metadata(metadata: Mapping[str, Any]) -> None:
             check(value, key)
     road_of(metadata)
     course_of(metadata)
+    surface_in(metadata)
     footprint_of(metadata)
     events_of(metadata)
 

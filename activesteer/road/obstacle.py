@@ -92,7 +92,7 @@ class Obstacle:
         ):
             if without:
                 raise ManeuverError(f"has no effect on this {self.kind}; leave it out", key=key)
-        right, left = self._borders
+        right, left = self.borders
         if not right < left:
             raise ManeuverError(f"the left border at {left:g} m is not left of the right one at {right:g} m")
         if steep and self.length_m is not None and self.length_m < 2.0 * self.edge_m:
@@ -101,7 +101,8 @@ class Obstacle:
             )
 
     @property
-    def _borders(self) -> tuple[float, float]:
+    def borders(self) -> tuple[float, float]:
+        """Right and left border [m]; infinite where there is none."""
         right, left = _SIDES[self.side]
         return (right if self.right_m is None else self.right_m), (left if self.left_m is None else self.left_m)
 
@@ -112,7 +113,7 @@ class Obstacle:
 
     def record(self) -> Any:
         """Return the obstacle for the kernels, an `OBSTACLE`."""
-        right, left = self._borders
+        right, left = self.borders
         height = self.slope if self.height_m is None else -self.height_m if self.kind == "pothole" else self.height_m
         length = math.inf if self.length_m is None else self.length_m
         skew = math.tan(self.angle_rad)

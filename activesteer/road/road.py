@@ -272,6 +272,10 @@ class Road:
         """Return first distance, step [m] and cross slopes of `banking`; None without it."""
         return None if self.banking is None else self.banking.sampled()
 
+    def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
+        """Return world x and y of places along and to the left of the middle of the road [m]."""
+        return s_m, d_m
+
     def areas(self) -> tuple[Area, ...]:
         """Return the areas whose friction is not `mu`; where areas overlap, the later one counts."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
@@ -312,20 +316,24 @@ class LaidRoad(Road):
     path: Path | None = None
     """The path of the course."""
 
+    def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
+        """Return world x and y of places along and beside the path, straight beyond its end; see the base class."""
+        path = self.path
+        assert path is not None
+        x, y, heading = (np.interp(s_m, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
+        beyond = np.maximum(s_m - path.length_m, 0.0) + np.minimum(s_m, 0.0)
+        cos, sin = np.cos(heading), np.sin(heading)
+        return x + beyond * cos - d_m * sin, y + beyond * sin + d_m * cos
+
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
         """Return quadrangles along the path; the rectangle does not matter. See the base class."""
         path, found = self.path, []
         assert path is not None
-
-        def place(s: Array, n: Array) -> tuple[Array, Array]:
-            x, y, heading = (np.interp(s, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
-            return x - n * np.sin(heading), y + n * np.cos(heading)
-
         for index, area in enumerate(self.areas()):
             shown = area.clipped(0.0, path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
             if shown is not None:
                 slices = min(_MAX_SLICES, math.ceil((shown.end_m - shown.start_m) / _SLICE_M))
-                found += _sliced(index, shown, slices, place)
+                found += _sliced(index, shown, slices, self.placed)
         return found
 
 

@@ -6,10 +6,14 @@ import functools
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
+
+import numpy as np
 
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording, ScenePart
+from activesteer.road.drawn import DrawnSurface, places_to_draw
+from activesteer.road.surface import surface_of
 from activesteer.scenario import Scenario, describe
 from activesteer.signals import Channel
 from activesteer.simulation.appearance import scene_of
@@ -17,6 +21,9 @@ from activesteer.simulation.control_unit import about
 from activesteer.simulation.recorder import Recorder
 from activesteer.vehicle import Vehicle
 from activesteer.version import __version__
+
+_BEYOND_M: Final = 30.0
+"""Length of road that is drawn beyond the distance at the speed of the manoeuvre [m]."""
 
 
 class RunContext(NamedTuple):
@@ -50,6 +57,13 @@ class RunContext(NamedTuple):
         }
         if (course := scenario.maneuver.course) is not None:
             metadata["course"] = course.to_table()
+        road = scenario.maneuver.ground
+        if (surface := surface_of(road)) is not None:
+            length_m = abs(scenario.maneuver.speed_mps) * scenario.maneuver.duration_s + _BEYOND_M
+            s_m, d_m = places_to_draw(road, length_m)
+            places = np.meshgrid(s_m, d_m, indexing="ij")
+            z_m = surface.at(*(place.ravel() for place in places))[:, 0].reshape(len(s_m), len(d_m))
+            metadata["surface"] = DrawnSurface(s_m, d_m, z_m).to_table()
         files = {**scenario.files, **controller.files}
         return cls(vehicle.channels.channels, vehicle.body_names, metadata, files, scene_of(vehicle.model))
 

@@ -15,6 +15,7 @@ from activesteer.conventions import CORNERS, run_looks
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.recording import Recording
 from activesteer.road.course import course_of
+from activesteer.road.drawn import surface_in
 from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.road.road import road_of
 from activesteer.video.cameras import CUTAWAY, view
@@ -191,8 +192,10 @@ class _Pane:
         ]
         metadata = first.recording.metadata
         self._size = size
-        self._scene = RenderScene(cars, course_of(metadata), road_of(metadata), size)
+        drawn = surface_in(metadata)
+        self._scene = RenderScene(cars, course_of(metadata), road_of(metadata), size, drawn)
         notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
+        notes += ["road heights to scale"] if drawn is not None else []
         self._labels = Labels(size)
         self._markings = None
         if self._view.marked:

@@ -19,6 +19,7 @@ from activesteer.drawing.ghosts import share_seen
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course
+from activesteer.road.drawn import DrawnSurface
 from activesteer.road.footprint import Footprint
 from activesteer.road.road import Road
 from activesteer.video.road import add_areas, add_course, add_road
@@ -90,6 +91,7 @@ class RenderScene:
         course: Course | None = None,
         road: Road | None = None,
         size: tuple[int, int] = (640, 480),
+        drawn: DrawnSurface | None = None,
     ) -> None:
         """Build the scene.
 
@@ -98,13 +100,14 @@ class RenderScene:
             course: Lanes, cones and path.
             road: The road; a plain one by default.
             size: Largest width and height of a frame [pixels].
+            drawn: Uneven surface of the road; None for a plane.
 
         Raises:
             PlaybackError: the recorded car, course or road cannot be built.
         """
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
-            add_road(spec, road or Road())
+            add_road(spec, road or Road(), drawn)
             add_areas(spec, road or Road())
             if course is not None:
                 add_course(spec, course)

@@ -7,11 +7,19 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from activesteer.drawing.colours import height_colours
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course
+from activesteer.road.drawn import DrawnSurface
 from activesteer.road.path import Path
 from activesteer.road.road import Road
 
 _TEXTURE: Final = "road"
+_SURFACE: Final = "uneven_road"
+_BANDS: Final = 8
+_LEAST_BAND_M: Final = 0.004
+"""Colours above and below the plane, and least height of the band of one colour [m]."""
+_SURFACE_TILE_M: Final = 1.0
+"""Side length of a square on an uneven surface [m], whose shape smaller squares show."""
 _DRY: Final = (0.37, 0.375, 0.385)
 _ICE: Final = (0.62, 0.7, 0.78)
 _ICE_MU: Final = 0.1
@@ -34,12 +42,13 @@ _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 """Largest numbers of pieces of patches, lanes, cones and dashes drawn: a scene holds a limited number of solids."""
 
 
-def add_road(spec: mujoco.MjSpec, road: Road) -> None:
+def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None) -> None:
     """Add the surface; lower friction makes it bluer.
 
     Args:
         spec: The model.
         road: The road, of which the friction `mu` is used.
+        drawn: Its uneven surface, drawn to scale above a plane that lies lower.
     """
     colour = np.array(_colour(road.mu))
     spec.add_texture(
@@ -61,9 +70,36 @@ def add_road(spec: mujoco.MjSpec, road: Road) -> None:
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=(0.0, 0.0, 1.0),
         material=_TEXTURE,
+        pos=(0.0, 0.0, 0.0 if drawn is None else drawn.plane_below_m),
         contype=0,
         conaffinity=0,
     )
+    if drawn is not None:
+        _add_surface(spec, *drawn.mesh(road))
+
+
+def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray) -> None:
+    """Add a surface in bands of height, each with its colour: light and shade hardly show a slope of a few degrees."""
+    heights = corners[triangles, 2].mean(axis=1)
+    width = max(_LEAST_BAND_M, float(np.abs(heights).max()) / _BANDS)
+    bands = np.round(heights / width).astype(int)
+    paint = spec.add_material(name=_SURFACE, specular=0.1)
+    paint.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _TEXTURE
+    colours = height_colours(width * np.arange(-_BANDS, _BANDS + 1)) / 255.0
+    for band in np.unique(bands):
+        inside = triangles[bands == band]
+        kept, faces = np.unique(inside, return_inverse=True)
+        mesh = spec.add_mesh(name=f"{_SURFACE}_{band}", inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        mesh.uservert, mesh.userface = corners[kept].ravel(), faces.ravel()
+        mesh.usertexcoord = (0.5 / _SURFACE_TILE_M * corners[kept, :2]).ravel()
+        mesh.userfacetexcoord = faces.ravel()
+        geom = spec.worldbody.add_geom(
+            name=mesh.name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, contype=0, conaffinity=0
+        )
+        if band == 0:
+            geom.material = _SURFACE
+        else:
+            geom.rgba = (*colours[min(max(band, -_BANDS), _BANDS) + _BANDS], 1.0)
 
 
 def add_areas(spec: mujoco.MjSpec, road: Road) -> None:

@@ -1,0 +1,93 @@
+"""Surface of an uneven road as a recording keeps it, to be drawn: heights at places along and across the road."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import Array
+from activesteer.road.recorded import fail, numbers, sequence, table_of
+from activesteer.road.road import Road
+
+_MAX_PLACES: Final = 200_000
+_STEP_M: Final = 0.25
+_MAX_ALONG: Final = 2000
+_WIDTH_M: Final = 8.0
+_ACROSS_M: Final = 0.5
+_EDGE_M: Final = 1e-3
+"""Distance of two places on both sides of an edge [m]."""
+
+
+class DrawnSurface(NamedTuple):
+    """Heights of a surface at places along (rows) and across (columns) the road.
+
+    Attributes:
+        s_m: Distances along the road [m], increasing.
+        d_m: Distances to the left of its middle [m], increasing.
+        z_m: Heights [m], shape (rows, columns).
+    """
+
+    s_m: Array
+    d_m: Array
+    z_m: Array
+
+    @property
+    def plane_below_m(self) -> float:
+        """Height of a plane below all of it, to be drawn around it [m]."""
+        return min(0.0, float(self.z_m.min())) - 0.02
+
+    def to_table(self) -> dict[str, Any]:
+        """Return the surface as plain tables, heights rounded to 0.1 mm."""
+        return {name: np.round(values, 4).tolist() for name, values in self._asdict().items()}
+
+    def mesh(self, road: Road) -> tuple[Array, NDArray[np.int64]]:
+        """Return corners in world axes [m], shape (n, 3), and triangles, shape (m, 3), anticlockwise from above."""
+        s, d = np.meshgrid(self.s_m, self.d_m, indexing="ij")
+        x, y = road.placed(s.ravel(), d.ravel())
+        corner = np.arange(s.size).reshape(s.shape)
+        near_right, near_left, far_right, far_left = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+        faces = [(near_right, far_right, far_left), (near_right, far_left, near_left)]
+        triangles = np.concatenate([np.stack(face, axis=-1).reshape(-1, 3) for face in faces])
+        return np.column_stack([x, y, self.z_m.ravel()]), triangles
+
+
+def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
+    """Return the places along and across a road at which its surface is drawn [m]: evenly, and around every edge.
+
+    Args:
+        road: The road.
+        length_m: Distance that the car drives [m].
+    """
+    count = min(_MAX_ALONG, max(2, round(length_m / _STEP_M)))
+    along, across = [np.linspace(0.0, length_m, count)], [np.arange(-_WIDTH_M, _WIDTH_M + 0.1, _ACROSS_M)]
+    for obstacle in road.obstacle:
+        ends = [0.0, *np.linspace(0.0, 1.0, 9) * (obstacle.length_m or 0.0)]
+        edge = obstacle.edge_m
+        inner = [edge, (obstacle.length_m or 0.0) - edge]
+        along.append(obstacle.start_m + np.array([*ends, *inner, -_EDGE_M, (obstacle.length_m or 0.0) + _EDGE_M]))
+        borders = [border for border in obstacle.borders if np.isfinite(border)]
+        across += [border + np.array([-_EDGE_M, _EDGE_M, -edge, edge]) for border in borders]
+    s, d = (np.unique(np.round(np.concatenate(parts), 4)) for parts in (along, across))
+    return s[(s >= 0.0) & (s <= length_m)], d[np.abs(d) <= _WIDTH_M]
+
+
+def surface_in(metadata: Mapping[str, Any]) -> DrawnSurface | None:
+    """Return the surface of a recorded run; None if the road was plane, or the surface was not recorded.
+
+    Raises:
+        RecordingError: the recorded surface is invalid.
+    """
+    if "surface" not in metadata:
+        return None
+    table = table_of(metadata["surface"], "surface")
+    s_m, d_m = (numbers(table.get(key), f"surface.{key}") for key in ("s_m", "d_m"))
+    rows = sequence(table.get("z_m"), "surface.z_m")
+    if len(s_m) < 2 or len(d_m) < 2 or len(rows) != len(s_m) or len(s_m) * len(d_m) > _MAX_PLACES:
+        raise fail("surface", f"has {len(s_m)} s_m, {len(d_m)} d_m and {len(rows)} rows")
+    if (np.diff(s_m) <= 0.0).any() or (np.diff(d_m) <= 0.0).any():
+        raise fail("surface", "has places that do not increase")
+    z_m = [numbers(row, f"surface.z_m.{index}", count=len(d_m)) for index, row in enumerate(rows)]
+    return DrawnSurface(s_m, d_m, np.array(z_m))
