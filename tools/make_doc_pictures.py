@@ -64,7 +64,7 @@ def at_wheel(channel: str) -> Quantity:
 
 LOADS: Final = (at_wheel("fl_tyre_fz_N"), at_wheel("rl_tyre_fz_N"))
 DISTANCE: Final = quantity_of("path_distance_m")._replace(channel="x_m", short="distance", unit=DisplayUnit("mm", 1e3))
-RIDE: Final = (quantity_of("az_mps2"), quantity_of("pitch_rad"), *LOADS)
+RIDE: Final = (quantity_of("pitch_rad"), *LOADS)
 PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
     "straight_line": (SPEED, at_wheel("fl_drive_torque_Nm"), *LOADS),
     "standstill": (DISTANCE, *LOADS),

@@ -13,6 +13,7 @@ import math
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS, Array
@@ -67,15 +68,15 @@ def seat_acceleration_mps2(recording: RecordingLike) -> float:
 def weighted(acceleration_mps2: Array, step_s: float) -> Array:
     """Return a vertical acceleration filtered by W_k; its mean is removed first."""
     spectrum = np.fft.rfft(acceleration_mps2 - np.mean(acceleration_mps2))
-    gain = weighting(np.fft.rfftfreq(len(acceleration_mps2), step_s))
+    gain = weighting(np.asarray(np.fft.rfftfreq(len(acceleration_mps2), step_s), np.float64))
     return np.fft.irfft(spectrum * gain, len(acceleration_mps2))
 
 
-def weighting(frequency_Hz: Array) -> Array:
+def weighting(frequency_Hz: Array) -> NDArray[np.complex128]:
     """Return the complex gain of the weighting W_k."""
     s = 2j * math.pi * np.asarray(frequency_Hz, np.float64)
 
-    def quadratic(at_Hz: float, quality: float) -> Array:
+    def quadratic(at_Hz: float, quality: float) -> NDArray[np.complex128]:
         part = s / (2.0 * math.pi * at_Hz)
         return 1.0 + part / quality + part * part
 

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.compilation import compiled
+from activesteer.road.obstacle import PLATEAU
 from activesteer.road.surface_kernels import (
     COARSE_M,
     ENVELOPING,
@@ -53,6 +54,9 @@ _FINE_M: Final = 0.0004
 0.1 mm [m]."""
 _GRID_M: Final = 0.002
 """The same for a grid, whose slopes are a tenth of a step's [m]."""
+
+_LEAST_RATE: Final = 1e-3
+"""Sine of the least angle between a wheel's heading and the edge of a step at which it rolls over that edge."""
 
 CAM: Final = np.dtype(
     (
@@ -112,6 +116,19 @@ def _cam_height(surface, numbers, obstacles, first, last, cam, reach, coarse, s,
         z = level_at(surface, numbers, obstacles, first, last, s + x * ahead_s, d + x * ahead_d) - _drop(cam, abs(x))
         if z > best:
             best, at = z, x
+    for index in range(first, last):
+        # A cam touches a step at its corner, which lies between the places above.
+        it = obstacles[index]
+        rate = ahead_s + it.skew * ahead_d
+        if it.shape == PLATEAU and abs(rate) > _LEAST_RATE:
+            inside = it.edge_m if it.height_m > 0.0 else 0.0
+            for corner in (inside, it.length_m - inside):
+                x = (it.start_m + corner - s - it.skew * d) / rate
+                if abs(x) <= cam.reach_m:
+                    z = level_at(surface, numbers, obstacles, first, last, s + x * ahead_s, d + x * ahead_d)
+                    z -= _drop(cam, abs(x))
+                    if z > best:
+                        best, at = z, x
     step, fine = 0.5 * coarse, _GRID_M if first >= last else _FINE_M
     while step > fine:
         middle = at
@@ -126,6 +143,8 @@ def _cam_height(surface, numbers, obstacles, first, last, cam, reach, coarse, s,
     place = min(abs(at) / _CAM_STEP_M, CAM_POINTS - 1.000001)
     index = int(place)
     slope = (cam.drop_m[index + 1] - cam.drop_m[index]) / _CAM_STEP_M
+    if index == 0:
+        slope *= 1.5 * math.sqrt(place)
     return best, math.copysign(slope, at)
 
 
@@ -136,7 +155,11 @@ def _drop(cam, x):
     index = int(place)
     if index >= CAM_POINTS - 1:
         return cam.drop_m[CAM_POINTS - 1] + 10.0 * (x - cam.reach_m)
-    return cam.drop_m[index] + (place - index) * (cam.drop_m[index + 1] - cam.drop_m[index])
+    part = place - index
+    if index == 0:
+        # Near its lowest point a cam is as flat as x^1.5, the nearest simple power to the ellipses of tyres.
+        part *= math.sqrt(part)
+    return cam.drop_m[index] + part * (cam.drop_m[index + 1] - cam.drop_m[index])
 
 
 @compiled

@@ -85,7 +85,7 @@ def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray
     bands = np.round(heights / width).astype(int)
     paint = spec.add_material(name=_SURFACE, specular=0.1)
     paint.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _TEXTURE
-    colours = height_colours(width * np.arange(-_BANDS, _BANDS + 1)) / 255.0
+    colours = height_colours(width * np.arange(-_BANDS, _BANDS + 1, dtype=np.float64)) / 255.0
     for band in np.unique(bands):
         inside = triangles[bands == band]
         kept, faces = np.unique(inside, return_inverse=True)

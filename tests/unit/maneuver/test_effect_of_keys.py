@@ -14,7 +14,6 @@ from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.maneuver import Maneuver
 from activesteer.resources import list_maneuvers
 from activesteer.road.road import Road
-from activesteer.road.surface import surface_of
 from activesteer.scenario import resolve
 
 LABELS = ("kind", "name", "title", "steering_csv", "drive_csv", "path.csv", "road.crg", "road.profile")
@@ -49,9 +48,9 @@ def seen(maneuver: Maneuver) -> str:
 
 
 def _surface(road: Road) -> list[Any]:
-    """Everything that the tyres are told of an uneven surface."""
-    found = surface_of(road)
-    return [] if found is None else [part.tobytes().hex() for part in found]
+    """Everything that makes an uneven surface; the surfaces themselves take too long to make."""
+    made_of = (road.obstacle, road.heights, road.roughness, road.banking, road.crg_data)
+    return [*map(to_table, made_of), road.contact_used, road.start_m, road.outside] if road.is_uneven else []
 
 
 def _inside(area: Any, x: float, y: float) -> bool:
