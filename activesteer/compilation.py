@@ -29,6 +29,8 @@ from numba.core.ccallback import CFunc
 from numba.extending import intrinsic, register_jitable
 from numba.np import linalg
 
+from activesteer.shared_laws import MARKED
+
 _VERSIONS: Final = ("numba", "llvmlite", "numpy", "mujoco")
 _KEPT: Final = 4
 """Compiled states kept per function: enough for some branches and versions used in turn."""
@@ -57,6 +59,7 @@ def compiled(function: Callable[..., Any]) -> Any:
 
     Division by zero follows IEEE 754, as in numpy, and does not raise.
     """
+    _know_shared()
     dispatcher: Any = njit(error_model="numpy")(function)
     if hasattr(dispatcher, "enable_caching"):  # a plain function where numba is switched off
         dispatcher._cache = _cache_of(function)
@@ -65,16 +68,14 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 def inlined(function: Callable[..., Any]) -> Any:
     """Decorator: make native code part of each compiled function that calls it."""
+    _know_shared()
     return njit(inline="always", error_model="numpy")(function)
 
 
-def shared(function: Callable[..., Any]) -> Any:
-    """Decorator: let compiled code call a Python function, which then becomes part of it; Python still calls it as is.
-
-    The function is the law of a block. Its first argument is the block itself in Python, and a record of the block's
-    attributes in compiled code; see `native_blocks`.
-    """
-    return register_jitable(error_model="numpy")(function)
+def _know_shared() -> None:
+    """Make the functions that are marked as shared known to compiled code."""
+    while MARKED:
+        register_jitable(error_model="numpy")(MARKED.pop())
 
 
 def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], CFunc]:
@@ -86,6 +87,7 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
     """
 
     def decorate(function: Callable[..., Any]) -> CFunc:
+        _know_shared()
         callback: Any = CFunc(function, (arguments, result), locals={}, options={"error_model": "numpy"})
         callback._cache = _cache_of(function)
         callback.compile()
@@ -108,6 +110,7 @@ def compiled_call(
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
+        _know_shared()
         dispatcher: Any = njit(error_model="numpy", nogil=others_run)(function)
         if not hasattr(dispatcher, "enable_caching"):
             return dispatcher

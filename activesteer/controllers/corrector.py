@@ -6,9 +6,9 @@ import math
 from enum import Enum
 from typing import NamedTuple
 
-from activesteer.compilation import shared
 from activesteer.controllers.parameters import CorrectorParameters
 from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 from activesteer.theory.tolerance import tolerance
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.compilation import shared
 from activesteer.controllers.parameters import DesiredYawRateParameters
 from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 from activesteer.theory.single_track import SingleTrack, yaw_rate_gain
 
 MIN_SPEED_MPS: Final = 3.0

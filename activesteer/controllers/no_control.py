@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from activesteer.compilation import shared
 from activesteer.controllers.desired_yaw_rate import DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from activesteer.compilation import shared
 from activesteer.controllers.corrector import Corrector, corrected, cut_off, rear_direction, reset
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters
 from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack, rear_prediction
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from activesteer.compilation import shared
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
 _TIME_CONSTANT_S: Final = 0.5

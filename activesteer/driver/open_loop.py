@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from activesteer.compilation import shared
 from activesteer.driver.base import DriverSetup
 from activesteer.driver.speed_hold import SpeedHold, drive_torque, take_foot_off
 from activesteer.errors import ManeuverError
 from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, new_message
 
 

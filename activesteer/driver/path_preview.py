@@ -20,12 +20,13 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.compilation import compiled, shared
+from activesteer.compilation import compiled
 from activesteer.conventions import Array
 from activesteer.driver.open_loop import OpenLoopDriver
 from activesteer.driver.parameters import DriverParameters
 from activesteer.native_blocks import NativeBlock
 from activesteer.road.path_search import PathSearch, nearest, point_at
+from activesteer.shared_laws import shared
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
 LateralModel = Callable[[float], tuple[Array, Array]]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
-from activesteer.compilation import shared
 from activesteer.driver.base import Drive
 from activesteer.driver.parameters import DriverParameters
 from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 from activesteer.signals import Measurement
 
 _STANDSTILL_MPS: Final = 0.05

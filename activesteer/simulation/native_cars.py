@@ -44,7 +44,6 @@ from activesteer.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from activesteer.road.path import Path
-    from activesteer.simulation.closed_loop import ClosedLoop
 
 _SPEED: Final = Motion._fields.index("speed_mps")
 
@@ -127,7 +126,7 @@ class NativeCars:
         motions: Present motions, shape (n, 6).
     """
 
-    def __init__(self, loops: Sequence[ClosedLoop]) -> None:
+    def __init__(self, loops: Sequence[Any]) -> None:
         """Bind the cars.
 
         Args:

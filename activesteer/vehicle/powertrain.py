@@ -21,7 +21,8 @@ from typing import Final
 
 from numba import types
 
-from activesteer.compilation import compiled, compiled_call, shared
+from activesteer.compilation import compiled, compiled_call
+from activesteer.shared_laws import shared
 from activesteer.vehicle.parameters import Powertrain
 
 CLUTCH_OPEN: Final = 0

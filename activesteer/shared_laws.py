@@ -1,0 +1,24 @@
+"""Mark of the functions that Python and compiled code share; `compilation` makes compiled code know them.
+
+The mark needs no compiler, so that lists of controllers and the help do without one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+MARKED: Final[list[Callable[..., Any]]] = []
+"""Functions that compiled code does not know yet."""
+
+
+def shared(function: _Function) -> _Function:
+    """Decorator: let compiled code call a Python function, which then becomes part of it; Python still calls it as is.
+
+    The function is the law of a block. Its first argument is the block itself in Python, and a record of the block's
+    attributes in compiled code; see `native_blocks`.
+    """
+    MARKED.append(function)
+    return function
