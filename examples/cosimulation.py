@@ -1,16 +1,20 @@
 """The paper's co-simulation with open parts: the car and its active front steering as two FMUs, coupled by FMPy.
 
     python examples/cosimulation.py
+    FOLDER=build/cosimulation python examples/cosimulation.py
 
 Both FMUs exchange data every millisecond, as in the paper, and then every 5 and 10 ms. The same car with the same
-controller in a single process is the reference. Needs a C compiler and `pip install activesteer[fmi]`.
+controller in a single process is the reference. With FOLDER, the FMUs and their SSP file stay there.
+Needs a C compiler and `pip install activesteer[fmi]`.
 Guide: docs/coupling.md.
 """
 
 import ctypes
 import math
+import os
 import runpy
 import shutil
+import tempfile
 import time
 import zipfile
 from pathlib import Path
@@ -214,4 +218,5 @@ def peak_deg(angles_rad):
 
 
 if __name__ == "__main__":
-    compare(Path("build") / "cosimulation")
+    with tempfile.TemporaryDirectory() as scratch:
+        compare(Path(os.environ.get("FOLDER", scratch)))
