@@ -54,8 +54,7 @@ class AxleSlopes:
         """Read the curves."""
         self._car, known = setup.single_track, setup.estimation
         assert known is not None  # an estimator exists
-        wheelbase_m = self._car.cg_to_front_m + self._car.cg_to_rear_m
-        half = 0.5 * self._car.mass_kg * GRAVITY_MPS2 / wheelbase_m
+        half = 0.5 * self._car.mass_kg * GRAVITY_MPS2 / self._car.wheelbase_m
         self.loads_N = half * self._car.cg_to_rear_m, half * self._car.cg_to_front_m
         self._step_rad = known.tyres[0].slip_angle_step_rad
         self._curves: list[list[float]] = []

@@ -110,7 +110,7 @@ class Lqr:
         assert known is not None  # an estimator exists
         self._torque_per_pressure_NmpPa = known.brake_torque_per_pressure_NmpPa
         self._moment_per_torque = 1.0 / front, -1.0 / front, 1.0 / rear, -1.0 / rear
-        wheelbase_m = self._car.cg_to_front_m + self._car.cg_to_rear_m
+        wheelbase_m = self._car.wheelbase_m
         self._compensation_radpNm = (
             -1.0 / (wheelbase_m * self._car.front_stiffness_Nprad),
             1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad),

@@ -97,9 +97,8 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
     simulation = ClosedLoop(scenario, "none", timestep_s)
     start = simulation.save_state()
     car, speed = scenario.car.config.single_track, max(probe.speed_mps, 1.0)
-    wheelbase = car.cg_to_front_m + car.cg_to_rear_m
     # First guess: Ackermann angle with the understeer of a typical car, about 2.5 deg/g.
-    angle = scenario.car.config.steering.ratio * wanted * (wheelbase / speed**2 + 0.0044)
+    angle = scenario.car.config.steering.ratio * wanted * (car.wheelbase_m / speed**2 + 0.0044)
     tried: list[tuple[float, float]] = []
     for _ in range(_RUNS):
         reached = _steady_acceleration(simulation, probe.with_amplitude(angle), start)

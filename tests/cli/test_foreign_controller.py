@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -61,9 +62,15 @@ def test_foreign_controller_goes_through_all_commands(call: Call) -> None:
     assert found["by_status"] == {"ok": 8}
     assert found["without_effect"] == []
     call("study", "grid", "--report")
-    report = Path("grid/report.html").read_text()
-    assert "YawBeta: k_beta [rad/rad]" in report
-    assert '"keys": ["controllers.YawBeta.k_beta", "controllers.YawBeta.k_yaw"]' in report  # of the heat map
+    data = re.search(r'id="data">(.*?)</script>', Path("grid/report.html").read_text())
+    assert data is not None
+    shown = json.loads(data[1])
+    assert [(factor["label"], factor["unit"]) for factor in shown["factors"]] == [
+        ("YawBeta: k_beta", "rad/rad"), ("YawBeta: k_yaw", ""),
+    ]  # fmt: skip
+    heat = shown["by_group"][0]["yaw_rate_overshoot"]["heat"]
+    assert heat["keys"] == ["controllers.YawBeta.k_beta", "controllers.YawBeta.k_yaw"]
+    assert len({value for row in heat["maps"][1] for value in row}) == 4
 
     Path("tune.toml").write_text(STUDY.replace("KIND", "uniform") + TUNE)
     tuned = call("tune", "tune.toml", "-o", "tune", "--jobs", "1", "--json").json

@@ -49,9 +49,10 @@ class Prior:
                 continue
             names = factor.maneuvers or tuple(label_of(item) for item in study.maneuvers)
             maneuver = next(item for item in study.maneuvers if label_of(item) in names)
-            found = value_of(resolve(maneuver, study.vehicles[0], study.overrides, study.driver), factor.key)
+            scenario = resolve(maneuver, study.vehicles[0], study.overrides, study.driver, study.controllers)
+            found = value_of(scenario, factor.key, study.controllers)
             if factor.of:  # the ratio or difference that the files have
-                other = value_of(resolve(maneuver, study.vehicles[0], study.overrides, study.driver), factor.of)
+                other = value_of(scenario, factor.of, study.controllers)
                 found = found / other if factor.nominal == "times" else found - other
             elif factor.nominal:
                 found = 1.0 if factor.nominal == "times" else 0.0
