@@ -20,7 +20,7 @@ from activesteer import ActuatorCommand
 class YawBeta:
     PARAMETERS = {"k_beta": {"unit": "rad/rad", "range": (0.0, 3.0)}}
 
-    def __init__(self, setup, k_beta=0.8, k_yaw: float = 0.1, limit_rad=0.05):
+    def __init__(self, setup, k_beta=0.8, k_yaw: float = 0.05, limit_rad=0.05):
         self.k_beta, self.k_yaw, self.limit_rad = k_beta, k_yaw, limit_rad
         self.step_s, self.sideslip = setup.timestep_s, 0.0
 
@@ -51,7 +51,7 @@ terms = [{ metric = "yaw_rate_overshoot", controller = "rsc.py:YawBeta" }]
 
 def test_foreign_controller_goes_through_all_commands(call: Call) -> None:
     Path("rsc.py").write_text(CODE)
-    given = ("-c", "rsc.py:YawBeta", "--vehicle", "vehicles/mine/mine.toml", "--set", "controllers.YawBeta.k_yaw=0.05")
+    given = ("-c", "rsc.py:YawBeta", "--vehicle", "vehicles/mine/mine.toml", "--set", "controllers.YawBeta.k_yaw=0.1")
     assert call("vehicle", "new", "mine", "--table", str(models_dir() / "tables/wishbone.csv")).status == 0
 
     run = call("run", "sine_with_dwell", *given, "--json").json["runs"][0]
