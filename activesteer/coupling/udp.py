@@ -30,7 +30,7 @@ _MOST_WAITING: Final = 1000
 
 
 class UdpPort(NamedTuple):
-    """Where commands come from.
+    """Address that commands come from.
 
     Attributes:
         port: Port of the run.

@@ -1,4 +1,4 @@
-"""What the page asks for, checked: names from lists, numbers for keys with a slider."""
+"""Checked choices of the page: names from lists, numbers for keys with a slider."""
 
 from __future__ import annotations
 

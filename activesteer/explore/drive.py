@@ -64,7 +64,7 @@ COURSES: Final = {
 
 
 class Hands(NamedTuple):
-    """What hands and feet ask for.
+    """Positions of hands and feet.
 
     Attributes:
         steer: Position of the steering, -1 full right to 1 full left.

@@ -85,7 +85,7 @@ class Falsified:
 
     @property
     def violated(self) -> bool:
-        """Whether a set violates the requirement."""
+        """Return True if a set violates the requirement."""
         return self.violations > 0
 
     def to_json(self) -> dict[str, Any]:

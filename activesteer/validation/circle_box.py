@@ -32,7 +32,7 @@ _QUANTILES: Final = (2.5, 97.5)
 
 
 class Case(NamedTuple):
-    """What is driven.
+    """A run on the circle.
 
     Attributes:
         table: The vehicle file.
