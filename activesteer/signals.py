@@ -290,6 +290,10 @@ class Estimate(NamedTuple):
         sideslip_std_rad: Standard deviation of the sideslip angle [rad].
         yaw_rate_std_radps: Standard deviation of the yaw rate [rad/s].
         friction_std: Standard deviation of the friction.
+        front_stiffness: Stiffness of the front tyres relative to new tyres under the known load.
+        rear_stiffness: The same of the rear tyres.
+        front_stiffness_std: Standard deviation of the stiffness of the front tyres.
+        rear_stiffness_std: The same of the rear tyres.
     """
 
     speed_mps: Annotated[float, Recorded("m/s", "speed along the car")]
@@ -302,6 +306,10 @@ class Estimate(NamedTuple):
     sideslip_std_rad: Annotated[float, Recorded("rad", "standard deviation of the sideslip angle")]
     yaw_rate_std_radps: Annotated[float, Recorded("rad/s", "standard deviation of the yaw rate")]
     friction_std: Annotated[float, Recorded("", "standard deviation of the friction")]
+    front_stiffness: Annotated[float, Recorded("", "stiffness of the front tyres relative to new tyres")] = 1.0
+    rear_stiffness: Annotated[float, Recorded("", "stiffness of the rear tyres relative to new tyres")] = 1.0
+    front_stiffness_std: Annotated[float, Recorded("", "standard deviation of the stiffness of the front tyres")] = 0.0
+    rear_stiffness_std: Annotated[float, Recorded("", "standard deviation of the stiffness of the rear tyres")] = 0.0
 
 
 NO_BRAKES: Final = (0.0, 0.0, 0.0, 0.0)

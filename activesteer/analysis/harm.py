@@ -3,6 +3,10 @@
 A controller *harms* a run if one of `MEASURES` grows by more than its size. The sizes were written down before the
 first run of a comparison. A measure without a size is reported and not counted. A measure of 0 is as good as can be:
 moving within the lane is no harm, and an error within `FREE_SIDE_M` of a path is none either.
+
+One rule was added after the first run: a stopping distance counts only if the car without control keeps the free side
+of its lane. On a split road a car that does not drifts with all wheels onto the better side and stops there; a
+controller that keeps it in its lane stops it on the split.
 """
 
 from __future__ import annotations
@@ -108,6 +112,9 @@ MEASURES: Final[dict[str, Measure]] = {
     "path": Measure("largest path error beyond the free side of a lane", _M, 0.05, _path),
     "cones": Measure("cones hit or missed", _COUNT, 1.0, _cones),
     "stopping": Measure("stopping distance", _M, 0.5, lambda m: _of(m, "stopping_distance_m")),
+    "stopping_elsewhere": Measure(
+        "stopping distance, where the car without control leaves the free side of its lane", _M, None, lambda _: None
+    ),
     "heading": Measure("heading at the end against path or straight line", _DEG, 2.0 * _DEGREE, _heading),
     "yaw_rate": Measure("yaw rate left at the end", _DEGPS, 1.0 * _DEGREE, _yaw_rate_left),
     "displacement": Measure("lateral displacement that FMVSS 126 misses", _M, 0.10, _displacement),
@@ -136,6 +143,8 @@ def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
         if before is None and after is None:
             continue
         before, after = (math.inf if value is None or math.isnan(value) else value for value in (before, after))
+        if name == "stopping" and (_path(without) or 0.0) > 0.0:
+            name = "stopping_elsewhere"  # noqa: PLW2901 - the same value, not counted
         found[name] = 0.0 if before == after else after - before
     return found
 

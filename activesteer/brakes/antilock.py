@@ -10,8 +10,9 @@ RELEASE lowers the pressure to a fraction of the friction torque (`friction_Nm`,
 wheel). On ice it lowers the pressure further, if that leaves too little torque to speed the wheel up, and still further
 if the wheel does not gain speed. RECOVER waits until the wheel rolls with the car again. BUILD starts just below the
 last friction torque and rises slowly, and faster the longer it lasts, as on a road with increasing friction. A wheel
-whose limit exceeds the driver's demand is OFF. Near standstill, slowly rising pressures hand the car over to the
-driver.
+whose limit exceeds the driver's demand is OFF. A front wheel that a controller brakes beyond the pedal may slip by
+`intervention_slip`: a tyre at a large slip angle takes brake force only with a large slip (van Zanten 2000). Near
+standstill, slowly rising pressures hand the car over to the driver.
 
 Source of the cycle by wheel deceleration: Bosch, Automotive Handbook, chapter on ABS; Pasillas-Lepine (2006), Hybrid
 modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Fractions, thresholds and rates
@@ -22,7 +23,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from activesteer.compilation import compiled
+from activesteer.compilation import compiled, inlined
 
 OFF, RELEASE, RECOVER, BUILD = 0.0, 1.0, 2.0, 3.0
 
@@ -57,23 +58,37 @@ def _release(setup, state, wheel):
     _begin(state, wheel, RELEASE)
 
 
+@inlined
+def _largest_slip(setup, state, wheel, fed_Pa):
+    """Slip that releases a wheel in any case; more for a front wheel that a controller brakes."""
+    return setup.intervention_slip if wheel < 2 and state.demand_Pa[wheel] > fed_Pa else setup.largest_slip
+
+
+@inlined
+def _least_slip(setup, state, wheel, car_mps2):
+    """Least slip with which a deceleration releases a wheel."""
+    phase = state.phase[wheel]
+    minimum = setup.first_slip if phase == OFF else setup.min_slip - setup.min_slip_gain_s2pm * car_mps2
+    if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:
+        minimum *= 2.0
+    return minimum + setup.min_slip_speed_mps / state.reference_mps
+
+
 @compiled
-def _wheel(setup, state, wheel, car_mps2):
+def _wheel(setup, state, wheel, car_mps2, fed_Pa):
     """Advance one wheel by one interval."""
+    largest_slip = _largest_slip(setup, state, wheel, fed_Pa)
     per_pressure = setup.torque_per_pressure_NmpPa[wheel]
     slip = (state.reference_mps - state.wheel_mps[wheel]) / state.reference_mps
     gain = state.wheel_mps2[wheel] - car_mps2
     # A locked wheel also gains speed relative to a braking car, but does not recover.
-    regains = gain > _REGAINS_mps2 and (slip < setup.largest_slip or state.wheel_mps2[wheel] > 0.0)
+    regains = gain > _REGAINS_mps2 and (slip < largest_slip or state.wheel_mps2[wheel] > 0.0)
     phase = state.phase[wheel]
     state.phase_s[wheel] += setup.interval_s
     if phase in (OFF, BUILD):
         threshold = setup.first_deceleration_mps2 if phase == OFF else setup.deceleration_mps2
-        minimum = setup.first_slip if phase == OFF else setup.min_slip - setup.min_slip_gain_s2pm * car_mps2
-        if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:
-            minimum *= 2.0
-        minimum += setup.min_slip_speed_mps / state.reference_mps
-        if (gain < -threshold and slip > minimum) or (slip > setup.largest_slip and gain < _REGAINS_mps2):
+        minimum = _least_slip(setup, state, wheel, car_mps2) if largest_slip == setup.largest_slip else largest_slip
+        if (gain < -threshold and slip > minimum) or (slip > largest_slip and gain < _REGAINS_mps2):
             _release(setup, state, wheel)
         elif phase == OFF:
             # The limit is below the highest pressure if the car has become faster again after a hand-over.
@@ -104,7 +119,7 @@ def _wheel(setup, state, wheel, car_mps2):
 
 
 @compiled
-def antilock(setup, state, ax_mps2, steered_Pa):
+def antilock(setup, state, ax_mps2, steered_Pa, fed_Pa):
     """Decide once for all wheels.
 
     Args:
@@ -112,6 +127,7 @@ def antilock(setup, state, ax_mps2, steered_Pa):
         state: Its `BRAKE_STATE`; `limit_Pa`, the phases and `side_Pa` are advanced.
         ax_mps2: Measured longitudinal acceleration [m/s2].
         steered_Pa: Side-to-side difference that the controller steers against, in addition to the driver's [Pa].
+        fed_Pa: Pressure of the pedal [Pa]; a controller that demands more at a front wheel intervenes there.
     """
     highest = setup.full_pedal_pressure_Pa
     slow = state.reference_mps < setup.lowest_speed_mps
@@ -124,7 +140,7 @@ def antilock(setup, state, ax_mps2, steered_Pa):
         elif slow:
             state.limit_Pa[wheel] = min(state.allowed_Pa[wheel] + setup.hand_over_Paps * setup.interval_s, highest)
         else:
-            _wheel(setup, state, wheel, ax_mps2 - state.offset_mps2)
+            _wheel(setup, state, wheel, ax_mps2 - state.offset_mps2, fed_Pa)
         state.allowed_Pa[wheel] = state.limit_Pa[wheel]
     _hold_sides_together(setup, state, steered_Pa)
     if setup.select_low != 0.0:

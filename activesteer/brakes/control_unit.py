@@ -37,7 +37,7 @@ def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm, 
         follow_wheels(setup, state, speeds_radps)
         follow_car(setup, state, ax_mps2, braked)
         if setup.abs != 0.0:
-            antilock(setup, state, ax_mps2, steered_Pa)
+            antilock(setup, state, ax_mps2, steered_Pa, pedal * setup.full_pedal_pressure_Pa)
         if setup.tcs != 0.0:
             traction(setup, state, drive_Nm, braked)
     flow(setup, state, pedal)

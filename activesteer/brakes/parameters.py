@@ -54,6 +54,9 @@ class Antilock:
     """
     largest_slip: Annotated[float, Range(0.05, 0.9)] = 0.3
     """Slip relative to the estimated speed that releases a wheel in any case."""
+    intervention_slip: Annotated[float, Range(0.05, 0.9)] = 0.5
+    """Slip that releases a front wheel which a controller brakes beyond the pedal. A tyre at a large slip angle takes
+    brake force only with a large slip, which also turns its force away from the side: both turn the car back."""
     release_fraction: Fraction = 0.9
     """Pressure of a released wheel, as a fraction of its friction torque ..."""
     regain_mps2: NotNegative = 10.0

@@ -62,8 +62,14 @@ class LqrParameters:
     """Scale of the superposition angle [rad]."""
     reference_length_m: _Length
     """Distance over which the desired yaw rate follows the driver [m]."""
-    friction_fraction: _Fraction
+    friction_fraction: Annotated[float, Range(0.1, 1.5)]
     """Fraction of the estimated friction that the desired yaw rate may use [-]."""
+    friction_deviations: Annotated[float, Range(0.0, 10.0)]
+    """Standard deviations of the friction that are added to it for this limit [-]: the controller acts on the friction
+    only as far as the estimate is certain."""
+    against_driver_rad: _Limit
+    """Superposition against the driver's angle that is allowed while the friction is unknown [rad]; it grows to the
+    limit of the actuator with the certainty of the friction."""
     relaxation_length_m: _Length
     """Distance over which a tyre of the model builds up its force [m]."""
 

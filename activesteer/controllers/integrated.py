@@ -72,6 +72,7 @@ class Integrated:
         self._lqr = Lqr.from_vehicle(setup)
         self._parameters, servos = (p := setup.gains.integrated), setup.gains.servos
         self._limits_rad = np.array([servos.superposition_limit_rad, servos.rear_limit_rad])
+        self._bounds_rad = -self._limits_rad, self._limits_rad.copy()
         self._reach_rad = p.ahead_s * np.array([servos.superposition_rate_radps, servos.rear_rate_radps])
         self._car, self._slopes = setup.single_track, AxleSlopes(setup)
         self._supervised = [SupervisedActuator(p.tolerance_rad, p.window_s, setup.timestep_s) for _ in range(2)]
@@ -117,8 +118,12 @@ class Integrated:
         car, demand_rad = self._car, np.array(turn.demand_rad)
         moment = car.yaw_inertia_kgm2 * (turn.desired_radps - now.yaw_rate_radps) / p.yaw_rate_time_s
         force = -car.mass_kg * now.speed_mps * (now.sideslip_rad - turn.sideslip_rad) / p.sideslip_time_s
-        lower = np.maximum(-self._limits_rad, at_rad - self._reach_rad)
-        upper = np.minimum(self._limits_rad, at_rad + self._reach_rad)
+        driver, most, (least_rad, most_rad) = command.front_steer_demand_rad, self._limits_rad[0], self._bounds_rad
+        least_rad[0] = -min(turn.against_rad, most) if driver > 0.0 else -most
+        most_rad[0] = min(turn.against_rad, most) if driver < 0.0 else most
+        lower = np.maximum(least_rad, at_rad - self._reach_rad)
+        upper = np.maximum(np.minimum(most_rad, at_rad + self._reach_rad), lower)
+        lower = np.minimum(lower, most_rad)
         stuck = ~np.array(works)
         lower[stuck] = upper[stuck] = at_rad[stuck]
         effects = self._effects(*slopes)

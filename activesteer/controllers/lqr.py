@@ -46,6 +46,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from activesteer.controllers.axle_slopes import AxleSlopes
+from activesteer.controllers.confidence import ConfidenceMonitor, bounded
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.esc import brake_levers
 from activesteer.controllers.file_gains import LqrParameters
@@ -78,6 +79,7 @@ class Turn(NamedTuple):
         sideslip_rad: Steady-state sideslip angle [rad].
         steady_rad: Steady-state angles [rad].
         demand_rad: Angles that the state feedback demands, without limits [rad].
+        against_rad: Limit of the superposition against the driver's angle [rad].
     """
 
     estimate: Estimate
@@ -85,6 +87,7 @@ class Turn(NamedTuple):
     sideslip_rad: float
     steady_rad: tuple[float, float]
     demand_rad: tuple[float, float]
+    against_rad: float
 
 
 class Lqr:
@@ -100,6 +103,7 @@ class Lqr:
         p = self._parameters = setup.gains.lqr
         self._servos = setup.gains.servos
         self._estimator = setup.estimator()
+        self._confidence = ConfidenceMonitor(setup, self._estimator)
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._curves = AxleSlopes(setup)
@@ -130,7 +134,8 @@ class Lqr:
             return ActuatorCommand(estimate=turn.estimate)
         fade = min((speed_mps - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
         added_demand, rear_demand = (fade * angle for angle in turn.demand_rad)
-        added = min(max(added_demand, -servos.superposition_limit_rad), servos.superposition_limit_rad)
+        driver = command.front_steer_demand_rad
+        added = bounded(added_demand, driver, turn.against_rad, servos.superposition_limit_rad)
         rear = min(max(rear_demand, -servos.rear_limit_rad), servos.rear_limit_rad)
         self.apply(added, rear)
         saturated = (added, rear) != (added_demand, rear_demand)
@@ -156,9 +161,10 @@ class Lqr:
         """
         p, now = self._parameters, self._estimator.step(measurement)
         speed, driver = now.speed_mps, command.front_steer_demand_rad
+        confidence = self._confidence.step(now)
         if speed < MIN_SPEED_MPS:
-            return Turn(now, 0.0, 0.0, (0.0, 0.0), (0.0, 0.0))
-        desired = self._reference.step(driver, speed, now.friction)
+            return Turn(now, 0.0, 0.0, (0.0, 0.0), (0.0, 0.0), 0.0)
+        desired = self._reference.step(driver, speed, now.friction + p.friction_deviations * now.friction_std)
         added, turned = measurement.superposition_rad, measurement.rear_steer_rad
         # The tyres follow the angles over their relaxation length.
         fraction = -math.expm1(-self._interval_s * speed / p.relaxation_length_m)
@@ -189,10 +195,12 @@ class Lqr:
         )
         second = _STEADY + len(errors)
         demand = (
-            held[0] - sum(map(mul, row[_STEADY:second], errors)),
-            held[1] - sum(map(mul, row[second:], errors)),
+            confidence.authority * (held[0] - sum(map(mul, row[_STEADY:second], errors))),
+            confidence.authority * (held[1] - sum(map(mul, row[second:], errors))),
         )
-        return Turn(now, desired, sideslip, steady, demand)
+        most = self._servos.superposition_limit_rad
+        against = p.against_driver_rad + confidence.friction * max(most - p.against_driver_rad, 0.0)
+        return Turn(now, desired, sideslip, steady, demand, against)
 
     def _steady(
         self, row: list[float], works: tuple[bool, bool], given_rad: float, yaw_rate_radps: float, now: Estimate
@@ -255,15 +263,24 @@ def schedule(
     """
     return tuple(
         (
-            *steady_turn(car, speed_mps, works).ravel().tolist(),
+            *steady_turn(car, speed_mps, works, in_phase=True).ravel().tolist(),
             *feedback(car, parameters, servo_lag_s, speed_mps, interval_s, works).ravel().tolist(),
         )
         for speed_mps in SPEEDS_MPS
     )
 
 
-def steady_turn(car: SingleTrackParameters, speed_mps: float, works: tuple[bool, bool] = BOTH) -> Array:
+def steady_turn(
+    car: SingleTrackParameters, speed_mps: float, works: tuple[bool, bool] = BOTH, *, in_phase: bool = False
+) -> Array:
     """Return front angle, rear angle and sideslip of a steady turn; with both actuators there is no sideslip.
+
+    Args:
+        car: The known car.
+        speed_mps: Speed [m/s].
+        works: Whether superposition and rear steering work.
+        in_phase: Whether the rear wheels never turn out of phase, which would swing the tail out of the lane: below the
+            speed at which the sideslip of the car with straight rear wheels changes sign, the turn has that sideslip.
 
     Returns:
         Shape (3, 2): each per yaw rate and per given angle of an axle.
@@ -271,7 +288,9 @@ def steady_turn(car: SingleTrackParameters, speed_mps: float, works: tuple[bool,
     a, b = SingleTrack(car).matrices(speed_mps)
     turn = np.zeros((3, 2))
     if works == BOTH:
-        turn[:2, 0] = np.linalg.solve(b, -a[:, 0])
+        if in_phase:  # the unknowns are front angle and sideslip, for straight rear wheels
+            turn[2, 0] = max(float(np.linalg.solve(np.column_stack([b[:, 0], a[:, 1]]), -a[:, 0])[1]), 0.0)
+        turn[:2, 0] = np.linalg.solve(b, -a[:, 0] - a[:, 1] * turn[2, 0])
         return turn
     axle = 0 if works[0] else 1
     # The unknowns are the angle of the axle that can still be steered, and the sideslip.

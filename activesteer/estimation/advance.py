@@ -15,8 +15,10 @@ from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation.kalman_filter import begin, correct, predict
 from activesteer.estimation.records import (
     FRICTION,
+    FRONT_STIFFNESS,
     LATERAL_SPEED,
     N_STATES,
+    REAR_STIFFNESS,
     SAID_AX,
     SAID_AY,
     SAID_RATE,
@@ -111,6 +113,9 @@ def _write_estimate(known, memory):
     out[7] = math.atan2(lateral_std, max(speed, 0.0))
     out[8] = math.hypot(math.sqrt(covariance[YAW_RATE, YAW_RATE]), turning_radps)
     out[9] = math.sqrt(covariance[FRICTION, FRICTION])
+    out[10], out[11] = now[FRONT_STIFFNESS], now[REAR_STIFFNESS]
+    out[12] = math.sqrt(covariance[FRONT_STIFFNESS, FRONT_STIFFNESS])
+    out[13] = math.sqrt(covariance[REAR_STIFFNESS, REAR_STIFFNESS])
 
 
 @compiled

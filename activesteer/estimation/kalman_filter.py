@@ -4,6 +4,8 @@ It measures the yaw rate r + b_r and the lateral acceleration a_y + g p + b_y wi
 leans with the body. Differences give the derivatives of the model. The unknowns of the model are
 
     e_i     slip angle errors: Gauss-Markov processes of the size `slip_angle_std_rad` + `slip_angle_fraction` |a_i|
+    k_i     stiffness of the tyres of an axle relative to new ones, of the size `stiffness_std`, for `stiffness_s`: it
+            shows at small slip angles, where the friction does not
     b_y     offset of the sensor and inclination of the road, likewise
     u       friction, likewise, about its assumed value; it is observable only from forces near the limit
     b_r     offset of the yaw rate sensor, a random walk
@@ -29,27 +31,32 @@ from activesteer.estimation.records import (
     FRICTION,
     FRONT_ERROR,
     FRONT_SLIP,
+    FRONT_STIFFNESS,
     LATERAL_SPEED,
+    N_MOVING,
     N_STATES,
     RATE_OFFSET,
     REAR_ERROR,
     REAR_SLIP,
+    REAR_STIFFNESS,
     YAW_RATE,
 )
 from activesteer.estimation.two_track_model import (
     LARGEST_FRICTION,
+    LARGEST_STIFFNESS,
     LEAST_FRICTION,
+    LEAST_STIFFNESS,
     SLOWEST_MPS,
     follow,
     forces_of,
     slip_angles,
 )
 
-_DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 0.01])
+_DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 0.01, 0.01, 0.01])
 """Steps of the differences, in the units of the states."""
 _MOST_BRAKED: Final = 0.25
-"""Fraction of the front axle's friction force above which lateral forces give no information on the friction: brakes
-then reduce them by more than `force_fraction`, by a friction circle that is itself not exact."""
+"""Fraction of the front axle's friction force above which lateral forces give no information on friction and stiffness:
+brakes then reduce them by more than `force_fraction`, by a friction circle that is itself not exact."""
 _CREEP_MPS: Final = 0.05
 """Standard deviation of the lateral speed of an almost standing car [m/s]."""
 _CREEP_DENSITY: Final = 0.05
@@ -67,10 +74,11 @@ def begin(known, memory):
     state, covariance = memory.state, memory.covariance
     state[:] = 0.0
     state[FRICTION] = known.friction
+    state[FRONT_STIFFNESS] = state[REAR_STIFFNESS] = 1.0
     covariance[:] = 0.0
     sizes = (
         0.1, 0.02, 0.005, 0.005, known.slip_angle_std_rad, known.slip_angle_std_rad, known.rate_offset_std_radps,
-        known.ay_offset_std_mps2, known.friction_std,
+        known.ay_offset_std_mps2, known.friction_std, known.stiffness_std, known.stiffness_std,
     )  # fmt: skip
     for place in range(N_STATES):
         covariance[place, place] = sizes[place] ** 2
@@ -99,18 +107,18 @@ def _force_errors(known, front_N, rear_N):
 def _differentiate(known, tyres, memory, duration_s, moved, slope):
     """Compute the state after an interval, and its derivatives by the present state."""
     state = memory.state
-    start, other = state.copy(), np.empty(N_STATES)
+    start, other, braked = state.copy(), np.empty(N_STATES), _is_braked(known, memory)
     follow(known, tyres, memory, start, duration_s, moved)
     for column in range(N_STATES):
         slope[:, column] = 0.0
         slope[column, column] = 1.0
-        if column in (RATE_OFFSET, AY_OFFSET) or (column == FRICTION and _is_braked(known, memory)):
+        if column in (RATE_OFFSET, AY_OFFSET) or (braked and column >= FRICTION):
             continue
         step = _step_of(state, column)
         start[column] += step
         follow(known, tyres, memory, start, duration_s, other)
         start[column] = state[column]
-        for row in range(N_STATES):
+        for row in range(N_MOVING):
             slope[row, column] = (other[row] - moved[row]) / step
 
 
@@ -126,6 +134,8 @@ def _forget(known, memory, duration_s, moved, slope, added):
         (REAR_ERROR, 0.0, rear, known.slip_angle_s),
         (AY_OFFSET, 0.0, known.ay_offset_std_mps2, known.ay_offset_s),
         (FRICTION, known.friction, known.friction_std, known.friction_s),
+        (FRONT_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
+        (REAR_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
     ):
         kept = math.exp(-duration_s / time_s)
         moved[place] = mean + kept * (moved[place] - mean)
@@ -177,20 +187,27 @@ def predict(known, tyres, memory, duration_s):
         memory.state[row] = moved[row]
         for column in range(n):
             total = 0.0
-            for k in range(n):
-                total += slope[row, k] * covariance[k, column]
+            if row < N_MOVING:
+                for k in range(n):
+                    total += slope[row, k] * covariance[k, column]
+            else:
+                total = slope[row, row] * covariance[row, column]
             half[row, column] = total
     for row in range(n):
         for column in range(row + 1):
             total = added[row, column]
-            for k in range(n):
-                total += half[row, k] * slope[column, k]
+            if column < N_MOVING:
+                for k in range(n):
+                    total += half[row, k] * slope[column, k]
+            else:
+                total += half[row, column] * slope[column, column]
             covariance[row, column] = covariance[column, row] = total
     if _is_braked(known, memory):
-        # The friction is not estimated while braking, so it must not follow the other states by old correlations.
-        variance = covariance[FRICTION, FRICTION]
-        covariance[FRICTION, :] = covariance[:, FRICTION] = 0.0
-        covariance[FRICTION, FRICTION] = variance
+        # Road and tyres are not estimated while braking, so they must not follow the other states by old correlations.
+        for place in range(FRICTION, n):
+            variance = covariance[place, place]
+            covariance[place, :] = covariance[:, place] = 0.0
+            covariance[place, place] = variance
 
 
 @inlined
@@ -240,8 +257,8 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         math.cos(memory.front_angle_rad),
         math.cos(memory.rear_angle_rad),
     )
-    for place in (FRONT_SLIP, REAR_SLIP, FRICTION):
-        if place == FRICTION and _is_braked(known, memory):
+    for place in (FRONT_SLIP, REAR_SLIP, FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS):
+        if place >= FRICTION and _is_braked(known, memory):
             continue
         kept, step = state[place], _step_of(state, place)
         state[place] += step
@@ -257,4 +274,6 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
     innovation += error * error / _take_in(state, covariance, row, error, variance)
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
+    for place in (FRONT_STIFFNESS, REAR_STIFFNESS):
+        state[place] = min(max(state[place], LEAST_STIFFNESS), LARGEST_STIFFNESS)
     return innovation

@@ -24,8 +24,13 @@ class EstimatorParameters:
     """Time constant with which the friction returns to the assumed value [s]."""
     slip_angle_std_rad: _Positive = math.radians(0.05)
     """Standard deviation of the slip angle error of an axle: toe, offset of the steering angle sensor [rad]."""
-    slip_angle_fraction: _NotNegative = 0.1
-    """Slip angle error per slip angle: tyres a tenth softer or stiffer than new ones, load, temperature."""
+    slip_angle_fraction: _NotNegative = 0.05
+    """Slip angle error per slip angle: camber, combined slip, curves that are not similar."""
+    stiffness_std: _Positive = 0.2
+    """Standard deviation of the stiffness of the tyres of an axle, relative to new tyres under the known load: wear,
+    temperature, winter tyres, load."""
+    stiffness_s: _Positive = 100.0
+    """Time constant with which the stiffness returns to that of new tyres [s]."""
     slip_angle_s: _Positive = 1.0
     """Time constant of the slip angle error [s]."""
     bank_std_mps2: _Positive = 0.1

@@ -13,9 +13,13 @@ from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.setup import EstimatorSetup
 from activesteer.sensors.sensor_kinds import Sensor
 
-LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OFFSET, AY_OFFSET, FRICTION = range(9)
-"""Indices of the states v_y, r, a_f, a_r, e_f, e_r, b_r, b_y, m; see `two_track_model` and `kalman_filter`."""
-N_STATES: Final = 9
+LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OFFSET, AY_OFFSET, FRICTION, \
+    FRONT_STIFFNESS, REAR_STIFFNESS = range(11)  # fmt: skip
+"""Indices of the states v_y, r, a_f, a_r, e_f, e_r, b_r, b_y, u, k_f, k_r; see `two_track_model`, `kalman_filter`."""
+N_STATES: Final = 11
+"""Number of states; those from `FRICTION` on are properties of road and tyres, which are not learned while braking."""
+N_MOVING: Final = 4
+"""Number of states that depend on others after an interval; the others, behind them, depend on themselves alone."""
 SAID: Final = (
     "yaw_rate_radps", "ay_mps2", "ax_mps2", "steering_wheel_rad", "rear_steer_rad", "superposition_rad",
     *(f"{corner}_spin_radps" for corner in ("fl", "fr", "rl", "rr")),
@@ -29,7 +33,7 @@ MEMORY: Final = np.dtype(
     (
         np.record,
         [
-            ("estimate", np.float64, (10,)),
+            ("estimate", np.float64, (14,)),
             ("calls", np.intp),
             *((name, np.float64) for name in ("waited_s", "innovation", "left_out", "friction_used")),
             ("last", np.float64, (3,)),

@@ -9,7 +9,9 @@ For the axles i = f, r:
     p'' + 2 D w p' + w^2 p = w^2 k a_y
 
 with the steer angles d, the longitudinal forces X and their moment M_x, slip angles a that build up over the relaxation
-lengths s, the car's own tyre F_y under the wheel's load, and the friction u of the road by similarity. With a
+lengths s, the car's own tyre F_y under the wheel's load, the friction u of the road by similarity, and the stiffness
+k_i of the tyres of an axle relative to new ones: u F_y(k_i a_i / u, F_z), which changes the slope of the curve and not
+its peak, as LKY does in the Magic Formula. With a
 longitudinal force, a friction circle reduces u. That lowers the largest force but hardly the force at small slip
 angles, as in the Magic Formula of combined slip (0.7 of the friction for the brake take 8 % at 2 deg). The body rolls
 by p as a mass on a spring, about an axis that lies h below the centre of gravity, so that the axles also move sideways
@@ -38,16 +40,21 @@ from activesteer.estimation.records import (
     FRICTION,
     FRONT_ERROR,
     FRONT_SLIP,
+    FRONT_STIFFNESS,
     LATERAL_SPEED,
     N_STATES,
     REAR_ERROR,
     REAR_SLIP,
+    REAR_STIFFNESS,
     YAW_RATE,
 )
 
 LEAST_FRICTION: Final = 0.05
 LARGEST_FRICTION: Final = 1.5
 """Bounds of the estimated friction [-]."""
+LEAST_STIFFNESS: Final = 0.3
+LARGEST_STIFFNESS: Final = 2.0
+"""Bounds of the estimated stiffness of the tyres relative to new ones [-]."""
 SLOWEST_MPS: Final = 3.0
 """Below this speed the car is assumed to roll without slip angles, which the sensors cannot show [m/s]."""
 _LEAST_LEFT: Final = 0.5
@@ -75,7 +82,7 @@ def _between(forces_N, angle_step_rad, load_step_N, angle_rad, load_N):
 
 
 @compiled
-def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N, left_N, right_N, friction):
+def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N, left_N, right_N, friction, stiffness):
     """Return the lateral force of both tyres of an axle [N].
 
     Args:
@@ -88,8 +95,9 @@ def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N
         left_N: Longitudinal force of the left wheel.
         right_N: Longitudinal force of the right wheel.
         friction: Friction of the road.
+        stiffness: Stiffness of the tyres relative to new ones.
     """
-    size_rad, total_N = abs(angle_rad) / friction, 0.0
+    size_rad, total_N = min(max(stiffness, LEAST_STIFFNESS), LARGEST_STIFFNESS) * abs(angle_rad) / friction, 0.0
     for sign, along_N in ((-1.0, left_N), (1.0, right_N)):
         own_N = max(load_N + sign * shift_N, 0.0)
         used = along_N / (friction * own_N + 1.0)
@@ -113,10 +121,12 @@ def forces_of(known, tyres, memory, state):
     front_N = axle_force(
         tyres[0], known.angle_step_rad, known.front_load_step_N, state[FRONT_SLIP], known.front_load_N - forward_N,
         known.front_load_kg * memory.loading_mps2, along_N[0], along_N[1], friction,
+        state[FRONT_STIFFNESS],
     )  # fmt: skip
     rear_N = axle_force(
         tyres[1], known.angle_step_rad, known.rear_load_step_N, state[REAR_SLIP], known.rear_load_N + forward_N,
         known.rear_load_kg * memory.loading_mps2, along_N[2], along_N[3], friction,
+        state[REAR_STIFFNESS],
     )  # fmt: skip
     return front_N, rear_N
 

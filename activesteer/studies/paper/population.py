@@ -176,7 +176,10 @@ def _effects(rows: Sequence[Row], systems: Sequence[str]) -> Iterator[SystemEffe
                 spun=sum(has_spun(row) for _, row in both),
                 lower=_count(lowest if asked([system]) and {*REFERENCES} <= {*systems} else ()),
                 harmed=_count(bool(harms(growth)) for growth in grown),
-                growth=tuple(_distribution(name, [growth[name] for growth in grown]) for name in (grown or [{}])[0]),
+                growth=tuple(
+                    _distribution(name, [growth[name] for growth in grown if name in growth])
+                    for name in dict.fromkeys(name for growth in grown for name in growth)
+                ),
                 worst_track_m=max((track for track in tracks if not math.isnan(track)), default=math.nan),
             )
 

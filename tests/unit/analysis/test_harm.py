@@ -67,6 +67,13 @@ def test_a_path_without_lanes_leaves_the_free_side_of_a_lane():
     assert harms(changes(path, path | {"track_deviation_max_m": 0.66})) == ["path"]
 
 
+def test_a_car_that_drifts_onto_the_better_side_is_no_measure_of_a_stop():
+    drifts = {"stopping_distance_m": 56.0, "lateral_deviation_max_m": 1.8, "heading_end_rad": 0.1}
+    change = changes(drifts, drifts | {"stopping_distance_m": 89.0, "lateral_deviation_max_m": 0.7})
+    assert harms(change) == []
+    assert change["stopping_elsewhere"] == pytest.approx(33.0)
+
+
 def test_a_longer_stop_is_harm_and_no_stop_is_a_lost_car():
     stop = {"stopping_distance_m": 40.0, "lateral_deviation_max_m": 0.2, "heading_end_rad": 0.0}
     assert harms(changes(stop, stop | {"stopping_distance_m": 40.4})) == []

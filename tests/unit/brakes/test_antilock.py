@@ -33,7 +33,7 @@ def step(setup: Any, state: Any, count: int = 1) -> list[float]:
     """Return the limits of the front left wheel [Pa]."""
     limits = []
     for _ in range(count):
-        antilock(setup, state, 0.0, 0.0)
+        antilock(setup, state, 0.0, 0.0, FULL_PA)
         limits.append(float(state.limit_Pa[0]))
     return limits
 
@@ -121,13 +121,13 @@ def test_a_wheel_that_locks_again_in_its_recovery_is_released() -> None:
     setup, state = braking(phase=RECOVER, slip=0.5, gain_mps2=-5.0)
     state.wheel_mps2[0] = -1.0
     state.regained_mps2[0] = 4.0
-    antilock(setup, state, -30.0, 0.0)
+    antilock(setup, state, -30.0, 0.0, FULL_PA)
     assert state.phase[0] == RELEASE
 
 
 def test_a_wheel_that_stands_does_not_regain_speed_because_the_car_brakes() -> None:
     setup, state = braking(phase=RELEASE, slip=1.0)
-    antilock(setup, state, -9.0, 0.0)
+    antilock(setup, state, -9.0, 0.0, FULL_PA)
     assert state.phase[0] == RELEASE
 
 
@@ -157,9 +157,18 @@ def test_the_front_wheels_differ_by_what_a_driver_can_steer_against() -> None:
     setup, state = braking(phase=BUILD)
     state.side_Pa = 0.5e6
     for steered_Pa in (0.0, 1e6):
-        antilock(setup, state, 0.0, steered_Pa)
+        antilock(setup, state, 0.0, steered_Pa, FULL_PA)
         assert state.allowed_Pa[1] == pytest.approx(BORNE_NM / PER_PRESSURE + state.side_Pa + steered_Pa)
     assert state.side_Pa == pytest.approx(0.5e6 + 2 * 4e6 * INTERVAL_S)
     state.phase[0] = OFF
     step(setup, state)
     assert state.side_Pa == 0.5e6
+
+
+@pytest.mark.parametrize(
+    ("fed_Pa", "slip", "phase"), [(FULL_PA, 0.35, RELEASE), (0.0, 0.35, OFF), (0.0, 0.55, RELEASE)]
+)
+def test_a_front_wheel_that_a_controller_brakes_may_slip_more(fed_Pa: float, slip: float, phase: float) -> None:
+    setup, state = braking(slip=slip, gain_mps2=-25.0)
+    antilock(setup, state, 0.0, 0.0, fed_Pa)
+    assert state.phase[0] == phase

@@ -87,7 +87,7 @@ def test_either_front_wheel_holds_back_the_other(controlled: int) -> None:
     state.demand_Pa[:], state.limit_Pa[:] = 5e6, 9e6
     state.phase[controlled], state.borne_Nm[controlled], state.side_Pa = BUILD, 440.0, 1e6
     state.wheel_mps[:] = 20.0
-    antilock(setup, state, 0.0, 0.0)
+    antilock(setup, state, 0.0, 0.0, setup.full_pedal_pressure_Pa)
     grown_Pa = 1e6 + setup.side_difference_rise_Paps * INTERVAL_S
     assert state.side_Pa == pytest.approx(grown_Pa)
     assert state.allowed_Pa[1 - controlled] == pytest.approx(440.0 / (2200.0 / 10e6) + grown_Pa)
@@ -100,5 +100,5 @@ def test_below_walking_pace_the_anti_lock_system_hands_over_and_above_it_control
         state.demand_Pa[:], state.limit_Pa[:], state.phase[0], state.borne_Nm[0] = 5e6, 4e6, BUILD, 440.0
         state.reference_mps = speed_mps
         state.wheel_mps[:] = speed_mps
-        antilock(setup, state, 0.0, 0.0)
+        antilock(setup, state, 0.0, 0.0, setup.full_pedal_pressure_Pa)
         assert state.phase[0] == phase

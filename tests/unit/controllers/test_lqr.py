@@ -30,12 +30,12 @@ def first(known, command, measurement):
 
 
 @pytest.mark.parametrize("speed_mps", [15.0, 40.0])
-def test_turn_without_sideslip_repeats_itself_in_the_model(speed_mps):
+def test_desired_turn_repeats_itself_in_the_model(speed_mps):
     desired_radps = 0.1
     row = schedule(CAR, PARAMETERS, LAG_S, INTERVAL_S)[SPEEDS_MPS.index(speed_mps)]
-    front, rear = (gain * desired_radps for gain in (row[0], row[2]))
+    front, rear, sideslip = (gain * desired_radps for gain in (row[0], row[2], row[4]))
     a, b = model(CAR, PARAMETERS, LAG_S, speed_mps, INTERVAL_S)
-    state = np.array([desired_radps, 0.0, *[front, rear] * 3])
+    state = np.array([desired_radps, sideslip, *[front, rear] * 3])
     assert a @ state + b @ (front, rear) == pytest.approx(state, abs=1e-12)
 
 
@@ -103,8 +103,24 @@ def test_desired_yaw_rate_is_the_cars_own_up_to_what_the_friction_gives(known):
     # The speed is the estimated one.
     assert small.yaw_rate_desired_radps == pytest.approx(0.01 * gain, rel=1e-3)
     large = held(load_controller("lqr", known), steering(0.2), measured(0.2, speed_mps), 300)
-    most = known.gains.lqr.friction_fraction * GRAVITY_MPS2 / speed_mps
+    # Three standard deviations of the assumed friction are added to it.
+    most = known.gains.lqr.friction_fraction * (1.0 + 3.0 * 0.25) * GRAVITY_MPS2 / speed_mps
     assert 0.3 * most < large.yaw_rate_desired_radps < 1.2 * most
+
+
+def test_rear_wheels_never_turn_out_of_phase_for_a_steady_turn():
+    """Below the speed at which the own sideslip changes sign, sqrt(l_r C_r l / (m l_f)), they stay straight."""
+    car = CAR
+    wheelbase_m = car.cg_to_front_m + car.cg_to_rear_m
+    changes_mps = math.sqrt(
+        car.cg_to_rear_m * car.rear_stiffness_Nprad * wheelbase_m / (car.mass_kg * car.cg_to_front_m)
+    )
+    _, rear, sideslip = steady_turn(car, 0.7 * changes_mps, in_phase=True)[:, 0]
+    assert rear == pytest.approx(0.0, abs=1e-12)
+    assert sideslip > 0.0
+    fast = steady_turn(car, 1.3 * changes_mps, in_phase=True)
+    assert fast[1, 0] > 0.0
+    assert fast[:, 0] == pytest.approx(steady_turn(car, 1.3 * changes_mps)[:, 0])
 
 
 def test_at_rest_nothing_is_steered(known):

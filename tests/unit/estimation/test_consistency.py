@@ -20,12 +20,14 @@ from activesteer.estimation.records import (
     FRICTION,
     FRONT_ERROR,
     FRONT_SLIP,
+    FRONT_STIFFNESS,
     LATERAL_SPEED,
     MEMORY,
     N_STATES,
     RATE_OFFSET,
     REAR_ERROR,
     REAR_SLIP,
+    REAR_STIFFNESS,
     YAW_RATE,
     known_of,
 )
@@ -58,6 +60,8 @@ def drift(known, memory, state, duration_s, rng):
         (REAR_ERROR, 0.0, known.slip_angle_std_rad + known.slip_angle_fraction * abs(rear_rad), known.slip_angle_s),
         (AY_OFFSET, 0.0, known.ay_offset_std_mps2, known.ay_offset_s),
         (FRICTION, known.friction, known.friction_std, known.friction_s),
+        (FRONT_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
+        (REAR_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
     ):
         kept = math.exp(-duration_s / time_s)
         state[place] = mean + kept * (state[place] - mean) + size * math.sqrt(1.0 - kept**2) * rng.standard_normal()

@@ -12,7 +12,7 @@ from activesteer.errors import ControllerError
 from activesteer.signals import Measurement
 from tests.raising import raises
 from tests.unit.controllers.cars import setup
-from tests.unit.estimation.drives import estimates, rolling
+from tests.unit.estimation.drives import drive, estimates, rolling
 
 SIDESLIP_RMS_RAD = math.radians(0.3)
 """What the estimator is to keep."""
@@ -131,6 +131,20 @@ def test_friction_that_shows_is(slalom):
     assert run["estimated_friction_std"].min() < 0.05
     shows = run["estimated_friction_std"] < 0.08
     assert np.abs(run["estimated_friction"][shows] - 0.9).max() < 0.25
+
+
+@pytest.mark.parametrize(("mu", "front", "rear"), [(0.71, 0.72, 0.72), (0.9, 0.7, 1.1), (0.5, 1.0, 1.0)])
+def test_soft_tyres_are_told_from_a_slippery_road_and_front_from_rear(mu, front, rear):
+    """The first car was taken for one on friction 0.44 while only friction showed in the estimate."""
+    factors = {"factors.front_cornering_stiffness": front, "factors.rear_cornering_stiffness": rear, "road.mu": mu}
+    run = drive("slalom", speed_kmh=100.0 * math.sqrt(mu / 0.9), duration_s=19.0, **factors).recording
+    late = (run["estimated_friction_std"] < 0.08) & (run.time_s > 6.0)
+    assert late.any()
+    assert np.abs(run["estimated_friction"][late] - mu).max() < 0.15
+    for name, factor in (("front", front), ("rear", rear)):
+        # The axle's compliance does not soften with its tyre, and the curve of a loaded tyre is not exactly similar.
+        assert np.abs(run[f"estimated_{name}_stiffness"][late] - factor).max() < 0.2
+        assert run[f"estimated_{name}_stiffness_std"][late].max() < 0.1
 
 
 def test_car_without_the_table_has_no_estimator():

@@ -14,10 +14,12 @@ from activesteer.estimation.kalman_filter import begin, correct, predict
 from activesteer.estimation.records import (
     AY_OFFSET,
     FRICTION,
+    FRONT_STIFFNESS,
     LATERAL_SPEED,
     MEMORY,
     N_STATES,
     RATE_OFFSET,
+    REAR_STIFFNESS,
     SAID,
     YAW_RATE,
     known_of,
@@ -159,11 +161,13 @@ def test_motion_of_a_standing_car_is_uncertain_by_its_creeping_alone(known, memo
 def test_said_errors_are_those_of_the_filters_and_of_the_way_to_the_present(known):
     memory = np.zeros(1, MEMORY)[0]
     memory["speed_mps"], memory["ax_mps2"], memory["loading_mps2"] = 20.0, -3.0, 5.0
-    memory["now"][[LATERAL_SPEED, YAW_RATE, FRICTION]] = 0.6, 0.25, 0.8
+    memory["now"][[LATERAL_SPEED, YAW_RATE, FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS]] = 0.6, 0.25, 0.8, 1.1, 0.7
     memory["speed_variance"], memory["waited_s"] = 0.04, 0.003
     memory["covariance"] = np.diag(0.001 * np.arange(1.0, N_STATES + 1.0))
     advance._write_estimate(known, memory)
-    lateral, rate, friction = (0.001 * (place + 1) for place in (LATERAL_SPEED, YAW_RATE, FRICTION))
+    lateral, rate, friction, front, rear = (
+        0.001 * (place + 1) for place in (LATERAL_SPEED, YAW_RATE, FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS)
+    )
     ahead_s = known.age_s + 0.003
     speed_mps = 20.0 + ahead_s * (-3.0 + 0.25 * 0.6)
     wrong_N = known.force_std_N + known.force_fraction * known.mass_kg * 5.0
@@ -173,6 +177,7 @@ def test_said_errors_are_those_of_the_filters_and_of_the_way_to_the_present(know
     assert memory.estimate == pytest.approx([
         speed_mps, 0.6, math.atan2(0.6, speed_mps), 0.25, 0.8, math.hypot(0.2, known.radius_std * speed_mps),
         lateral_std, math.atan2(lateral_std, speed_mps), math.hypot(math.sqrt(rate), turned), math.sqrt(friction),
+        1.1, 0.7, math.sqrt(front), math.sqrt(rear),
     ])  # fmt: skip
 
 
