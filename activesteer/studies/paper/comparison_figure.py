@@ -107,5 +107,5 @@ def comparison_population_figure(made: Population) -> Figure:
         panels.append(Heat(none + (every - none) * proportions, texts, names, rows, (-1.0, 1.0), _COLOURS, title))
     legend = _legend("better", "worse", "as without control, or in half of the runs")
     title = f"{made.samples} samples of {made.vehicle}, seed {made.seed}; -: no such run"
-    width_in, height_in = 2.0 + 1.5 * len(names), 1.4 + 0.3 * len(scenarios)
+    width_in, height_in = 2.0 + 1.5 * max(len(names), 4), 1.4 + 0.3 * len(scenarios)
     return draw(Picture(title, panels, None, len(panels), width_in, height_in, legend, shared_legend=True))
