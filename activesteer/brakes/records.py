@@ -17,6 +17,7 @@ _HYDRAULICS: Final = ("full_pedal_pressure_Pa", "rise_Paps", "fall_Paps", "pump_
 _ANTILOCK: Final = tuple(Antilock.__dataclass_fields__)
 _OF_WHEELS: Final = (
     "rolling_radius_m", "torque_per_pressure_NmpPa", "parking_torque_Nm", "drive_fraction", "inertia_kgm2",
+    "differential",
 )  # fmt: skip
 _TRACTION: Final = tuple(TractionControl.__dataclass_fields__)
 
@@ -73,6 +74,7 @@ def brake_setup(
     rolling_radius_m: Sequence[float],
     drive_fraction: Sequence[float],
     inertia_kgm2: Sequence[float],
+    differential: Sequence[bool],
 ) -> NDArray[Any]:
     """Build the constants of a car's brakes.
 
@@ -82,6 +84,7 @@ def brake_setup(
         rolling_radius_m: Radius of each wheel that turns its rotation into a speed [m].
         drive_fraction: Fraction of the drive torque of each wheel.
         inertia_kgm2: Inertia of each wheel about its axis [kg m2].
+        differential: Whether a differential drives the wheel.
 
     Returns:
         A `BRAKE_SETUP`, shape (1,).
@@ -99,6 +102,7 @@ def brake_setup(
     setup["torque_per_pressure_NmpPa"] = np.array(brakes.torques_Nm) / hydraulics.full_pedal_pressure_Pa
     setup["parking_torque_Nm"] = (0.0, 0.0, brakes.parking_torque_Nm, brakes.parking_torque_Nm)
     setup["drive_fraction"], setup["inertia_kgm2"] = drive_fraction, inertia_kgm2
+    setup["differential"] = differential
     return setup
 
 

@@ -12,7 +12,7 @@ def traction(setup, state, torque_Nm, braked):
 
     The mean speed of the driven wheels may exceed that of the car by a fraction and a constant. A proportional and an
     integral part reduce the drive torque by the excess; the integral starts from the torque at that instant. Of two
-    wheels of an axle the faster one is braked, so that the differential passes its torque to the other.
+    wheels behind a differential the faster one is braked, so that the differential passes its torque to the other.
 
     Args:
         setup: A `BRAKE_SETUP`.
@@ -40,5 +40,5 @@ def traction(setup, state, torque_Nm, braked):
     for wheel in range(4):
         other = state.wheel_mps[wheel + 1 - 2 * (wheel % 2)]
         beyond = state.wheel_mps[wheel] - other - setup.spin_mps
-        pressure = setup.brake_gain_Paspm * beyond if setup.drive_fraction[wheel] > 0.0 else 0.0
+        pressure = setup.brake_gain_Paspm * beyond if setup.differential[wheel] != 0.0 else 0.0
         state.traction_Pa[wheel] = min(max(pressure, 0.0), setup.brake_limit_Pa)

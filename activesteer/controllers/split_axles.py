@@ -6,12 +6,18 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.signals import NO_TORQUES, DriverCommand, Estimate, Measurement, PerWheel
 
 _SIDES: Final = (-1.0, 1.0, -1.0, 1.0)
 """Sign of a torque that turns the car to the left, order of `CORNERS`."""
+_FREE_SLIP: Final = 0.03
+"""Slip up to which a wheel gets all of its torque [-]: that of a rear wheel of the compact at 1.7 kN."""
+_MOST_SLIP: Final = 0.06
+"""Slip from which a wheel gets nothing [-]: further slip costs more side force than it gives drive force."""
 _LEAST_RADPS: Final = 1.0
 """Wheel speed below which a motor's power sets no limit [rad/s]."""
 
@@ -47,6 +53,11 @@ class Range(NamedTuple):
         return min(max(right - difference_Nm, self.low[0]), self.high[0]), right
 
 
+def _left_by(slip: float) -> float:
+    """Return the fraction of a torque that a wheel may get which slips in its direction already."""
+    return min(max((_MOST_SLIP - slip) / (_MOST_SLIP - _FREE_SLIP), 0.0), 1.0)
+
+
 class SplitTorques:
     """Electric axles of a car as a controller knows them."""
 
@@ -73,6 +84,9 @@ class SplitTorques:
             car.mass_kg * known.two_track.load_height_m * share / track_m
             for share, track_m in zip(shares, tracks_m, strict=True)
         ]
+        self._arms_m = [
+            0.5 * side * track_m for side, track_m in zip(_SIDES, np.repeat(tracks_m, 2).tolist(), strict=True)
+        ]
         self._levers = [0.5 * track_m / self._radius_m[2 * axle] for axle, track_m in enumerate(tracks_m)]
 
     def ranges(self, command: DriverCommand, measurement: Measurement, now: Estimate) -> list[Range]:
@@ -90,8 +104,10 @@ class SplitTorques:
             nothing = 0.0, 0.0
             return [Range(axle.place, self._levers[axle.place // 2], nothing, nothing, 0.0) for axle in self._axles]
         use, least = self._fractions
-        used = measurement.ay_mps2 / (GRAVITY_MPS2 * max(now.friction, 0.05))
-        grip = now.friction * max(math.sqrt(max(use**2 - used**2, 0.0)), least)
+        # On a sudden change the estimate may exceed the friction in the tyre files, which no road does.
+        friction = min(max(now.friction, 0.05), 1.0)
+        used = measurement.ay_mps2 / (GRAVITY_MPS2 * friction)
+        grip = friction * max(math.sqrt(max(use**2 - used**2, 0.0)), least)
         drive_Nm = command.drive_torque_demand_Nm if command.gear else 0.0
         found = []
         for axle in self._axles:
@@ -104,8 +120,10 @@ class SplitTorques:
                 most = min(axle.torque_Nm, axle.power_W / max(abs(speed), _LEAST_RADPS))
                 driver = self._drive[wheel] * drive_Nm
                 drives, absorbs = (most, axle.regeneration * most) if speed >= 0.0 else (axle.regeneration * most, most)
-                high[side] = max(min(drives, road_Nm) - driver, 0.0)
-                low[side] = min(-min(absorbs, road_Nm) - driver, 0.0)
+                travel_mps = now.speed_mps + self._arms_m[wheel] * now.yaw_rate_radps
+                slip = self._radius_m[wheel] * speed / max(travel_mps, 1.0) - 1.0
+                high[side] = _left_by(slip) * max(min(drives, road_Nm) - driver, 0.0)
+                low[side] = _left_by(-slip) * min(-min(absorbs, road_Nm) - driver, 0.0)
             lever = self._levers[axle.place // 2]
             found.append(Range(axle.place, lever, (low[0], low[1]), (high[0], high[1]), axle.difference_Nm))
         return found

@@ -13,8 +13,9 @@ at its limit, the other one takes the rest. The limits of a wheel are
     friction    |T| <= R F_z mu max(sqrt(u^2 - (a_y / (g mu))^2), s)
 
 with the estimated friction mu, the fraction u of it that may be used, a fraction s that stays for the moment in a turn
-at the limit, and the wheel load F_z of the measured lateral acceleration. Last, q is reduced so far that the electric
-power stays within the limits of the battery. While the driver brakes, the controller rests.
+at the limit, and the wheel load F_z of the measured lateral acceleration. Both limits fade to zero for a wheel whose
+slip grows from 3 to 6 %, since the estimate of a sudden change of friction comes late. Last, q is reduced so far that
+the electric power stays within the limits of the battery. While the driver brakes, the controller rests.
 
 Unlike the brakes of `esc`, the moment costs no speed, so the controller acts at every error. Electric motors answer
 within some 15 ms, faster than hydraulics.

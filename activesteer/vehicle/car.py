@@ -105,7 +105,13 @@ class Vehicle(Uncopyable):
             self._place()
             radii_m = self._wheels.effective_radii_m(tyres)
             inertias_kgm2, fractions = self._wheels.inertias_kgm2(), parameters.powertrain.wheel_fractions
-            self._brake_setup[:] = brake_setup(parameters.brakes, timestep_s, radii_m, fractions, inertias_kgm2)
+            differential = [
+                part > 0.0 and getattr(parameters.motors, corner) is None
+                for corner, part in zip(CORNERS, fractions, strict=True)
+            ]
+            self._brake_setup[:] = brake_setup(
+                parameters.brakes, timestep_s, radii_m, fractions, inertias_kgm2, differential
+            )
             reset(self._brake_state, self._brake_setup, 0.0)
             if parameters.sensors.speed_from_wheels:
                 self._bindings["wheel_radii_m"] = speed_radii(parameters.powertrain.front_fraction, radii_m)

@@ -143,7 +143,7 @@ def _record(bindings, tape):
 
 @inlined
 def _with_grip(setup, state, wheel, torque_Nm):
-    """Return a controller's torque at a wheel as traction control leaves it: less for a wheel that spins or locks."""
+    """Return the demand at a motor's wheel as traction control leaves it: less for a wheel that spins or locks."""
     if setup.tcs == 0.0 or torque_Nm == 0.0:
         return torque_Nm
     faster_mps = state.wheel_mps[wheel] - state.reference_mps
@@ -223,7 +223,8 @@ def carry_out(bindings_address, driver_command, actuator_command, torques_set):
             # A motor has no clutch: with it open, only the driver's torque is missing.
             for wheel in range(_N_WHEELS):
                 if bindings.driven_by[wheel] == MOTOR:
-                    ctrl[bindings.drives[wheel]] += _with_grip(setup, state, wheel, added_Nm[wheel])
+                    demand_Nm = ctrl[bindings.drives[wheel]] + added_Nm[wheel]
+                    ctrl[bindings.drives[wheel]] = _with_grip(setup, state, wheel, demand_Nm)
         step_motors(
             bindings.motors, bindings.n_motors, bindings.battery, bindings.electric_state, ctrl, bindings.drives,
             carray(f64_pointer(bindings.qvel), (bindings.n_dofs,)), bindings.spins, bindings.timestep_s, torques_set,

@@ -28,7 +28,7 @@ def known():
 
 def torques_of(known, moment_Nm, driver=None, now=STRAIGHT, ay_mps2=0.0, speed_mps=SPEED_MPS):
     seen = measured(0.0, speed_mps)._replace(ay_mps2=ay_mps2, wheel_speed_radps=(speed_mps / 0.307,) * 4)
-    split = SplitTorques(known, known.gains.tv.friction_fraction, known.gains.tv.least_fraction)
+    split, now = SplitTorques(known, known.gains.tv.friction_fraction, 0.2), now._replace(speed_mps=speed_mps)
     return split.for_moment(moment_Nm, driver or DriverCommand(), seen, now)
 
 
@@ -56,17 +56,25 @@ def test_without_an_error_there_is_no_torque_and_errors_have_the_sign_of_their_m
 
 
 def test_a_wheel_gets_no_more_than_its_motor_has_beside_the_torque_of_the_driver(known):
-    grip = STRAIGHT._replace(friction=3.0)
-    (_, _, rl, rr), reached = torques_of(known, 1e5, now=grip, speed_mps=10.0)
-    assert rr == -rl == 155.0 * 9.5
+    weak = replace(known, split_axles=(known.split_axles[0]._replace(torque_Nm=500.0, power_W=30e3),))
+    (_, _, rl, rr), reached = torques_of(weak, 1e5, speed_mps=10.0)
+    assert rr == -rl == 500.0
     assert reached < 1e5
-    pedal = DriverCommand(drive_torque_demand_Nm=2000.0)
-    (_, _, rl, rr), _ = torques_of(known, 1e5, pedal, grip, speed_mps=10.0)
-    assert rr == pytest.approx(155.0 * 9.5 - 1000.0)
-    assert rl == pytest.approx(-155.0 * 9.5 - 1000.0)
-    # 55 kW at 25 m/s.
-    (_, _, rl, rr), _ = torques_of(known, 1e5, now=grip)
-    assert rr == pytest.approx(55e3 / (SPEED_MPS / 0.307)) == -rl
+    pedal = DriverCommand(drive_torque_demand_Nm=400.0)
+    (_, _, rl, rr), _ = torques_of(weak, 1e5, pedal, speed_mps=10.0)
+    assert rr == pytest.approx(500.0 - 200.0)
+    assert rl == pytest.approx(-500.0 - 200.0)
+    # 30 kW at 25 m/s.
+    (_, _, rl, rr), _ = torques_of(weak, 1e5)
+    assert rr == pytest.approx(30e3 / (SPEED_MPS / 0.307)) == -rl
+
+
+def test_a_wheel_that_slips_gets_no_more_in_that_direction(known):
+    split = SplitTorques(known, 0.9, 0.2)
+    spinning = measured(0.0, SPEED_MPS)._replace(wheel_speed_radps=(81.4, 81.4, 81.4, 1.1 * 81.4))
+    (_, _, rl, rr), _ = split.for_moment(300.0, DriverCommand(), spinning, STRAIGHT)
+    assert rr == 0.0
+    assert rl < -50.0
 
 
 def test_friction_limits_the_torque_by_the_load_that_the_turn_leaves(known):
