@@ -19,7 +19,7 @@ NOTHING = np.zeros(4)
 def of(brakes: Brakes, timestep_s: float = 0.001) -> tuple[Any, Any]:
     """Return setup and state in the form of compiled code."""
     setup, state = (
-        brake_setup(brakes, timestep_s, [0.3] * 4, [0.5, 0.5, 0.0, 0.0], [1.0] * 4, [True] * 4),
+        brake_setup(brakes, timestep_s, [0.3] * 4, [0.5, 0.5, 0.0, 0.0], [1.0] * 4, [True, True, False, False]),
         np.zeros(1, BRAKE_STATE),
     )
     reset(state, setup, 20.0)
