@@ -20,7 +20,7 @@ class Condition(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether the condition holds."""
+        """True if the condition holds."""
         return self.margin > 0.0 if self.strict else self.margin >= 0.0
 
     @property
