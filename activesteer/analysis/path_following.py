@@ -179,7 +179,12 @@ def _steering_effort(wheel: Array, step_s: float) -> dict[str, float]:
 
 def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
     """Return the metrics of the car's distances from path, lanes and cones."""
-    deviation = track.path_distance(*track.front_axle(recording), course.path.x_m, course.path.y_m)
+    x, y = track.front_axle(recording)
+    if course.last_gate_x_m is None:  # such a path may cross itself
+        every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
+        deviation = track.places_along(x[::every], y[::every], course.path)[1]
+    else:
+        deviation = track.path_distance(x, y, course.path.x_m, course.path.y_m)
     values = {"track_deviation_max_m": float(np.abs(deviation).max()), "track_deviation_rms_m": rms(deviation)}
     values["heading_end_rad"] = track.heading_at_end(recording, course.path.x_m, course.path.y_m)
     if not course.lanes and not len(course.cones_m):
