@@ -26,7 +26,7 @@ _MARKER: Final = "fl_road_z_m"
 
 def is_uneven(recording: RecordingLike) -> bool:
     """Return whether a run was driven on an uneven road."""
-    return any(channel.name == _MARKER for channel in getattr(recording, "channels", ()))
+    return any(getattr(channel, "name", channel) == _MARKER for channel in getattr(recording, "channels", ()))
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
