@@ -64,7 +64,7 @@ def at_wheel(channel: str) -> Quantity:
 
 LOADS: Final = (at_wheel("fl_tyre_fz_N"), at_wheel("rl_tyre_fz_N"))
 DISTANCE: Final = quantity_of("path_distance_m")._replace(channel="x_m", short="distance", unit=DisplayUnit("mm", 1e3))
-RIDE: Final = (quantity_of("pitch_rad"), *LOADS)
+RIDE: Final = (quantity_of("pitch_rad"), LOADS[0])
 PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
     "straight_line": (SPEED, at_wheel("fl_drive_torque_Nm"), *LOADS),
     "standstill": (DISTANCE, *LOADS),
@@ -72,7 +72,8 @@ PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
     "drive_off_and_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
     "start_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
     **dict.fromkeys(("rough_road", "rough_road_50", "rough_road_120", "cleat", "kerb_strike"), RIDE),
-    "rough_braking": (SPEED, quantity_of("ax_mps2"), at_wheel("fl_brake_pressure_Pa"), *LOADS),
+    "rough_braking": (SPEED, at_wheel("fl_brake_pressure_Pa"), LOADS[0]),
+    **dict.fromkeys(("rough_lane_change", "banked_curve"), (quantity_of("yaw_rate_radps"), LOADS[0])),
     "straight_braking": (
         SPEED, quantity_of("ax_mps2"), at_wheel("fl_brake_pressure_Pa"), at_wheel("rl_brake_pressure_Pa"),
     ),
