@@ -13,13 +13,12 @@ The tyre's formula needs a plane. Three ways lead to it, from the place straight
 The cams follow |x/a|^c + |z/b|^c = 1 with a = `ELLIPS_LENGTH` R0, b = `ELLIPS_HEIGHT` R0, c = `ELLIPS_ORDER`; their
 distance is `ELLIPS_SHIFT` times the length of the contact patch at the nominal load of the tyre file.
 
-Range: the parameters of the Magic Formula book (1.471, 0.9622, 1.5174, 0.8335) belong to a 205/60 R15 at 2.2 bar and
-were fitted to slow rolling over steps and cleats up to `ELLIPS_MAX_STEP` (25 mm), at constant axle height. The belt's
-own vibration, above 30 Hz, is not modelled. The distance of the cams does not follow the load.
+Range: the parameters (1.471, 0.9622, 1.5174, 0.8335) are those of the tyre file of a 205/60 R15 in Pacejka's book, whose
+`ELLIPS_MAX_STEP` is 25 mm. The belt's own vibration is not modelled. The distance of the cams does not follow the load.
 
-Sources: Schmeitz, A semi-empirical three-dimensional model of the pneumatic tyre rolling over arbitrarily uneven road
-surfaces, TU Delft 2004, chapter 4; Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 10.1.6 and appendix 3
-(parameters of the 205/60 R15).
+Sources, which were not at hand when this was written: Schmeitz, A semi-empirical three-dimensional model of the
+pneumatic tyre rolling over arbitrarily uneven road surfaces, TU Delft 2004; Pacejka, Tire and Vehicle Dynamics, 3rd ed.
+2012.
 """
 
 from __future__ import annotations
