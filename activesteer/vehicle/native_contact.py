@@ -13,8 +13,9 @@ The tyre's formula needs a plane. Three ways lead to it, from the place straight
 The cams follow |x/a|^c + |z/b|^c = 1 with a = `ELLIPS_LENGTH` R0, b = `ELLIPS_HEIGHT` R0, c = `ELLIPS_ORDER`; their
 distance is `ELLIPS_SHIFT` times the length of the contact patch at the nominal load of the tyre file.
 
-Range: the parameters (1.471, 0.9622, 1.5174, 0.8335) are those of the tyre file of a 205/60 R15 in Pacejka's book, whose
-`ELLIPS_MAX_STEP` is 25 mm. The belt's own vibration is not modelled. The distance of the cams does not follow the load.
+Range: the parameters (1.471, 0.9622, 1.5174, 0.8335) are those of the tyre file of a 205/60 R15 in Pacejka's book,
+whose `ELLIPS_MAX_STEP` is 25 mm. The belt's own vibration is not modelled. The distance of the cams does not follow the
+load.
 
 Sources, which were not at hand when this was written: Schmeitz, A semi-empirical three-dimensional model of the
 pneumatic tyre rolling over arbitrarily uneven road surfaces, TU Delft 2004; Pacejka, Tire and Vehicle Dynamics, 3rd ed.
