@@ -73,7 +73,7 @@ class Batch:
     Example:
         >>> import numpy as np
         >>> import activesteer
-        >>> batch = activesteer.Batch("sine_with_dwell", 3, overrides={"road.mu": np.array([0.3, 0.6, 0.9])})
+        >>> batch = activesteer.Batch("sine_with_dwell", 3, overrides={"road.mu": np.array([0.6, 0.8, 1.0])})
         >>> measurement = batch.advance(1500)
         >>> measurement.yaw_rate_radps.shape
         (3,)

@@ -155,10 +155,13 @@ def test_run_that_fails_keeps_what_was_recorded(call, controller, tmp_path, body
     assert "INCOMPLETE: ControllerError" in info.out
 
 
-def test_failing_run_prints_no_json(call, controller):
+def test_failing_run_leaves_the_json_of_the_others(call, controller):
     name = controller("return None if self.steps > 10 else ActuatorCommand()")
     told = call("run", "straight_line", "-c", "none", "-c", name, *SHORT, "--json")
-    refused(told, "step returned None")
+    assert told.status == 1
+    errors = [run.get("error") for run in told.json["runs"]]
+    assert errors[0] is None
+    assert "step returned None" in errors[1]
     assert Recording.open("runs/straight_line-none.mcap").metadata["complete"] is True
 
 
