@@ -73,6 +73,17 @@ KEY_FIGURES: Final = (
     KeyFigure("Mean deceleration", ("mean_deceleration_mps2",)),
     KeyFigure("Off the path", ("track_deviation_max_m",)),
     KeyFigure("Steering effort, rms rate", ("steering_wheel_rate_rms_radps",)),
+    KeyFigure("Seat acceleration rms", ("seat_acceleration_rms_mps2",)),
+    KeyFigure("Heading end", ("heading_end_rad",)),
+    KeyFigure("Yaw rate delay", ("yaw_rate_delay_s",)),
+    KeyFigure("Lateral acceleration delay", ("ay_delay_s",)),
+    KeyFigure("Lap time", ("lap_time_s",)),
+    KeyFigure("Road overstep", ("road_overstep_m",)),
+    KeyFigure("Two wheel lift time", ("two_wheel_lift_time_s",)),
+    KeyFigure("Battery energy", ("battery_energy_J",)),
+    KeyFigure("Wheel load coefficient max", ("wheel_load_coefficient_max",)),
+    KeyFigure("Wheel lift share", ("wheel_lift_share",)),
+    KeyFigure("Suspension travel max", ("suspension_travel_max_m",)),
 )
 """Key figures in the order of their columns; a manoeuvre has some of them."""
 

@@ -40,7 +40,7 @@ def test_a_claim_is_nearer_the_smaller_its_gap_and_at_zero_if_it_passes():
     for amplitude_m in (1.4, 1.6, 1.7, 2.0):
         arguments["ars"]["amplitude_m"] = amplitude_m
         distances.append(check("slalom", arguments)["Z1"].distance)
-    assert distances[0] == pytest.approx(-1.0)
+    assert distances[0] == pytest.approx(-1.0, abs=1e-4)  # graded: it nears -1
     assert sorted(distances) == distances
     assert distances[1] > 0.0
 

@@ -280,6 +280,8 @@ def test_hints_name_keys_that_exist():
 @pytest.mark.parametrize("part", ["", "vehicle."])
 def test_mass_of_the_car_and_the_like_lead_to_the_keys_that_change_it(key, part):
     for call in (resolve, lambda _, overrides: load_car(overrides=overrides)):
+        if part + key == "driver" and call is resolve:
+            continue  # the key that chooses the driver
         with pytest.raises(ParameterError) as told:
             call("standstill", overrides={part + key: 1800})
         assert HINTS[key] in str(told.value)
