@@ -130,6 +130,8 @@ def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: floa
             names[maximum] = part
     modes = []
     for index, sums in by_mode.items():
+        if values[index] == 0.0:
+            continue  # it settles within one step, as a state that each step sets anew
         # ln of a negative real z means half a turn per step: the steps do not resolve such a mode.
         s = complex(np.log(complex(values[index]))) / timestep_s
         name = names.get(index)
