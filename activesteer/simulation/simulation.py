@@ -188,8 +188,8 @@ class Simulation:
     def truth(self) -> dict[str, float]:
         """Current values of all recorded channels, by name.
 
-        Quantities that depend on the next command (demands, drive torque) are not yet updated. Each access computes all
-        channels again, which takes as long as about ten steps.
+        Quantities that depend on the next command (demands, torques of servos and drive, accelerations) are not yet
+        updated. Each access computes all channels again, which takes as long as about ten steps.
         """
         with self.loop.in_use:
             return self._recorder.present(*self.loop.commands)

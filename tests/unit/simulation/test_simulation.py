@@ -29,6 +29,7 @@ OF_THE_COMMANDS = (
     "ay_mps2",
     "az_mps2",
     "drive_torque",
+    "steer_torque",
     "demand",
     "desired",
     "prediction",
@@ -135,19 +136,22 @@ def test_the_state_of_another_simulation_is_refused() -> None:
         made().restore_state(made(overrides=STEP_STEER | {"speed_kmh": 70}).save_state())
 
 
-@pytest.mark.xfail(
-    reason="since the loop runs natively, accelerations and drive torques of `truth` differ too", strict=True
-)
 def test_truth_is_the_next_row_but_for_what_the_next_commands_decide() -> None:
     whole = activesteer.simulate("step_steer", "ars", overrides=STEP_STEER)
     looked, plain = made(), made()
     names = [channel.name for channel in whole.channels]
+    servo = looked.loop.vehicle.model.actuator("rl_steer")
+    torque_per_demand_Nm = servo.gainprm[0] * plain.loop.vehicle.timestep_s / servo.dynprm[0]
     for step in (0, 1, 499, 500, 777):
         looked.advance(step - looked.loop.step_count)
         truth = looked.truth
         assert list(truth) == names
         differing = [name for name in names if truth[name] != whole[name][step]]
         assert all(any(part in name for part in OF_THE_COMMANDS) for name in differing), differing
+        # A servo's torque follows the demand of the same step: its angle moves by the fraction timestep / lag of it.
+        change_rad = whole["rear_steer_demand_rad"][step] - truth["rear_steer_demand_rad"]
+        for name in ("rl_steer_torque_Nm", "rr_steer_torque_Nm"):
+            assert whole[name][step] - truth[name] == pytest.approx(torque_per_demand_Nm * change_rad, abs=1e-9)
     looked.run()
     plain.run()
     assert_same(looked.recording(), plain.recording())
