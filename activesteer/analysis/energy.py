@@ -22,9 +22,6 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         `battery_energy_J`, given by the battery from start to end, less what it took back; `steering_energy_J`,
         mechanical work of the actuators of rear wheels and superposition where they drive (they recover nothing);
         `brake_energy_J`, heat of the friction brakes. All in J.
-
-    Raises:
-        RecordingError: a channel is missing.
     """
     vehicle = recording.metadata.get("vehicle")
     if not isinstance(vehicle, Mapping) or not vehicle.get("motors"):

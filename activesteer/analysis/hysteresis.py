@@ -38,9 +38,6 @@ def loop(x: Array, y: Array) -> Loop:
         x: Abscissa, which oscillates about zero, shape (n,).
         y: Ordinate, shape (n,).
 
-    Returns:
-        Gradient and dead bands.
-
     Raises:
         RecordingError: a signal does not pass through zero both upwards and downwards.
     """
@@ -66,12 +63,6 @@ def crossings(x: Array, y: Array, *, rising: bool) -> Array:
         x: The other signal, shape (n,).
         y: The signal, shape (n,).
         rising: Whether the other signal passes upwards.
-
-    Returns:
-        A value for each passage.
-
-    Raises:
-        RecordingError: the other signal never does.
     """
     sign = 1.0 if rising else -1.0
     places = np.flatnonzero((sign * x[:-1] < 0.0) & (sign * x[1:] >= 0.0))

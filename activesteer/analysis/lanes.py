@@ -25,11 +25,6 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> f
     A corner of the body counts while it is between the two ends of a lane. The end of a side always counts, since a
     body that turns there covers it while its corners are elsewhere.
 
-    Args:
-        recording: The run.
-        course: Its course, with lanes.
-        car: Its car.
-
     Returns:
         Distance [m]; below 0, the smallest distance from a side. nan if no corner is ever inside a lane.
     """

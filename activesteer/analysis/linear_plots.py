@@ -48,13 +48,6 @@ def draw_bode(
         path: File to write; its ending gives the format (.png, .pdf, .svg).
         input_name: Input that the responses belong to.
         recording: A sine sweep of the full car, drawn as dots within its frequencies.
-
-    Returns:
-        The path written.
-
-    Raises:
-        ParameterError: matplotlib is not installed, there is no system, or a system has no such input.
-        RecordingError: the recording is no sweep.
     """
     if not systems:
         raise ParameterError("there is no linear car to draw, at least one is needed")
@@ -112,9 +105,6 @@ def driver_loops_figure(
             `crossover_rad_s`.
         frequency_radps: Frequencies [rad/s].
         responses: Return ratios, one row for each loop.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
     """
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
@@ -161,12 +151,6 @@ def draw_root_locus(
         systems: The car linearised at every speed.
         speeds_mps: The speeds [m/s].
         path: File to write; its ending gives the format (.png, .pdf, .svg).
-
-    Returns:
-        The path written.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or there are not as many systems as speeds.
     """
     if not systems or len(systems) != len(speeds_mps):
         raise ParameterError(

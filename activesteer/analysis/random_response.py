@@ -52,13 +52,6 @@ def random_response(
         lowest_Hz: Least frequency [Hz].
         highest_Hz: Greatest frequency [Hz].
         input_channel: Input of the response.
-
-    Returns:
-        The response.
-
-    Raises:
-        RecordingError: there is no run, one is too short, a channel is missing, or the steering does not contain a
-            frequency.
     """
     if not recordings:
         raise RecordingError("there is no run with random steering")

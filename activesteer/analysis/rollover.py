@@ -31,9 +31,6 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     Returns:
         `two_wheel_lift_time_s`, the time with both wheels of a side lifted; `wheel_load_min_N`, the smallest vertical
         load of any wheel; and the metrics of `general`.
-
-    Raises:
-        RecordingError: a channel is missing.
     """
     loads_N = np.array([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS], dtype=np.float64)
     lifted = loads_N < LIFTED_N

@@ -36,9 +36,6 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     Returns:
         The metrics of `handling`, and `steering_wheel_at_0_3g_rad`: the steering wheel angle at 0.3 g with its sign, by
         the line through the filtered signals [rad]; nan if the run does not reach 0.375 g.
-
-    Raises:
-        RecordingError: as for `handling.metrics`.
     """
     values = handling.metrics(recording)
     step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))

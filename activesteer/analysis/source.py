@@ -35,11 +35,7 @@ class Evaluable:
     """A recorded run whose channels are fit for formulas: finite, with two rows or more."""
 
     def __init__(self, recording: RecordingLike) -> None:
-        """Refuse a run that is too short.
-
-        Raises:
-            RecordingError: it has fewer than two rows.
-        """
+        """Refuse a run that is too short."""
         if len(recording.time_s) < 2:
             raise RecordingError(f"a run of {len(recording.time_s)} rows cannot be evaluated, at least 2 are needed")
         self._recording = recording
@@ -67,11 +63,7 @@ _MAX_VALUE: Final = 1e30
 
 
 def maneuver_kind(recording: RecordingLike) -> str:
-    """Return the kind of the manoeuvre (`step_steer` ...).
-
-    Raises:
-        RecordingError: the metadata do not name it.
-    """
+    """Return the kind of the manoeuvre (`step_steer` ...)."""
     maneuver = recording.metadata.get("maneuver")
     kind = maneuver.get("kind") if isinstance(maneuver, Mapping) else None
     if not isinstance(kind, str):
@@ -85,11 +77,7 @@ def maneuver_kind(recording: RecordingLike) -> str:
 
 
 def read_course(recording: RecordingLike) -> Course:
-    """Return the course of a run.
-
-    Raises:
-        RecordingError: the metadata hold no course, or a wrong one.
-    """
+    """Return the course of a run."""
     course = course_of(recording.metadata)
     if course is None:
         raise RecordingError("is missing: the manoeuvre has no path", file="the metadata", key="course")
@@ -97,11 +85,7 @@ def read_course(recording: RecordingLike) -> Course:
 
 
 def read_footprint(recording: RecordingLike) -> Footprint:
-    """Return the sizes of the car of a run.
-
-    Raises:
-        RecordingError: the metadata hold no sizes, or wrong ones.
-    """
+    """Return the sizes of the car of a run."""
     footprint = footprint_of(recording.metadata)
     if footprint is None:
         raise RecordingError("is missing: the sizes of the car are needed", file="the metadata", key="car")

@@ -16,11 +16,7 @@ _ALSO: Final = ("yaw_rate_steady_state_radps", "stopping_distance_m", "steering_
 
 
 def outcome(recording: Recording) -> str:
-    """Describe failures, met requirements and key figures of a run, in the words of the report.
-
-    Args:
-        recording: The run.
-    """
+    """Describe failures, met requirements and key figures of a run, in the words of the report."""
     metadata, metrics = recording.metadata, recording.metrics
     if not metadata.get("complete", True):
         return f"the run did not end properly: {metadata.get('error', 'no reason is recorded')}"
@@ -34,11 +30,7 @@ def outcome(recording: Recording) -> str:
 
 
 def verdict(recordings: Mapping[str, Recording]) -> list[str]:
-    """Return a line for each run, then a line for each claim of the paper about them.
-
-    Args:
-        recordings: By name of the run.
-    """
+    """Return a line for each run, then a line for each claim of the paper about them."""
     lines = [f"{name}: {outcome(recording)}" for name, recording in recordings.items()]
     groups = groups_of({f"{name}.mcap": recording for name, recording in recordings.items()})
     judged = judge(groups[0]).scorecard.judged if len(groups) == 1 else ()

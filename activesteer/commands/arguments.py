@@ -253,11 +253,7 @@ def add_cutaway(parser: argparse.ArgumentParser) -> None:
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:
-    """Return the scenario that the arguments describe.
-
-    Raises:
-        ActiveSteerError: a manoeuvre, vehicle or parameter does not exist, or a value is wrong.
-    """
+    """Return the scenario that the arguments describe."""
     from activesteer.faults import fault_table
     from activesteer.scenario import resolve
 
@@ -269,15 +265,7 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the parameters that `--overrides` and `--set` replace.
-
-    Args:
-        options: Options of the command.
-        given: Keys that already have values.
-
-    Raises:
-        ParameterError: a file cannot be read, an option is malformed, or a key is given twice.
-    """
+    """Return the parameters that `--overrides` and `--set` replace."""
     values = dict(given or {})
     for path in options.override_files:
         table, source = read_toml(path)
@@ -298,9 +286,6 @@ def pairs(texts: Sequence[str], option: str, example: str, given: Mapping[str, A
         option: Name of the option, for error messages.
         example: Example of a value.
         given: Keys that already have values.
-
-    Raises:
-        ParameterError: a text is no `key=value`, or a key is given twice.
     """
     values = dict(given or {})
     for text in texts:

@@ -68,9 +68,6 @@ def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle:
         recordings: Scenario -> system -> recording.
         folder: Folder for the figures.
         vehicle: Name or path of the vehicle, for the rig and the linear models.
-
-    Raises:
-        ActiveSteerError: matplotlib is not installed, a file cannot be written, or the rig fails.
     """
     from activesteer.analysis.figures import FORMATS, figure_2
     from activesteer.analysis.figures import draw_all as draw_runs

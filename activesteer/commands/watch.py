@@ -83,11 +83,7 @@ def _threads_joined() -> Iterator[None]:
 
 
 def check_display() -> None:
-    """Check that there is a display with OpenGL; without one, the viewer would wait forever.
-
-    Raises:
-        PlaybackError: there is none.
-    """
+    """Check that there is a display with OpenGL; without one, the viewer would wait forever."""
     import glfw
 
     with warnings.catch_warnings(record=True) as caught:

@@ -32,10 +32,6 @@ def spellings(name: str) -> list[str]:
 def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, float]:
     """Return the field that a key of a file fills.
 
-    Args:
-        key: The key, possibly in a display unit.
-        fields: Names of the fields, in SI.
-
     Returns:
         Name of the field, or None, and the factor from the unit of the key to SI.
     """

@@ -17,17 +17,6 @@ def merged(
 ) -> dict[str, Any]:
     """Return a table with one key replaced, in any of its units.
 
-    Args:
-        cls: Dataclass of the table.
-        table: The table.
-        path: Path of names to the replaced key.
-        value: New value.
-        source: Source of the table, for error messages.
-        above: Path of names to the table.
-
-    Returns:
-        A new table.
-
     Raises:
         ActiveSteerError: there is no such key, or a key above it is no table.
     """

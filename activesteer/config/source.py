@@ -43,14 +43,7 @@ class Source:
     overridden: frozenset[str] = frozenset()
 
     def fail(self, path: Sequence[str], problem: str, value: object = None, allowed: Any = None) -> ActiveSteerError:
-        """Return an error with file, line and key.
-
-        Args:
-            path: Path of names to the wrong key.
-            problem: Description of the problem.
-            value: Given value.
-            allowed: Allowed values: a range, or names.
-        """
+        """Return an error with file, line and key."""
         key = ".".join(path)
         overridden = any(key == other or key.startswith(other + ".") for other in self.overridden)
         # A key in an inline table or a list has no line of its own.

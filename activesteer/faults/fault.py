@@ -121,11 +121,7 @@ class Fault:
     """Delay of the demand or reading [s]."""
 
     def __post_init__(self) -> None:
-        """Check that the part can fail in this way, and that exactly the keys of this kind are given.
-
-        Raises:
-            ManeuverError: it cannot, a key is missing, or a key has no effect.
-        """
+        """Check that the part can fail in this way, and that exactly the keys of this kind are given."""
         if self.part not in ACTUATORS and self.part not in SENSORS:
             names = [*ACTUATORS, *SENSORS]
             raise ManeuverError(

@@ -22,12 +22,6 @@ def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
     Args:
         text: Part, kind, size with its unit, and time [s].
         start_s: Start if the text must not give it [s].
-
-    Returns:
-        The table.
-
-    Raises:
-        ParameterError: the text has another form.
     """
     found = _FAULT.fullmatch(text.strip())
     if found is None or (found["start"] is None) is (start_s is None):

@@ -26,11 +26,7 @@ class AlongCourse(Maneuver):
     """Base of the kinds that are driven along a course at constant speed."""
 
     def __post_init__(self) -> None:
-        """Check that the car drives forwards and passes the last gate within the run.
-
-        Raises:
-            ManeuverError: it does not, or the course cannot be laid out.
-        """
+        """Check that the car drives forwards and passes the last gate within the run."""
         if self.speed_mps < _MIN_SPEED_MPS:
             raise ManeuverError(
                 f"is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, at no less than "
@@ -72,11 +68,7 @@ class AlongCourse(Maneuver):
 
 
 def known_width(vehicle_width_m: float | None) -> float:
-    """Return the width of the vehicle, for which a course is laid out [m].
-
-    Raises:
-        ManeuverError: it is not known.
-    """
+    """Return the width of the vehicle, for which a course is laid out [m]."""
     if vehicle_width_m is None:
         raise ManeuverError(
             "is missing; it comes from the vehicle file (width_m) unless it is given here", key="vehicle_width_m"

@@ -144,9 +144,6 @@ def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
         speed_mps: Speed of the manoeuvre [m/s].
         aim: Key that makes the search necessary.
         amplitude: Key to give instead.
-
-    Raises:
-        ManeuverError: the speed is too low.
     """
     if speed_mps < MIN_SEARCH_SPEED_MPS:
         minimum = 3.6 * MIN_SEARCH_SPEED_MPS

@@ -34,11 +34,7 @@ class ConstantRadius(Maneuver):
     """The circle."""
 
     def __post_init__(self) -> None:
-        """Check that a car can drive the circle and that its speed rises.
-
-        Raises:
-            ManeuverError: it cannot, or the speed does not rise.
-        """
+        """Check that a car can drive the circle and that its speed rises."""
         circle = self.circle
         if abs(circle.radius_m) < 10.0:
             raise ManeuverError(

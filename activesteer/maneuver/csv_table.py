@@ -18,12 +18,6 @@ def find_csv(name: str, folder: Path | None, source: Source, key: Sequence[str])
         folder: Folder of the manoeuvre file; None for a table that has no file.
         source: For error messages.
         key: Key that names it.
-
-    Returns:
-        Path of an existing file.
-
-    Raises:
-        ManeuverError: there is no such file; the message names the nearest ones.
     """
     beside = () if folder is None else (folder / name,)
     for candidate in (*beside, user_path(name, source.error)):
@@ -50,10 +44,6 @@ def read_columns(
 
     Returns:
         Column name to values in SI, and the line number of each row.
-
-    Raises:
-        ManeuverError: the file cannot be read, a column is missing or given twice, a row has more cells than the
-            header, or a value is no number.
     """
     rows = read_csv(path, ManeuverError)
     if not rows:

@@ -38,11 +38,7 @@ class PathTable:
     """Widths of the road at the points [m], the path in its middle; for evaluation."""
 
     def __post_init__(self) -> None:
-        """Check that the points make a path.
-
-        Raises:
-            ManeuverError: there are none, or a car cannot follow them.
-        """
+        """Check that the points make a path."""
         if self.x_m is None or self.y_m is None:
             raise ManeuverError("csv (a file with the columns x_m and y_m) or both lists x_m and y_m are needed")
         check_points(self.x_m, self.y_m, lambda index: f"point {index + 1}")

@@ -57,9 +57,6 @@ def lanes(
         side: 1 for a side lane on the left, -1 on the right.
         length_factor: Factor on all lengths of the standard [-].
         offset_factor: Factor on the offset of the side lane and the exit lane [-].
-
-    Returns:
-        Entry, side and exit lane.
     """
     b = vehicle_width_m
     entry, exit_first = 1.1 * b + 0.25, 1.3 * b + 0.25

@@ -47,9 +47,6 @@ def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
     Args:
         table: The table.
         source: For error messages; its error class is raised.
-
-    Raises:
-        ManeuverError: `kind` is missing or unknown.
     """
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
@@ -60,15 +57,7 @@ def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
 
 
 def build_maneuver(table: Mapping[str, Any], source: Source) -> Maneuver:
-    """Build a manoeuvre from its table.
-
-    Args:
-        table: Keys and values of the file.
-        source: For error messages.
-
-    Raises:
-        ManeuverError: a key is unknown or missing, or a value is wrong.
-    """
+    """Build a manoeuvre from its table."""
     maneuver = build(maneuver_class(table, source), table, source)
     check_faults(maneuver.fault, maneuver.duration_s, source.fail)
     try:

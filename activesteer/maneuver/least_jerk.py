@@ -59,9 +59,6 @@ def least_jerk(start_x_m: float, end_x_m: float, end_y_m: float, bounds: Sequenc
     Returns:
         Spline y(x) [m] between start and end, with its derivatives.
 
-    Raises:
-        ManeuverError: the bounds contradict each other.
-
     Validity: small headings; a point ahead is at y + ahead y', its x at x + ahead.
     """
     spline = _Spline(start_x_m, end_x_m)

@@ -16,11 +16,7 @@ from activesteer.maneuver.csv_table import find_csv, read_columns
 
 
 def check_table(times_s: Sequence[float], values: Sequence[float]) -> None:
-    """Check that a table has as many values as times, and that its times increase.
-
-    Raises:
-        ManeuverError: it has not, or they do not.
-    """
+    """Check that a table has as many values as times, and that its times increase."""
     if not times_s or len(times_s) != len(values):
         raise ManeuverError(
             f"has {len(times_s)} times and {len(values)} values; as many of each are needed, at least one"

@@ -32,14 +32,8 @@ _MAX_START_RAD: Final = math.radians(15.0)
 def read_csv(path: Path) -> tuple[dict[str, list[float]], list[int]]:
     """Read the points from a CSV with the header x_m,y_m, and speed and width there if it has such columns.
 
-    Args:
-        path: The file.
-
     Returns:
         Values by column, SI, and the line number of each point.
-
-    Raises:
-        ManeuverError: the file cannot be read, a column is missing, or a value is no number.
     """
     return read_columns(path, COLUMNS, OPTIONAL)
 
@@ -51,10 +45,6 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
         x_m: World x of the points [m].
         y_m: World y of the points [m].
         place: Function from the index of a point to its place in the file, for error messages.
-
-    Raises:
-        ManeuverError: there are too few points, or the path jumps, goes back, has a kink, or does not begin at
-            the car.
     """
     count = len(x_m)
     if count != len(y_m) or count < MIN_POINTS:

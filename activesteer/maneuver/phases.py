@@ -134,11 +134,7 @@ class Phase:
     """End of the phase. Default: when steering wheel, speed demand and pedal have reached their values."""
 
     def __post_init__(self) -> None:
-        """Check that no key lacks an effect.
-
-        Raises:
-            ManeuverError: one does.
-        """
+        """Check that no key lacks an effect."""
         turns = self.steering_wheel_rad is not None or self.steering_factor is not None
         for key, given, beside, needed in (
             ("steering_factor", self.steering_factor is not None, self.steering_wheel_rad is None,
@@ -167,11 +163,7 @@ class Phases(Maneuver):
     """A, the angle of `steering_factor = 1` [rad]. Default: a search finds it."""
 
     def __post_init__(self) -> None:
-        """Check the phases.
-
-        Raises:
-            ManeuverError: there is none, or a search for A needs more speed.
-        """
+        """Check the phases."""
         if not self.phases:
             raise ManeuverError("at least one phase [[phases]] is needed", key="phases")
         if self._needs_reference:

@@ -47,11 +47,7 @@ class RandomSteer(Maneuver):
     """The angle."""
 
     def __post_init__(self) -> None:
-        """Check that the band is wide enough for a run of this length: a sum of few sines is not random.
-
-        Raises:
-            ManeuverError: it is not, or its upper end is too high.
-        """
+        """Check that the band is wide enough for a run of this length: a sum of few sines is not random."""
         random = self.random
         least_Hz = random.lowest_Hz + _LINES / self.duration_s
         if not least_Hz <= random.highest_Hz <= _MOST_Hz:

@@ -27,9 +27,6 @@ def with_road_files(
 
     Returns:
         The table, and the CSV file by its name, to be kept with the recording; the table holds the OpenCRG file.
-
-    Raises:
-        ManeuverError: a file is not found or wrong, or the manoeuvre gives its contents too.
     """
     road = table.get("road")
     files: dict[str, bytes] = {}

@@ -40,11 +40,7 @@ class SineSweep(Maneuver):
     """The sweep."""
 
     def __post_init__(self) -> None:
-        """Check that the frequency rises and that the sweep ends within the run.
-
-        Raises:
-            ManeuverError: it does not.
-        """
+        """Check that the frequency rises and that the sweep ends within the run."""
         sweep = self.sweep
         if sweep.last_Hz <= sweep.first_Hz:
             raise ManeuverError(

@@ -52,11 +52,7 @@ class DwellInput:
     """Amplitude as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the car without control [-]."""
 
     def __post_init__(self) -> None:
-        """Check the keys. If both amplitude and factor are given, a search has found the amplitude.
-
-        Raises:
-            ManeuverError: neither is given.
-        """
+        """Check the keys. If both amplitude and factor are given, a search has found the amplitude."""
         if self.steering_wheel_rad is None and self.amplitude_factor is None:
             raise ManeuverError(
                 "steering_wheel_deg (the amplitude) or amplitude_factor (the amplitude as a multiple of the steering "
@@ -79,11 +75,7 @@ class SineWithDwell(Maneuver):
     """Drive from the beginning of the sine: `coast`, which FMVSS 126 requires, or `hold_speed`."""
 
     def __post_init__(self) -> None:
-        """Check that the sine ends within the run, and that the speed suits a search for A.
-
-        Raises:
-            ManeuverError: it does not.
-        """
+        """Check that the sine ends within the run, and that the speed suits a search for A."""
         steer = self.steer
         if steer.completion_s > self.duration_s:
             raise ManeuverError(

@@ -34,11 +34,7 @@ class ConeRow:
     """Side on which the car passes the first cone: `left` or `right`."""
 
     def __post_init__(self) -> None:
-        """Check that the path has room to leave the straight line before the first cone.
-
-        Raises:
-            ManeuverError: it has not.
-        """
+        """Check that the path has room to leave the straight line before the first cone."""
         if self.entry_m < self.spacing_m:
             raise ManeuverError(
                 f"is {self.entry_m:g} m; the path leaves the straight line one spacing before the first cone: "

@@ -32,11 +32,7 @@ class SlowlyIncreasingSteer(Maneuver):
     """The ramp."""
 
     def __post_init__(self) -> None:
-        """Check that the ramp begins within the run and turns the steering wheel.
-
-        Raises:
-            ManeuverError: it does not.
-        """
+        """Check that the ramp begins within the run and turns the steering wheel."""
         ramp = self.steer
         if ramp.start_s >= self.duration_s:
             raise ManeuverError(

@@ -33,11 +33,7 @@ class StepInput:
     """Steady-state lateral acceleration of the car without control that the search reaches, left positive [m/s2]."""
 
     def __post_init__(self) -> None:
-        """Check that amplitude or lateral acceleration is given; with both, a search has found the amplitude.
-
-        Raises:
-            ManeuverError: neither is given.
-        """
+        """Check that amplitude or lateral acceleration is given; with both, a search has found the amplitude."""
         if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
             raise ManeuverError(
                 "steering_wheel_deg (the amplitude) or lateral_acceleration_g (which the car without control reaches) "
@@ -53,11 +49,7 @@ class StepSteer(Maneuver):
     """The step."""
 
     def __post_init__(self) -> None:
-        """Check that the step starts before the end of the run.
-
-        Raises:
-            ManeuverError: it does not.
-        """
+        """Check that the step starts before the end of the run."""
         step = self.steer
         if step.start_s >= self.duration_s:
             raise ManeuverError(

@@ -28,11 +28,7 @@ class StraightBraking(Maneuver):
     """Whether the driver keeps the car on a straight line; otherwise the steering wheel is held straight."""
 
     def __post_init__(self) -> None:
-        """Check that the car drives forwards and brakes within the run.
-
-        Raises:
-            ManeuverError: it does not.
-        """
+        """Check that the car drives forwards and brakes within the run."""
         if self.speed_mps < _MIN_SPEED_MPS:
             min_kmh = 3.6 * _MIN_SPEED_MPS
             raise ManeuverError(

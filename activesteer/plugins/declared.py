@@ -69,13 +69,7 @@ def declared_by(origin: Any) -> dict[str, Declared]:
 
 
 def declared_in(table: Any, keys: Collection[str], prefix: str) -> dict[str, Declared]:
-    """Return the values of a dataclass as declared parameters, those of its tables included: dotted key -> declaration.
-
-    Args:
-        table: The dataclass.
-        keys: Names of the fields to return.
-        prefix: Start of the keys, with a dot at its end.
-    """
+    """Return the values of a dataclass and of its tables as declared parameters: dotted key -> declaration."""
     found: dict[str, Declared] = {}
     for name, annotation in typing.get_type_hints(type(table), include_extras=True).items():
         value = getattr(table, name)

@@ -78,14 +78,7 @@ class Kind:
         return isinstance(given, (str, os.PathLike)) and (os.fspath(given).endswith(".toml") or given in self.data())
 
     def fail(self, name: str, problem: str, value: Any = None, allowed: Any = None) -> ActiveSteerError:
-        """Return the error for a block.
-
-        Args:
-            name: Name of the block.
-            problem: The problem, and how to solve it.
-            value: Value that was given or returned.
-            allowed: Values that are allowed.
-        """
+        """Return the error for a block."""
         return self.error(problem, key=f"{self.word} {name}".rstrip(), value=value, allowed=allowed)
 
     def checked(self, command: Any, name: str, setup: Any, said: str = "step returned") -> Any:

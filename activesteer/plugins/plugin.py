@@ -164,22 +164,10 @@ class Plugin:
 
 
 class Watched:
-    """A user's block whose errors and wrong commands are reported with file, class and line.
-
-    Attributes:
-        inner: The user's object.
-    """
+    """A user's block whose errors and wrong commands are reported with file, class and line."""
 
     def __init__(self, inner: Any, kind: Kind, name: str, setup: Any, files: tuple[str, ...] = ()) -> None:
-        """Wrap a block.
-
-        Args:
-            inner: The user's object.
-            kind: Controllers or drivers.
-            name: Name in messages.
-            setup: Properties of the car that the block may know.
-            files: Names of the user's files.
-        """
+        """Wrap a block."""
         self.inner = inner
         self._about = kind, name, setup, files
 

@@ -97,11 +97,6 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, such as `factors.mass` or `vehicle.tyres.rear`.
 
-    Raises:
-        ParameterError: the vehicle is not found or wrong, or an override names a key that does not exist.
-        ModelError: the model file is not found.
-        TyreFileError: a tyre file is not found or wrong.
-
     Example:
         >>> from activesteer.road.road import Road
         >>> from activesteer.scenario import load_car

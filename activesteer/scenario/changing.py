@@ -31,12 +31,7 @@ _SAMPLES: Final = 200
 
 
 class Change(NamedTuple):
-    """A changed scenario.
-
-    Attributes:
-        part: Part that changes.
-        scenario: The scenario with the change.
-    """
+    """A changed scenario."""
 
     part: Part
     scenario: Scenario
@@ -51,10 +46,6 @@ def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s
         value: New value.
         controller: The controller that drives.
         time_s: Present time of the run [s].
-
-    Raises:
-        ParameterError: there is no such key, it cannot change during a run, or nothing reads it.
-        ManeuverError: a value of the manoeuvre is wrong.
     """
     value = plain({key: value})[key]
     part, path = part_of(key, type(scenario.maneuver), own_controllers([controller]))

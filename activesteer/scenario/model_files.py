@@ -54,15 +54,9 @@ _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
 def model_files(mjcf: Path) -> dict[str, bytes]:
     """Read an MJCF file, its included files, and the files of its meshes, textures and height fields.
 
-    Args:
-        mjcf: The model file.
-
     Returns:
         Path relative to the model's folder -> content, the model file first. A mesh or picture may be large, so only
         its SHA-256 is returned, under its path and `.sha256`.
-
-    Raises:
-        ModelError: a file cannot be read or is not XML, or the model requests more than a car needs.
     """
     files: dict[str, bytes] = {}
     elements = 0

@@ -14,13 +14,7 @@ from activesteer.errors import ParameterError, shown
 
 
 class Override(NamedTuple):
-    """One replaced key.
-
-    Attributes:
-        given: The key as given.
-        path: Path of keys inside the file.
-        value: The new value.
-    """
+    """One replaced key."""
 
     given: str
     path: tuple[str, ...]
@@ -28,11 +22,7 @@ class Override(NamedTuple):
 
 
 def plain(overrides: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Convert NumPy's numbers and arrays in overrides to Python's, because JSON cannot store them.
-
-    Raises:
-        ParameterError: a key is not text.
-    """
+    """Convert NumPy's numbers and arrays in overrides to Python's, because JSON cannot store them."""
     for key in overrides or {}:
         if not isinstance(key, str):
             raise ParameterError(f"the key of an override is text such as 'road.mu', not {shown(key)}", value=key)
@@ -46,12 +36,6 @@ def applied(
     cls: type, table: Mapping[str, Any], source: Source, overrides: Sequence[Override]
 ) -> tuple[dict[str, Any], Source]:
     """Apply overrides to the table of a file.
-
-    Args:
-        cls: Dataclass of the table.
-        table: The table.
-        source: Source of the table.
-        overrides: The overrides.
 
     Returns:
         The new table, and its source, which knows the overridden keys.

@@ -42,9 +42,6 @@ def own_values(overrides: Mapping[str, Any], controllers: Mapping[str, Sequence[
     Args:
         overrides: Dotted key -> value, of these controllers only.
         controllers: Users' controllers, as from `own_controllers`.
-
-    Raises:
-        ParameterError: a controller has no such parameter, or a value is wrong.
     """
     given: dict[str, dict[str, Any]] = {}
     for key, value in overrides.items():

@@ -24,11 +24,7 @@ def is_recording(maneuver: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def recorded_inputs(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the manoeuvre of a file; see `open_loop_of`. A damaged file is used up to the damage.
-
-    Raises:
-        RecordingError: the file cannot be read, or lacks a channel.
-    """
+    """Return the manoeuvre of a file; see `open_loop_of`. A damaged file is used up to the damage."""
     file = user_path(path, RecordingError)
     return open_loop_of(Recording.open(file, recover=True), file.stem)
 

@@ -149,9 +149,6 @@ def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequenc
         overrides: Dotted key -> value, as for `resolve`.
         scenario: Scenario with these overrides.
         parts: Parts that overrides may change beside the road: `vehicle`, `driver`.
-
-    Raises:
-        ParameterError: an override changes another part.
     """
     for key, value in overrides.items():
         part, path = part_of(key, type(scenario.maneuver))
@@ -213,9 +210,6 @@ def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> A
 
     Returns:
         The value; a number in the unit of the key.
-
-    Raises:
-        ParameterError: there is no such key, or a part of it has no value.
     """
     part, path = part_of(key, type(scenario.maneuver))
     if part == "controllers":

@@ -33,9 +33,6 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
         values: Key -> value as text.
         command: Command that found the values.
         date: Date, such as 2026-11-21.
-
-    Raises:
-        ParameterError: the file cannot be read or written, or is not TOML.
     """
     before, source = read_toml(vehicle_file)
     lines = source.text.splitlines()

@@ -84,12 +84,6 @@ def examine(
         jobs: Number of processes; by default the number of processors.
         scheduler: Address of a Dask scheduler that drives the runs instead.
         progress: Called with controller, series, number of finished runs, and number of all runs.
-
-    Returns:
-        The result.
-
-    Raises:
-        ActiveSteerError: an input is wrong.
     """
     standard = standard_of(name)
     driver = standard.driver if driver is None else driver
@@ -117,10 +111,6 @@ def examine(
 
 
 def write_json(result: Examination, path: Path) -> Path:
-    """Write the result as JSON and return its path; an existing file is replaced.
-
-    Raises:
-        ParameterError: the file cannot be written.
-    """
+    """Write the result as JSON and return its path; an existing file is replaced."""
     make_folder(path.parent, ParameterError)
     return write_text(path, json_text(result.to_json()) + "\n", ParameterError)

@@ -16,15 +16,7 @@ from activesteer.standards.standard import Findings
 
 
 def write_page(result: Examination, path: Path) -> Path:
-    """Write the page and return its path; an existing file is replaced.
-
-    Args:
-        result: Result of the test.
-        path: The HTML file.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or the file cannot be written.
-    """
+    """Write the page and return its path; an existing file is replaced."""
     text = page(result)
     make_folder(path.parent, ParameterError)
     return write_text(path, text, ParameterError)

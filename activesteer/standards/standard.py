@@ -120,9 +120,6 @@ class Ground(Protocol):
 
         Returns:
             The runs, in the order of the cases.
-
-        Raises:
-            ActiveSteerError: an input is wrong.
         """
         ...
 
@@ -131,12 +128,6 @@ class Ground(Protocol):
 
         Args:
             preset: Name of speeds and situations, one of `studies.paper.fault_situations.PRESETS`.
-
-        Returns:
-            The rows of the map.
-
-        Raises:
-            ActiveSteerError: an input is wrong, or the car without fault cannot be driven.
         """
         ...
 

@@ -26,9 +26,6 @@ def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float
 
     Returns:
         Steering wheel angle, to 0.1 deg [deg].
-
-    Raises:
-        NoResult: the car does not reach the acceleration, or the ramp cannot be driven.
     """
     [run] = ground.drive(
         f"ramp_{speed_kmh:g}kmh",

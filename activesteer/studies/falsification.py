@@ -116,13 +116,6 @@ def falsify(
         jobs: Number of processes; default: the number of processors.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
         progress: Called after every set with the search, the number of its finished sets and the total.
-
-    Returns:
-        A result for each search.
-
-    Raises:
-        ActiveSteerError: an input is wrong, Optuna is not installed, or the folder cannot be written or holds another
-            search.
     """
     study = read_study(requirement_file, "falsify")
     table = build(FalsifyTable, study.falsify or {}, study.source, ("falsify",))

@@ -16,11 +16,7 @@ _KEPT, _BROKEN = "#5b9fd0", "#b3261e"
 
 
 def draw_falsified(found: Falsified, path: Path) -> Path:
-    """Draw a search and return its file.
-
-    Raises:
-        ActiveSteerError: the file cannot be written, or matplotlib is not installed.
-    """
+    """Draw a search and return its file."""
     robustness = np.array([value for _, value in found.sets])
     judged = np.abs(robustness) < 0.99e6  # others define no metric
     # A set far below zero is drawn at the edge, so that the others can be told apart.

@@ -210,11 +210,7 @@ def read_baseline(path: Path = BASELINE) -> Baseline:
 
 
 def write_baseline(benchmark: Benchmark, path: Path = BASELINE) -> Path:
-    """Write the key metrics of a benchmark as the new baseline.
-
-    Raises:
-        ActiveSteerError: the file cannot be written.
-    """
+    """Write the key metrics of a benchmark as the new baseline."""
     return write_text(path, json_text(benchmark.key_metrics()) + "\n", ActiveSteerError)
 
 

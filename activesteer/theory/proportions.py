@@ -25,12 +25,7 @@ class ProportionVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class Proportion:
-    """Number of samples with a property, of all samples.
-
-    Attributes:
-        count: Samples with the property.
-        number: All samples.
-    """
+    """Number of samples with a property, of all samples."""
 
     count: int = 0
     number: int = 0
@@ -73,10 +68,6 @@ def percent(proportion: float) -> str:
 
 def wilson_interval(passed: int, number: int) -> tuple[float, float]:
     """Return the 95 % confidence interval of a proportion.
-
-    Args:
-        passed: Number that passed.
-        number: Total number.
 
     Returns:
         Lower and upper end; 0 and 1 for a total of 0.

@@ -105,11 +105,7 @@ class Claim:
 
 
 def check_systems(runs: Mapping[str, object], what: str) -> None:
-    """Check that the three runs are given; further runs are ignored.
-
-    Raises:
-        ParameterError: one is missing.
-    """
+    """Check that the three runs are given; further runs are ignored."""
     if missing := [system for system in SYSTEMS if system not in runs]:
         raise ParameterError(
             f"the claims about the {what} need the runs {', '.join(SYSTEMS)}; missing: {', '.join(missing)}",

@@ -244,11 +244,7 @@ class Population:
 
     @classmethod
     def from_json(cls, table: Mapping[str, Any]) -> Population:
-        """Return the population that `to_json` described.
-
-        Raises:
-            StudyError: the table is damaged.
-        """
+        """Return the population that `to_json` described."""
         try:
             claims = (
                 ClaimProportion(**{key: claim[key] for key in claim if key != "verdict"}) for claim in table["claims"]
@@ -303,9 +299,6 @@ def read_population(name: str) -> Population | None:
     Args:
         name: Folder of the results, in the folder of the study files: `population`, or `comparison` for the comparison
             of controllers.
-
-    Raises:
-        StudyError: the file cannot be read.
     """
     path = studies_dir() / name / SUMMARY
     if not path.is_file():
@@ -319,14 +312,8 @@ def read_population(name: str) -> Population | None:
 def stored_population(vehicle: str) -> Population | None:
     """Return the population that belongs to the package.
 
-    Args:
-        vehicle: Name of a car.
-
     Returns:
         Its result; None if no population of this car is stored.
-
-    Raises:
-        StudyError: the file cannot be read.
     """
     found = read_population("population")
     return found if found is not None and found.vehicle == vehicle else None

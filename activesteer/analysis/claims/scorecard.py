@@ -150,12 +150,6 @@ def scorecard(
         known: Number -> reason of the claims that are not reproduced, in place of the list.
         population: Population in place of the stored one.
         setting: Setting of the runs. The paper's has a list of its own, and no population.
-
-    Returns:
-        The scorecard.
-
-    Raises:
-        ParameterError: the list is wrong.
     """
     if setting == PAPER:
         known, vehicle = read_setting(PAPER).fails, ""
@@ -171,15 +165,8 @@ def scorecard(
 def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:
     """Return the claims that are not reproduced with a vehicle.
 
-    Args:
-        vehicle: Name of the vehicle.
-        text: TOML text in place of the package's file.
-
     Returns:
         Number of the claim -> reason; empty for a vehicle that is not listed.
-
-    Raises:
-        ParameterError: the text is no TOML, names a claim that does not exist, or gives no reason.
     """
     if text is None:
         text = files("activesteer.analysis.claims").joinpath(FILE).read_text(encoding="utf-8")

@@ -70,9 +70,6 @@ def read_setting(name: str) -> Setting:
 
     Args:
         name: `paper` or `human`.
-
-    Raises:
-        ParameterError: there is no such setting, or its file is wrong.
     """
     if name not in SETTINGS:
         raise ParameterError(nearest_names(name, SETTINGS), key="--setting", value=name, allowed=tuple(SETTINGS))

@@ -43,10 +43,6 @@ class SystemRuns:
             recordings: Runs by system; further runs are ignored.
             metrics: Function that evaluates a run.
             what: Name of the manoeuvre, for errors.
-
-        Raises:
-            ParameterError: one of the three runs is missing.
-            RecordingError: a whole run cannot be evaluated, or a channel is missing.
         """
         check_systems(recordings, what)
         self.recordings = {system: recordings[system] for system in SYSTEMS}

@@ -33,10 +33,6 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     Args:
         recordings: Runs by label; `none`, `ars` and `afs` get the paper's names and numbers, others keep their own.
 
-    Raises:
-        ParameterError: matplotlib is not installed, or there is no run to draw.
-        RecordingError: a channel is missing.
-
     Source: V. Dorsch, Mecatronics-REM 2012, figure 11.
     """
     curves = style.curves(recordings)
@@ -64,13 +60,6 @@ def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.Pa
     Args:
         recordings: Runs by label; see `figure_11`.
         path: File to write; its ending gives the format (.png, .pdf, .svg).
-
-    Returns:
-        The path written.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or there is no run to draw.
-        RecordingError: a channel is missing, or the file cannot be written.
     """
     return save(figure_11(recordings), Path(path), RecordingError)
 
@@ -88,13 +77,6 @@ def figure_2(
         models: Label -> channel -> values over the time of the recording, drawn beside it: the single-track model
             (`identification.single_track_response`), which has no roll, and the linear car
             (`linearisation.linear_response`).
-
-    Returns:
-        The path written.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-        RecordingError: a channel is missing, or the file cannot be written.
 
     Source: V. Dorsch, Mecatronics-REM 2012, figure 2.
     """

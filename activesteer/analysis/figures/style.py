@@ -78,11 +78,7 @@ class DrawnRun(NamedTuple):
 
 
 def curves(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
-    """Return the runs in the paper's order; the three systems always have the same colours.
-
-    Raises:
-        ParameterError: there is no run to draw.
-    """
+    """Return the runs in the paper's order; the three systems always have the same colours."""
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
     return [

@@ -143,12 +143,7 @@ def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Quantity) -> 
 
 
 def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Quantity]) -> Figure:
-    """Draw panels over one time axis, as wide as a column.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or there is no run to draw.
-        RecordingError: a channel is missing.
-    """
+    """Draw panels over one time axis, as wide as a column."""
     drawn = curves(recordings)
     shown = present(panels, drawn)
     figure = new_figure(width_in=COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))

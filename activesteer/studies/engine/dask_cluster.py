@@ -33,9 +33,6 @@ class DaskCluster:
 
         Args:
             client: A `distributed.Client`.
-
-        Raises:
-            StudyError: there is no worker, or versions differ.
         """
         self._client = client
         self._executor = client.get_executor(pure=False)
@@ -60,11 +57,7 @@ class DaskCluster:
         return type(error).__name__ == "KilledWorker" or isinstance(error, CancelledError)
 
     def replace(self) -> None:
-        """Check that the scheduler still exists; the cluster replaces its workers itself.
-
-        Raises:
-            StudyError: the scheduler is gone.
-        """
+        """Check that the scheduler still exists; the cluster replaces its workers itself."""
         try:
             self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except Exception as reason:
@@ -100,12 +93,6 @@ def connected(scheduler: str) -> Iterator[Any]:
 
     Args:
         scheduler: Its address, such as tcp://host:8786, or the scheduler file that it wrote.
-
-    Yields:
-        The client.
-
-    Raises:
-        StudyError: the scheduler cannot be reached, or `distributed` is not installed.
     """
     try:
         from distributed import Client  # noqa: PLC0415 - an extra

@@ -73,12 +73,6 @@ def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: in
         count: Size of the sample; unused for a grid.
         seed: Seed of the random numbers.
         stream: Number of the independent sample with this seed.
-
-    Returns:
-        The combinations.
-
-    Raises:
-        StudyError: `saltelli` or `morris` without SALib.
     """
     grids = [factor for factor in factors if factor.kind == "grid"]
     sampled = [factor for factor in factors if factor.kind != "grid"]
@@ -136,14 +130,8 @@ def cases(given: Iterable[Mapping[str, Any]]) -> Samples:
 def read_cases(path: Path) -> Samples:
     """Read a list of cases from a CSV file. Its header holds the keys; an empty cell leaves a key unchanged.
 
-    Args:
-        path: The file.
-
     Returns:
         The cases; a cell becomes a number or a truth value if possible, and otherwise a text.
-
-    Raises:
-        StudyError: the file cannot be read, has no rows, or has a row of another length.
     """
 
     def fail(problem: str, line: int, key: str | None = None) -> StudyError:
@@ -178,9 +166,6 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
         factors: Factors of the study.
         has_cases: Whether the study has a list of cases.
         source: Source of the study, for error messages.
-
-    Returns:
-        The design.
 
     Raises:
         ActiveSteerError: parts of the design contradict each other.

@@ -24,17 +24,10 @@ def label_of(item: FileOrTable) -> str:
 
 
 class FactorValues:
-    """Conversion of sample values to overrides; each pair of manoeuvre and vehicle is resolved once.
-
-    Attributes:
-        study: The study.
-    """
+    """Conversion of sample values to overrides; each pair of manoeuvre and vehicle is resolved once."""
 
     def __init__(self, study: StudyFile) -> None:
         """Prepare the conversion for a study.
-
-        Args:
-            study: The study.
 
         Raises:
             StudyError: a factor names a manoeuvre, or a value of another factor, that the study does not have.
@@ -75,9 +68,6 @@ class FactorValues:
 
         Returns:
             Dotted key -> value, for the keys that vary in this manoeuvre.
-
-        Raises:
-            ActiveSteerError: a key does not exist, or a relative factor refers to a value that is no number.
         """
         label = label_of(self.study.maneuvers[maneuver])
         found = {}

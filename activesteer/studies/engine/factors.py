@@ -125,12 +125,6 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
             `maneuvers = ["slalom"]` the key varies in these manoeuvres only, with
             `when = { "sensors.preset" = "production" }` only where another factor has that value.
         source: Source of the study, for error messages.
-
-    Returns:
-        The factor.
-
-    Raises:
-        ActiveSteerError: the table is wrong.
     """
     where = ("factors", key)
     if not isinstance(table, Mapping):

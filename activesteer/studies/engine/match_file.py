@@ -101,11 +101,7 @@ class Statements:
     """
 
     def __init__(self, study: StudyFile) -> None:
-        """Check the table [match] of a study.
-
-        Raises:
-            StudyError: the table is wrong, or there is nothing to search.
-        """
+        """Check the table [match] of a study."""
         source, given = study.source, dict(study.match or {})
         if study.case_list is not None or not study.factors:
             raise source.fail(("factors",), "a search needs factors")
@@ -146,11 +142,7 @@ class Statements:
         self.of[maneuver].append(statement.id)
 
     def check_metrics(self, study: StudyFile, maneuver: str, rows: Sequence[Row]) -> None:
-        """Check that the runs have every metric of the user's statements.
-
-        Raises:
-            StudyError: one is missing.
-        """
+        """Check that the runs have every metric of the user's statements."""
         known = [name for name, value in rows[0].items() if isinstance(value, float) and name not in study.keys]
         for statement in self._own[maneuver]:
             for criterion in statement.criteria:

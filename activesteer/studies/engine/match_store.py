@@ -70,9 +70,6 @@ class MatchStore:
             folder: The folder.
             study_toml: The study as it runs, behind a line with the digest of everything that decides its results.
             reads: Whether the search is only read, which another version may do too.
-
-        Raises:
-            StudyError: the folder cannot be written, or holds another search.
         """
         self.candidates: dict[int, Candidate] = {}
         self.known: dict[tuple[str, str], Evaluation] = {}

@@ -180,10 +180,6 @@ def match(
         jobs: Number of processes; default: the number of processors.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
         progress: Called after every evaluation.
-
-    Raises:
-        ActiveSteerError: an input is wrong, `cma` is not installed, or the folder cannot be written or holds another
-            search.
     """
     study = read_study(study_file, "match")
     search = _Search(study, Path(output), progress)
@@ -201,11 +197,7 @@ def match(
 
 
 def read_match(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Match:
-    """Return the match in a folder as far as it is.
-
-    Raises:
-        ActiveSteerError: the study is wrong, or the folder holds another search.
-    """
+    """Return the match in a folder as far as it is."""
     return _Search(read_study(study_file, "match"), Path(folder), None, reads=True).result
 
 

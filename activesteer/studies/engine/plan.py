@@ -34,16 +34,7 @@ class Plan:
     """
 
     def __init__(self, study: StudyFile, folder: Path | None = None) -> None:
-        """Check the study and enumerate its runs.
-
-        Args:
-            study: The study.
-            folder: Folder of the recordings, if some are kept.
-
-        Raises:
-            ActiveSteerError: a manoeuvre, vehicle or controller is not found or wrong; a key does not exist, changes
-                nothing, or can take a value that is not allowed.
-        """
+        """Check the study and enumerate its runs."""
         self.study = study
         self.samples = study.samples()
         self._values = FactorValues(study)
@@ -114,14 +105,7 @@ class Plan:
         return self.request_with(run, sample, (maneuver, vehicle, controller), samples[sample])
 
     def request_with(self, run: int, sample: int, place: tuple[int, int, int], factors: dict[str, Any]) -> Request:
-        """Return a run with values of its own.
-
-        Args:
-            run: Number of the run.
-            sample: Number of the values.
-            place: Numbers of manoeuvre, vehicle and controller.
-            factors: The values.
-        """
+        """Return a run with values of its own."""
         overrides = self.study.overrides | self._values.overrides(*place[:2], factors)
         return Request(run, sample, *place, factors, overrides)
 
@@ -272,11 +256,6 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
 
 def task_size(runs: int, controllers: int, in_flight: int) -> int:
     """Return the number of runs per task: 8 to 64, whole samples, and enough tasks for all workers to end together.
-
-    Args:
-        runs: Runs of the study.
-        controllers: Runs of a sample.
-        in_flight: Number of tasks that the workers have at a time.
 
     Returns:
         Runs per task; fewer than 8 only if the study is small.

@@ -42,17 +42,7 @@ Group = tuple[str, str]
 
 
 def write_report(folder: str | os.PathLike[str]) -> Path:
-    """Write report.html into a study's folder from its finished runs.
-
-    Args:
-        folder: Folder of the study.
-
-    Returns:
-        The page.
-
-    Raises:
-        StudyError: there is no study, it has no rows yet, or the page cannot be written.
-    """
+    """Write report.html into a study's folder from its finished runs."""
     home = Path(folder)
     store = Store(home, ())
     progress = store.progress()

@@ -36,25 +36,10 @@ Rows = Mapping[str, Mapping[str, float | None]]
 
 
 class Requirement:
-    """A requirement.
-
-    Attributes:
-        text: The text.
-        controllers: Controllers whose runs it needs, other than the examined one.
-        metrics: Metrics that it names.
-    """
+    """A requirement."""
 
     def __init__(self, text: str, source: Source, where: tuple[str, ...]) -> None:
-        """Parse a requirement.
-
-        Args:
-            text: The text.
-            source: Source of the text, for error messages.
-            where: Its key.
-
-        Raises:
-            ActiveSteerError: the text is no comparison of metrics.
-        """
+        """Parse a requirement."""
         self.text, self.controllers, self.metrics = text, list[str](), list[str]()
         self._fail = lambda problem: source.fail(where, f"{problem} in {shown(text)}", text)
         if len(text) > _LONGEST:

@@ -21,12 +21,7 @@ _TYPES: Final = {"run": pa.int64(), "sample": pa.int64()} | dict.fromkeys(
 
 
 def table_of(rows: Sequence[Row], factors: Sequence[str]) -> pa.Table:
-    """Return rows as a table, with a unit for each column.
-
-    Args:
-        rows: The rows.
-        factors: Varied keys: the columns between identity and outcome.
-    """
+    """Return rows as a table, with a unit for each column."""
     names = dict.fromkeys([*IDENTITY, *factors, *OUTCOME, *(name for row in rows for name in row)])
     columns = {}
     for name in names:

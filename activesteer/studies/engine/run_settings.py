@@ -58,17 +58,7 @@ class Settings:
 
 
 class Request(NamedTuple):
-    """Request for one run.
-
-    Attributes:
-        run: Number of the run in the study.
-        sample: Number of the combination of factors.
-        maneuver: Index of the manoeuvre.
-        vehicle: Index of the vehicle.
-        controller: Index of the controller.
-        factors: Values of the factors.
-        overrides: Overrides from the factors and from the settings.
-    """
+    """Request for one run."""
 
     run: int
     sample: int
@@ -80,11 +70,7 @@ class Request(NamedTuple):
 
 
 def present_inputs(settings: Settings) -> dict[str, str]:
-    """Return the hashes of `Settings.expected` for the files on this machine.
-
-    Raises:
-        ActiveSteerError: a file or a controller is not found.
-    """
+    """Return the hashes of `Settings.expected` for the files on this machine."""
     found = {f"{_VERSION}{key}": value for key, value in deciding_versions().items()}
     places = itertools.product(range(len(settings.maneuvers)), range(len(settings.vehicles)))
     for maneuver, vehicle, overrides in (*((*place, settings.overrides) for place in places), *settings.named):
@@ -129,24 +115,13 @@ def differences(settings: Settings) -> str:
 
 
 def prepare(workers: Workers, settings: Settings) -> None:
-    """Prepare the workers, once per machine.
-
-    Args:
-        workers: Workers that make the runs.
-        settings: What all runs of the study share.
-
-    Raises:
-        StudyError: a machine cannot make the runs.
-    """
+    """Prepare the workers, once per machine."""
     if problem := workers.everywhere(prepare_worker, settings):
         raise StudyError(problem)
 
 
 def prepare_worker(settings: Settings) -> str:
     """Compile the native code and check that this machine can make the runs.
-
-    Args:
-        settings: What all runs of the study share.
 
     Returns:
         The obstacles in words; empty if there are none.

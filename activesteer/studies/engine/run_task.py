@@ -56,9 +56,6 @@ def drive(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     Args:
         settings: What all runs of the study share.
         requests: The runs, grouped by sample, so that a search by driving is made once per sample.
-
-    Returns:
-        A row for each run.
     """
     if problem := _problem(digest({"expected": settings.expected}), settings):
         return [failed_row(settings, request, Status.FAILED, problem) for request in requests]

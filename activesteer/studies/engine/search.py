@@ -31,11 +31,7 @@ class Judgement(NamedTuple):
 
 
 def import_optuna(command: str) -> Any:
-    """Import Optuna and silence it.
-
-    Raises:
-        StudyError: it is not installed.
-    """
+    """Import Optuna and silence it."""
     try:
         import optuna  # noqa: PLC0415 - an extra
     except ImportError as reason:
@@ -45,11 +41,7 @@ def import_optuna(command: str) -> Any:
 
 
 def claim_folder(folder: Path, name: str, plan: Plan, text: str = "") -> None:
-    """Write the study into a folder, or check that the folder holds the same search.
-
-    Raises:
-        StudyError: the folder holds another search, or cannot be written.
-    """
+    """Write the study into a folder, or check that the folder holds the same search."""
     path = folder / f"{name}.toml"
     text = f"# {plan.digest}\n{text}{plan.study.to_toml()}"
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
@@ -80,9 +72,6 @@ def search(
         judge: Function from the rows of a set to its judgement.
         workers: Workers that make the runs.
         progress: Called after every set with the number of finished sets and the total.
-
-    Returns:
-        The study of Optuna, with all sets.
     """
     optuna = import_optuna(name)
     from optuna.storages import JournalStorage, journal  # noqa: PLC0415 - an extra

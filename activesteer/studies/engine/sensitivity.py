@@ -58,9 +58,6 @@ def indices(
     Returns:
         The indices. Empty if the design or the values allow none: a grid or a list, failed runs in a design that needs
         all of them, or a metric that does not vary.
-
-    Raises:
-        StudyError: SALib is not installed.
     """
     finite = np.isfinite(values)
     discrete = kind in ("grid", "list") or any(factor.kind in ("grid", "choice") for factor in factors)

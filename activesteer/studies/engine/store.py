@@ -67,28 +67,14 @@ class Store:
     """A study's folder, held by one process at a time."""
 
     def __init__(self, folder: Path, factors: Sequence[str]) -> None:
-        """Prepare the store; `opened` opens it.
-
-        Args:
-            folder: The folder.
-            factors: Varied keys: the columns between identity and outcome.
-        """
+        """Prepare the store; `opened` opens it."""
         self.folder = folder
         self._factors = tuple(factors)
         self._parts = folder / "parts"
 
     @contextlib.contextmanager
     def opened(self, study_toml: str, identity: str, total: int) -> Iterator[Store]:
-        """Make the folder, or resume the study in it.
-
-        Args:
-            study_toml: The study as it runs.
-            identity: Hash of everything that decides the results.
-            total: Number of its runs.
-
-        Raises:
-            StudyError: the folder cannot be written, another process works in it, or it holds another study.
-        """
+        """Make the folder, or resume the study in it."""
         make_folder(self._parts, StudyError)
         with _locked(self.folder / ".lock"):
             about = {"digest": identity, "runs": total, "versions": versions(), "platform": platform.platform()}
@@ -116,24 +102,13 @@ class Store:
         return [*found, range(begin, total)] if begin < total else found
 
     def write(self, rows: Sequence[Row]) -> None:
-        """Store the rows of a finished task, which belong to consecutive runs.
-
-        Raises:
-            StudyError: they cannot be written.
-        """
+        """Store the rows of a finished task, which belong to consecutive runs."""
         name = f"{rows[0]['run']:09d}-{rows[-1]['run']:09d}.parquet"
         with replacing(self._parts / name, StudyError) as path:
             pq.write_table(table_of(rows, self._factors), path)
 
     def join(self) -> Path:
-        """Join all parts to one file in the order of the runs, and delete the parts.
-
-        Returns:
-            The file.
-
-        Raises:
-            StudyError: it cannot be written, or a part cannot be read.
-        """
+        """Join all parts to one file in the order of the runs, and delete the parts."""
         target = self.folder / RESULTS
         if not target.exists():
             paths = self._paths()
@@ -145,11 +120,7 @@ class Store:
         return target
 
     def read(self) -> pa.Table:
-        """Return all rows so far, in the order of the runs.
-
-        Raises:
-            StudyError: a file cannot be read.
-        """
+        """Return all rows so far, in the order of the runs."""
         if (self.folder / RESULTS).exists():
             return next(_tables([self.folder / RESULTS]))
         paths = self._paths()
@@ -157,11 +128,7 @@ class Store:
         return pa.concat_tables([schema.empty_table(), *(fitted(table, schema) for table in _tables(paths))])
 
     def progress(self) -> Progress:
-        """Return the progress of the study.
-
-        Raises:
-            StudyError: a file cannot be read.
-        """
+        """Return the progress of the study."""
         about = read_environment(self.folder)
         counts: dict[str, int] = {}
         errors: dict[str, int] = {}
@@ -176,11 +143,7 @@ class Store:
         return Progress(about["runs"], sum(counts.values()), counts, maximum, running, self.without_effect())
 
     def note_without_effect(self, factors: Sequence[str]) -> None:
-        """Store the factors that change no metric of any run.
-
-        Raises:
-            StudyError: they cannot be written.
-        """
+        """Store the factors that change no metric of any run."""
         if factors:
             write_text(self.folder / _WITHOUT_EFFECT, json.dumps(factors) + "\n", StudyError)
 
@@ -204,11 +167,7 @@ class Store:
 
 
 def read_environment(folder: Path) -> dict[str, Any]:
-    """Return the description in a study's folder.
-
-    Raises:
-        StudyError: the folder has no study, or it cannot be read.
-    """
+    """Return the description in a study's folder."""
     path = folder / "environment.json"
     if not path.is_file():
         raise StudyError(

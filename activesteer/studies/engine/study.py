@@ -30,14 +30,7 @@ _logger: Final = logging.getLogger(__name__)
 
 
 class StudyProgress(NamedTuple):
-    """Progress of a study, for a callback.
-
-    Attributes:
-        done: Runs with a row.
-        total: Runs of the study.
-        failed: Runs of this call that are incomplete.
-        here: Runs made by this call.
-    """
+    """Progress of a study, for a callback."""
 
     done: int
     total: int

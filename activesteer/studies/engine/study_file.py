@@ -145,12 +145,6 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
         given: Name of a study of the package, a path, or a table. Relative paths in a file start at its folder, those
             in a table at the working directory.
         search: `tune`, `match`, `fit` or `falsify` if the study must have that table.
-
-    Returns:
-        The study.
-
-    Raises:
-        StudyError: the study cannot be read, or a key or value is wrong.
     """
     if isinstance(given, StudyFile):
         return given

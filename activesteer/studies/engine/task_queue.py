@@ -40,11 +40,7 @@ class Outcome(NamedTuple):
     error: BaseException | None
 
     def result(self) -> Any:
-        """Return the result.
-
-        Raises:
-            BaseException: the error of the task.
-        """
+        """Return the result."""
         if self.error is not None:
             raise self.error
         return self.value
@@ -61,11 +57,7 @@ class TaskQueue:
     """Waiting tasks, running tasks, and the results of finished tasks."""
 
     def __init__(self, workers: Workers) -> None:
-        """Make an empty queue.
-
-        Args:
-            workers: Workers that do the tasks.
-        """
+        """Make an empty queue."""
         self._workers = workers
         self._waiting: deque[_Task] = deque()
         self._suspects: deque[_Task] = deque()
@@ -92,12 +84,6 @@ class TaskQueue:
 
         Args:
             more: Further tasks, as arguments of `add`, taken only if there is room for them.
-
-        Yields:
-            An outcome for every task.
-
-        Raises:
-            StudyError: the workers are gone for good.
         """
         more = iter(()) if more is None else more
         while True:
@@ -167,11 +153,6 @@ def in_parallel(
 
     Returns:
         The results, in the order of the arguments.
-
-    Raises:
-        ParameterError: fewer than one job.
-        StudyError: see `workers_for`.
-        BaseException: the error of a call.
     """
     results: dict[int, Any] = {}
     with workers_for(jobs, scheduler=scheduler) if workers is None else contextlib.nullcontext(workers) as crew:

@@ -136,13 +136,6 @@ def tune(
         client: A `distributed.Client` whose cluster makes the runs.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
         progress: Called after every set with the number of finished sets and the total.
-
-    Returns:
-        The best sets.
-
-    Raises:
-        ActiveSteerError: an input is wrong, Optuna is not installed, or the folder cannot be written or holds another
-            search.
     """
     study = read_study(study_file, "tune")
     table = _table(study)

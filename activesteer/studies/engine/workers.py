@@ -85,11 +85,7 @@ class LocalProcesses:
     """Newly started processes that share nothing with this one, because MuJoCo's callbacks belong to a process."""
 
     def __init__(self, count: int) -> None:
-        """Prepare the pool, which starts processes as tasks arrive.
-
-        Args:
-            count: Number of processes.
-        """
+        """Prepare the pool, which starts processes as tasks arrive."""
         self._count = count
         self.in_flight = count + 1  # one task waits, so that no process does
         self._pool = self._new_pool()
@@ -170,9 +166,6 @@ def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str |
             does the work.
         client: A `distributed.Client` instead.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
-
-    Yields:
-        The workers.
 
     Raises:
         ParameterError: `jobs` is below 1 or above four times the number of processors, or is given with a scheduler.

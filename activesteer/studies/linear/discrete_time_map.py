@@ -49,11 +49,7 @@ class DiscreteTimeMap:
         return self.local.read()
 
     def trim(self, speed_mps: float) -> None:
-        """Make steady straight driving the reference, with its drive torque.
-
-        Raises:
-            ModelError: there is none.
-        """
+        """Make steady straight driving the reference, with its drive torque."""
         size, rest = len(self.local.names), np.zeros(len(INPUTS))
         speed = self.local.names.index("d_x")
         x = np.zeros(size)

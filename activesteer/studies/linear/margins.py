@@ -243,10 +243,6 @@ def loop_margins(
         vehicle: Name, path, or table of a vehicle.
         speeds_kmh: Speeds [km/h].
         overrides: Dotted key -> value.
-
-    Raises:
-        ControllerError: a controller has no linear form.
-        ActiveSteerError: an input is wrong.
     """
     check_gains(overrides or {}, controllers)
     return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}]))
@@ -270,10 +266,6 @@ def margins_of_cars(
         vehicle: Name, path, or table of a vehicle.
         speeds_kmh: Speeds [km/h].
         cars: Overrides of each car: dotted key -> value.
-
-    Raises:
-        ControllerError: a controller has no linear form.
-        ActiveSteerError: an input is wrong.
     """
     plugins = [find_controller(given) for given in controllers]
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}

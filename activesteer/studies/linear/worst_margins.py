@@ -47,10 +47,6 @@ def worst_margins(
 
     Returns:
         The smallest of each margin over all samples; `factors` are those of the smallest disk margin.
-
-    Raises:
-        ControllerError: a controller has no linear form.
-        ActiveSteerError: an input is wrong.
     """
     given, changed = read_study(study_file), dict(overrides or {})
     for key in changed:

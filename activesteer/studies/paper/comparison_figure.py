@@ -35,11 +35,7 @@ _PROPORTIONS: Final = {
 
 
 def draw_comparison(made: Comparison, path: Path) -> Path:
-    """Draw a comparison and return its file.
-
-    Raises:
-        ActiveSteerError: the file cannot be written, or matplotlib is not installed.
-    """
+    """Draw a comparison and return its file."""
     return save(comparison_figure(made), path)
 
 
@@ -85,11 +81,7 @@ def _legend(better: str, worse: str, neutral: str) -> list[tuple[str, str]]:
 
 
 def draw_comparison_population(made: Population, path: Path) -> Path:
-    """Draw a comparison over a population and return its file.
-
-    Raises:
-        ActiveSteerError: the file cannot be written, or matplotlib is not installed.
-    """
+    """Draw a comparison over a population and return its file."""
     return save(comparison_population_figure(made), path)
 
 

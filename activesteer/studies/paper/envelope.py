@@ -220,12 +220,6 @@ def envelope(
         jobs: Number of processes; default: the number of processors.
         scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
         progress: Called with the current item, the number of finished runs or searches, and the total.
-
-    Returns:
-        The envelope.
-
-    Raises:
-        ActiveSteerError: an input is wrong, the manoeuvre has no lanes and no cones, or a run failed.
     """
     given = dict(overrides or {})
     scenario = resolve(maneuver, vehicle, given, drivers[0], controllers)
@@ -313,9 +307,6 @@ def entry_speed(
     Returns:
         The speed [km/h], within `RESOLUTION_KMH` below the lowest speed at which the car fails; None if it fails at
         every speed of `RANGE_KMH`, the upper end if it succeeds at every one.
-
-    Raises:
-        ActiveSteerError: an input is wrong.
     """
     read = read_by(overrides, controller)
     base = resolve(maneuver, vehicle, read, driver, [controller])

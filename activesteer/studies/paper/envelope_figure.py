@@ -24,15 +24,7 @@ _COLOURS: Final = {
 
 
 def draw_envelope(made: Envelope, path: Path) -> Path:
-    """Draw an envelope and return its file.
-
-    Args:
-        made: The envelope.
-        path: File to write.
-
-    Raises:
-        ActiveSteerError: the file cannot be written, or matplotlib is not installed.
-    """
+    """Draw an envelope and return its file."""
     return save(envelope_figure(made), path, StudyError)
 
 

@@ -114,12 +114,6 @@ def fault_map(
         scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
         workers: Workers to use instead; they still belong to the caller.
         progress: Called after every pair of speed and situation with the number of finished pairs and the total.
-
-    Returns:
-        The map.
-
-    Raises:
-        ActiveSteerError: an input is wrong, or the car without a fault cannot drive a situation.
     """
     limits = Limits() if limits is None else limits
     chosen = {text: _fault(text) for text in faults or usual_faults(str(controller))}

@@ -60,9 +60,6 @@ def draw_fault_map(made: FaultMap, folder: str | os.PathLike[str]) -> list[Path]
     Args:
         made: The map.
         folder: Folder for the files; it is created if it does not exist.
-
-    Raises:
-        ActiveSteerError: a file cannot be written, or matplotlib is not installed.
     """
     directory = make_folder(folder, StudyError)
     return [

@@ -80,12 +80,6 @@ def population(
         jobs: Number of processes.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
         progress: Called after every task.
-
-    Returns:
-        Proportions and effects.
-
-    Raises:
-        ActiveSteerError: an input is wrong, or the folder holds another study.
     """
     if controllers is None:
         planned = population_study(samples, seed, vehicle)

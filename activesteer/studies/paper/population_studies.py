@@ -25,9 +25,6 @@ def population_study(
         samples: Number of samples; default: that of the file.
         seed: Seed of the sample; default: that of the file.
         vehicle: Name, path or table of a vehicle; default: that of the file.
-
-    Raises:
-        ActiveSteerError: an input is wrong.
     """
     return _changed(STUDY, samples, seed, vehicle)
 
@@ -48,9 +45,6 @@ def comparison_study(
         samples: Number of samples; default: that of the study file.
         seed: Seed of the sample; same default.
         vehicle: Name, path or table of a vehicle; same default.
-
-    Raises:
-        ActiveSteerError: an input is wrong.
     """
     if NONE not in controllers:
         raise ParameterError(

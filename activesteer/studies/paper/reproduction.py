@@ -88,9 +88,6 @@ def reproduce(
         jobs: Number of processes; default: the number of processors.
         progress: Called after every run.
 
-    Returns:
-        Files and scorecard.
-
     Raises:
         ActiveSteerError: an input is wrong. A failed run stops no other run; `failures` names it.
     """
@@ -118,11 +115,7 @@ def reproduce(
 
 
 def recordings_in(folder: str | os.PathLike[str]) -> dict[str, dict[str, Recording]]:
-    """Return the recordings of `reproduce` in a folder: scenario -> system -> recording, for complete scenarios.
-
-    Raises:
-        RecordingError: there are none, or one cannot be read.
-    """
+    """Return the recordings of `reproduce` in a folder: scenario -> system -> recording, for complete scenarios."""
     found: dict[str, dict[str, Recording]] = {}
     for name in SCENARIOS:
         paths = {system: _path(Path(folder), name, system) for system in SYSTEMS}
@@ -201,9 +194,6 @@ def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None)
 
     Returns:
         All claims, in the order of the paper.
-
-    Raises:
-        ActiveSteerError: an input is wrong, or a run failed.
     """
     found = in_parallel(_claims_of, [(name, vehicle) for name in SCENARIOS], jobs)
     return [claim for claims in found for claim in claims]
