@@ -1,10 +1,9 @@
-"""Definition of a metric: a function with a name, a unit and axles, whose docstring is the definition."""
+"""A metric of the rig, and the axle from whose sweeps it is evaluated."""
 
 from __future__ import annotations
 
-import inspect
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from activesteer.rigs.kc.tyre_stiffness import TyreStiffness
 
 AxleName = Literal["front", "rear", "car"]
 
-FRONT_AND_REAR: Final = ("front", "rear")
+DEG: Final = math.degrees(1.0)
 SMALL_TRAVEL_M: Final = 0.015
 _SMALL: Final = {
     "parallel": SMALL_TRAVEL_M, "opposite": SMALL_TRAVEL_M, "lateral": 1000.0, "longitudinal": 1000.0,
@@ -58,6 +57,10 @@ class Axle(NamedTuple):
         """Names of the knuckles' bodies."""
         return (f"{self.name[0]}l_knuckle", f"{self.name[0]}r_knuckle")
 
+    def beside(self, name: AxleName) -> Axle:
+        """Return another axle of the same car."""
+        return Axle(name, self.measured)
+
     def sweep(self, name: str) -> Sweep:
         """Return a sweep of the rig."""
         return self.measured.sweeps[name]
@@ -92,41 +95,24 @@ class Axle(NamedTuple):
 Evaluate = Callable[[Axle], float]
 
 
-@dataclass(frozen=True)
-class Definition:
+def slope(sweep: str, quantity: str, factor: float = 1.0, axis: int | None = None) -> Evaluate:
+    """Return the evaluation of `Axle.mean_slope`, times a factor."""
+    return lambda axle: factor * axle.mean_slope(sweep, quantity, axis)
+
+
+class Definition(NamedTuple):
     """A metric's definition.
 
     Attributes:
         name: Name.
         unit: Unit.
-        axles: Axles that have the metric.
-        text: Definition, sign, source.
         evaluate: Function from an axle to its value.
+        text: Definition, sign, source.
+        axles: Axles that have the metric.
     """
 
     name: str
     unit: str
-    axles: tuple[AxleName, ...]
-    text: str
     evaluate: Evaluate
-
-
-DEFINITIONS: Final[list[Definition]] = []
-"""All metrics, in the order of the table."""
-
-
-def metric(unit: str, *axles: AxleName) -> Callable[[Evaluate], Evaluate]:
-    """Make a function of an axle a metric, by its name and docstring.
-
-    Args:
-        unit: Unit of its value.
-        axles: Axles that have the metric. Default: both.
-    """
-
-    def enter(function: Evaluate) -> Evaluate:
-        name = getattr(function, "__name__", "")
-        text = " ".join((inspect.getdoc(function) or "").split())
-        DEFINITIONS.append(Definition(name, unit, axles or FRONT_AND_REAR, text, function))
-        return function
-
-    return enter
+    text: str
+    axles: tuple[AxleName, ...] = ("front", "rear")

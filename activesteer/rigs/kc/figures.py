@@ -15,8 +15,8 @@ from activesteer.conventions import Array
 from activesteer.plotting import Area, Curve, Panel, Picture, save_all
 from activesteer.plotting import draw as drawn
 from activesteer.rigs.kc.definitions import Axle
-from activesteer.rigs.kc.metrics_kinematics import roll_angle_rad
 from activesteer.rigs.kc.metrics_steering import mean_steer_rad, ratio_curve
+from activesteer.rigs.kc.metrics_travel import roll_angle_rad
 from activesteer.rigs.kc.programme import rear_screw_travel_m
 from activesteer.rigs.kc.result import KcMetric, KcResult
 from activesteer.rigs.kc.sweep import Sweep

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.rigs.kc.definitions import DEFINITIONS, Axle
+from activesteer.rigs.kc.definitions import Axle
+from activesteer.rigs.kc.metrics_steering import DEFINITIONS
 from activesteer.rigs.kc.programme import Measured
 from activesteer.rigs.kc.sweep import Sweep
 from activesteer.rigs.kc.targets import Target, Targets

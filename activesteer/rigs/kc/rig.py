@@ -10,11 +10,6 @@ from typing import Any
 import numpy as np
 
 from activesteer.errors import ModelError
-
-# The metrics register themselves in the table of definitions, in this order.
-from activesteer.rigs.kc import (  # isort: skip  # noqa: F401
-    metrics_kinematics, metrics_support, metrics_steering, metrics_compliance, metrics_modes,
-)  # fmt: skip
 from activesteer.rigs.kc.programme import measure
 from activesteer.rigs.kc.result import KcResult, evaluated
 from activesteer.rigs.kc.targets import load_targets

@@ -9,7 +9,7 @@ from pathlib import Path
 from activesteer.config import Source, build, read_toml
 from activesteer.errors import nearest_names
 from activesteer.resources import models_dir
-from activesteer.rigs.kc.definitions import DEFINITIONS
+from activesteer.rigs.kc.metrics_steering import DEFINITIONS
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from activesteer.errors import ParameterError
 from activesteer.files import json_text
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, draw, kinematics_compliance
-from activesteer.rigs.kc.definitions import DEFINITIONS
 from activesteer.rigs.kc.held_car import WheelPose
+from activesteer.rigs.kc.metrics_steering import DEFINITIONS
 from activesteer.rigs.kc.steering_axis import steering_axis
 from activesteer.rigs.kc.targets import load_targets
 from tests.raising import raises
