@@ -11,6 +11,7 @@ import pytest
 
 from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError, SimulationDiverged
+from activesteer.scenario import load_car
 from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Tape, Vehicle
 from activesteer.vehicle.channels import RawRows
@@ -63,14 +64,24 @@ def test_a_row_is_a_copy_of_the_engine_s_arrays() -> None:
     assert tape["rows"][0] == 3, "where there is no room, nothing is written"
 
 
-def test_inputs_played_back_give_the_same_drive() -> None:
-    driven, replayed = _rolling(), _rolling()
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("compact", STEER),
+        ("compact_electric", STEER._replace(wheel_torque_demand_Nm=(0.0, 0.0, -150.0, 250.0))),
+        ("tesla_model_s", ActuatorCommand()),
+    ],
+)
+def test_inputs_played_back_give_the_same_drive(name, asked) -> None:
+    driven, replayed = (load_car(name).on() for _ in range(2))
+    for vehicle in (driven, replayed):
+        vehicle.start(20.0)
     inputs = np.empty((50, driven.model.nu))
     for step, row in enumerate(inputs):
-        driven.step(COMMAND._replace(steering_wheel_demand_rad=0.01 * step), STEER)
+        driven.step(COMMAND._replace(steering_wheel_demand_rad=0.01 * step), asked)
         row[:] = driven.data.ctrl
     # The gear is no input.
-    replayed.step(COMMAND, STEER)
+    replayed.step(COMMAND, asked)
     replayed.start(20.0)
     replayed.replay(inputs)
     assert replayed.data.qpos.tobytes() == driven.data.qpos.tobytes()
