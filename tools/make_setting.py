@@ -30,7 +30,8 @@ FILE: Final = Path(setting_file.__file__).parent / "paper_setting.toml"
 _HEAD: Final = """# The paper's setting: numbers for all that the paper leaves open, with which most statements hold.
 # Selected by the verdicts of the claims, among the settings of `activesteer match match_paper`: the most plausible of
 # those with the most statements. It shows under which conditions the statements are so; it is no evidence for them. The
-# ranges were committed before the search. Written by tools/make_setting.py.
+# ranges were committed before the search, which started from settings chosen by hand (docs/claims.md). Written by
+# tools/make_setting.py.
 """
 
 
