@@ -36,6 +36,10 @@ def add_to(commands: Any) -> None:
         "--layout", default="overlay", choices=("overlay", "side-by-side"),
         help="transparent cars in one picture, or one picture for each car (default: overlay)",
     )  # fmt: skip
+    parser.add_argument(
+        "--gauges", default="full", choices=("full", "sideslip"),
+        help="all gauges, or one large sideslip angle for each car (default: full)",
+    )  # fmt: skip
     parser.add_argument("--size", type=_size, default=(1280, 720), metavar="WxH", help="pixels (default: 1280x720)")
     parser.add_argument("--fps", type=float, help="pictures per second (default: 30, GIF: 20)")
     add_pace(parser)
@@ -69,7 +73,14 @@ def _video(options: argparse.Namespace) -> int:
     output = options.output if options.output is not None else options.file.with_suffix(".mp4")
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
     settings = Settings(
-        options.camera, options.corner or CORNERS[0], options.size, rate, options.speed, options.layout, options.cutaway
+        options.camera,
+        options.corner or CORNERS[0],
+        options.size,
+        rate,
+        options.speed,
+        options.layout,
+        gauges=options.gauges,
+        cutaway=options.cutaway,
     )
     named = dict(zip(run_names(files, recordings), recordings, strict=True))
     started = time.monotonic()

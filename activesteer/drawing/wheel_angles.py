@@ -29,7 +29,7 @@ _BESIDE_M: Final = 0.4
 _WHEEL_M: Final = 0.36, 0.13
 """Half length and half width of a wheel in plan view [m]."""
 _NOTHING_RAD: Final = math.radians(0.05)
-"""Least angle with a side [rad]; a smaller one is written as zero."""
+"""Least angle that is written [rad]."""
 
 
 def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
@@ -136,13 +136,13 @@ def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
 
 
 def words(angle_rad: float) -> str:
-    """Write the true angle of a wedge and its side; empty for an unknown angle.
+    """Write the true angle of a wedge and its side; empty for an unknown angle and for one that is as good as zero.
 
     Args:
         angle_rad: Steer angle [rad], left positive.
     """
-    if not math.isfinite(angle_rad):
+    if not abs(angle_rad) >= _NOTHING_RAD:
         return ""
-    side = "" if abs(angle_rad) < _NOTHING_RAD else " left" if angle_rad > 0.0 else " right"
+    side = " left" if angle_rad > 0.0 else " right"
     unit = quantity_of(CHANNELS[0]).unit
     return f"{abs(angle_rad) * unit.factor:.1f} {unit.name}{side}"

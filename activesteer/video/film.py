@@ -21,15 +21,21 @@ from activesteer.road.road import road_of
 from activesteer.video.cameras import CUTAWAY, view
 from activesteer.video.encoder import check, encoder, frame_rate
 from activesteer.video.end_card import end_card
-from activesteer.video.gauges import Dials, Gauges
+from activesteer.video.gauges import Dials, Gauges, LargeSideslip, used
 from activesteer.video.labels import Labels
 from activesteer.video.markings import Markings
 from activesteer.video.offscreen import Offscreen
 from activesteer.video.render_scene import Car, RenderScene
+from activesteer.video.road import edges_beside
+from activesteer.video.traces import Traces
 from activesteer.video.track import Track
 
 LAYOUTS: Final = ("overlay", "side-by-side")
 """Layouts of several cars: one view with all but the first car transparent, or a pane for each car."""
+GAUGES: Final = ("full", "sideslip")
+"""Kinds of gauges over the frames."""
+_TAIL_OPENS_RAD: Final = tuple(np.radians((0.3, 0.8)))
+"""Rear steer angles from which the tail of a body lets the rear wheels be seen, and at which it is open [rad]."""
 END_S: Final = 3.0
 """Duration of the end card [s]."""
 _SAMPLES: Final = 6
@@ -51,6 +57,8 @@ class Settings:
     """Simulated seconds per second of film."""
     layout: str = "overlay"
     """`overlay` or `side-by-side`."""
+    gauges: str = "full"
+    """`full`, or `sideslip` for one large number for each car and no markings."""
     cutaway: bool = False
     """Whether the shells of the cars are transparent; the camera `wheel` always shows them so."""
 
@@ -60,10 +68,9 @@ class Settings:
         Raises:
             ParameterError: a setting is out of its range.
         """
-        if self.layout not in LAYOUTS:
-            raise ParameterError(
-                f"there is no layout {self.layout!r}; {nearest_names(self.layout, LAYOUTS)}", value=self.layout
-            )
+        for kind, name, names in (("layout", self.layout, LAYOUTS), ("kind of gauges", self.gauges, GAUGES)):
+            if name not in names:
+                raise ParameterError(f"there is no {kind} {name!r}; {nearest_names(name, names)}", value=name)
         for name, value, low, high in (
             ("pictures a second", self.rate_hz, 1.0, 240.0),
             ("speed", self.speed, 0.01, 100.0),
@@ -91,19 +98,18 @@ class Film:
         if not recordings:
             raise ParameterError("there is no recording to make a film of, at least one is needed")
         self.settings = settings
-        every = tuple(recordings.values())
         looks = run_looks(recordings)
         actors = [
             _Actor(recording, Track(recording, name), looks[name].label, looks[name].on_dark)
             for name, recording in recordings.items()
         ]
         self._tracks = [actor.track for actor in actors]
-        maneuver = every[0].metadata.get("maneuver", {})
+        maneuver = actors[0].recording.metadata.get("maneuver", {})
         title = str(maneuver.get("title") or maneuver.get("name") or "")
         groups = [[actor] for actor in actors] if settings.layout == "side-by-side" else [actors]
         edges = np.linspace(0, settings.size[0], len(groups) + 1).astype(int)
         self._panes = [
-            _Pane(group, every, settings, (int(width), settings.size[1]), "" if number else title)
+            _Pane(group, actors, settings, (int(width), settings.size[1]), "" if number else title)
             for number, (group, width) in enumerate(zip(groups, np.diff(edges), strict=True))
         ]
         self._end = end_card(title, verdict, [actor.colour for actor in actors], settings.size)
@@ -167,6 +173,10 @@ class _Actor(NamedTuple):
     colour: str
 
     @property
+    def dials(self) -> Dials:
+        return Dials(self.recording, self.label, self.colour)
+
+    @property
     def size(self) -> Footprint | None:
         return footprint_of(self.recording.metadata)
 
@@ -177,7 +187,7 @@ class _Pane:
     def __init__(
         self,
         actors: Sequence[_Actor],
-        every: Sequence[Recording],
+        every: Sequence[_Actor],
         settings: Settings,
         size: tuple[int, int],
         title: str,
@@ -187,23 +197,44 @@ class _Pane:
         self._view = view(settings.camera, first.track, settings.corner)
         opacity = CUTAWAY if settings.cutaway else self._view.shell_opacity
         cars = [
-            Car(actor.recording.scene, actor.track.bodies, actor.colour, opacity, ghost=number > 0, size=actor.size)
+            Car(
+                actor.recording.scene,
+                actor.track.bodies,
+                actor.colour,
+                opacity,
+                ghost=number > 0,
+                size=actor.size,
+                tail_opens=number == 0 and opacity == 1.0 and used(actor.recording, "rear_steer_rad"),
+            )
             for number, actor in enumerate(actors)
         ]
         metadata = first.recording.metadata
         self._size = size
         drawn = surface_in(metadata)
-        self._scene = RenderScene(cars, course_of(metadata), road_of(metadata), size, drawn)
+        course = course_of(metadata)
+        edges = None
+        if course is None and drawn is None:
+            edges = edges_beside([actor.track.path()[1] for actor in every])
+        self._distances = [] if edges is None else edges.labels()
+        self._scene = RenderScene(cars, course, road_of(metadata), size, drawn, edges)
         notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
         notes += ["road heights to scale"] if drawn is not None else []
+        footprint = first.size or Footprint()
+        self._traces = [
+            Traces(actor.recording, actor.track, footprint, actor.colour, number, uneven=drawn is not None)
+            for number, actor in enumerate(actors)
+        ]
         self._labels = Labels(size)
         self._markings = None
-        if self._view.marked:
-            footprint = first.size or Footprint()
-            self._markings = Markings(first.recording, first.track, footprint, first.colour, every)
+        if self._view.marked and settings.gauges == "full":
+            recordings = [actor.recording for actor in every]
+            self._markings = Markings(first.recording, first.track, footprint, first.colour, recordings)
             notes += [self._markings.note] if self._markings.note else []
-        dials = [Dials(actor.recording, actor.label, actor.colour) for actor in actors]
-        self._gauges = Gauges(dials, title, size, ", ".join(notes), every)
+        self._dials = [actor.dials for actor in actors]
+        if settings.gauges == "sideslip":
+            self._gauges = LargeSideslip(self._dials, size)
+        else:
+            self._gauges = Gauges(self._dials, title, size, ", ".join(notes), [actor.dials for actor in every])
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
         self._canvas: Offscreen | None = None
@@ -221,10 +252,16 @@ class _Pane:
             raise RuntimeError("a film is drawn in a `with` block")
         for number, track in enumerate(self._tracks):
             self._scene.place(number, *track.poses(time_s))
+        rear_steer = abs(self._dials[0].value("rear_steer_rad", time_s))
+        self._scene.open_tail(0, float(np.interp(rear_steer, _TAIL_OPENS_RAD, (0.0, 1.0))))
         self._scene.update()
         self._view.aim(self._camera, time_s)
         scene = self._canvas.prepare(self._scene.data, self._camera)
-        labels = self._markings.add(scene, time_s) if self._markings is not None else []
+        for traces in self._traces:
+            traces.add(scene, time_s)
+        labels = list(self._distances)
+        if self._markings is not None:
+            labels += self._markings.add(scene, time_s)
         pixels = self._labels.draw(self._canvas.draw(), scene, labels)
         return self._gauges.draw(pixels, time_s)
 

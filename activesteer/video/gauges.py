@@ -15,7 +15,7 @@ from activesteer.drawing import wheel_angles
 from activesteer.drawing.colours import bytes_of
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
-from activesteer.video.lettering import GREY, LEGIBLE, PANEL, WHITE, font, text_scale, write
+from activesteer.video.lettering import GREY, LEGIBLE, PANEL, WHITE, Colour, font, text_scale, write
 
 _YELLOW: Final = (255, 205, 70, 255)
 _BODY: Final = (70, 76, 86, 255)
@@ -32,8 +32,12 @@ LARGEST_SHARE: Final = 0.1
 _ROWS_SHARE: Final = 0.07
 """Largest fraction of the frame that title and rows may cover, so that there is room for the plans."""
 _SMALLEST: Final = 0.4
-_PLAN_ASPECT: Final = 0.8
-"""Ratio of width to height of a plan."""
+_PLAN_ASPECT: Final = 1.25
+"""Ratio of width to height of a plan with its steering wheel."""
+_CAR_AT, _WHEEL_AT, _WHEEL_HEIGHT = 0.64, 0.2, 0.42
+"""Middle of the car and of the steering wheel in a plan, relative to its width, and of the latter to its height."""
+_WHEEL_RADIUS: Final = 0.165
+"""Radius of the steering wheel, relative to the width of a plan."""
 _MIN_ANGLE_RAD: Final = math.radians(0.005)
 """A rear or superposition angle that never reaches this limit is not shown: the car has no such steering [rad]."""
 MIN_SPEED_MPS: Final = 1.0
@@ -42,12 +46,11 @@ _SIDE: Final = 3
 """Factor by which plans are drawn larger and then scaled down, because Pillow's lines have hard edges."""
 
 READINGS: Final = tuple(
-    quantity_of(channel)
-    for channel in ("speed_mps", "sideslip_rad", "steering_wheel_rad", "rear_steer_rad", "superposition_rad")
+    quantity_of(channel) for channel in ("speed_mps", "sideslip_rad", "rear_steer_rad", "superposition_rad")
 )
 """Values in a row; a narrow frame shows the first ones only."""
 _ADDED: Final = ("rear_steer_rad", "superposition_rad")
-_WIDEST: Final = {"speed_mps": "188.8", "steering_wheel_rad": "-188", "sideslip_rad": "-18.8"}
+_WIDEST: Final = {"speed_mps": "188.8", "sideslip_rad": "-18.8"}
 
 
 class Dials(NamedTuple):
@@ -79,7 +82,7 @@ class Gauges:
         title: str,
         size: tuple[int, int],
         note: str = "",
-        shown_with: Sequence[Recording] = (),
+        shown_with: Sequence[Dials] = (),
     ) -> None:
         """Choose fonts and values.
 
@@ -88,17 +91,18 @@ class Gauges:
             title: Title of the frame; if empty, the time is left out too.
             size: Width and height of the frames [pixels].
             note: Text behind the title, such as a slower speed.
-            shown_with: All runs of the film, if there are more than in `dials`; their plans share one scale.
+            shown_with: All runs of the film, if there are more than in `dials`; all panes then have the same gauges.
         """
         self._dials = list(dials)
         self._title, self._note = title, note
         self._size = size
-        recordings = list(shown_with) or [dial.recording for dial in dials]
+        self._every = list(shown_with or dials)
+        recordings = [dial.recording for dial in self._every]
         self._factors = wheel_angles.factors(recordings)
         self._readings = [
             reading
             for reading in READINGS
-            if reading.channel not in _ADDED or any(_used(recording, reading.channel) for recording in recordings)
+            if reading.channel not in _ADDED or any(used(recording, reading.channel) for recording in recordings)
         ]
         area, scale = size[0] * size[1], text_scale(size)
         while self._fit(scale) > _ROWS_SHARE * area and scale > LEGIBLE:
@@ -149,7 +153,7 @@ class Gauges:
     def _places(self) -> list[int]:
         """Return the left edges of the columns of a row, and the right edge of the last one [pixels]."""
         gap = _GAP * self._scale
-        places = [max((self._text.getlength(dial.label) for dial in self._dials), default=0.0) + 2.5 * gap]
+        places = [max((self._text.getlength(dial.label) for dial in self._every), default=0.0) + 2.5 * gap]
         for reading in self._readings:
             value = self._text.getlength(_WIDEST.get(reading.channel, "-8.88"))
             name = self._small.getlength(f"{reading.short} {reading.unit.name}")
@@ -205,7 +209,7 @@ class Gauges:
         middle_m = 0.5 * (size.front_m + size.rear_m) + 0.1
 
         def at(points_m: NDArray[np.float64]) -> list[tuple[float, float]]:
-            return [(large.width / 2 - y * per_m, large.height / 2 - (x - middle_m) * per_m) for x, y in points_m]
+            return [(_CAR_AT * large.width - y * per_m, large.height / 2 - (x - middle_m) * per_m) for x, y in points_m]
 
         line = max(1, round(0.05 * per_m))
         pen.polygon(at(plan.body), fill=_BODY, outline=colour, width=line)
@@ -218,13 +222,65 @@ class Gauges:
             arrow = at(_arrow((-0.5 * size.wheelbase_m, 0.0), sideslip))
             pen.line(arrow[:2], _YELLOW, line)
             pen.polygon(arrow[2:], _YELLOW)
+        _draw_steering_wheel(pen, large.size, dial.value("steering_wheel_rad", time_s), colour)
         shrunk = large.resize((width, height), Image.Resampling.BOX)
         for row, wheel, x in ((0.02, 0, 0.0), (0.97, 2, -size.wheelbase_m)):
             mean = wheel_angles.words(float(np.mean(angles[wheel : wheel + 2])))
-            write(shrunk, (width / 2, row * height), mean, WHITE, self._small, "mt" if row < 0.5 else "mb")
+            write(shrunk, (_CAR_AT * width, row * height), mean, WHITE, self._small, "mt" if row < 0.5 else "mb")
             beside = width - 0.6 * _GAP * self._scale, at(np.array([(x, 0.0)]))[0][1] / _SIDE
             write(shrunk, beside, f"x{self._factors[wheel]}" if mean else "", GREY, self._small, "rm")
+        steering = quantity_of("steering_wheel_rad")
+        value = steering.value_text(dial.value(steering.channel, time_s))
+        below = _WHEEL_AT * width, _WHEEL_HEIGHT * height + (_WHEEL_RADIUS + 0.03) * width
+        write(shrunk, below, f"{value} {steering.unit.name}", WHITE, self._small, "mt")
         return shrunk
+
+
+class LargeSideslip:
+    """Name and sideslip angle of each run, legible in a small picture."""
+
+    def __init__(self, dials: Sequence[Dials], size: tuple[int, int]) -> None:
+        """Choose the fonts.
+
+        Args:
+            dials: The runs, from top to bottom.
+            size: Width and height of the frames [pixels].
+        """
+        self._dials, self._size = list(dials), size
+        self._name, self._number = font(0.06 * size[1]), font(0.16 * size[1])
+
+    def draw(self, pixels: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
+        """Draw names and numbers over a frame; see `Gauges.draw`."""
+        picture = Image.fromarray(np.ascontiguousarray(pixels))
+        row = round(0.25 * self._size[1])
+        gap = round(0.03 * self._size[1])
+        for number, dial in enumerate(self._dials):
+            colour = (*bytes_of(dial.colour), 255)
+            panel = Image.new("RGBA", (self._size[0], row), PANEL)
+            value = abs(math.degrees(dial.value("sideslip_rad", time_s)))
+            known = math.isfinite(value) and dial.value("speed_mps", time_s) > MIN_SPEED_MPS
+            write(panel, (gap, 0.32 * row), dial.label, colour, self._name)
+            write(panel, (gap, 0.7 * row), "sideslip angle", GREY, self._name)
+            words = f"{value:.0f}°" if known else "-"
+            write(panel, (self._size[0] - gap, 0.5 * row), words, WHITE, self._number, "rm")
+            picture.paste(panel, (0, self._size[1] - row * (len(self._dials) - number)), panel)
+        return np.asarray(picture)
+
+
+def _draw_steering_wheel(pen: ImageDraw.ImageDraw, size: tuple[int, int], angle_rad: float, colour: Colour) -> None:
+    """Draw a steering wheel with three spokes; the colour marks its top."""
+    if not math.isfinite(angle_rad):
+        return
+    x, y, radius = _WHEEL_AT * size[0], _WHEEL_HEIGHT * size[1], _WHEEL_RADIUS * size[0]
+    thick = max(2, round(0.16 * radius))
+    box = (x - radius, y - radius, x + radius, y + radius)
+    pen.arc(box, 0, 360, WHITE, thick)
+    for spoke in (0.0, 0.5 * math.pi, math.pi):
+        # Left is positive, and the rows of a picture count downwards.
+        sine, cosine = math.sin(spoke - angle_rad), math.cos(spoke - angle_rad)
+        pen.line((x, y, x + (radius - 1) * cosine, y + (radius - 1) * sine), WHITE, thick)
+    top = -math.degrees(angle_rad) - 90.0
+    pen.arc(box, top - 14.0, top + 14.0, colour, round(1.5 * thick))
 
 
 def _arrow(start: tuple[float, float], angle_rad: float) -> NDArray[np.float64]:
@@ -234,7 +290,8 @@ def _arrow(start: tuple[float, float], angle_rad: float) -> NDArray[np.float64]:
     return np.array(start) + shape @ np.array([(cos, sin), (-sin, cos)])
 
 
-def _used(recording: Recording, channel: str) -> bool:
+def used(recording: Recording, channel: str) -> bool:
+    """Return whether a steering of the car ever turns its wheels."""
     if channel not in recording:
         return False
     values = np.abs(recording[channel])

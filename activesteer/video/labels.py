@@ -8,7 +8,7 @@ from typing import Final
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from activesteer.conventions import Array
 from activesteer.video.lettering import PANEL, WHITE, font, text_scale, write
@@ -43,18 +43,22 @@ class Labels:
         picture = Image.fromarray(np.ascontiguousarray(pixels))
         for label in labels:
             at, outside = (pixel_of(scene, place, self._size) for place in (label.place_m, label.outside_m))
-            if not label.text or at is None or outside is None or not self._has(at):
+            far = np.linalg.norm(label.place_m - scene.camera[0].pos) > label.far_m
+            if far or not label.text or at is None or outside is None or not self._has(at):
                 continue
             right, down = outside[0] - at[0], outside[1] - at[1]
             sideways = abs(right) >= abs(down)
             anchor = ("l" if right > 0 else "r") + "m" if sideways else "m" + ("t" if down > 0 else "b")
-            self._write(picture, at, label.text, anchor)
+            line = None if label.leads_to_m is None else pixel_of(scene, label.leads_to_m, self._size)
+            self._write(picture, at, label.text, anchor, line)
         return np.asarray(picture)
 
     def _has(self, at: tuple[float, float]) -> bool:
         return 0.0 <= at[0] < self._size[0] and 0.0 <= at[1] < self._size[1]
 
-    def _write(self, picture: Image.Image, at: tuple[float, float], text: str, anchor: str) -> None:
+    def _write(
+        self, picture: Image.Image, at: tuple[float, float], text: str, anchor: str, line_to: tuple[float, float] | None
+    ) -> None:
         pad = 3.0 * self._scale
         width = round(self._font.getlength(text) + 2 * pad)
         height = round(1.35 * _TEXT * self._scale)
@@ -64,6 +68,9 @@ class Labels:
         top = at[1] - {"t": 0.0, "m": 0.5, "b": 1.0}[anchor[1]] * height
         # Move a label that an edge would cut until all of it is seen.
         left, top = min(max(left, 0.0), self._size[0] - width), min(max(top, 0.0), self._size[1] - height)
+        if line_to is not None:
+            pen, thick = ImageDraw.Draw(picture), max(1, round(1.2 * self._scale))
+            pen.line([line_to, (min(max(line_to[0], left), left + width), top + height / 2)], WHITE[:3], thick)
         picture.paste(panel, (round(left), round(top)), panel)
 
 

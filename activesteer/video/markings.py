@@ -23,8 +23,12 @@ _AHEAD_RGBA: Final = (0.97, 0.97, 0.97, 1.0)
 _WEDGE_OPACITY: Final = 0.75
 _ARROW_RGBA: Final = (0.83, 0.05, 0.45, 1.0)
 _ARROW_M: Final = 0.05
-_LABEL_M: Final = 0.35, 0.4
+_LABEL_M: Final = 0.9, 0.9
 """Distance of a label from the tip of its wedge, ahead and to the outside [m]."""
+_SHOWN_RAD: Final = np.radians(0.3)
+"""Least angle with a wedge [rad]: toe and elasticity turn the wheels of any car by less."""
+_ROOF_M: Final = 1.4
+"""Height of a car's roof, usual for the class, to find what the car hides [m]."""
 
 
 class Label(NamedTuple):
@@ -34,11 +38,15 @@ class Label(NamedTuple):
         text: The text.
         place_m: Start of the text [m], shape (3,).
         outside_m: A point such that the text runs from `place_m` away from the car [m], shape (3,).
+        leads_to_m: The place that a line connects with the text [m], shape (3,); None for no line.
+        far_m: Distance from the camera up to which the text is written [m].
     """
 
     text: str
     place_m: Array
     outside_m: Array
+    leads_to_m: Array | None = None
+    far_m: float = np.inf
 
 
 class Markings:
@@ -61,6 +69,8 @@ class Markings:
             shown_with: All runs of the frame; they share their scales.
         """
         self._track, self._rgb = track, shares_of(colour)
+        self._low = np.array([size.rear_m, -0.5 * size.width_m, 0.2])
+        self._high = np.array([size.front_m, 0.5 * size.width_m, _ROOF_M])
         self._tips = wheel_angles.tips_beside(size)
         self._factors = wheel_angles.factors(shown_with)
         self._recording = recording
@@ -86,13 +96,19 @@ class Markings:
             origin, heading = self._track.chassis(time_s), self._track.heading(time_s)
             cos, sin = np.cos(heading), np.sin(heading)
             turn = np.array([(cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)])
+            eye = turn.T @ (0.5 * (scene.camera[0].pos + scene.camera[1].pos) - origin)
             for angle, factor, tip in zip(angles, self._factors, self._tips, strict=True):
+                if not abs(angle) >= _SHOWN_RAD:
+                    continue
                 at = origin + turn @ (*tip, _ABOVE_ROAD_M)
                 self._add_wedge(scene, at, turn, float(angle), factor)
                 outside = np.sign(tip[1])
+                if _hides(self._low, self._high, eye, np.array([*tip, _ABOVE_ROAD_M])):
+                    continue
                 place = at + turn @ (_LABEL_M[0], outside * _LABEL_M[1], 0.0)
-                words = wheel_angles.words(float(angle))
-                labels.append(Label(f"{words}, x{factor}" if words else "", place, place + turn @ (0.0, outside, 0.0)))
+                text = f"{wheel_angles.words(float(angle))}, x{factor}"
+                pointed = at + turn @ (0.6 * wheel_angles.RADIUS_M, 0.0, 0.0)
+                labels.append(Label(text, place, place + turn @ (0.0, outside, 0.0), pointed))
         if self._arrows is not None:
             row = min(int(np.searchsorted(self._recording.time_s, time_s)), len(self._recording) - 1)
             for origin, vector in zip(self._arrows[0][row], self._arrows[1][row], strict=True):
@@ -107,12 +123,21 @@ class Markings:
         for first, second in pairwise(arc):
             # The sides of the triangle lie along the axes of its frame, which need not be at right angles.
             frame = np.column_stack([first - tip, second - tip, (0.0, 0.0, 1.0)])
-            _add(scene, mujoco.mjtGeom.mjGEOM_TRIANGLE, np.ones(3), tip, frame, (*self._rgb, _WEDGE_OPACITY))
+            add_geom(scene, mujoco.mjtGeom.mjGEOM_TRIANGLE, np.ones(3), tip, frame, (*self._rgb, _WEDGE_OPACITY))
         for end, rgba in ((arc[0], _AHEAD_RGBA), (arc[-1], (*self._rgb, 1.0))):
             _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, _EDGE_M, tip, end, rgba)
 
 
-def _add(
+def _hides(low: Array, high: Array, eye: Array, place: Array) -> bool:
+    """Return whether a box stands between the eye and a place [m]; both lie outside the box."""
+    way = place - eye
+    way = np.where(np.abs(way) < 1e-9, 1e-9, way)
+    first, second = (low - eye) / way, (high - eye) / way
+    enters, leaves = np.minimum(first, second).max(), np.maximum(first, second).min()
+    return bool(enters < leaves and 0.0 < enters < 1.0)
+
+
+def add_geom(
     scene: mujoco.MjvScene,
     kind: mujoco.mjtGeom,
     size: NDArray[np.float64],
@@ -120,6 +145,16 @@ def _add(
     frame: Array,
     rgba: tuple[float, ...],
 ) -> mujoco.MjvGeom:
+    """Add a solid to a scene that is being drawn.
+
+    Args:
+        scene: The scene.
+        kind: Kind of the solid.
+        size: Its half sizes [m], shape (3,).
+        at: Its centre [m], shape (3,).
+        frame: Its axes as columns, shape (3, 3).
+        rgba: Its colour and opacity, 0 to 1.
+    """
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, size, at, frame.ravel(), np.array(rgba, np.float32))
     scene.ngeom += 1
@@ -129,5 +164,5 @@ def _add(
 def _connect(
     scene: mujoco.MjvScene, kind: mujoco.mjtGeom, width: float, start: Array, end: Array, rgba: tuple[float, ...]
 ) -> None:
-    geom = _add(scene, kind, np.ones(3), start, np.eye(3), rgba)
+    geom = add_geom(scene, kind, np.ones(3), start, np.eye(3), rgba)
     mujoco.mjv_connector(geom, kind, width, np.asarray(start, np.float64), np.asarray(end, np.float64))

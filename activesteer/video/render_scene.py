@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import Array, yaw_of
-from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed
+from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed, without_tail
 from activesteer.drawing.colours import shares_of
 from activesteer.drawing.ghosts import share_seen
 from activesteer.errors import PlaybackError
@@ -22,11 +22,17 @@ from activesteer.road.course import Course
 from activesteer.road.drawn import DrawnSurface
 from activesteer.road.footprint import Footprint
 from activesteer.road.road import Road
-from activesteer.video.road import add_areas, add_course, add_road
+from activesteer.video.road import Edges, add_areas, add_course, add_edges, add_road
 from activesteer.video.sky import SKY, add_sky
 
 _PAINT: Final = (0.23, 0.46, 0.72)
 """Colour of a car without a colour of its own."""
+_SHADED_BELOW: Final = 0.2
+_CUTAWAY_SHADE: Final = 0.3
+"""Opacity of a shell below which it is darker, and its brightness then: a bright one would tint the tyres behind it."""
+_TAIL_OPACITY: Final = 0.12
+"""Opacity of the tail of a body that lets the steered rear wheels be seen."""
+_TAIL: Final = "_tail"
 _GHOST_OPACITY: Final = 0.35
 """Opacity of a ghost's solid relative to the same solid of an opaque car."""
 _GLASS: Final = (0.1, 0.13, 0.17)
@@ -67,6 +73,7 @@ class Car(NamedTuple):
         shell_opacity: Opacity of its shell, 0 to 1.
         ghost: Whether all of the car is transparent.
         size: Size of the car, which determines its bodywork and wheels; if unknown, the model's solids are drawn.
+        tail_opens: Whether `open_tail` can make the tail of its body transparent.
     """
 
     parts: tuple[ScenePart, ...]
@@ -75,6 +82,7 @@ class Car(NamedTuple):
     shell_opacity: float = 1.0
     ghost: bool = False
     size: Footprint | None = None
+    tail_opens: bool = False
 
 
 class RenderScene:
@@ -92,6 +100,7 @@ class RenderScene:
         road: Road | None = None,
         size: tuple[int, int] = (640, 480),
         drawn: DrawnSurface | None = None,
+        edges: Edges | None = None,
     ) -> None:
         """Build the scene.
 
@@ -101,6 +110,7 @@ class RenderScene:
             road: The road; a plain one by default.
             size: Largest width and height of a frame [pixels].
             drawn: Uneven surface of the road; None for a plane.
+            edges: Edges of a straight road without a course.
 
         Raises:
             PlaybackError: the recorded car, course or road cannot be built.
@@ -111,6 +121,8 @@ class RenderScene:
             add_areas(spec, road or Road())
             if course is not None:
                 add_course(spec, course)
+            if edges is not None:
+                add_edges(spec, edges)
             for number, car in enumerate(cars):
                 _add_car(spec, car, f"{number}/")
             add_sky(spec)
@@ -125,6 +137,11 @@ class RenderScene:
         self._shadow = [self._mocap_id(f"{number}/shadow") for number in range(len(cars))]
         self._sky = self._mocap_id(SKY)
         self._opacity = self.model.geom_rgba[:, 3].copy(), self.model.tendon_rgba[:, 3].copy()
+        self._tails = [
+            [index for index in self._drawn(number)[0] if self.model.geom(index).name.endswith(_TAIL)]
+            for number in range(len(cars))
+        ]
+        self._tail_rgba = [self.model.geom_rgba[tail].copy() for tail in self._tails]
         self._ghosts = [(number, *self._drawn(number)) for number, car in enumerate(cars) if car.ghost]
         mujoco.mj_forward(self.model, self.data)
 
@@ -151,6 +168,16 @@ class RenderScene:
         half = 0.5 * yaw_of(quaternions[chassis])
         data.mocap_pos[self._shadow[car]] = positions_m[chassis, 0], positions_m[chassis, 1], 0.0
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
+
+    def open_tail(self, car: int, share: float) -> None:
+        """Make the tail of a body transparent, so that the rear wheels are seen from behind.
+
+        Args:
+            car: Index of the car; without `tail_opens` nothing changes.
+            share: 0 for closed, 1 for open.
+        """
+        open_rgba = np.array([*(3 * [_CUTAWAY_SHADE]), _TAIL_OPACITY])
+        self.model.geom_rgba[self._tails[car]] = self._tail_rgba[car] * (1.0 - share * (1.0 - open_rgba))
 
     def update(self) -> None:
         """Update everything that is attached to the bodies; a ghost fades out near the car that it accompanies."""
@@ -206,11 +233,22 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
 
 
 def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car, name: str) -> None:
+    if panel.shell and car.size is not None and car.tail_opens:
+        panel, tail = without_tail(panel, car.size)
+        _add_mesh(spec, body, tail, car, f"{name}{_TAIL}")
+    _add_mesh(spec, body, panel, car, name)
+
+
+def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car, name: str) -> None:
+    if not len(panel.faces):
+        return
     mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
     mesh.uservert, mesh.userface = panel.vertices_m.ravel(), panel.faces.ravel()
     mesh.usernormal = panel.normals.ravel()
     mesh.userfacenormal = panel.faces.ravel()
     rgb = panel.rgb or (shares_of(car.colour) if car.colour else _PAINT)
+    if panel.shell and car.shell_opacity < _SHADED_BELOW:
+        rgb = tuple(_CUTAWAY_SHADE * value for value in rgb)
     opacity = (car.shell_opacity if panel.shell else 1.0) * (_GHOST_OPACITY if car.ghost else 1.0)
     body.add_geom(
         name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity), contype=0, conaffinity=0

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
 
+from activesteer.conventions import Array
 from activesteer.drawing.colours import height_colours
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course
 from activesteer.road.drawn import DrawnSurface
 from activesteer.road.path import Path
 from activesteer.road.road import Road
+from activesteer.video.markings import Label
 
 _TEXTURE: Final = "road"
 _SURFACE: Final = "uneven_road"
@@ -38,6 +41,15 @@ _DASH_M: Final = 1.5
 _GAP_M: Final = 2.5
 _FAR_M: Final = 2000.0
 """Distance from the origin up to which patches of other friction are drawn [m]."""
+_LEAST_HALF_WIDTH_M, _MOST_HALF_WIDTH_M = 3.75, 25.0
+"""Half widths of a road without a course [m]; a run that needs more is on an open surface."""
+_BESIDE_CAR_M, _BEYOND_M = 2.5, 60.0
+"""Room between the middle of a car and the edge, and length of the edges ahead and behind [m]."""
+_MARKS_M, _POSTS_M, _POST_M, _POST_HEIGHT_M = 10.0, 50.0, 0.6, 0.9
+"""Spacing of marks and of posts, distance of a post from its edge, and its height [m]."""
+_MAX_POSTS: Final = 200
+_READ_M: Final = 70.0
+"""Distance up to which the label of a post is written [m]."""
 _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 """Largest numbers of pieces of patches, lanes, cones and dashes drawn: a scene holds a limited number of solids."""
 
@@ -136,6 +148,64 @@ def add_course(spec: mujoco.MjSpec, course: Course) -> None:
     _add_path(spec, course.path)
     if len(course.cones_m):
         _add_cones(spec, course.cones_m[:_MAX_CONES])
+
+
+class Edges(NamedTuple):
+    """Edges of a straight road along x.
+
+    Attributes:
+        start_m: Where the edges start, world x [m].
+        end_m: Where they end [m].
+        half_width_m: Distance of an edge from the x axis [m].
+    """
+
+    start_m: float
+    end_m: float
+    half_width_m: float
+
+    def labels(self) -> list[Label]:
+        """Return the distances from the start of the run, written at the posts."""
+        places = ((x, np.array([x, self.half_width_m + _POST_M, _POST_HEIGHT_M + 0.25])) for x in self.posts_m())
+        return [Label(f"{x:.0f} m", place, place + np.array([0.0, 0.0, 1.0]), far_m=_READ_M) for x, place in places]
+
+    def posts_m(self) -> Array:
+        """Return world x of the posts [m]."""
+        return (
+            np.arange(np.ceil(self.start_m / _POSTS_M), np.floor(self.end_m / _POSTS_M) + 1.0)[:_MAX_POSTS] * _POSTS_M
+        )
+
+
+def edges_beside(paths: Sequence[Array]) -> Edges | None:
+    """Return edges that all cars stay between; None if a car turns too far for a straight road.
+
+    Args:
+        paths: World x and y of each car, then any other columns [m], each of shape (k, 2 or more).
+    """
+    points = np.concatenate([path[:, :2] for path in paths])
+    half = max(_LEAST_HALF_WIDTH_M, float(np.abs(points[:, 1]).max()) + _BESIDE_CAR_M)
+    if half > _MOST_HALF_WIDTH_M:
+        return None
+    return Edges(float(points[:, 0].min()) - _BEYOND_M, float(points[:, 0].max()) + _BEYOND_M, half)
+
+
+def add_edges(spec: mujoco.MjSpec, edges: Edges) -> None:
+    """Add the edges of a straight road, a mark every 10 m and a post every 50 m.
+
+    Args:
+        spec: The model.
+        edges: The edges.
+    """
+    half = 0.5 * _LINE_M
+    for side in (-1.0, 1.0):
+        y = side * edges.half_width_m
+        _box(spec, (edges.start_m, edges.end_m), (y - half, y + half), 0.012, _LANE)
+        first = np.ceil(edges.start_m / _MARKS_M) * _MARKS_M
+        for x in np.arange(first, edges.end_m, _MARKS_M)[:_MAX_LANES]:
+            near, far = sorted((y, y - side * 0.6))
+            _box(spec, (x - half, x + half), (near, far), 0.012, _LANE)
+        for x in edges.posts_m():
+            beside = y + side * _POST_M
+            _box(spec, (x - half, x + half), (beside - half, beside + half), _POST_HEIGHT_M, _LANE)
 
 
 def _add_path(spec: mujoco.MjSpec, path: Path) -> None:

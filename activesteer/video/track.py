@@ -44,6 +44,7 @@ class Track:
         self._middle_m = -0.5 * (footprint_of(recording.metadata) or Footprint()).wheelbase_m
         forward = np.column_stack([np.cos(self._heading_rad), np.sin(self._heading_rad)])
         middle_m = self._positions_m[:, poses.names.index(CHASSIS), :2] + self._middle_m * forward
+        self._middles_m = np.column_stack([middle_m, self._positions_m[:, poses.names.index(CHASSIS), 2]])
         self._direction_rad = direction_of_motion(self._time_s, middle_m, self._heading_rad)
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
@@ -81,6 +82,13 @@ class Track:
         heading = self.heading(time_s)
         forward = np.array([np.cos(heading), np.sin(heading), 0.0])
         return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0) + self._middle_m * forward
+
+    def path(self) -> tuple[Array, Array]:
+        """Return all instants [s], shape (k,), and the midpoints of the axles at the height of the chassis [m].
+
+        The points have the shape (k, 3). The origin of the chassis lies on the road in the design position.
+        """
+        return self._time_s, self._middles_m
 
     def wheel_place(self, corner: str) -> Array:
         """Return the initial centre of a wheel relative to the chassis, in axes along its heading [m], shape (3,).

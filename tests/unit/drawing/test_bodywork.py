@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.drawing.bodywork import Panel, dressed
+from activesteer.drawing.bodywork import Panel, dressed, without_tail
 from activesteer.recording import Link, Primitive
 from activesteer.resources import models_dir
 from activesteer.road.footprint import Footprint
@@ -73,3 +73,22 @@ def test_the_files_are_small():
     files = list((models_dir() / "bodies").glob("*.npz"))
     assert {file.stem for file in files} == {"hatchback", "saloon", "wheel"}
     assert sum(file.stat().st_size for file in files) < 300_000
+
+
+def area_m2(panel: Panel) -> float:
+    corners = panel.vertices_m[panel.faces]
+    return 0.5 * float(
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    )
+
+
+@pytest.mark.parametrize("size", [COMPACT, SALOON])
+def test_tail_and_the_rest_are_the_whole_body_and_the_tail_is_at_the_rear_wheels(size):
+    paint = panels_of(size)["chassis", "paint"]
+    rest, tail = without_tail(paint, size)
+    assert area_m2(rest) + area_m2(tail) == pytest.approx(area_m2(paint), rel=1e-9)
+    assert tail.vertices_m[:, 0].max() <= -size.wheelbase_m + 0.5
+    assert tail.vertices_m[:, 2].max() <= 0.8
+    assert tail.vertices_m[:, 0].min() == pytest.approx(paint.vertices_m[:, 0].min())
+    lamp = panels_of(size)["chassis", "lamp"]
+    assert len(without_tail(lamp, size)[1].faces) == 0

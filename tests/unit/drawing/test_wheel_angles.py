@@ -69,5 +69,5 @@ def test_wheels_of_the_plan_turn_with_their_wedges():
 def test_words_say_the_true_angle_and_its_side():
     assert words(math.radians(1.7)) == "1.7 deg left"
     assert words(math.radians(-0.3)) == "0.3 deg right"
-    assert words(math.radians(-0.04)) == "0.0 deg"
+    assert words(math.radians(-0.04)) == ""
     assert words(math.nan) == ""

@@ -8,9 +8,9 @@ import pytest
 from activesteer.drawing.wheel_angles import CHANNELS
 from activesteer.recording import Recording
 from activesteer.signals import Channel
-from activesteer.video.gauges import LARGEST_SHARE, Dials, Gauges
+from activesteer.video.gauges import LARGEST_SHARE, Dials, Gauges, LargeSideslip
 
-SIZE = (1280, 720)
+SIZE, LARGE = (1280, 720), (1920, 1080)
 NAMES = ("speed_mps", "steering_wheel_rad", "sideslip_rad", "rear_steer_rad", "superposition_rad", *CHANNELS)
 ORANGE = "#f0843c"
 
@@ -61,8 +61,8 @@ def test_each_value_is_seen(change):
 def wedges(rear_deg: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows and columns of the wedges at the rear wheels of the plan."""
     steer = dict.fromkeys(CHANNELS, 0.0)
-    straight = drawn(recording(**steer))
-    turned = drawn(recording(**(steer | dict.fromkeys(CHANNELS[2:], math.radians(rear_deg)))))
+    straight = drawn(recording(**steer), size=LARGE)
+    turned = drawn(recording(**(steer | dict.fromkeys(CHANNELS[2:], math.radians(rear_deg)))), size=LARGE)
     red, green, blue = np.moveaxis(turned, 2, 0)
     rows, columns = np.nonzero(
         (red > 200) & (abs(green - 132) < 45) & (blue < 110) & (np.abs(turned - straight).max(axis=2) > 60)
@@ -74,7 +74,7 @@ def wedges(rear_deg: float) -> tuple[np.ndarray, np.ndarray]:
 def test_the_plan_shows_side_and_size_of_rear_steering(angle_deg):
     rows, columns = wedges(angle_deg)
     assert len(rows) > 40
-    assert rows.min() > 600  # the rear end of a plan whose nose is up
+    assert rows.min() > 900  # the rear end of a plan whose nose is up
     # Wedges have their tips below and open to the side of their sign: left is positive, and left in the picture.
     top, bottom = columns[rows < np.median(rows)], columns[rows > np.median(rows)]
     assert np.sign(top.mean() - bottom.mean()) == -np.sign(angle_deg)
@@ -122,3 +122,40 @@ def test_long_title_leaves_room_for_the_time():
 @pytest.mark.parametrize("size", [(16, 16), (64, 480), (480, 64), (1920, 1080)])
 def test_any_size_can_be_drawn_on(size):
     assert drawn(recording(), title="Title", size=size, note="x 0.25").shape == (size[1], size[0], 3)
+
+
+def test_steering_wheel_turns_to_the_side_of_the_drivers_angle():
+    def mark(angle_rad: float) -> tuple[float, float]:
+        """Return column and row of the coloured mark, which other angles leave uncoloured."""
+        turned, upside_down = (
+            drawn(recording(steering_wheel_rad=angle), size=LARGE, colour="#00ff00") for angle in (angle_rad, np.pi)
+        )
+        rows, columns = np.nonzero(
+            (turned[..., 1] > 200) & (turned[..., 0] < 60) & (upside_down[..., 0] != turned[..., 0])
+        )
+        return columns.mean(), rows.mean()
+
+    (right, low), (middle, high), (left, low_too) = (mark(angle) for angle in (-1.0, 0.0, 1.0))
+    assert left < middle - 10 < right - 20  # the mark is at the top of the wheel; left is positive
+    assert low == pytest.approx(low_too, abs=4)
+    assert high < low - 4
+
+
+def test_panes_of_several_runs_have_the_same_gauges():
+    short, long = (Dials(recording(rear_steer_rad=0.05), label, ORANGE) for label in ("no", "2 active rear steering"))
+    empty = np.full((480, 427, 3), 100, np.uint8)
+    columns = [Gauges([own], "", (427, 480), "", [short, long])._columns for own in (short, long)]
+    assert columns[0] == columns[1]
+    assert Gauges([short], "", (427, 480), "", [short, long]).draw(empty, 0.5).shape == empty.shape
+
+
+def test_large_sideslip_changes_with_the_angle_and_is_left_out_at_rest():
+    def shown(**values: float) -> np.ndarray:
+        dial = Dials(recording(**values), "2 active rear steering", ORANGE)
+        return LargeSideslip([dial], (283, 340)).draw(np.full((340, 283, 3), 100, np.uint8), 0.5).astype(int)
+
+    small, large = shown(sideslip_rad=0.02), shown(sideslip_rad=0.7)
+    assert len(changed(small, large)) > 100
+    assert (small[:200] == 100).all()
+    at_rest = {"speed_mps": 0.0}
+    assert (shown(sideslip_rad=0.02, **at_rest) == shown(sideslip_rad=0.7, **at_rest)).all()

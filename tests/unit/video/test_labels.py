@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from activesteer.video.labels import Labels, pixel_of
-from activesteer.video.markings import Label
+from activesteer.video.markings import Label, _hides
 
 SIZE = (640, 480)
 
@@ -48,3 +48,24 @@ def test_a_label_at_an_edge_is_seen_whole_and_one_of_a_place_beyond_it_is_not_wr
     assert edge[:, 1].max() == SIZE[0] - 1
     assert np.ptp(edge[:, 1]) == np.ptp(inside[:, 1])
     assert len(written(6.0)) == 0
+
+
+def test_a_line_leads_from_a_label_to_its_place(scene):
+    grey = np.full((SIZE[1], SIZE[0], 3), 128, np.uint8)
+    place, pointed = np.array([1.0, 0.0, 0.0]), np.array([-2.0, 0.0, 0.0])
+    label = Label("2.0 deg", place, place + np.array([1.0, 0.0, 0.0]))
+    without, with_line = (
+        np.argwhere((Labels(SIZE).draw(grey, scene, [one]) != grey).any(axis=2))
+        for one in (label, label._replace(leads_to_m=pointed))
+    )
+    at = pixel_of(scene, pointed, SIZE)
+    assert at is not None
+    assert with_line[:, 1].min() == pytest.approx(at[0], abs=2.0)
+    assert without[:, 1].min() > at[0] + 20.0
+    assert (Labels(SIZE).draw(grey, scene, [label._replace(far_m=5.0)]) == grey).all()
+
+
+def test_a_car_hides_a_place_on_its_far_side_only():
+    low, high, eye = np.array([-3.5, -0.9, 0.2]), np.array([0.85, 0.9, 1.4]), np.array([-9.0, 3.0, 3.0])
+    assert _hides(low, high, eye, np.array([-1.0, -1.3, 0.05]))
+    assert not _hides(low, high, eye, np.array([-2.6, 1.3, 0.05]))

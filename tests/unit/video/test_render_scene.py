@@ -9,8 +9,10 @@ import pytest
 from activesteer.errors import PlaybackError, RecordingError
 from activesteer.recording import Primitive
 from activesteer.road.course import Course
+from activesteer.road.footprint import Footprint
 from activesteer.road.road import Road, RoadPatch
 from activesteer.video import Car, Film, RenderScene, Settings
+from activesteer.video.road import Edges
 from activesteer.video.track import Track
 from tests.raising import raises
 from tests.unit.playback.synthetic import circle
@@ -171,3 +173,24 @@ def test_a_car_that_cannot_be_drawn_says_so():
 def test_a_course_without_end_is_drawn_as_far_as_a_picture_can_hold():
     far = {"path": {"x_m": [0.0, 1e6], "y_m": [0.0, 0.0]}, "cones": [[float(x), 0.0] for x in range(5000)]}
     assert stage(course=Course.from_table(far)).model.ngeom < 20000
+
+
+def test_open_tail_is_transparent_and_closes_again():
+    run = circle()
+    built = stage(Car(run.scene, run.poses.names, "#ff8800", size=Footprint(), tail_opens=True))
+    tail = [index for index in range(built.model.ngeom) if built.model.geom(index).name.endswith("_tail")]
+    assert tail
+    closed = built.model.geom_rgba.copy()
+    built.open_tail(0, 1.0)
+    assert (built.model.geom_rgba[tail, 3] < 0.2).all()
+    others = np.delete(np.arange(built.model.ngeom), tail)
+    assert (built.model.geom_rgba[others] == closed[others]).all()
+    built.open_tail(0, 0.0)
+    assert (built.model.geom_rgba == closed).all()
+
+
+def test_posts_stand_at_both_edges_every_50_m():
+    built = stage(edges=Edges(-10.0, 110.0, 5.0))
+    tall = [pos for pos, size in zip(built.model.geom_pos, built.model.geom_size, strict=True) if size[2] == 0.9]
+    assert {round(place[0]) for place in tall} == {0, 50, 100}
+    assert {round(place[1], 1) for place in tall} == {-5.6, 5.6}
