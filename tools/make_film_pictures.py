@@ -19,13 +19,14 @@ from activesteer.video import Film, Settings
 
 PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 STILL, ANIMATION = PICTURES / "film_rear_steering.webp", PICTURES / "film_three_systems.webp"
-LAYOUT_SIZE: Final = (960, 400)
+LAYOUT_SIZE: Final = (850, 360)
+"""The width of README on GitHub."""
 RATE_HZ: Final = 10.0
 FROM_S, TO_S = -0.2, 4.0
 """Of the animation, from the begin of steering [s]."""
 STILL_S: Final = 0.55
 """Of the still: the steering wheel goes back, the rear wheels are turned most [s]."""
-QUALITY: Final = 60
+QUALITY: Final = 45
 
 
 def main() -> None:
@@ -35,7 +36,7 @@ def main() -> None:
     begin_s = runs["none"].metrics["steer_begin_time_s"]
     with Film({"ars": runs["ars"]}, Settings()) as film:
         Image.fromarray(film.picture(begin_s + STILL_S)).save(STILL, quality=85)
-    with Film(runs, Settings(size=LAYOUT_SIZE, layout="side-by-side", camera="top")) as film:
+    with Film(runs, Settings(size=LAYOUT_SIZE, layout="side-by-side", gauges="sideslip")) as film:
         count = round((TO_S - FROM_S) * RATE_HZ)
         pictures = [Image.fromarray(film.picture(begin_s + FROM_S + number / RATE_HZ)) for number in range(count)]
     first, *others = pictures

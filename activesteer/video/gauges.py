@@ -247,7 +247,7 @@ class LargeSideslip:
             size: Width and height of the frames [pixels].
         """
         self._dials, self._size = list(dials), size
-        self._name, self._number = font(0.06 * size[1]), font(0.16 * size[1])
+        self._name, self._number = font(0.05 * size[1]), font(0.16 * size[1])
 
     def draw(self, pixels: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
         """Draw names and numbers over a frame; see `Gauges.draw`."""
