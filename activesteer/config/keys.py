@@ -71,8 +71,9 @@ def element_of(hint: Any) -> type | None:
     return item if isinstance(item, type) and dataclasses.is_dataclass(item) else None
 
 
-def key_paths(cls: type, prefix: str = "") -> list[str]:
-    """Return all dotted keys that a table for `cls` may have, for error messages."""
+@functools.cache
+def key_paths(cls: type, prefix: str = "") -> tuple[str, ...]:
+    """Return all dotted keys that a table for `cls` may have, cached: every override is looked up in them."""
     paths: list[str] = []
     hints = hints_of(cls)
     for field in dataclasses.fields(cls):
@@ -81,7 +82,7 @@ def key_paths(cls: type, prefix: str = "") -> list[str]:
             paths += key_paths(inner, f"{prefix}{field.name}.")
         else:
             paths += [prefix + spelling for spelling in spellings(field.name)]
-    return paths
+    return tuple(paths)
 
 
 def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:

@@ -188,7 +188,8 @@ def part_of(
         raise ParameterError(
             f"both manoeuvre and vehicle have this key; use maneuver.{key} or vehicle.{key}", key=key, overridden=True
         )
-    known = [f"{part}.{path}" for part in paths for path in paths[part]] + paths["maneuver"] + paths["vehicle"]
+    known = [f"{part}.{path}" for part in paths for path in paths[part]]
+    known += [*paths["maneuver"], *paths["vehicle"]]
     known += [f"driver.{path}" for path in key_paths(DriverParameters)]
     for name, (plugin, *_) in (owned or {}).items():
         known += [f"controllers.{name}.{parameter}" for parameter in plugin.declared]

@@ -94,12 +94,14 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
     if wanted == 0.0:
         return 0.0
     probe = search.probe
-    simulation = ClosedLoop(scenario, "none", timestep_s)
-    start = simulation.save_state()
     car, speed = scenario.car.config.single_track, max(probe.speed_mps, 1.0)
     # First guess: Ackermann angle with the understeer of a typical car, about 2.5 deg/g.
     angle = scenario.car.config.steering.ratio * wanted * (car.wheelbase_m / speed**2 + 0.0044)
     tried: list[tuple[float, float]] = []
+    simulation = ClosedLoop(replace(scenario, maneuver=probe.with_amplitude(angle)), "none", timestep_s)
+    # Until the wheel turns, the runs are the same.
+    simulation.advance(int(probe.steer.start_s / timestep_s))
+    start = simulation.save_state()
     for _ in range(_RUNS):
         reached = _steady_acceleration(simulation, probe.with_amplitude(angle), start)
         if abs(reached / wanted - 1.0) < _TOLERANCE:
@@ -124,10 +126,11 @@ def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> f
 def _steady_acceleration(simulation: ClosedLoop, maneuver: StepSteer, start: Any) -> float:
     simulation.restore_state(start)
     simulation.maneuver = maneuver
-    recorder = Recorder(simulation.vehicle, simulation.steps)
+    steady = round(_STEADY_S / simulation.vehicle.timestep_s)
+    simulation.advance(simulation.steps - simulation.step_count - steady)
+    recorder = Recorder(simulation.vehicle, steady)
     simulation.run(recorder)
-    ay = _rows(recorder, "ay_mps2")
-    return float(ay[-round(_STEADY_S / simulation.vehicle.timestep_s) :].mean())
+    return float(_rows(recorder, "ay_mps2").mean())
 
 
 def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> float:

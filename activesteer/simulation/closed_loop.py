@@ -128,6 +128,7 @@ class ClosedLoop(Uncopyable):
             SimulationDiverged: the car does not settle.
         """
         self.scenario, self._plugin, self.sequence = scenario, find_controller(controller), None
+        self._behind = False  # whether the objects are behind the record, see `_take_over`
         self._start, self.changes = scenario, ()
         self.maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.ground, timestep_s)
@@ -277,6 +278,7 @@ class ClosedLoop(Uncopyable):
                     for block in _pieces(stretch) if recorder is None else recorder.blocks(stretch):
                         if native and self._drive_natively(block, setpoint_at):
                             continue
+                        self._take_over()
                         driver_command, actuator_command = self.commands
                         measurement, motion = self.measurement, self.motion
                         for step in block:
@@ -286,12 +288,20 @@ class ClosedLoop(Uncopyable):
                             measurement, motion = step_car(driver_command, actuator_command)
                         self.step_count, self.commands = block.stop, (driver_command, actuator_command)
                         self.measurement, self.motion = measurement, motion
+                    self._take_over()
             finally:
+                self._take_over()
                 vehicle.record_on(None)
 
     @cached_property
     def _native(self) -> NativeCars:
         return NativeCars([self])
+
+    def _take_over(self) -> None:
+        """Bring driver, controller and loop up to date after native calls."""
+        if self._behind:
+            self._native.store(0)
+            self._behind = False
 
     def _drive_natively(self, block: range, setpoint_at: Callable[[float], Setpoint]) -> bool:
         """Drive a block of steps in one native call; see `native_loop`.
@@ -306,14 +316,13 @@ class ClosedLoop(Uncopyable):
         table = tabulate(setpoints, self.driver_setup.rack_per_steering_wheel_m)
         if table is None:
             return False
-        native.load(0)
-        native.follow(0, table, self.step_count)
+        if not self._behind:
+            native.load(0)
+            self._behind = True
+        native.follow(0, table, block.start)
         native.cars["left"] = len(block)
-        try:
-            for error in native.drive().values():
-                raise error
-        finally:
-            native.store(0)
+        for error in native.drive().values():
+            raise error
         return True
 
     def save_state(self) -> LoopState:

@@ -64,6 +64,13 @@ tendon_entry, tendon_place, tendon_term: Their elements in `ten_J`, their places
 servo, servo_place: Actuators whose force depends on their joint, and the place of that joint.
 limited, limited_qpos: Joints with a limit, and their elements in `qpos`.
 """
+_STRUCTURE: Final = (
+    "ten_J_rowadr", "ten_J_rownnz", "ten_J_colind", "tendon_adr", "tendon_num", "wrap_type", "wrap_objid",
+    "site_bodyid", "body_parentid", "body_dofadr", "body_dofnum", "M_rowadr", "M_rownnz", "M_colind",
+    "actuator_biastype", "actuator_trnid", "jnt_dofadr", "jnt_limited", "jnt_qposadr",
+)  # fmt: skip
+"""Arrays of the model that decide the tables."""
+_MAX_STRUCTURES: Final = 64
 _WORDS: Final = ("model", "data", *_STAGES, *_OF_MODEL, *_OF_DATA, *_TABLES, *(f"n_{name}" for name in _TABLES))
 IMPLICIT_PLAN: Final = np.dtype(
     (
@@ -119,8 +126,8 @@ class ImplicitPlan:
         }
         memory: list[NDArray[Any]] = []
         if words["direct"]:
-            tables, size = _tables(model)
-            memory = [np.array(tables[name], np.int32) for name in _TABLES]
+            tables, size = _known_tables(model)
+            memory = [table.copy() for table in tables]
             for name, table in zip(_TABLES, memory, strict=True):
                 words[name], words[f"n_{name}"] = table.ctypes.data, table.size
             factor, right_side = np.zeros(size), np.zeros(model.nv)
@@ -201,6 +208,20 @@ def _sensed_body(model: mujoco.MjModel) -> int:
     bodies = {int(body) for body in model.site_bodyid[model.sensor_objid[late]]}
     body = bodies.pop() if bodies else 0
     return 0 if bodies or model.body_parentid[body] else body
+
+
+_structures: dict[bytes, tuple[list[NDArray[np.int32]], int]] = {}
+
+
+def _known_tables(model: mujoco.MjModel) -> tuple[list[NDArray[np.int32]], int]:
+    """Return the tables in the order of their names, and the size of the factor; found once for each structure."""
+    structure = b"|".join(getattr(model, name).tobytes() for name in _STRUCTURE)
+    if structure not in _structures:
+        if len(_structures) >= _MAX_STRUCTURES:
+            _structures.clear()
+        tables, size = _tables(model)
+        _structures[structure] = [np.array(tables[name], np.int32) for name in _TABLES], size
+    return _structures[structure]
 
 
 def _tables(model: mujoco.MjModel) -> tuple[dict[str, Sequence[int] | NDArray[Any]], int]:

@@ -13,6 +13,7 @@ from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.brake_in_turn import BrakeInTurn
 from activesteer.maneuver.sine_with_dwell import SineWithDwell
+from activesteer.maneuver.step_steer import StepSteer
 from activesteer.scenario import describe, resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
@@ -50,6 +51,22 @@ def test_angle_is_rounded_to_a_tenth_of_a_degree_and_then_multiplied():
     assert one * 10.0 == pytest.approx(round(one * 10.0), abs=1e-6)
     assert dwell_deg(5.0) == pytest.approx(5.0 * one)
     assert dwell_deg(6.5) == pytest.approx(6.5 * one)
+
+
+def test_search_judges_whole_step_steers():
+    # The search shares the time before the step between its runs, and records the end only.
+    wanted, keys = 0.5 * GRAVITY_MPS2, {"steer.start_s": 0.3, "settle_s": 1.0}
+    maneuver = prepared(resolve("step_steer", overrides=keys | {"steer.lateral_acceleration_g": 0.5})).maneuver
+    assert isinstance(maneuver, StepSteer)
+    assert maneuver.steer.steering_wheel_rad is not None
+    found_deg = math.degrees(maneuver.steer.steering_wheel_rad)
+
+    def steady_mps2(steering_wheel_deg: float) -> float:
+        overrides = keys | {"steer.steering_wheel_deg": steering_wheel_deg, "duration_s": 4.8}
+        return activesteer.simulate("step_steer", overrides=overrides)["ay_mps2"][-500:].mean()
+
+    assert steady_mps2(found_deg) == pytest.approx(wanted, rel=5e-4)
+    assert steady_mps2(1.01 * found_deg) > 1.001 * wanted
 
 
 def test_step_to_the_angle_reaches_03_g():
