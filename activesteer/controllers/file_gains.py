@@ -114,6 +114,10 @@ class TorqueVectoringParameters:
     """Fraction of the estimated friction that the desired yaw rate, and a wheel in all directions, may use [-]."""
     least_fraction: _Fraction
     """Fraction of the friction that stays for the torque in a turn at the limit [-]."""
+    acceleration_time_s: _Lag
+    """T_a: time in which the lateral acceleration follows the desired yaw rate [s]."""
+    acceleration_shortfall_mps2: Annotated[float, Range(0.0, 20.0)]
+    """D: lateral acceleration that the turn may lack before the desired yaw rate falls [m/s2]."""
     full_speed_mps: Annotated[float, Range(2.0, 50.0)]
     """Speed from which the controller acts fully [m/s]; below it fades out until walking speed."""
 

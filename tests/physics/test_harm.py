@@ -38,3 +38,13 @@ def test_stability_control_keeps_the_car_in_the_largest_sine_of_the_law(directio
         pressure = run[f"{corner}_brake_pressure_Pa"]
         assert pressure.max() <= 1.0e7
         assert (pressure[1:] - pressure[:-1]).max() <= 3.0e4 * 1.001
+
+
+def test_vectoring_does_not_turn_the_car_in_where_its_front_wheels_reach_snow():
+    none, vectored = (
+        simulate("mu_jump", name, vehicle="compact_electric", overrides={"sensors.preset": "production"}).metrics
+        for name in ("none", "tv")
+    )
+    assert vectored["track_deviation_max_m"] < none["track_deviation_max_m"]
+    # 11.5 deg with a desired yaw rate that only the estimated friction limits, 2.5 deg without control.
+    assert vectored["sideslip_peak_abs_rad"] < 0.087
