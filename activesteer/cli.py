@@ -70,51 +70,20 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
 
 def all_commands() -> Commands:
     """Return all commands in the groups in which `--help` lists them."""
-    from activesteer.commands import (
-        bench,
-        compare,
-        driver,
-        envelope,
-        explore,
-        export,
-        falsify,
-        fault_map,
-        figures,
-        fit,
-        identify,
-        import_,
-        info,
-        kc,
-        linearise,
-        listing,
-        margins,
-        match,
-        recover,
-        replay,
-        report,
-        reproduce,
-        run,
-        study,
-        test,
-        tune,
-        tyre,
-        validate,
-        vehicle,
-        video,
-        watch,
-    )
+    from importlib import import_module
+
     from activesteer.commands.arguments import Commands
     from activesteer.version import __version__
 
     commands = Commands(f"activesteer {__version__}")
     for title, modules in {
-        "drive": (listing, run, watch, explore),
-        "recordings": (info, report, compare, replay, video, import_, recover),
-        "car": (vehicle, tyre, kc, export),
-        "study": (study, tune, falsify, match, fit, envelope, fault_map, identify, linearise, driver, margins),
-        "verify": (reproduce, test, figures, validate, bench),
+        "drive": "listing run watch explore",
+        "recordings": "info report compare replay video import_ recover",
+        "car": "vehicle tyre kc export",
+        "study": "study tune falsify match fit envelope fault_map identify linearise driver margins",
+        "verify": "reproduce test figures validate bench",
     }.items():
         commands.begin_group(title)
-        for module in modules:
-            module.add_to(commands)
+        for module in modules.split():
+            import_module(f"activesteer.commands.{module}").add_to(commands)
     return commands

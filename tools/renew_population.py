@@ -17,7 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -28,11 +28,11 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from activesteer.analysis.bands import FILE as BANDS
-from activesteer.analysis.bands import TRACK, Band, band_of_tracks, band_over_time, table_of
+from activesteer.analysis.bands import TRACK, Band
 from activesteer.analysis.claims import SCENARIO_OF, STATEMENTS, SYSTEMS, Claim, Kind
 from activesteer.analysis.claims.population import SUMMARY, Change, Population, read_population
 from activesteer.commands.progress import RunCounter
-from activesteer.conventions import CURVE_STEP_S
+from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
 from activesteer.files import make_folder, replacing, write_text
 from activesteer.metric_table import metric
@@ -56,6 +56,12 @@ COMPARED: Final = ("none", "ars", "afs", "esc", "lqr", "mpc", "integrated")
 RUNS: Final = "runs.parquet"
 _EVERY: Final = 2
 """Interval of the stored values of a band, which is smoother than the curves."""
+QUANTILES: Final = (0.1, 0.9)
+"""Fractions of the runs below the lower and below the upper edge of a band."""
+TRACK_STEP_M: Final = 0.5
+_KEY: Final = ("maneuver", "controller", "channel")
+_MANTISSA_BITS: Final = 11
+"""Bits that are kept of an edge: an error of 0.02 %, less than the width of a line."""
 _KEPT: Final = ("sample", "maneuver", "controller", "status")
 PRODUCTION: Final = "sensors.preset = production"
 """Key of the samples with the sensors of production cars."""
@@ -279,6 +285,56 @@ def _bands(table: pa.Table) -> dict[tuple[str, str, str], Band]:
             tracks = list(zip(*(curves[name] for name in TRACK), strict=True))
             found[maneuver, controller, TRACK[1]] = band_of_tracks(tracks)
     return found
+
+
+def band_over_time(curves: Sequence[Array], step_s: float) -> Band:
+    """Return the band of a channel over time.
+
+    Args:
+        curves: The channel in every run, every `step_s`; the shortest run ends the band.
+        step_s: Time between two values [s].
+    """
+    length = min(map(len, curves))
+    low, high = np.quantile(np.stack([curve[:length] for curve in curves]), QUANTILES, axis=0)
+    return Band(step_s * np.arange(length, dtype=np.float64), low, high)
+
+
+def band_of_tracks(tracks: Sequence[tuple[Array, Array]]) -> Band:
+    """Return the band of tracks across the course, to the place that half of the runs reach.
+
+    Args:
+        tracks: x and y of the front axle centre in every run [m].
+    """
+    furthest = [np.maximum.accumulate(x) for x, _ in tracks]
+    begin, end = max(float(x[0]) for x in furthest), float(np.median([x[-1] for x in furthest]))
+    at = np.arange(begin, end, TRACK_STEP_M)
+    # A car that turns round counts until it does so.
+    across = [np.interp(at, x, y, right=np.nan) for x, (_, y) in zip(furthest, tracks, strict=True)]
+    low, high = np.nanquantile(np.stack(across), QUANTILES, axis=0)
+    return Band(at, low, high)
+
+
+def table_of(bands: Mapping[tuple[str, str, str], Band]) -> pa.Table:
+    """Return bands as a table, with the precision of a picture.
+
+    Args:
+        bands: (manoeuvre, controller, channel) -> band.
+    """
+    keys = list(bands)
+    edges = pa.list_(pa.float32())
+    columns = {name: pa.array([key[place] for key in keys]) for place, name in enumerate(_KEY)}
+    columns |= {
+        "start": pa.array([float(band.at[0]) for band in bands.values()]),
+        "step": pa.array([float(band.at[1] - band.at[0]) for band in bands.values()]),
+        "low": pa.array([_rounded(band.low) for band in bands.values()], edges),
+        "high": pa.array([_rounded(band.high) for band in bands.values()], edges),
+    }
+    return pa.table(columns)
+
+
+def _rounded(values: Array) -> np.ndarray:
+    mantissa, exponent = np.frexp(values)
+    return np.ldexp(np.round(mantissa * 2.0**_MANTISSA_BITS) / 2.0**_MANTISSA_BITS, exponent).astype(np.float32)
 
 
 def judge_again(changed: dict[str, str], jobs: int | None) -> Population:
