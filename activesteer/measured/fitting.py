@@ -228,7 +228,7 @@ def drive(
     """
     try:
         scenario = scenario_of(settings, recording, 0, overrides)
-        run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.timestep_s)
+        run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)
     except ActiveSteerError as error:
         return str(error)
     return {name: np.interp(time_s, run.time_s, run[name]) for name in channels}

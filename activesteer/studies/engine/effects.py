@@ -71,7 +71,8 @@ def _others(factor: Factor, number: int, point: Point) -> Iterator[Point]:
 
 def _driven(plan: Plan, place: Place, point: Point) -> str | None:
     """Return the metrics of a run with these values; None if it is incomplete."""
-    settings = replace(plan.settings, recordings="none", folder=None, curves=(), claims=False)
+    study = replace(plan.settings.study, recordings="none", curves=(), claims=False)
+    settings = replace(plan.settings, study=study, folder=None)
     # A table may hold a whole number of the study as a float.
     values = {
         factor.key: next((known for known in factor.values if known == value), value)

@@ -94,20 +94,11 @@ class Factor:
     def to_table(self) -> dict[str, Any]:
         """Return the factor as the table that `read_factor` takes."""
         table: dict[str, Any] = {self.kind: list(self.values) or [self.low, self.high]}
-        if self.weights:
-            table["weights"] = list(self.weights)
         if self.kind == "normal":
             table |= {"normal": [self.mean, self.deviation], "truncate": [self.low, self.high]}
-        if self.nominal:
-            table["nominal"] = self.nominal
-        if self.of:
-            table["of"] = self.of
-        if self.grows_with:
-            table["grows_with"] = dict(self.grows_with)
-        if self.maneuvers:
-            table["maneuvers"] = list(self.maneuvers)
-        if self.when:
-            table["when"] = dict(self.when)
+        for name in ("weights", *_ANYWHERE):
+            if value := getattr(self, name):
+                table[name] = list(value) if isinstance(value, tuple) else value
         return table
 
 

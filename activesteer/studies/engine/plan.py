@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,7 +18,7 @@ from activesteer.studies.engine.design import Samples
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.run_identity import digest
 from activesteer.studies.engine.run_settings import Request, Settings, present_inputs
-from activesteer.studies.engine.study_file import StudyFile
+from activesteer.studies.engine.study_file import SEARCHES, StudyFile
 
 _LABELS: Final = ("name", "title")
 """Keys of manoeuvres and vehicles that affect texts only."""
@@ -38,32 +39,17 @@ class Plan:
         self.study = study
         self.samples = study.samples()
         self._values = FactorValues(study)
-        labelled = {
-            "maneuvers": _labelled(study, "maneuvers", study.maneuvers),
-            "vehicles": _labelled(study, "vehicles", study.vehicles),
-            "controllers": _labelled(study, "controllers", study.controllers),
-        }
+        labelled = {key: _labelled(study, key) for key in ("maneuvers", "vehicles", "controllers")}
         self.settings = Settings(
+            replace(study, case_list=None, **dict.fromkeys(SEARCHES)),
             **labelled,
-            driver=study.driver,
-            overrides=study.overrides,
-            seed=study.seed,
-            timestep_s=study.timestep_s,
-            metrics=study.metrics,
-            recordings=study.recordings,
             folder=None if study.recordings == "none" else folder,
-            claims=study.claims,
-            curves=study.curves,
             named=tuple(self._named()),
             expected={},
         )
         _check(study, self.samples, self._values)
         self.settings.expected.update(present_inputs(self.settings))
-        table = {
-            key: value
-            for key, value in study.to_table().items()
-            if key not in (*labelled, "title", "tune", "match", "fit", "falsify")
-        }
+        table = {key: value for key, value in study.to_table().items() if key not in (*labelled, "title", *SEARCHES)}
         table["design"] = [samples.columns for samples in self.samples]
         self._maneuver_of: list[int] | None = None
         if study.design.maneuvers == "one":
@@ -84,8 +70,7 @@ class Plan:
         for samples in self.samples:
             columns = {key: values for key, values in samples.columns.items() if _has_text(values)}
             rows: Iterable[tuple[Any, ...]] = dict.fromkeys(zip(*columns.values(), strict=True))
-            searches = study.tune, study.match, study.falsify
-            if any(found is not None for found in searches):  # a search combines values as it proceeds
+            if study.tune or study.match or study.falsify:  # a search combines values as it proceeds
                 columns = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
                 rows = itertools.product(*columns.values())
             for row in rows if columns else ():
@@ -118,8 +103,9 @@ def _has_text(values: Iterable[Any]) -> bool:
     return any(isinstance(value, str) for value in values)
 
 
-def _labelled(study: StudyFile, key: str, items: Sequence[Any]) -> tuple[tuple[str, Any], ...]:
+def _labelled(study: StudyFile, key: str) -> Any:
     """Return every item with its name in the results: without folders, so that it is the same on every machine."""
+    items = getattr(study, key)
     labels = [label_of(item) for item in items]
     for label in labels:
         if labels.count(label) > 1:

@@ -12,6 +12,7 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import make_folder, writing
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.studies.engine.run_identity import controller_digest, deciding_versions, files_digest
+from activesteer.studies.engine.study_file import StudyFile
 from activesteer.studies.engine.workers import Workers
 from activesteer.vehicle.native_forces import install_native_forces
 
@@ -23,36 +24,22 @@ class Settings:
     """Settings that all runs of a study share; small, because every task carries them.
 
     Attributes:
+        study: The study without its cases and searches.
         maneuvers: Label and name, path or table of each manoeuvre.
         vehicles: Label and name, path or table of each vehicle.
         controllers: Label and name or file of each controller.
-        driver: Name, path or table of the driver, or a driver class.
-        overrides: Overrides of all runs.
-        seed: Seed of the study.
-        timestep_s: Step of the simulation [s].
-        metrics: Patterns of the metrics to keep; empty for all.
-        recordings: `none`, `failed`, `all`, or n for every n-th sample.
         folder: Folder of the recordings.
-        claims: Whether the paper's claims are checked for every sample.
-        curves: Channels to keep of every complete run.
         named: Indices of manoeuvre and vehicle with overrides, one for each combination of text factors, which may name
             other files.
         expected: Hashes at the start of the study: of the files of each pair of manoeuvre and vehicle with each
             combination of texts, of each controller, and of the versions.
     """
 
+    study: StudyFile
     maneuvers: tuple[tuple[str, FileOrTable], ...]
     vehicles: tuple[tuple[str, FileOrTable], ...]
     controllers: tuple[tuple[str, str], ...]
-    driver: FileOrTable
-    overrides: dict[str, Any]
-    seed: int
-    timestep_s: float
-    metrics: tuple[str, ...]
-    recordings: str | int
     folder: Path | None
-    claims: bool
-    curves: tuple[str, ...]
     named: tuple[tuple[int, int, dict[str, Any]], ...]
     expected: dict[str, str]
 
@@ -73,7 +60,7 @@ def present_inputs(settings: Settings) -> dict[str, str]:
     """Return the hashes of `Settings.expected` for the files on this machine."""
     found = {f"{_VERSION}{key}": value for key, value in deciding_versions().items()}
     places = itertools.product(range(len(settings.maneuvers)), range(len(settings.vehicles)))
-    for maneuver, vehicle, overrides in (*((*place, settings.overrides) for place in places), *settings.named):
+    for maneuver, vehicle, overrides in (*((*place, settings.study.overrides) for place in places), *settings.named):
         scenario = scenario_of(settings, maneuver, vehicle, overrides)
         found[files_key(settings, maneuver, vehicle, overrides)] = files_digest(scenario)
     for label, controller in settings.controllers:
@@ -85,7 +72,7 @@ def scenario_of(settings: Settings, maneuver: int, vehicle: int, overrides: dict
     """Return the scenario for these indices of manoeuvre and vehicle."""
     controllers = [controller for _, controller in settings.controllers]
     return resolve(
-        settings.maneuvers[maneuver][1], settings.vehicles[vehicle][1], overrides, settings.driver, controllers
+        settings.maneuvers[maneuver][1], settings.vehicles[vehicle][1], overrides, settings.study.driver, controllers
     )
 
 
@@ -94,7 +81,7 @@ def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[s
     texts = [
         f"{key} = {value}"
         for key, value in sorted(overrides.items())
-        if isinstance(value, str) and value != settings.overrides.get(key)
+        if isinstance(value, str) and value != settings.study.overrides.get(key)
     ]
     words = f"files of {settings.maneuvers[maneuver][0]} and {settings.vehicles[vehicle][0]}"
     return f"{words} with {', '.join(texts)}" if texts else words

@@ -98,7 +98,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
         if files_digest(scenario) != settings.expected[key]:
             raise StudyError(f"{key}: changed while the study ran")
         with amplitude_store.not_on_disk():
-            ready = prepared(scenario, settings.timestep_s)
+            ready = prepared(scenario, settings.study.timestep_s)
     except ActiveSteerError as error:
         return [failed_row(settings, request, Status.FAILED, _words_of(error)) for request in requests]
     rows = []
@@ -106,12 +106,12 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     for request in requests:
         label, controller = settings.controllers[request.controller]
         row = _row(settings, request)
-        row["run_id"] = run_id(scenario, controller, settings.seed, settings.timestep_s)
+        row["run_id"] = run_id(scenario, controller, settings.study.seed, settings.study.timestep_s)
         recording = _drive_one(settings, request, row, ready, controller)
-        if settings.claims and recording is not None:
+        if settings.study.claims and recording is not None:
             recordings[label] = recording
         rows.append(row)
-    if settings.claims:
+    if settings.study.claims:
         claims = _claims(settings.maneuvers[first.maneuver][0], recordings)
         for row in rows:
             row.update(claims)
@@ -121,10 +121,10 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
 def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, controller: str) -> Recording | None:
     """Make one run and fill its row; return the recording of a complete run."""
     path = _recording_path(settings, request)
-    every = settings.recordings
+    every = settings.study.recordings
     keeps = every == "all" or (isinstance(every, int) and request.sample % every == 0)
     try:
-        recording = run_scenario(ready, controller, path=path if keeps else None, timestep_s=settings.timestep_s)
+        recording = run_scenario(ready, controller, path=path if keeps else None, timestep_s=settings.study.timestep_s)
     except ActiveSteerError as error:
         row |= {"status": Status.FAILED.value, "error": _words_of(error)}
         if every == "failed" and path is not None and error.recording is not None and len(error.recording):
@@ -133,18 +133,20 @@ def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, 
             except ActiveSteerError as reason:
                 row["error"] = f"{row['error']}; {reason}"
         return None
-    every_steps = max(1, round(CURVE_STEP_S / settings.timestep_s))
-    row.update((f"{CURVE}{name}", np.float32(recording[name][::every_steps])) for name in settings.curves)
+    every_steps = max(1, round(CURVE_STEP_S / settings.study.timestep_s))
+    row.update((f"{CURVE}{name}", np.float32(recording[name][::every_steps])) for name in settings.study.curves)
     if problem := recording.metadata.get("metrics_error"):
         row |= {"status": Status.UNEVALUATED.value, "error": str(problem)[:_ERROR_CHARACTERS]}
         return None
     row["status"] = Status.OK.value
-    row.update((name, float(value)) for name, value in recording.metrics.items() if _is_kept(settings.metrics, name))
+    row.update(
+        (name, float(value)) for name, value in recording.metrics.items() if _is_kept(settings.study.metrics, name)
+    )
     return recording
 
 
 def _recording_path(settings: Settings, request: Request) -> Path | None:
-    if settings.folder is None or settings.recordings == "none":
+    if settings.folder is None or settings.study.recordings == "none":
         return None
     return settings.folder / recording_name(
         request.run, settings.maneuvers[request.maneuver][0], settings.controllers[request.controller][0]

@@ -23,7 +23,7 @@ _KEYS: Final = (
     "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
     "recordings", "curves", "claims", "timestep_s", "tune", "fit", "match", "falsify",
 )  # fmt: skip
-_SEARCHES: Final = {
+SEARCHES: Final = {
     "tune": "it says what is to be made small",
     "match": "it says which statements should hold",
     "fit": "it says which channels are compared, and how noisy they are",
@@ -97,18 +97,15 @@ class StudyFile:
 
     def to_table(self) -> dict[str, Any]:
         """Return the study as the table of a study file."""
+        names = (
+            "title", "maneuvers", "controllers", "vehicles", "driver", "seed", "timestep_s", "recordings", "claims",
+            "overrides",
+        )  # fmt: skip
         table: dict[str, Any] = {
-            "title": self.title,
-            "maneuvers": list(self.maneuvers),
-            "controllers": list(self.controllers),
-            "vehicles": list(self.vehicles),
-            "driver": self.driver,
-            "seed": self.seed,
-            "timestep_s": self.timestep_s,
-            "recordings": {"every": self.recordings} if isinstance(self.recordings, int) else self.recordings,
-            "claims": self.claims,
-            "overrides": dict(self.overrides),
+            key: list(value) if isinstance(value := getattr(self, key), tuple) else value for key in names
         }
+        if isinstance(self.recordings, int):
+            table["recordings"] = {"every": self.recordings}
         design: dict[str, Any] = {"kind": self.design.kind, "paired": self.design.paired}
         if self.design.maneuvers != "all":
             design["maneuvers"] = self.design.maneuvers
@@ -118,10 +115,8 @@ class StudyFile:
             design["cases"] = [self.case_list[number] for number in range(len(self.case_list))]
         else:
             table["factors"] = {factor.key: factor.to_table() for factor in self.factors}
-        for key, names in (("metrics", self.metrics), ("curves", self.curves)):
-            if names:
-                table[key] = list(names)
-        table |= {key: found for key in _SEARCHES if (found := getattr(self, key)) is not None}
+        table |= {key: list(kept) for key in ("metrics", "curves") if (kept := getattr(self, key))}
+        table |= {key: found for key in SEARCHES if (found := getattr(self, key)) is not None}
         return table | {"design": design}
 
     def to_toml(self) -> str:
@@ -158,7 +153,7 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
         if key not in _KEYS:
             raise source.fail((key,), f"there is no such key; {nearest_names(key, _KEYS)}")
     if search and search not in table:
-        raise source.fail((search,), f"the table is missing: {_SEARCHES[search]}")
+        raise source.fail((search,), f"the table is missing: {SEARCHES[search]}")
     if "maneuvers" not in table:
         raise source.fail((), "the key maneuvers is missing: a list of names or files")
     read = {
@@ -169,7 +164,7 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
         "metrics": lambda value: tuple(_items(value, (str,))),
         "curves": lambda value: tuple(_items(value, (str,))),
         "overrides": lambda value: dict(_typed(value, Mapping, "a table")),
-        **dict.fromkeys(_SEARCHES, lambda value: dict(_typed(value, Mapping, "a table"))),
+        **dict.fromkeys(SEARCHES, lambda value: dict(_typed(value, Mapping, "a table"))),
         "claims": lambda value: _typed(value, bool, "true or false"),
         "title": lambda value: _typed(value, str, "a text"),
         "seed": _seed,
@@ -203,7 +198,7 @@ def _varied(table: Mapping[str, Any], folder: Path, source: Source) -> dict[str,
         parts.append(dict(part))
     factors = tuple(read_factor(key, value, source) for key, value in parts[0].items())
     case_list = _cases(parts[1].pop("cases", None), folder, source)
-    if any(key in table for key in _SEARCHES) and any(factor.kind != "grid" for factor in factors):
+    if any(key in table for key in SEARCHES) and any(factor.kind != "grid" for factor in factors):
         parts[1].setdefault("samples", 1)
     design = build(DesignTable, parts[1], source, ("design",))
     return {
