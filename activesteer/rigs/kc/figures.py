@@ -79,11 +79,8 @@ def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
     """
     pictures: dict[str, Callable[[KcResult], Picture]] = {
         "rear_camber": _rear_camber,
-        "parallel_travel": _parallel_travel,
+        **{name: partial(_drawn_grid, grid=grid) for name, grid in _GRIDS.items()},
         "opposite_travel": _opposite_travel,
-        "side_force": _side_force,
-        "longitudinal_force": _longitudinal_force,
-        "aligning_moment": _aligning_moment,
         "steering": _steering,
         "targets": _targets,
     }
@@ -112,19 +109,10 @@ def _wheels(x: Array, values: Array, label: str = "", *, both: bool = True) -> l
     ]
 
 
-def _grid(
-    result: KcResult,
-    title: str,
-    rows: Sequence[Row],
-    both: tuple[str, str],
-    left: tuple[str, str] | None,
-    x_label: str,
-    factor: float,
-) -> Picture:
-    """Return one row per quantity and one column per axle.
+class Grid(NamedTuple):
+    """A picture with one row per quantity and one column per axle.
 
-    Args:
-        result: Result of the rig.
+    Attributes:
         title: Title of the picture.
         rows: The rows.
         both: Name and word for the legend of the sweep that is drawn of both wheels.
@@ -132,22 +120,67 @@ def _grid(
         x_label: Label of the abscissa.
         factor: From the sweep's SI unit to the label's unit.
     """
+
+    title: str
+    rows: Sequence[Row]
+    both: tuple[str, str]
+    left: tuple[str, str] | None
+    x_label: str
+    factor: float
+
+
+_GRIDS: Final = {
+    "parallel_travel": Grid(
+        "parallel wheel travel",
+        (
+            _TOE, _CAMBER, _LOAD, Row("contact point\noutwards [mm]", _moved("contact_m", 1, outwards=True)),
+            Row("wheel centre\nforwards [mm]", _moved("centre_m", 0)),
+        ),
+        ("parallel_travel", ""), ("parallel_kinematic", "without springs, links unloaded"),
+        "wheel travel [mm] (+ bump)", 1e3,
+    ),
+    "opposite_travel": Grid(
+        "opposite wheel travel", (_TOE, _CAMBER, _LOAD), ("opposite_travel", ""), None,
+        "travel of the right wheel [mm]", 1e3,
+    ),
+    "side_force": Grid(
+        "side force at the contact points",
+        (
+            _TOE, _CAMBER, Row("contact point\nto the left [mm]", _moved("contact_m", 1)),
+            Row("wheel centre\nto the left [mm]", _moved("centre_m", 1)),
+        ),
+        ("lateral_in_phase", "in phase (+ to the left)"), ("lateral_opposed", "left, opposed (+ inwards)"),
+        "side force at each wheel [kN]", 1e-3,
+    ),
+    "longitudinal_force": Grid(
+        "longitudinal force",
+        (_TOE, _CAMBER, Row("wheel centre\nforwards [mm]", _moved("centre_m", 0)), _WIND_UP),
+        ("longitudinal_patch", "at the contact point, locked"), ("longitudinal_centre", "left, at the wheel centre"),
+        "force at each wheel [kN] (+ forwards)", 1e-3,
+    ),
+    "aligning_moment": Grid(
+        "aligning moment", (Row("steer angle [deg]\n(+ left)", lambda sweep: _DEG * sweep.steer_rad), _CAMBER),
+        ("aligning_in_phase", "in phase (+ to the left)"), ("aligning_opposed", "left, opposed (+ toe-in)"),
+        "moment on each wheel [Nm]", 1.0,
+    ),
+}  # fmt: skip
+"""Name of a picture -> its content."""
+
+
+def _drawn_grid(result: KcResult, grid: Grid) -> Picture:
     panels = []
-    for row in rows:
+    for row in grid.rows:
+        above, below = row is grid.rows[0], row is grid.rows[-1]
         for axle, first in _AXLES:
             curves = []
-            for name, label in filter(None, (both, left)):
+            for name, label in filter(None, (grid.both, grid.left)):
                 sweep = result.curves[name]
                 values = row.values(sweep)[:, first : first + 2]
-                curves += _wheels(factor * sweep.x, values, label, both=name == both[0])
-            above, below = row is rows[0], row is rows[-1]
-            panels.append(
-                Panel(
-                    x_label if below else "", row.label if not first else "", curves, axle if above else "", zero=True
-                )
-            )
-    height_in = 1.0 + 1.75 * len(rows)
-    return Picture(title, panels, columns=2, width_in=8.5, height_in=height_in, shared_legend=True)
+                curves += _wheels(grid.factor * sweep.x, values, label, both=name == grid.both[0])
+            labels = grid.x_label if below else "", row.label if not first else ""
+            panels.append(Panel(*labels, curves, axle if above else "", zero=True))
+    height_in = 1.0 + 1.75 * len(grid.rows)
+    return Picture(grid.title, panels, columns=2, width_in=8.5, height_in=height_in, shared_legend=True)
 
 
 def _rear_camber(result: KcResult) -> Picture:
@@ -165,53 +198,14 @@ def _rear_camber(result: KcResult) -> Picture:
     return Picture("camber angle of the rear suspension", panels, width_in=8.5, height_in=3.6)
 
 
-def _parallel_travel(result: KcResult) -> Picture:
-    rows = (
-        _TOE,
-        _CAMBER,
-        _LOAD,
-        Row("contact point\noutwards [mm]", _moved("contact_m", 1, outwards=True)),
-        Row("wheel centre\nforwards [mm]", _moved("centre_m", 0)),
-    )
-    kinematic = ("parallel_kinematic", "without springs, links unloaded")
-    x_label = "wheel travel [mm] (+ bump)"
-    return _grid(result, "parallel wheel travel", rows, ("parallel_travel", ""), kinematic, x_label, 1e3)
-
-
 def _opposite_travel(result: KcResult) -> Picture:
-    x_label = "travel of the right wheel [mm]"
-    rows = (_TOE, _CAMBER, _LOAD)
-    picture = _grid(result, "opposite wheel travel", rows, ("opposite_travel", ""), None, x_label, 1e3)
+    picture = _drawn_grid(result, _GRIDS["opposite_travel"])
     panels = list(picture.panels)
     for place, axle in enumerate(("front", "rear")):
         roll = _DEG * roll_angle_rad(Axle(axle, result.measured))
         travel = 1e3 * result.curves["opposite_travel"].x
         panels[place] = panels[place]._replace(above=("roll angle of the body [deg] (+ to the right)", travel, roll))
     return picture._replace(panels=panels)
-
-
-def _side_force(result: KcResult) -> Picture:
-    rows = (
-        _TOE,
-        _CAMBER,
-        Row("contact point\nto the left [mm]", _moved("contact_m", 1)),
-        Row("wheel centre\nto the left [mm]", _moved("centre_m", 1)),
-    )
-    both, left = ("lateral_in_phase", "in phase (+ to the left)"), ("lateral_opposed", "left, opposed (+ inwards)")
-    return _grid(result, "side force at the contact points", rows, both, left, "side force at each wheel [kN]", 1e-3)
-
-
-def _longitudinal_force(result: KcResult) -> Picture:
-    rows = (_TOE, _CAMBER, Row("wheel centre\nforwards [mm]", _moved("centre_m", 0)), _WIND_UP)
-    both = ("longitudinal_patch", "at the contact point, locked")
-    left = ("longitudinal_centre", "left, at the wheel centre")
-    return _grid(result, "longitudinal force", rows, both, left, "force at each wheel [kN] (+ forwards)", 1e-3)
-
-
-def _aligning_moment(result: KcResult) -> Picture:
-    rows = (Row("steer angle [deg]\n(+ left)", lambda sweep: _DEG * sweep.steer_rad), _CAMBER)
-    both, left = ("aligning_in_phase", "in phase (+ to the left)"), ("aligning_opposed", "left, opposed (+ toe-in)")
-    return _grid(result, "aligning moment", rows, both, left, "moment on each wheel [Nm]", 1.0)
 
 
 def _steering(result: KcResult) -> Picture:

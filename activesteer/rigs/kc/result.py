@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.rigs.kc.definitions import Axle
@@ -79,19 +79,8 @@ class KcResult:
 
     def to_json(self) -> dict[str, Any]:
         """Return the metrics as JSON values: name, axle, value, unit, band, inside, source; a missing value is null."""
-        rows = [
-            {
-                "name": entry.name,
-                "axle": entry.axle,
-                "value": entry.value,
-                "unit": entry.unit,
-                "band": list(entry.band) if entry.band else None,
-                "inside": entry.inside,
-                "source": entry.source,
-            }
-            for entry in self.metrics
-        ]
-        return {"metrics": rows}
+        names = ("name", "axle", "value", "unit", "band", "inside", "source")
+        return {"metrics": [{name: getattr(entry, name) for name in names} for entry in self.metrics]}
 
     def table(self) -> str:
         """Return the metrics as text of 80 columns, a line each, with their target bands."""
@@ -116,34 +105,23 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.4g}" if abs(value) >= 1.0 else f"{value:.3f}"
 
 
-def evaluated(vehicle: str, measured: Measured, targets: Targets) -> KcResult:
-    """Compute all metrics and compare them with their bands.
+_NO_TARGET: Final = Target((), "")
 
-    Args:
-        vehicle: Name of the car.
-        measured: Results of the rig.
-        targets: Bands by axle and metric.
-    """
+
+def evaluated(vehicle: str, measured: Measured, targets: Targets) -> KcResult:
+    """Compute all metrics and compare them with their bands."""
     metrics = []
     for definition in DEFINITIONS:
         for name in definition.axles:
             value = definition.evaluate(Axle(name, measured))
-            target = targets.get((name, definition.name))
+            band, inside, target = None, None, targets.get((name, definition.name), _NO_TARGET)
+            if target is not _NO_TARGET:
+                band = target.band[0], target.band[1]
+                inside = bool(band[0] <= value <= band[1])
             metrics.append(
                 KcMetric(
-                    definition.name,
-                    name,
-                    value,
-                    definition.unit,
-                    (target.band[0], target.band[1]) if target else None,
-                    _inside(value, target),
-                    target.source if target else "",
-                    definition.text,
-                    target.remark if target else "",
+                    definition.name, name, value, definition.unit, band, inside, target.source, definition.text,
+                    target.remark,
                 )
-            )
+            )  # fmt: skip
     return KcResult(vehicle, tuple(metrics), measured.sweeps, measured)
-
-
-def _inside(value: float, target: Target | None) -> bool | None:
-    return None if target is None else bool(target.band[0] <= value <= target.band[1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Final
 
@@ -85,34 +85,21 @@ class Sweep:
         return table | {name: value.tolist() for name, value in arrays.items()}
 
 
-@dataclass(frozen=True)
-class _Point:
-    """One row of a sweep."""
-
-    centre_m: Array
-    rotation: Array
-    contact_m: Array
-    load_N: Array
-    damper_m: Array
-    rack_m: float
-    steering_wheel_rad: float
-    steering_wheel_torque_Nm: float
-
-
-def _read(car: HeldCar) -> _Point:
+def _read(car: HeldCar) -> dict[str, Array]:
+    """Return one point of a sweep by the names of the fields of `Sweep`, with the rotations of the wheels."""
     model, data = car.model, car.data
     poses = [car.wheel(corner) for corner in range(4)]
     wheel = model.joint("steering_wheel")
-    return _Point(
-        np.array([pose.centre_m for pose in poses]) - car.origin_m,
-        np.array([pose.rotation for pose in poses]),
-        np.array([pose.contact_m for pose in poses]) - car.origin_m,
-        car.load_N.copy(),
-        np.array([data.ten_length[model.tendon(f"{corner}_damper").id] for corner in CORNERS]),
-        float(data.qpos[model.joint("rack").qposadr[0]]),
-        float(data.qpos[wheel.qposadr[0]]),
-        float(data.qfrc_actuator[wheel.dofadr[0]]),
-    )
+    return {
+        "centre_m": np.array([pose.centre_m for pose in poses]) - car.origin_m,
+        "rotation": np.array([pose.rotation for pose in poses]),
+        "contact_m": np.array([pose.contact_m for pose in poses]) - car.origin_m,
+        "load_N": car.load_N.copy(),
+        "damper_m": np.array([data.ten_length[model.tendon(f"{corner}_damper").id] for corner in CORNERS]),
+        "rack_m": data.qpos[model.joint("rack").qposadr[0]],
+        "steering_wheel_rad": data.qpos[wheel.qposadr[0]],
+        "steering_wheel_torque_Nm": data.qfrc_actuator[wheel.dofadr[0]],
+    }
 
 
 def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float, Case]) -> Sweep:
@@ -128,7 +115,7 @@ def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float
     Raises:
         ModelError: a point has no equilibrium.
     """
-    points: dict[float, _Point] = {}
+    points: dict[float, dict[str, Array]] = {}
     for side in (sorted(x for x in cases if x >= 0.0), sorted((x for x in cases if x < 0.0), reverse=True)):
         car.reset()
         for x in side:
@@ -136,26 +123,15 @@ def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float
             points[x] = _read(car)
     car.reset()
     order = sorted(points)
-    rows = [points[x] for x in order]
     zero = points[min(points, key=abs)]
-    rotation = _stacked(row.rotation for row in rows)
-    at_zero = np.einsum("cji,cj->ci", zero.rotation, zero.contact_m - zero.centre_m)
-    centre = _stacked(row.centre_m for row in rows)
+    columns = {name: np.stack([points[x][name] for x in order]) for name in zero}
+    rotation = columns.pop("rotation")
+    at_zero = np.einsum("cji,cj->ci", zero["rotation"], zero["contact_m"] - zero["centre_m"])
     return Sweep(
         title, variable, unit,
         x=np.array(order),
-        centre_m=centre,
         axle=rotation[..., 1],
-        contact_m=_stacked(row.contact_m for row in rows),
-        patch_m=centre + np.einsum("ncij,cj->nci", rotation, at_zero),
-        load_N=_stacked(row.load_N for row in rows),
+        patch_m=columns["centre_m"] + np.einsum("ncij,cj->nci", rotation, at_zero),
         wind_up_rad=np.arctan2(-rotation[..., 2, 0], rotation[..., 0, 0]),
-        damper_m=_stacked(row.damper_m for row in rows),
-        rack_m=np.array([row.rack_m for row in rows]),
-        steering_wheel_rad=np.array([row.steering_wheel_rad for row in rows]),
-        steering_wheel_torque_Nm=np.array([row.steering_wheel_torque_Nm for row in rows]),
+        **columns,
     )  # fmt: skip
-
-
-def _stacked(rows: Iterable[Array]) -> Array:
-    return np.stack(list(rows))
