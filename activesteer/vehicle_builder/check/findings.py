@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Final, Literal
+
+from activesteer.config import build, read_toml
 
 Level = Literal["ok", "warning", "error"]
 _ROUNDING: Final = 1e-7
@@ -80,37 +84,55 @@ class CheckReport:
 
 @dataclass(frozen=True)
 class Usual:
-    """Usual and possible range of a value."""
+    """Usual and possible range of a value; keys of a table in usual.toml, which has the sources."""
 
-    low: float
-    high: float
-    minimum: float = -math.inf
-    maximum: float = math.inf
+    topic: str
+    words: str
+    """Name in the report."""
+    usual: tuple[float, ...]
+    """Lowest and highest usual value; a value outside is a warning."""
+    advice: str
+    """Advice for a value outside."""
+    unit: str = ""
+    """Unit; empty for a pure number or a metric of the rig, which has its own."""
+    possible: tuple[float, ...] = (-math.inf, math.inf)
+    """Lowest and highest possible value; a value outside is an error."""
+    axle: str = ""
+    name: str = ""
+    """Axle and name of a metric of the rig."""
 
-    def level(self, value: float) -> Level:
-        """Return the level of a value: warning outside the usual range, error outside the possible range."""
-        if not self.minimum <= value <= self.maximum:
-            return "error"
-        return "ok" if self.low <= value <= self.high else "warning"
+    def judged(self, value: float, unit: str = "", **words: str) -> Finding:
+        """Return the finding about a value; nan counts as a warning.
 
-    def __str__(self) -> str:
-        """Return the usual range as text."""
-        return f"{self.low:g} to {self.high:g}"
+        Args:
+            value: The value.
+            unit: Its unit, if the table has none; `-` for a pure number.
+            words: Words that `words` has in braces.
+        """
+        unit = (self.unit or unit).removesuffix("-")
+        level: Level = "warning"
+        if not math.isnan(value):
+            level = "ok" if self.usual[0] <= value <= self.usual[1] else "warning"
+            level = level if self.possible[0] <= value <= self.possible[1] else "error"
+        shown = 0.0 if abs(value) < _ROUNDING else value
+        said = "none" if math.isnan(value) else f"{shown:.4g} {unit}".strip()
+        usual = f"{self.usual[0]:g} to {self.usual[1]:g} {unit}".strip()
+        advice = "" if level == "ok" else self.advice
+        return Finding(self.topic, self.words.format(**words), level, said, usual, advice)
 
 
-def judged(topic: str, what: str, value: float, unit: str, usual: Usual, advice: str) -> Finding:
-    """Return a finding about a number.
+@dataclass(frozen=True)
+class _File:
+    metric: tuple[Usual, ...]
+    quantity: dict[str, Usual]
 
-    Args:
-        topic: Topic.
-        what: Subject.
-        value: The number; nan counts as a warning.
-        unit: Unit.
-        usual: Usual and possible range.
-        advice: Advice for a value outside.
-    """
-    unit = "" if unit == "-" else unit
-    level: Level = "warning" if math.isnan(value) else usual.level(value)
-    shown = 0.0 if abs(value) < _ROUNDING else value
-    words = "none" if math.isnan(value) else f"{shown:.4g} {unit}".strip()
-    return Finding(topic, what, level, words, f"{usual} {unit}".strip(), "" if level == "ok" else advice)
+
+@functools.cache
+def usual_values() -> _File:
+    """Return the usual values of metrics and quantities."""
+    return build(_File, *read_toml(Path(__file__).with_name("usual.toml")))
+
+
+def judged(quantity: str, value: float, **words: str) -> Finding:
+    """Return the finding about a quantity of usual.toml; see `Usual.judged`."""
+    return usual_values().quantity[quantity].judged(value, **words)

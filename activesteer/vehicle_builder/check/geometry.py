@@ -11,7 +11,7 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError
-from activesteer.vehicle_builder.check.findings import Finding, Level, Usual, judged
+from activesteer.vehicle_builder.check.findings import Finding, Level, judged
 from activesteer.vehicle_builder.corner_motion import corner_motion
 
 _MIRROR_M: Final = 1e-6
@@ -33,11 +33,7 @@ class _Rod:
 
 
 def geometry(model: mujoco.MjModel) -> Iterator[Finding]:
-    """Return all findings about the hardpoints.
-
-    Args:
-        model: The car.
-    """
+    """Return all findings about the hardpoints."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     origin = data.xpos[model.body("chassis").id]
@@ -115,12 +111,10 @@ def _rods(model: mujoco.MjModel, data: mujoco.MjData) -> list[_Rod]:
 
 
 def _lengths(rods: list[_Rod]) -> Iterator[Finding]:
-    if rods:
-        usual = Usual(0.1, 0.9, 0.03, 2.0)
-        for rod in (min(rods, key=lambda rod: rod.length_m), max(rods, key=lambda rod: rod.length_m)):
-            word = "shortest" if rod.length_m == min(rods, key=lambda rod: rod.length_m).length_m else "longest"
-            advice = "are both of its ends right, and all points in the same unit?"
-            yield judged("geometry", f"{word} link, {rod.name}", rod.length_m, "m", usual, advice)
+    for choose in (min, max) if rods else ():
+        rod = choose(rods, key=lambda rod: rod.length_m)
+        word = "shortest" if rod.length_m == min(rod.length_m for rod in rods) else "longest"
+        yield judged("link_length", rod.length_m, which=word, rod=rod.name)
 
 
 def _order(rods: list[_Rod], points: dict[str, Array]) -> Iterator[Finding]:
@@ -194,11 +188,7 @@ def _reach(points: dict[str, Array]) -> Iterator[Finding]:
 
 def _firmness(model: mujoco.MjModel, corner: str) -> Iterator[Finding]:
     axle = "front" if corner[0] == "f" else "rear"
-    what = f"{axle} links hold the wheel"
     try:
-        motion = corner_motion(model, corner)
+        yield judged("firmness", corner_motion(model, corner).firmness, axle=axle)
     except ModelError as reason:
-        yield Finding("geometry", what, "error", "no", "", str(reason))
-        return
-    advice = "two links constrain nearly the same direction: look for parallel links in one plane, or coincident points"
-    yield judged("geometry", what, motion.firmness, "", Usual(0.03, 1.0, 1e-3), advice)
+        yield Finding("geometry", f"{axle} links hold the wheel", "error", "no", "", str(reason))

@@ -16,12 +16,10 @@ from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.mass_properties import mass_properties
-from activesteer.vehicle_builder.check.findings import Finding, Usual, judged
+from activesteer.vehicle_builder.check.findings import Finding, judged
 
 _STEPS: Final = 500
 _STILL_MPS: Final = 0.01
-_DAMPING: Final = Usual(500.0, 20e3, 0.0, 100e3)
-"""Slope of a damper's curve [N s/m]; chosen: the dampers of our cars have 2 to 4 kN s/m, those of the `sedan` 15."""
 
 
 def standing(vehicle: Vehicle, car: Car) -> Iterator[Finding]:
@@ -47,18 +45,11 @@ def standing(vehicle: Vehicle, car: Car) -> Iterator[Finding]:
 
 
 def _loads(load_N: np.ndarray, mass_kg: float) -> Iterator[Finding]:
-    yield judged(
-        "standing", "mass of the whole car", mass_kg, "kg", Usual(700.0, 3000.0, 200.0, 6000.0), "check the masses"
-    )
-    fraction = 100.0 * load_N[:2].sum() / load_N.sum()
-    advice = "check mass.front_fraction, or x of the chassis' centre of gravity"
-    yield judged("standing", "share of the weight in front", fraction, "%", Usual(40.0, 65.0, 20.0, 80.0), advice)
+    yield judged("mass", mass_kg)
+    yield judged("front_share", 100.0 * load_N[:2].sum() / load_N.sum())
     for axle, left, right in (("front", 0, 1), ("rear", 2, 3)):
         difference = 100.0 * abs(load_N[left] - load_N[right]) / load_N[left : right + 1].mean()
-        yield judged(
-            "standing", f"{axle} wheel loads, left against right", difference, "%", Usual(0.0, 0.1, 0.0, 2.0),
-            "left and right differ: is the mass off the middle, or was only one side edited?",
-        )  # fmt: skip
+        yield judged("wheel_load_difference", difference, axle=axle)
 
 
 def _height(vehicle: Vehicle) -> Iterator[Finding]:
@@ -74,41 +65,19 @@ def _height(vehicle: Vehicle) -> Iterator[Finding]:
             wheel = model.body(f"{corner}_wheel").id
             now = (turn @ (data.xpos[wheel] - data.xpos[chassis]))[2]
             travel += 500.0 * float(now - (design.xpos[wheel, 2] - design.xpos[chassis, 2]))
-        advice = (
-            "the springs carry the car at another height than that of the hardpoints: change springlength "
-            "(docs/suspension.md), or make the car from its table again, which trims it"
-        )
-        yield judged(
-            "standing",
-            f"{axle} wheel travel from the design position",
-            travel,
-            "mm",
-            Usual(-2.0, 2.0, -60.0, 60.0),
-            advice,
-        )
+        yield judged("wheel_travel", travel, axle=axle)
     w, x, y, z = data.qpos[3:7]
     pitch = math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))))
     roll = math.degrees(2.0 * math.atan2(x, w))
-    advice = "the heights of the wheel centres differ from the loaded radii of the tyres: check z and the tyres"
-    yield judged("standing", "pitch, positive nose down", pitch, "deg", Usual(-0.7, 0.7, -4.0, 4.0), advice)
-    yield judged("standing", "roll", roll, "deg", Usual(-0.01, 0.01, -1.0, 1.0), "left and right differ")
+    yield judged("pitch", pitch)
+    yield judged("roll", roll)
 
 
 def _stability(vehicle: Vehicle, height_m: float) -> Iterator[Finding]:
     wheels = [vehicle.data.xpos[vehicle.model.body(f"{corner}_wheel").id, 1] for corner in CORNERS]
     track = 0.5 * (wheels[0] - wheels[1] + wheels[2] - wheels[3])
-    yield judged(
-        "standing",
-        "height of the centre of gravity",
-        height_m,
-        "m",
-        Usual(0.4, 0.75, 0.15, 1.5),
-        "check mass.cg_height_m",
-    )
-    yield judged(
-        "standing", "static stability factor, track over twice the height", track / (2.0 * height_m), "",
-        Usual(1.1, 2.0, 0.8, 4.0), "below 1.1 a car rolls over before it slides: check track and height of the mass",
-    )  # fmt: skip
+    yield judged("cg_height", height_m)
+    yield judged("stability_factor", track / (2.0 * height_m))
 
 
 def _inertia(model: mujoco.MjModel) -> Iterator[Finding]:
@@ -117,25 +86,13 @@ def _inertia(model: mujoco.MjModel) -> Iterator[Finding]:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     to_front, to_rear = data.xpos[front, 0] - body.cg_m[0], body.cg_m[0] - data.xpos[rear, 0]
-    index = float(body.inertia_kgm2[2, 2] / (body.mass_kg * to_front * to_rear))
-    yield judged(
-        "standing", "yaw inertia over m l_f l_r", index, "", Usual(0.8, 1.1, 0.3, 2.0),
-        "check the inertia: kg m2 about the centre of gravity, of the whole car or of the chassis",
-    )  # fmt: skip
+    yield judged("yaw_inertia", float(body.inertia_kgm2[2, 2] / (body.mass_kg * to_front * to_rear)))
 
 
 def _tyres(car: Car, load_N: np.ndarray) -> Iterator[Finding]:
     for axle, tyre, load in zip(("front", "rear"), car.tyres, (load_N[:2].mean(), load_N[2:].mean()), strict=True):
-        nominal, maximum = float(tyre["FNOMIN"]), float(tyre["FZMAX"])
-        yield judged(
-            "tyres", f"{axle} static load over the tyre's nominal load", float(load) / nominal, "",
-            Usual(0.5, 1.3, 0.1, 3.0), "choose a tyre file for this load",
-        )  # fmt: skip
-        yield judged(
-            "tyres", f"{axle} highest valid load over the static load", maximum / float(load), "",
-            Usual(1.8, 10.0, 1.05, 100.0),
-            "in a turn the outer tyre carries up to twice its load; beyond its range the forces stay constant",
-        )  # fmt: skip
+        yield judged("tyre_load", float(load) / float(tyre["FNOMIN"]), axle=axle)
+        yield judged("tyre_reserve", float(tyre["FZMAX"]) / float(load), axle=axle)
 
 
 def _dampers(car: Car) -> Iterator[Finding]:
@@ -147,30 +104,20 @@ def _dampers(car: Car) -> Iterator[Finding]:
             "force_N has the sign of velocity_mps, both positive in compression, and is 0 at rest" if bad else "",
         )  # fmt: skip
         slope = np.abs(np.diff(curve.force_N) / np.diff(curve.velocity_mps)).max()
-        yield judged(
-            "standing", f"{axle} damper, steepest slope of its curve", float(slope), "N s/m", _DAMPING,
-            "velocity_mps is in m/s and force_N in N",
-        )  # fmt: skip
+        yield judged("damper_slope", float(slope), axle=axle)
 
 
 def _brakes(vehicle: Vehicle, car: Car, mass_kg: float) -> Iterator[Finding]:
     brakes = car.config.brakes
     radius = vehicle.data.xpos[vehicle.model.body("fl_wheel").id, 2]
     maximum = 2.0 * (brakes.front_torque_Nm + brakes.rear_torque_Nm) / radius / (mass_kg * GRAVITY_MPS2)
-    yield judged(
-        "standing", "deceleration at full pedal, if the tyres hold", float(maximum), "g", Usual(0.9, 2.0, 0.0, 10.0),
-        "brakes.front_torque_Nm and rear_torque_Nm are per wheel",
-    )  # fmt: skip
+    yield judged("deceleration", float(maximum))
 
 
 def _controllers_view(car: Car, mass_kg: float, yaw_inertia: float) -> Iterator[Finding]:
     track = car.config.single_track
     for what, known, real in (("mass", track.mass_kg, mass_kg), ("yaw inertia", track.yaw_inertia_kgm2, yaw_inertia)):
-        off = 100.0 * (known / real - 1.0)
-        yield judged(
-            "standing", f"{what} that controllers know, against that of the model", off, "%", Usual(-2.0, 2.0),
-            "run `activesteer identify`, which writes [single_track]",
-        )  # fmt: skip
+        yield judged("known", 100.0 * (known / real - 1.0), what=what)
 
 
 def _stays(vehicle: Vehicle) -> Iterator[Finding]:
