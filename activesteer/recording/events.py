@@ -7,15 +7,10 @@ are a list of tables with the fields of `Event`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import cache
 from typing import Any, Final, NamedTuple
 
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
-from google.protobuf.descriptor_pool import DescriptorPool
-from google.protobuf.message_factory import GetMessageClass
-
 from activesteer.errors import RecordingError
-from activesteer.recording.schemas import LOG_SCHEMA, foxglove_schema
+from activesteer.recording.schemas import LOG_SCHEMA, message_class
 from activesteer.road.recorded import fail, sequence, table_of, text
 
 MAX_EVENTS: Final = 10_000
@@ -59,7 +54,7 @@ def tables_of(events: Iterable[Event]) -> list[dict[str, Any]]:
 def encode_event(event: Event) -> tuple[int, bytes]:
     """Return the time [ns] and the message of an event."""
     time_ns = round(event.time_s * 1e9)
-    message = _log_class()(level=_INFO, message=event.what, name=event.kind)
+    message = message_class(LOG_SCHEMA)(level=_INFO, message=event.what, name=event.kind)
     message.timestamp.FromNanoseconds(time_ns)
     return time_ns, message.SerializeToString()
 
@@ -70,7 +65,7 @@ def decode_event(data: bytes) -> Event:
     Raises:
         RecordingError: it is no event of ours.
     """
-    message = _log_class().FromString(data)
+    message = message_class(LOG_SCHEMA).FromString(data)
     return _event({"time_s": message.timestamp.ToNanoseconds() / 1e9, "kind": message.name, "what": message.message},
                   "events")  # fmt: skip
 
@@ -83,11 +78,3 @@ def _event(entry: object, key: str) -> Event:
     if max(len(kind), len(what)) > _MAX_LETTERS:
         raise RecordingError(f"an event has more than {_MAX_LETTERS} letters")
     return Event(float(time_s), kind, what)
-
-
-@cache
-def _log_class() -> Any:
-    pool = DescriptorPool()
-    for file in FileDescriptorSet.FromString(foxglove_schema()).file:
-        pool.Add(file)
-    return GetMessageClass(pool.FindMessageTypeByName(LOG_SCHEMA))

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from functools import cache
 from typing import Any, Final, NamedTuple
-
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
-from google.protobuf.descriptor_pool import DescriptorPool
-from google.protobuf.message_factory import GetMessageClass
 
 from activesteer.errors import RecordingError
 from activesteer.recording.contents import MAX_PARTS, check_names, check_numbers
-from activesteer.recording.schemas import SCENE_SCHEMA, foxglove_schema
+from activesteer.recording.schemas import SCENE_SCHEMA, message_class
 
 _FIELDS = {"box": "cubes", "cylinder": "cylinders", "sphere": "spheres"}
 LINK_KINDS: Final = ("link", "spring", "damper")
@@ -66,15 +61,6 @@ ScenePart = Primitive | Link
 """Part of a scene."""
 
 
-@cache
-def _scene_class() -> Any:
-    """Return the message class, which protobuf creates at run time."""
-    pool = DescriptorPool()
-    for file in FileDescriptorSet.FromString(foxglove_schema()).file:
-        pool.Add(file)
-    return GetMessageClass(pool.FindMessageTypeByName(SCENE_SCHEMA))
-
-
 def encode_scene(parts: Iterable[ScenePart]) -> bytes:
     """Serialise a scene as a foxglove.SceneUpdate.
 
@@ -84,7 +70,7 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
     Raises:
         RecordingError: a kind is unknown, a name is wrong, or a number is missing or out of range.
     """
-    update = _scene_class()()
+    update = message_class(SCENE_SCHEMA)()
     entities: dict[str, Any] = {}
     parts = tuple(parts)
     for primitive in parts:
@@ -168,7 +154,7 @@ def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
         google.protobuf.message.DecodeError: the data are no scene.
         ValueError, TypeError, KeyError: a link is broken.
     """
-    update = _scene_class().FromString(data)
+    update = message_class(SCENE_SCHEMA).FromString(data)
     if len(update.entities) > MAX_PARTS:
         raise RecordingError(f"a scene has {len(update.entities)} entities, at most {MAX_PARTS} are allowed")
     primitives: list[ScenePart] = []

@@ -10,9 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from functools import cache
+from typing import Any
 
 from google.protobuf import duration_pb2, timestamp_pb2
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message_factory import GetMessageClass
 
 from activesteer.errors import RecordingError
 from activesteer.recording.protobuf import STAMP_LENGTH, FixedMessage
@@ -109,6 +112,15 @@ def foxglove_schema() -> bytes:
         foxglove.message_type.append(_define("foxglove", name, fields, _FOXGLOVE_ENUMS.get(name, ())))
     files.file.append(foxglove)
     return files.SerializeToString()
+
+
+@cache
+def message_class(name: str) -> Any:
+    """Return the class of a Foxglove message, which protobuf creates at run time."""
+    pool = DescriptorPool()
+    for file in FileDescriptorSet.FromString(foxglove_schema()).file:
+        pool.Add(file)
+    return GetMessageClass(pool.FindMessageTypeByName(name))
 
 
 def state_schema_name(group: str) -> str:

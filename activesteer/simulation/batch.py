@@ -248,7 +248,7 @@ class Batch:
         if controllers is not None:
             for car in np.flatnonzero(controllers[:, _WHEEL_TORQUES].any(axis=1)).tolist():
                 with _named(car):
-                    self.loops[car].vehicle.check_driven(controllers[car, _WHEEL_TORQUES].tolist())
+                    self.loops[car].vehicle.wheels.check_driven(controllers[car, _WHEEL_TORQUES].tolist())
         with self._in_use, engine_warnings_held():
             left = np.minimum(left, self._last - self._native.cars["step"])
             left[~self._mask(cars) | self.done] = 0

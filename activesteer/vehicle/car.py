@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -62,6 +62,11 @@ class Vehicle(Uncopyable):
         channels: Map from raw rows to recorded channels.
         actuators: Parameters of the actuators in the native forces.
         rows: Arrays that the row of a step is copied from.
+        brakes: `BRAKE_SETUP` and `BRAKE_STATE`, shape (1,) each, as views to read.
+        electric: Motors and battery, as views to read; a fault changes `motors`.
+        sensors: Sensors between the truth and the measurement; None for ideal sensors.
+        wheels: The wheels in the engine.
+        gear: Present gear; compiled code that engages a gear sets it.
     """
 
     def __init__(
@@ -93,18 +98,18 @@ class Vehicle(Uncopyable):
         try:
             self.model = load_model(mjcf, parameters, tyres, road, timestep_s, content)
             self.data = mujoco.MjData(self.model)
-            self._sensors = None if parameters.sensors.is_ideal else SensorBlock(parameters.sensors, timestep_s)
-            self._brake_setup, self._brake_state = np.zeros(1, BRAKE_SETUP), np.zeros(1, BRAKE_STATE)
+            self.sensors = None if parameters.sensors.is_ideal else SensorBlock(parameters.sensors, timestep_s)
+            self.brakes = self._brake_setup, self._brake_state = np.zeros(1, BRAKE_SETUP), np.zeros(1, BRAKE_STATE)
             self._brake_row = self._brake_state.view(np.float64)
-            measured = np.empty(0) if self._sensors is None else self._sensors.outputs
-            self._electric = ElectricDrive.of(parameters.motors, parameters.battery, timestep_s)
-            self.rows = RecordedArrays(self.model, self.data, measured, self._brake_row, self._electric.state)
+            measured = np.empty(0) if self.sensors is None else self.sensors.outputs
+            self.electric = ElectricDrive.of(parameters.motors, parameters.battery, timestep_s)
+            self.rows = RecordedArrays(self.model, self.data, measured, self._brake_row, self.electric.state)
             self._estimate_memory: memoryview | None = None
             self.channels = ChannelMap(self.model, parameters)
             self._bind()
             self._place()
-            radii_m = self._wheels.effective_radii_m(tyres)
-            inertias_kgm2, fractions = self._wheels.inertias_kgm2(), parameters.powertrain.wheel_fractions
+            radii_m = self.wheels.effective_radii_m(tyres)
+            inertias_kgm2, fractions = self.wheels.inertias_kgm2(), parameters.powertrain.wheel_fractions
             differential = [
                 part > 0.0 and getattr(parameters.motors, corner) is None
                 for corner, part in zip(CORNERS, fractions, strict=True)
@@ -124,13 +129,14 @@ class Vehicle(Uncopyable):
         root = model.joint(find(model, mujoco.mjtObj.mjOBJ_JOINT, "root"))
         if root.qposadr[0] or root.dofadr[0]:
             raise ModelError("the free joint 'root' of the chassis must be the first joint of the model")
-        self._wheels = WheelSet(model, data, self.parameters)
+        self.wheels = WheelSet(model, data, self.parameters)
         self.actuators = ActuatorRecords(model)
-        ratio, brakes = self.parameters.steering.ratio, (self._brake_setup, self._brake_state)
+        ratio = self.parameters.steering.ratio
         self._implicit = ImplicitPlan(model, data)
         self._bindings = bind_step(
-            model, data, self._implicit.plan, self.rows.live(), self._wheels.torques, ratio, self._sensors, brakes,
-            self._electric,
+            model, data, self._implicit.plan, self.rows.live(), self.wheels.torques, ratio, self.sensors,
+            self.brakes,
+            self.electric,
         )  # fmt: skip
         self._address = self._bindings.ctypes.data
         self._tape: Tape | None = None
@@ -139,7 +145,7 @@ class Vehicle(Uncopyable):
         self._hands = model.actuator("steering_wheel").id
         self._velocimeter = data.sensor("cg_velocimeter").data
         self._gyro = data.sensor("cg_gyro").data
-        self._gear: float = CLUTCH_OPEN
+        self.gear: float = CLUTCH_OPEN
 
     def _place(self) -> None:
         """Put the car into static equilibrium at the origin of the world, heading along x."""
@@ -148,7 +154,7 @@ class Vehicle(Uncopyable):
         originals = [play.copy() for play in plays]
         for play in plays:
             play[:] = 0.0  # the search follows slopes, and within the play the slope is zero
-        static_ride(self.model, self.data, np.array([0, 1, YAW_DOF, *self._wheels.spins]))
+        static_ride(self.model, self.data, np.array([0, 1, YAW_DOF, *self.wheels.spins]))
         for play, value in zip(plays, originals, strict=True):
             play[:] = value
 
@@ -167,21 +173,21 @@ class Vehicle(Uncopyable):
         self._place()
         data.qvel[0] = speed_mps
         # The settling before a manoeuvre corrects the rest.
-        data.qvel[self._wheels.spins] = speed_mps / self._wheels.heights_m()
+        data.qvel[self.wheels.spins] = speed_mps / self.wheels.heights_m()
         data.time = time_s
         reset(self._brake_state, self._brake_setup, speed_mps)
-        self._electric.state[:] = 0.0
+        self.electric.state[:] = 0.0
         mujoco.mj_forward(self.model, data)
         drop_metric(self.model, data)
-        if self._sensors is not None:
-            self._sensors.reset(self.truth()[0])
+        if self.sensors is not None:
+            self.sensors.reset(self.truth()[0])
         return self.measure()
 
     @property
     def wheel_radius_m(self) -> float:
         """Present height of the driven wheels' centres, mean weighted by their fractions of the torque [m]."""
         fractions = self.parameters.powertrain.wheel_fractions
-        return sum(part * height for part, height in zip(fractions, self._wheels.heights_m().tolist(), strict=True))
+        return sum(part * height for part, height in zip(fractions, self.wheels.heights_m().tolist(), strict=True))
 
     def rebase(self) -> None:
         """Make the present position and heading the origin of the road, and the present instant the origin of time.
@@ -198,7 +204,7 @@ class Vehicle(Uncopyable):
         data.qpos[0], data.qpos[1] = cos * x + sin * y, -sin * x + cos * y
         turn_chassis_back(data, half)
         data.time = 0.0
-        self._electric.state[ENERGY : ENERGY + 1] = 0.0
+        self.electric.state[ENERGY : ENERGY + 1] = 0.0
         self._forces["areas_felt"] = 1.0
         mujoco.mj_forward(self.model, data)
         drop_metric(self.model, data)
@@ -229,13 +235,13 @@ class Vehicle(Uncopyable):
             if self._estimate_memory is not None and (estimate := actuator_command.estimate) is not None:
                 write_estimate(self._estimate_memory, 0, *estimate)
             if (added := actuator_command.wheel_torque_demand_Nm) is not NO_TORQUES:
-                self.check_driven(added)
+                self.wheels.check_driven(added)
             torques = driver_command.wheel_torques
             gear = driver_command.gear if torques is None else CLUTCH_OPEN
-            if gear != self._gear:
+            if gear != self.gear:
                 self._engage(gear)
             if torques is not None:
-                self._wheels.apply(torques)
+                self.wheels.apply(torques)
             sane, measurement, motion = native_step.step(
                 self._address, driver_command, actuator_command, torques is not None
             )
@@ -258,31 +264,18 @@ class Vehicle(Uncopyable):
     def _engage(self, gear: Any) -> None:
         if gear not in _GEARS:
             raise ValueError(f"gear {gear!r} is not one of {_GEARS}")
-        self._gear = self._forces["gear"] = gear
-        self._wheels.engage(gear)
-
-    def check_driven(self, torques_Nm: Sequence[float]) -> None:
-        """Check that no torque is demanded of a wheel without a drive; see `WheelSet.check_driven`."""
-        self._wheels.check_driven(torques_Nm)
-
-    @property
-    def gear(self) -> float:
-        """Present gear; setting it notes the gear that compiled code has engaged."""
-        return self._gear
-
-    @gear.setter
-    def gear(self, gear: float) -> None:
-        self._gear = gear
+        self.gear = self._forces["gear"] = gear
+        self.wheels.engage(gear)
 
     def bound(self) -> dict[str, Any]:
         """Return what compiled code needs to step this car and to change its gear, by the names of `native_loop.CAR`.
 
         The addresses are those of this car's memory, which must outlive them.
         """
-        armature, wheels = self.model.dof_armature, self._wheels
+        armature, wheels = self.model.dof_armature, self.wheels
         return {
             "bindings": self._address,
-            "gear": self._gear,
+            "gear": self.gear,
             "gear_address": self._forces["gear"].ctypes.data,
             "armature": [armature.ctypes.data + dof * armature.strides[0] for dof in wheels.spins],
             "free_kgm2": wheels.armatures_kgm2(CLUTCH_OPEN),
@@ -342,7 +335,7 @@ class Vehicle(Uncopyable):
             SimulationDiverged: see `check`.
         """
         truth, _ = self.truth()
-        return truth if self._sensors is None else self._sensors.measurement(truth.time_s)
+        return truth if self.sensors is None else self.sensors.measurement(truth.time_s)
 
     @property
     def roll_rate_radps(self) -> float:
@@ -401,7 +394,7 @@ class Vehicle(Uncopyable):
         """Return the state of engine, brakes, motors, sensors and gear, from which a run continues bit-identically."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return np.concatenate((state, *self._memory(), (self._gear,)))
+        return np.concatenate((state, *self._memory(), (self.gear,)))
 
     def restore_state(self, state: NDArray[np.float64]) -> None:
         """Restore a saved state.
@@ -422,13 +415,8 @@ class Vehicle(Uncopyable):
 
     def _memory(self) -> list[NDArray[np.float64]]:
         """Memory apart from the engine's state: brakes, motors, sensors, estimate, the engine's present sensor data."""
-        sensors = [] if self._sensors is None else [self._sensors.memory]
-        return [self._brake_row, self._electric.state, self.data.sensordata, self.rows.estimate, *sensors]
-
-    @property
-    def wheels(self) -> WheelSet:
-        """The wheels in the engine."""
-        return self._wheels
+        sensors = [] if self.sensors is None else [self.sensors.memory]
+        return [self._brake_row, self.electric.state, self.data.sensordata, self.rows.estimate, *sensors]
 
     def native_parts(self) -> dict[str, NDArray[Any]]:
         """Return the memory of the native step apart from the engine's, by name, as views.
@@ -436,15 +424,15 @@ class Vehicle(Uncopyable):
         An address in one of these records points into one of these arrays, into an array or a struct of the engine, or
         to a function of the engine.
         """
-        sensors = self._sensors
+        sensors = self.sensors
         return {
             "bindings": self._bindings,
             **self._implicit.parts(),
             "brake_setup": self._brake_setup,
             "brake_state": self._brake_state,
-            "motors": self._electric.motors,
-            "battery": self._electric.battery,
-            "electric_state": self._electric.state,
+            "motors": self.electric.motors,
+            "battery": self.electric.battery,
+            "electric_state": self.electric.state,
             "commands": self.rows.commands,
             "estimate": self.rows.estimate,
             **({} if sensors is None else {"sensors": sensors.chains, "sensor_memory": sensors.memory}),
@@ -481,37 +469,22 @@ class Vehicle(Uncopyable):
         maximum = 0.0 if torque_Nm is None else torque_Nm / felt
         self.model.actuator_forcerange[hands] = -maximum, maximum
 
-    @property
-    def brakes(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """`BRAKE_SETUP` and `BRAKE_STATE` of the car, shape (1,) each, as views to read."""
-        return self._brake_setup, self._brake_state
-
-    @property
-    def electric(self) -> ElectricDrive:
-        """Motors and battery, as views to read; a fault changes `motors`."""
-        return self._electric
-
-    @property
-    def sensors(self) -> SensorBlock | None:
-        """Sensors between the truth and the measurement; None for ideal sensors."""
-        return self._sensors
-
     def put_sensors_between(self, *, wanted: bool) -> None:
         """Insert ideal sensors that can fail between the truth and the brakes, or remove them.
 
         Args:
             wanted: Whether to insert the sensors; no effect on a car with sensors of its own.
         """
-        if self.parameters.sensors.is_ideal and wanted is (self._sensors is None):
-            self._sensors = SensorBlock(self.parameters.sensors, float(self.model.opt.timestep)) if wanted else None
-            read_through(self._bindings, self._sensors)
-            if self._sensors is not None:
-                self._sensors.reset(self.truth()[0])
+        if self.parameters.sensors.is_ideal and wanted is (self.sensors is None):
+            self.sensors = SensorBlock(self.parameters.sensors, float(self.model.opt.timestep)) if wanted else None
+            read_through(self._bindings, self.sensors)
+            if self.sensors is not None:
+                self.sensors.reset(self.truth()[0])
 
     def note_measurement(self, measurement: Measurement) -> None:
         """Pass the measurement of faulty sensors to the brakes, and to the recording if it holds measurements."""
-        if self._sensors is not None:
-            self._sensors.say(measurement)
+        if self.sensors is not None:
+            self.sensors.say(measurement)
 
     def note_faults(self, count: int) -> None:
         """Record this number of active faults from now on."""

@@ -56,7 +56,7 @@ class Faults:
             ManeuverError: this car does not have one of the parts.
         """
         self._vehicle = vehicle
-        self._acting: list[_ActuatorFault | _MotorFault | _SensorFault] = []
+        self._acting: list[_Acting] = []
         vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
         for fault in faults:
             if fault.part in SENSORS:
@@ -120,9 +120,9 @@ class Faults:
         for acting, memory in zip(self._acting, copy.deepcopy(state), strict=True):
             acting.memory = memory
 
-    def _watched(self, watching: Sequence[_ActuatorFault | _MotorFault | _SensorFault], begin: int) -> Step:
+    def _watched(self, watching: Sequence[_Acting], begin: int) -> Step:
         vehicle = self._vehicle
-        delays = [acting for acting in watching if not isinstance(acting, _SensorFault)]
+        delays = [acting for acting in watching if isinstance(acting, _DemandFault)]
         sensors = [(acting, acting.begins <= begin) for acting in watching if isinstance(acting, _SensorFault)]
 
         def step(driver_command: DriverCommand, actuator_command: ActuatorCommand) -> tuple[Measurement, Motion]:
@@ -140,38 +140,74 @@ class Faults:
         return step
 
 
-class _ActuatorFault:
-    """A fault of one of the engine's actuators.
+class _Acting:
+    """A fault in a car.
 
     Attributes:
         fault: The fault.
         begins: Step at which it begins; `ends`: step from which the part works again.
+        delay: Steps by which it delays demands or readings.
         listens: Step from which on it must know the demands.
         watches: Whether it acts in every step.
         memory: The last demands for a delay, or the demand at which a brake sticks.
     """
 
-    def __init__(self, fault: Fault, name: str, vehicle: Vehicle) -> None:
-        model = self._model = vehicle.model
+    def __init__(self, fault: Fault, timestep_s: float) -> None:
         self.fault = fault
+        self.begins, never = round(fault.start_s / timestep_s), 2**62
+        self.ends = never if fault.end_s is None else max(self.begins + 1, round(fault.end_s / timestep_s))
+        self.watches = fault.delay_s is not None
+        self.delay = round((fault.delay_s or 0.0) / timestep_s)
+        self.listens = self.begins - self.delay
+        self.memory: deque[float] = deque(maxlen=max(1, self.delay))
+
+    def engage(self) -> None:
+        """Activate the fault in the model, if it acts there."""
+
+    def release(self) -> None:
+        """Restore the part as built."""
+
+    def recover(self) -> None:
+        """Do what the part needs when the fault ends; a motor returns to its demand with its lag and rate."""
+
+
+class _DemandFault(_Acting):
+    """A fault of a part that follows a demand."""
+
+    _record: NDArray[Any]
+
+    def _demand(self) -> float:
+        raise NotImplementedError
+
+    def before_step(self) -> None:
+        """Give the part the delayed demand."""
+        if self._record["scale"] == 0.0:
+            self._record["offset"] = self.memory[0] if self.memory else self._demand()
+
+    def after_step(self) -> None:
+        """Keep the demand."""
+        self.memory.append(self._demand())
+
+
+class _ActuatorFault(_DemandFault):
+    """A fault of one of the engine's actuators."""
+
+    def __init__(self, fault: Fault, name: str, vehicle: Vehicle) -> None:
+        super().__init__(fault, vehicle.timestep_s)
+        model = self._model = vehicle.model
         self._index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-        self._record: NDArray[Any] = vehicle.actuators.of(self._index)
-        self._healthy = (
-            self._record.copy(),
-            model.actuator_gainprm[self._index].copy(),
-            (model.actuator_biasprm[self._index].copy()),
-        )
+        self._record = vehicle.actuators.of(self._index)
+        parts = self._record, model.actuator_gainprm[self._index], model.actuator_biasprm[self._index]
+        self._healthy = tuple(part.copy() for part in parts)
         self._screw = vehicle.actuators.screw(self._index)
         self._healthy_screw = tuple(part.copy() for part in self._screw)
         self._data = vehicle.data
         self._ctrl = vehicle.data.ctrl
         ratio = vehicle.parameters.steering.ratio if ACTUATORS[fault.part].by_ratio else 1.0
         self._offset = fault.size * ratio
-        self.begins, self.ends = _steps(fault, vehicle.timestep_s)
-        self.watches = fault.delay_s is not None
-        delay = round((fault.delay_s or 0.0) / vehicle.timestep_s)
-        self.listens = self.begins - delay
-        self.memory: deque[float] = deque(maxlen=max(1, delay))
+
+    def _demand(self) -> float:
+        return float(self._ctrl[self._index])
 
     def engage(self) -> None:
         """Activate the fault."""
@@ -183,7 +219,7 @@ class _ActuatorFault:
             self._screw[0]["backlash_m"] = 4.0 * self._screw[1]["stop_m"]
         elif kind == "stuck" and ACTUATORS[self.fault.part].has_torque:
             if not self.memory:
-                self.memory.append(float(self._ctrl[self._index]))
+                self.memory.append(self._demand())
             record["scale"], record["offset"] = 0.0, self.memory[0]
         elif kind == "stuck":
             # Without a rate the servo holds its present angle, with its stiffness and its strength.
@@ -211,18 +247,9 @@ class _ActuatorFault:
             angle = self._data.qpos[self._model.jnt_qposadr[self._model.actuator_trnid[self._index, 0]]]
             self._data.act[self._model.actuator_actadr[self._index]] = angle
 
-    def before_step(self) -> None:
-        """Give the actuator the delayed demand."""
-        if self._record["scale"] == 0.0:
-            self._record["offset"] = self.memory[0] if self.memory else self._ctrl[self._index]
 
-    def after_step(self) -> None:
-        """Keep the demand."""
-        self.memory.append(float(self._ctrl[self._index]))
-
-
-class _MotorFault:
-    """A fault of an electric motor; attributes as those of `_ActuatorFault`."""
+class _MotorFault(_DemandFault):
+    """A fault of an electric motor."""
 
     def __init__(self, fault: Fault, name: str, vehicle: Vehicle) -> None:
         places = [place for place, _ in vehicle.parameters.motors]
@@ -230,15 +257,13 @@ class _MotorFault:
             motors = [MOTOR + each for each in places]
             problem = f"is no part of this car, which has {', '.join(motors) or 'no electric motor ([motors])'}"
             raise ManeuverError(f"{name!r} {problem}", key="part", value=fault.part, allowed=motors)
+        super().__init__(fault, vehicle.timestep_s)
         number = places.index(place)
-        self.fault = fault
         self._record = vehicle.electric.motors[number : number + 1]
         self._state = vehicle.electric.states[number : number + 1]
-        self.begins, self.ends = _steps(fault, vehicle.timestep_s)
-        self.watches = fault.delay_s is not None
-        delay = round((fault.delay_s or 0.0) / vehicle.timestep_s)
-        self.listens = self.begins - delay
-        self.memory: deque[float] = deque(maxlen=max(1, delay))
+
+    def _demand(self) -> float:
+        return float(self._state["demand_Nm"][0])
 
     def engage(self) -> None:
         """Activate the fault."""
@@ -256,38 +281,18 @@ class _MotorFault:
         for name, value in HEALTHY.items():
             self._record[name] = value
 
-    def recover(self) -> None:
-        """Do nothing: the torque returns to its demand with its lag and rate."""
 
-    def before_step(self) -> None:
-        """Give the motor the delayed demand."""
-        if self._record["scale"] == 0.0:
-            self._record["offset"] = self.memory[0] if self.memory else self._state["demand_Nm"]
-
-    def after_step(self) -> None:
-        """Keep the demand."""
-        self.memory.append(float(self._state["demand_Nm"][0]))
-
-
-class _SensorFault:
-    """A fault of one signal, which changes nothing in the car; attributes as those of `_ActuatorFault`."""
-
-    watches = True
+class _SensorFault(_Acting):
+    """A fault of one signal, which changes nothing in the car."""
 
     def __init__(self, fault: Fault, timestep_s: float) -> None:
-        self.fault = fault
+        super().__init__(fault, timestep_s)
+        self.watches = True
         self._sensor = SENSORS[fault.part]
         self._place = Measurement._fields.index(self._sensor.field)
-        self.begins, self.ends = _steps(fault, timestep_s)
-        delay = round((fault.delay_s or 0.0) / timestep_s)
         # A stuck sensor needs its last reading.
-        self.listens = self.begins - max(1, delay)
-        self.memory: deque[float] = deque(maxlen=delay + 1 if delay else 1)
-
-    def engage(self) -> None:
-        """Do nothing."""
-
-    recover = release = engage
+        self.listens = self.begins - max(1, self.delay)
+        self.memory = deque(maxlen=self.delay + 1 if self.delay else 1)
 
     def read(self, measurement: Measurement, *, active: bool) -> Measurement:
         """Return the faulty reading for a true one."""
@@ -312,10 +317,3 @@ class _SensorFault:
         if kind == "runaway":
             return self.fault.size
         return -good if kind == "reversed" else 0.0
-
-
-def _steps(fault: Fault, timestep_s: float) -> tuple[int, int]:
-    """Return the first step of a fault, and the first step after it."""
-    begins = round(fault.start_s / timestep_s)
-    never = 2**62
-    return begins, never if fault.end_s is None else max(begins + 1, round(fault.end_s / timestep_s))

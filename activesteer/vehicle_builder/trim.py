@@ -19,8 +19,8 @@ import numpy as np
 from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar
+from activesteer.rigs.kc.tyre_stiffness import tyre_stiffness
 from activesteer.scenario import load_car
-from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_force
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.mass_properties import mass_properties
@@ -136,10 +136,7 @@ def _compiled(mjcf: Path) -> mujoco.MjModel:
 
 def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
     """Return the vertical stiffness of a tyre under a load [N/m]."""
-    pressure = float(tyre["INFLPRES"])
-    deflection = deflection_under_load(tyre.record, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
-    more, less = (vertical_force(tyre.record, deflection + step, 0.0, pressure) for step in (1e-4, -1e-4))
-    return float((more - less) / 2e-4)
+    return tyre_stiffness(tyre, None, load_N).vertical_Npm
 
 
 def _target_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:

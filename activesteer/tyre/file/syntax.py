@@ -34,6 +34,10 @@ class Entry:
     value: float | str
     line: int
 
+    def fail(self, problem: str, source: Path) -> TyreFileError:
+        """Return an error about this entry of a file."""
+        return TyreFileError(problem, file=str(source), line=self.line, key=self.key, value=self.value)
+
 
 @dataclass(frozen=True)
 class Syntax:

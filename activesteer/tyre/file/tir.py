@@ -87,10 +87,7 @@ def tir_from_text(
     values: dict[str, float] = {}
     for name, entry in lines.items():
         if isinstance(entry.value, str):
-            raise TyreFileError(
-                f"{entry.value[:60]!r} is not a number",
-                file=str(source), line=entry.line, key=entry.key, value=entry.value,
-            )  # fmt: skip
+            raise entry.fail(f"{entry.value[:60]!r} is not a number", source)
         values[name] = entry.value * si_factor(BY_NAME[name].quantity, units)
     words = {key: word for (_, key), word in texts.items()}
     if "FITTYP" not in values:
@@ -114,13 +111,7 @@ def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> No
     home = BY_NAME[name].section
     at_home = (before.section == home, entry.section == home)
     if at_home[0] == at_home[1]:
-        raise TyreFileError(
-            f"is {entry.value} and contradicts line {before.line}, where it is {before.value}",
-            file=str(source),
-            line=entry.line,
-            key=entry.key,
-            value=entry.value,
-        )
+        raise entry.fail(f"is {entry.value} and contradicts line {before.line}, where it is {before.value}", source)
     if at_home[1]:
         lines[name] = entry
 
@@ -134,13 +125,7 @@ def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
         known = BASE_UNITS[entry.key]
         word = str(entry.value).lower()
         if word not in known:
-            raise TyreFileError(
-                f"is {str(entry.value)[:60]!r} in [UNITS]; allowed are {', '.join(known)}",
-                file=str(source),
-                line=entry.line,
-                key=entry.key,
-                value=entry.value,
-            )
+            raise entry.fail(f"is {str(entry.value)[:60]!r} in [UNITS]; allowed are {', '.join(known)}", source)
         sizes[entry.key] = known[word]
     return sizes
 
