@@ -67,12 +67,7 @@ class McapFile:
     """Writer of the records and the summary of an MCAP file."""
 
     def __init__(self, stream: BinaryIO, library: str) -> None:
-        """Write magic and header.
-
-        Args:
-            stream: Stream to write to.
-            library: Name and version of the writing program.
-        """
+        """Write magic and header."""
         self._stream = stream
         self._position = 0
         self._crc = 0

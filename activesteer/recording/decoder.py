@@ -92,9 +92,6 @@ class BlockDecoder:
     def decode(self, data: bytes) -> Block:
         """Decode the messages of a chunk.
 
-        Args:
-            data: Decompressed chunk.
-
         Raises:
             RecordingError: a message does not match the schema of its topic, a value is implausible, or topics differ
                 in their times.

@@ -199,11 +199,7 @@ class Recording:
         return _frozen(self._values.values()) if isinstance(self._values, FileRows) else self._values
 
     def at(self, rows: NDArray[np.intp]) -> Recording:
-        """Return the same run with some of its rows, in memory, and with all poses.
-
-        Args:
-            rows: Row numbers, ascending.
-        """
+        """Return the same run with some of its rows (ascending numbers), in memory, and with all poses."""
         values = self._values.at(rows) if isinstance(self._values, FileRows) else self._values[rows]
         return Recording(
             self._channels, self._time_s[rows], values, poses=self.poses, metadata=self.metadata,

@@ -104,9 +104,6 @@ def read_bytes(descriptor: int, start: int, length: int) -> bytes:
 def messages_of(content: bytes) -> tuple[bytes, int]:
     """Decompress a chunk; return its messages and their checksum. The declared size is an upper limit.
 
-    Args:
-        content: Content of its record.
-
     Raises:
         RecordingError: the chunk is too large, or differs from its declaration.
     """

@@ -81,9 +81,6 @@ class Course:
     def from_table(cls, table: object) -> Course:
         """Build the course that `to_table` describes; differences between its points give heading and curvature.
 
-        Args:
-            table: The table in a recording.
-
         Raises:
             RecordingError: a key is missing, of the wrong type or out of range.
         """

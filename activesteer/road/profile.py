@@ -36,11 +36,7 @@ class ProfileTable:
     """Distance of the two tracks [m]."""
 
     def __post_init__(self) -> None:
-        """Check the points.
-
-        Raises:
-            ManeuverError: they are too few, do not increase, are too far or too high.
-        """
+        """Check the points."""
         count = len(self.s_m)
         for key in ("left_z_m", "right_z_m"):
             values = getattr(self, key)

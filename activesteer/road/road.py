@@ -61,11 +61,7 @@ class RoadPatch:
     """Friction at the end [-], linear from `mu` at the start. Default: `mu` throughout."""
 
     def __post_init__(self) -> None:
-        """Check the place.
-
-        Raises:
-            ManeuverError: the patch ends before it begins, or its side has an unknown name.
-        """
+        """Check the place."""
         if not self.end_m > self.start_m:
             raise ManeuverError(
                 f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
@@ -84,11 +80,7 @@ class BankingTable:
     """Bank at these places [rad]; positive if the left side is higher."""
 
     def __post_init__(self) -> None:
-        """Check the points.
-
-        Raises:
-            ManeuverError: they are too few or too many, do not increase, or are steeper than 45 deg.
-        """
+        """Check the points."""
         count = len(self.s_m)
         if count != len(self.bank_rad) or not 2 <= count <= _MAX_POINTS:
             raise ManeuverError(f"has {count} s_m and {len(self.bank_rad)} bank; 2 to {_MAX_POINTS} of each are needed")
@@ -200,11 +192,7 @@ class Road:
     """Beyond the known surface: `extend` its edge, or end the run with an `error`."""
 
     def __post_init__(self) -> None:
-        """Check that no key is without effect.
-
-        Raises:
-            ManeuverError: one is.
-        """
+        """Check that no key is without effect."""
         split = self.patches or self.mu_left is not None or self.mu_right is not None
         if self.along == "path" and not split and not self.is_uneven:
             raise ManeuverError("'path' has no effect without patches, mu_left, mu_right or a surface", key="along")

@@ -61,11 +61,7 @@ class Roughness:
     """Highest spatial frequency [cycles/m]; the tyre swallows shorter waves."""
 
     def __post_init__(self) -> None:
-        """Check the band.
-
-        Raises:
-            ManeuverError: it is empty, or has no wave that fits into the length.
-        """
+        """Check the band."""
         if not max(self.least_1pm, 1.0 / self.length_m) < self.greatest_1pm:
             raise ManeuverError(f"is {self.greatest_1pm:g}, not above least_1pm and 1/length_m", key="greatest_1pm")
 

@@ -25,9 +25,6 @@ def _slips(low: float, high: float) -> np.ndarray:
 def key_figures(params: TyreParameters) -> dict[str, Any]:
     """Return numbers that characterise a tyre, for a table or as JSON.
 
-    Args:
-        params: The tyre.
-
     Returns:
         Identification (`file`, `version`, `fittyp`, `side`, `size`, `nominal_load_N`, `pressure_Pa`,
         `unloaded_radius_m` ...), the ranges of validity, and under `over_load` one list per quantity, in the order of
@@ -119,9 +116,6 @@ _TABLE: Final = (
 
 def describe(params: TyreParameters) -> str:
     """Describe a tyre and its unusual properties as text for a terminal.
-
-    Args:
-        params: The tyre.
 
     Returns:
         Several lines, without a line break at the end.

@@ -44,10 +44,7 @@ class LocalState:
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Take the present state of the vehicle as the reference.
-
-        Args:
-            vehicle: The car, rolling along the world's x axis.
+        """Take the present state of the vehicle, which rolls along the world's x axis, as the reference.
 
         Raises:
             ParameterError: the road is uneven or banked.
@@ -106,11 +103,7 @@ class LocalState:
         )
 
     def write(self, difference: Array) -> None:
-        """Set the vehicle to the reference plus a difference.
-
-        Args:
-            difference: Shape (len(names),).
-        """
+        """Set the vehicle to the reference plus a difference, shape (len(names),)."""
         vehicle = self.vehicle
         data, model = vehicle.data, vehicle.model
         vehicle.restore_state(self._state)

@@ -53,12 +53,7 @@ class RecordedArrays:
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> RawRows:
-        """Return one row as a step fills it, for the present instant and the present inputs; change nothing.
-
-        Args:
-            driver_command: Last command of the driver.
-            actuator_command: Last command of the controller.
-        """
+        """Return one row as a step fills it, for the present instant and the present inputs; change nothing."""
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)

@@ -34,11 +34,6 @@ class WheelSet:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, parameters: VehicleParameters) -> None:
         """Look the wheels up.
 
-        Args:
-            model: The car.
-            data: Its state.
-            parameters: Contents of the vehicle file.
-
         Raises:
             ModelError: the model lacks a part of a wheel.
         """

@@ -29,12 +29,7 @@ _LEAST = 1e-4
 
 
 def car_table(car: Car, result: KcResult) -> str:
-    """Return the text of the table.
-
-    Args:
-        car: The car.
-        result: Result of the rig.
-    """
+    """Return the text of the table."""
     model, config = result.measured.vehicle.model, car.config
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -314,10 +314,6 @@ def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:
 def check_origin(car: Car, given: CarTable) -> None:
     """Check that the vehicle coordinates begin on the road below the front axle.
 
-    Args:
-        car: The car.
-        given: Its table as the user wrote it.
-
     Raises:
         ParameterError: they do not.
     """

@@ -33,10 +33,6 @@ class CornerMotion:
 def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
     """Return the motion of a corner with held chassis and rack, without springs.
 
-    Args:
-        model: The car.
-        corner: Name of the corner.
-
     Raises:
         ModelError: the links do not leave exactly one degree of freedom.
     """

@@ -43,9 +43,6 @@ _MUST_RISE: Final = (
 def check_signs(tests: dict[str, Samples]) -> None:
     """Check the signs of the slopes.
 
-    Args:
-        tests: All tests of an axle.
-
     Raises:
         ParameterError: a slope has the wrong sign.
     """

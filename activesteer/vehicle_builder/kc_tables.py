@@ -99,10 +99,6 @@ class KcTables:
 def read_kc(folder: Path, axles: list[str]) -> KcTables:
     """Read the tests of a folder.
 
-    Args:
-        folder: Folder of the files.
-        axles: The axles that are needed.
-
     Raises:
         ParameterError: there is no such folder, no table in it, or a table is wrong.
     """

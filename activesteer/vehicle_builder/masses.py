@@ -14,11 +14,6 @@ from activesteer.vehicle_builder.design import Car, Log, Solid
 def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
     """Return the chassis of the table, or the rest of the whole car without its other bodies.
 
-    Args:
-        car: The car.
-        model: Model of the car with any chassis.
-        log: Log of the assumptions.
-
     Raises:
         ParameterError: the rest is impossible for a body.
     """

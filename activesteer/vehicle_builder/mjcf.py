@@ -29,12 +29,7 @@ _SHELL = (
 
 
 def mjcf_files(car: Car, trimmed: Trimmed) -> dict[str, str]:
-    """Return the files of the model as name to text; the keyframe is empty.
-
-    Args:
-        car: The car.
-        trimmed: Result of the trim.
-    """
+    """Return the files of the model as name to text; the keyframe is empty."""
     return {
         f"{car.name}.xml": _main(car, trimmed),
         "front_axle.xml": axle_file(car, car.front, trimmed),

@@ -21,13 +21,7 @@ _GUIDED = """  <!-- {words} guide the {axle} axle, a fragment of the chassis bod
 
 
 def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
-    """Return the text of front_axle.xml or rear_axle.xml.
-
-    Args:
-        car: The car.
-        axle: One of its axles.
-        trimmed: Result of the trim.
-    """
+    """Return the text of front_axle.xml or rear_axle.xml."""
     words = axle.kind.name.replace("_", " ")
     lines = [
         "<mujocoinclude>",

@@ -68,11 +68,6 @@ class _Stand:
 def trim(car: Car, write: Write, log: Log) -> Trimmed:
     """Find all values of `Trimmed`, and write the files with them.
 
-    Args:
-        car: The car.
-        write: Function that writes its files.
-        log: Log of the assumptions.
-
     Raises:
         ActiveSteerError: the car cannot stand.
     """

@@ -167,9 +167,6 @@ class HeldCar:
     def equilibrium(self, case: Case) -> None:
         """Move the car from its present position into equilibrium.
 
-        Args:
-            case: Loads and positions that the rig imposes.
-
         Raises:
             ModelError: there is no equilibrium.
         """

@@ -46,10 +46,6 @@ class ChannelMap:
     def __init__(self, model: mujoco.MjModel, parameters: VehicleParameters) -> None:
         """Look up everything by name, once.
 
-        Args:
-            model: The car.
-            parameters: Its parameters.
-
         Raises:
             ModelError: a sensor, tendon or actuator is missing.
         """
