@@ -54,26 +54,37 @@ def main() -> None:
     tables.mkdir(exist_ok=True)
     write_tables(vehicle, tables)
     (tables / "car.toml").write_text(car_table(vehicle), encoding="utf-8")
+    make_car(NAME, tables, "python tools/make_tesla_model_s.py")
+
+
+def make_car(name: str, tables: Path, command: str) -> None:
+    """Make a car of the package from the tables of a rig.
+
+    Args:
+        name: Name of the car.
+        tables: Folder with `car.toml` and the curves.
+        command: Command that repeats this.
+    """
     with tempfile.TemporaryDirectory() as scratch:
-        made = new_vehicle(NAME, folder=Path(scratch) / NAME, kc=tables)
-        mjcf = models_dir() / "mjcf" / NAME
+        made = new_vehicle(name, folder=Path(scratch) / name, kc=tables)
+        mjcf = models_dir() / "mjcf" / name
         mjcf.mkdir(exist_ok=True)
         for file in made.folder.iterdir():
             if file.suffix == ".xml" or file.name == "README.md":
                 shutil.copyfile(file, mjcf / file.name)
         text = made.vehicle_file.read_text(encoding="utf-8").replace(
-            f'mjcf = "{NAME}.xml"', f'mjcf = "{NAME}/{NAME}.xml"'
+            f'mjcf = "{name}.xml"', f'mjcf = "{name}/{name}.xml"'
         )
-        file = models_dir() / "vehicles" / f"{NAME}.toml"
+        file = models_dir() / "vehicles" / f"{name}.toml"
         file.write_text(text, encoding="utf-8")
         print(*made.questions, sep="\n")
-    tell_controllers(file)
+    tell_controllers(file, name, command)
 
 
-def tell_controllers(file: Path) -> None:
+def tell_controllers(file: Path, name: str, command: str) -> None:
     """Write what controllers and estimators know of the car, from its runs, by the rules in the compact's file."""
-    found = identify(NAME)
-    write_identified(file, found, "python tools/make_tesla_model_s.py", datetime.date.today().isoformat())
+    found = identify(name)
+    write_identified(file, found, command, datetime.date.today().isoformat())
     text = file.read_text(encoding="utf-8")
     start = text.index("# Controllers of the compact")
     controllers = re.sub(r"^#.*\n", "", text[start:], flags=re.MULTILINE).replace(

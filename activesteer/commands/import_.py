@@ -1,4 +1,4 @@
-"""`activesteer import FILE -o OUT.mcap`: convert measured data to a recording."""
+"""`activesteer import FILE... -o OUT.mcap`: convert measured data to a recording."""
 
 from __future__ import annotations
 
@@ -16,10 +16,13 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "import",
         help="convert measured data to a recording",
-        description="Reads a CSV, MAT, Parquet or MDF file. Columns become channels in SI units with the signs of ISO "
-        "8855 on a uniform time. Without a map, columns are recognised by the names that exporters write.",
+        description="Reads CSV, MAT, Parquet or MDF files of one run. Columns become channels in SI units with the "
+        "signs of ISO 8855 on a uniform time. Without a map, columns are recognised by the names that exporters write.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help="a .csv, .txt, .mat, .parquet or .mf4 file")
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE",
+        help="a .csv, .txt, .mat, .parquet or .mf4 file, or several of one run, each with its own times",
+    )  # fmt: skip
     parser.add_argument("--map", type=Path, metavar="MAP.toml", help="column and unit of each channel")
     add_vehicle(parser)
     add_output(parser, "OUT.mcap", "the recording (default: FILE.mcap)")
@@ -32,8 +35,8 @@ def _import(options: argparse.Namespace) -> int:
 
     if options.output is not None and options.output.suffix != ".mcap":
         raise ParameterError(f"-o {options.output}: the name of a recording ends in .mcap")
-    output = options.output or options.file.parent / f"{options.file.stem}.mcap"
-    found = import_file(options.file, options.map, options.vehicle)
+    output = options.output or options.files[0].with_suffix(".mcap")
+    found = import_file(options.files, options.map, options.vehicle)
     recording = found.recording
     recording.save(output)
     print_notes(found.notes)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_json, add_output, add_workers
-from activesteer.commands.output import BAD, painted, print_json
+from activesteer.commands.output import BAD, painted, print_json, print_notes
 from activesteer.commands.progress import ProgressBar
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
@@ -26,7 +26,8 @@ def add_to(commands: Any) -> None:
         nargs="?",
         default="sedan",
         metavar="NAME",
-        help="folder in models/reference: sedan, tesla_model_s (default: sedan)",
+        help="a car of the package: sedan, tesla_model_s, bmw_m8 (default: sedan); or a folder with measured runs and "
+        "a validation.toml",
     )
     add_output(parser, "DIR", "folder for page, JSON and runs (default: no files)")
     parser.add_argument(
@@ -49,14 +50,19 @@ def add_to(commands: Any) -> None:
 
 def _validate(options: argparse.Namespace) -> int:
     from activesteer.validation.measured_circle import is_measured
+    from activesteer.validation.measured_file import measured_folder
 
-    measured = is_measured(options.name)
-    for name in ("reference", "study", "timestep") if measured else ("samples",):
-        if getattr(options, name):
-            other = "another code" if measured else "a measurement on the road"
+    circle, folder = is_measured(options.name), measured_folder(options.name)
+    code = not circle and folder is None
+    belongs = {"reference": (code, "another code"), "study": (code, "another code"), "timestep": (code, "another code"),
+               "samples": (circle, "a measured circle")}  # fmt: skip
+    for name, (allowed, other) in belongs.items():
+        if getattr(options, name) and not allowed:
             raise ParameterError(f"belongs to a comparison with {other}; {options.name} is none", key=f"--{name}")
-    if measured:
+    if circle:
         return _circle(options)
+    if folder is not None:
+        return _measured(options, folder)
     from activesteer.validation import to_json, validate
     from activesteer.validation.programme import write_json, write_runs
     from activesteer.validation.study import as_text
@@ -113,6 +119,26 @@ def _circle(options: argparse.Namespace) -> int:
         print(result.text())
     if options.output is not None:
         page = write_circle_page(result, options.output / "validation.html")
+        if not options.json:
+            print(f"page: {page}")
+    return 0 if result.inside else 1
+
+
+def _measured(options: argparse.Namespace, folder: Path) -> int:
+    from activesteer.validation.measured_file import read_measured
+    from activesteer.validation.measured_folder import validate_measured
+    from activesteer.validation.measured_page import measured_text, write_measured_page
+
+    file = read_measured(folder)
+    with ProgressBar("validate", quiet=options.json) as bar:
+        result = validate_measured(file, options.jobs, scheduler=options.scheduler, progress=bar)
+    print_notes(result.notes)
+    if options.json:
+        print_json(result.to_json())
+    else:
+        print(measured_text(result))
+    if options.output is not None:
+        page = write_measured_page(result, options.output / "validation.html")
         if not options.json:
             print(f"page: {page}")
     return 0 if result.inside else 1

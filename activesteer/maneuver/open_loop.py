@@ -44,6 +44,9 @@ class OpenLoop(Maneuver):
     """CSV file with the column time_s and any of the columns fl_drive_Nm ... rr_brake_Nm."""
     drive: DriveMode = "hold_speed"
     """`hold_speed` or `coast`; with wheel torques it holds only before the recording starts."""
+    sensor_ahead_m: float = 0.0
+    """Position of the sensors of a repeated measurement, ahead of the centre of gravity [m]: `fit`, `compare` and
+    `validate` use the motion there."""
     hold_last: bool = False
     """Whether steering or wheel torques that end before `duration_s` keep their last value; a single value always
     does."""
@@ -95,7 +98,8 @@ class OpenLoop(Maneuver):
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Values of the tables; see the base class."""
-        value = _interpolate(time_s, self.steering.time_s, self.steering.values)
+        steering = self.steering
+        value = steering.factor * _interpolate(time_s - steering.delay_s, steering.time_s, steering.values)
         angle, rack = (value, None) if self.steering.rack_m is None else (0.0, value)
         if self.wheel_torques is not None:
             return Setpoint(angle, self.speed_mps, 0.0, False, None, rack, self._torques(self.wheel_torques, time_s))

@@ -36,6 +36,10 @@ class SteeringTable:
     """Angles, left positive [rad]. Default: zero, if no rack positions are given."""
     rack_m: tuple[float, ...] | None = None
     """Rack positions from the centre instead of angles, positive steers left [m]."""
+    factor: float = 1.0
+    """Scale of the column, for a recorded signal with a scale of its own."""
+    delay_s: float = 0.0
+    """Time by which the column comes later, for a recorded signal with a clock of its own [s]."""
 
     def __post_init__(self) -> None:
         """Check that times come with one of the two columns.

@@ -7,7 +7,7 @@ must contain the measurement. The first uses cross plots over the lateral accele
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from activesteer.conventions import Array
 from activesteer.display_units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.measured.alignment import time_shift
+from activesteer.measured.motion import at_sensor
 from activesteer.measured.noise import FILTERS, allowance, filter_table, smooth
 from activesteer.recording import Recording
 
@@ -165,6 +166,8 @@ def compare(
     *,
     filtered: str = "iso15037",
     noise: bool = True,
+    tolerances: Mapping[str, Tolerance] = TOLERANCES,
+    aligned: bool = True,
 ) -> Comparison:
     """Compare measured runs of a manoeuvre with its simulation.
 
@@ -174,18 +177,21 @@ def compare(
         standard: Key of `STANDARDS`.
         filtered: Key of `FILTERS`; the filter is applied alike to both sides.
         noise: Whether to widen the corridor by the noise that remains in the measurement, estimated from it.
+        tolerances: Channel that is compared -> its tolerance.
+        aligned: Whether to find the time shift; else the runs share a clock.
 
     Raises:
         RecordingError: the runs share no channel or no time.
     """
-    names = [name for name in TOLERANCES if all(name in run for run in (*measured, simulated))]
+    simulated = at_sensor(simulated)
+    names = [name for name in tolerances if all(name in run for run in (*measured, simulated))]
     if standard == "iso19364" and _ACROSS not in names:
         raise RecordingError(f"cross plots need {_ACROSS} in every run", value=_ACROSS)
     if not names:
         raise RecordingError(
-            f"the runs have none of the compared channels: {', '.join(TOLERANCES)}", allowed=tuple(TOLERANCES)
+            f"the runs have none of the compared channels: {', '.join(tolerances)}", allowed=tuple(tolerances)
         )
-    shifts = tuple(time_shift(run, simulated) for run in measured)
+    shifts = tuple(time_shift(run, simulated) if aligned else 0.0 for run in measured)
     made_up = [0.0 if math.isnan(shift) else shift for shift in shifts]
     start = max(simulated.time_s[0], *(run.time_s[0] - shift for run, shift in zip(measured, made_up, strict=True)))
     end = min(simulated.time_s[-1], *(run.time_s[-1] - shift for run, shift in zip(measured, made_up, strict=True)))
@@ -218,14 +224,28 @@ def compare(
         across = mean_of(_ACROSS)[0]
         found = [
             _crossed(
-                name, across, *mean_of(name), simulated_of(_ACROSS), simulated_of(name), allowed[_ACROSS], allowed[name]
+                name,
+                tolerances,
+                across,
+                *mean_of(name),
+                simulated_of(_ACROSS),
+                simulated_of(name),
+                allowed[_ACROSS],
+                allowed[name],
             )
             for name in names
             if name not in (_ACROSS, "speed_mps")
         ]
     else:
         found = [
-            _timed(name, time_s, *mean_of(name), np.interp(time_s, simulated.time_s, simulated_of(name)), allowed[name])
+            _timed(
+                name,
+                tolerances[name],
+                time_s,
+                *mean_of(name),
+                np.interp(time_s, simulated.time_s, simulated_of(name)),
+                allowed[name],
+            )
             for name in names
         ]
     return Comparison(standard, shifts, tuple(found), filtered, tuple(problems))
@@ -241,8 +261,9 @@ def _confidence(values: Array) -> Array:
     return t.ppf(0.975, count - 1) * values.std(axis=0, ddof=1) / math.sqrt(count)
 
 
-def _timed(name: str, time_s: Array, measured: Array, confidence: Array, simulated: Array, noise: float) -> Compared:
-    tolerance = TOLERANCES[name]
+def _timed(
+    name: str, tolerance: Tolerance, time_s: Array, measured: Array, confidence: Array, simulated: Array, noise: float
+) -> Compared:
     low, high = corridor(time_s, simulated, tolerance.width(simulated) + noise)
     within = (measured >= low) & (measured <= high)
     return Compared(name, tolerance, time_s, measured, confidence, simulated, low, high, within, noise)
@@ -250,6 +271,7 @@ def _timed(name: str, time_s: Array, measured: Array, confidence: Array, simulat
 
 def _crossed(
     name: str,
+    tolerances: Mapping[str, Tolerance],
     across: Array,
     measured: Array,
     confidence: Array,
@@ -259,11 +281,11 @@ def _crossed(
     noise: float,
 ) -> Compared:
     """Compare in a cross plot: inside is a point in the ellipse of both tolerances around a point of the curve."""
-    tolerance = TOLERANCES[name]
+    tolerance = tolerances[name]
     rows = np.unique(np.linspace(0, len(across) - 1, min(len(across), _CROSS_POINTS)).astype(int))
     curve = np.unique(np.linspace(0, len(sim_across) - 1, min(len(sim_across), _CROSS_POINTS)).astype(int))
     x, y, px, py = across[rows], measured[rows], sim_across[curve], sim_values[curve]
-    width_x, width_y = TOLERANCES[_ACROSS].width(px) + noise_across, tolerance.width(py) + noise
+    width_x, width_y = tolerances[_ACROSS].width(px) + noise_across, tolerance.width(py) + noise
     distance = ((x[:, None] - px) / width_x) ** 2 + ((y[:, None] - py) / width_y) ** 2
     nearest = distance.argmin(axis=1)
     within = distance[np.arange(len(x)), nearest] <= 1.0

@@ -24,6 +24,8 @@ class FitTable:
     """Start of the compared part of the recordings [s]; inputs are driven from the first row."""
     until_s: float | None = None
     """End of the compared part [s]."""
+    windows: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    """Recording -> its own start and end of the compared part [s]."""
     intervals: Literal["residuals", "noise"] = "residuals"
     """Basis of the intervals: the final residuals with their autocorrelation, or the stated `noise`."""
 

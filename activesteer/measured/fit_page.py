@@ -56,9 +56,9 @@ def _page(found: Fit, name: str) -> Page:
         "as stated."
     ]
     lead += [Markup('<span class="failed">{}.</span>').format(note[0].upper() + note[1:]) for note in found.notes]
-    sections = [Section(tables=[_parameters(found)])]
+    sections = [Section(tables=[parameter_table(found)])]
     if len(found.parameters) > 1:
-        sections.append(Section("Correlation of their errors", tables=[_correlations(found)]))
+        sections.append(Section("Correlation of their errors", tables=[correlation_table(found)]))
     columns = [
         "recording", "channel", "stated noise", "rms at the start", "rms at the end", "samples", "independent samples",
     ]  # fmt: skip
@@ -71,7 +71,8 @@ def _page(found: Fit, name: str) -> Page:
     return Page(f"activesteer fit: {name}", f"Parameters from recordings: {name}", lead, sections)
 
 
-def _parameters(found: Fit) -> Table:
+def parameter_table(found: Fit) -> Table:
+    """Return the table of the parameters, with intervals."""
     rows = [
         (
             Markup('{}<br><code class="key">{}</code>').format(parameter_title(one.key), one.key),
@@ -83,7 +84,8 @@ def _parameters(found: Fit) -> Table:
     return Table("", ["parameter", "value and 95 % interval", "at the start", "range"], rows, outside)
 
 
-def _correlations(found: Fit) -> Table:
+def correlation_table(found: Fit) -> Table:
+    """Return the table of the correlations of the parameters' errors."""
     rows = [
         (f"{number} {parameter_title(one.key)}", *("-" if math.isnan(value) else f"{value:+.3f}" for value in values))
         for number, (one, values) in enumerate(zip(found.parameters, found.correlations, strict=True), start=1)

@@ -19,6 +19,7 @@ from activesteer.measured.fit_file import FitTable, read_fit
 from activesteer.measured.fit_result import Compared, Fit, Parameter, notes_of
 from activesteer.measured.intervals import intervals, told_apart, without_effect
 from activesteer.measured.least_squares import AT_END, Answer, Found, search
+from activesteer.measured.motion import at_sensor
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
 from activesteer.scenario.recorded_inputs import led, open_loop_of
@@ -31,7 +32,7 @@ from activesteer.studies.engine.study_file import StudyFile
 from activesteer.studies.engine.task_queue import TaskQueue
 from activesteer.studies.engine.workers import Workers, workers_for
 
-_SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
+SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
 """Gains that hold the recorded speed to 0.1 %, unless the study sets them. A driver's gains leave 0.3 %, which the fit
 would attribute to the car."""
 
@@ -88,7 +89,7 @@ class _Problem:
     def __init__(self, study: StudyFile, table: FitTable) -> None:
         recordings = [Recording.open(Path(str(path))) for path in study.maneuvers]
         names = [label_of(path) for path in study.maneuvers]
-        held = _SPEED_HOLD if is_driver_file(study.driver) else {}
+        held = SPEED_HOLD if is_driver_file(study.driver) else {}
         known = {key: value for key, value in held.items() if key not in study.keys} | study.overrides
         inputs = open_loop_of(recordings[0], names[0])
         first = resolve(inputs, study.vehicles[0], known, study.driver, study.controllers)
@@ -231,6 +232,7 @@ def drive(
         run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)
     except ActiveSteerError as error:
         return str(error)
+    run = at_sensor(run)
     return {name: np.interp(time_s, run.time_s, run[name]) for name in channels}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -65,13 +65,18 @@ class _Source(NamedTuple):
     column: Column
     known: Known
     given: ChannelMap | None
+    file: Path
 
 
-def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compact") -> Import:
-    """Read a file of measured data.
+_Files = Mapping[Path, list[Column]]
+"""File -> its columns."""
+
+
+def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehicle: str = "compact") -> Import:
+    """Read one or several files of measured data of one run.
 
     Args:
-        path: CSV, MAT, Parquet or MDF.
+        path: CSV, MAT, Parquet or MDF; several files may have times of their own.
         map_path: Map file; without it, columns are recognised by their names.
         vehicle: Car that represents the measured one in replay.
 
@@ -83,9 +88,12 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
         ActiveSteerError: there is no such vehicle.
     """
     chosen = read_map(map_path)
-    columns = read_columns(path)
-    names = {column.name for column in columns}
-    repeated = [name for name in names if second_of(name) in names]
+    paths = [path] if isinstance(path, Path) else list(path)
+    path = paths[0]
+    files = {file: read_columns(file) for file in paths}
+    _check_shifts(chosen, paths)
+    every = [{column.name for column in columns} for columns in files.values()]
+    repeated = [name for names in every for name in names if second_of(name) in names]
     car = load_car(vehicle)
     model = car.on(Road())
     table = {channel.name: channel for channel in model.channels.channels}
@@ -95,10 +103,11 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
     ]
     if len(repeated) > _MOST_REPEATED:
         notes.append(f"{len(repeated) - _MOST_REPEATED} more names stand over several columns each")
-    sources = _mapped(chosen, columns, table, path) if chosen.channels else _by_name(columns, table, path, notes)
-    shared = _shared_time(columns, chosen, path, needed=any(_own_time(source) is None for source in sources.values()))
+    sources = _mapped(chosen, files, table) if chosen.channels else _by_name(files, table, notes)
+    shared = _shared_times(files, chosen, sources)
     signals = {
-        name: _signal(name, _si_unit(name, table), source, shared, chosen, path) for name, source in sources.items()
+        name: _signal(name, _si_unit(name, table), source, shared[source.file], chosen)
+        for name, source in sources.items()
     }
     grid_s, step_s = _grid(signals, chosen, path)
     start_s = float(grid_s[0])
@@ -127,8 +136,8 @@ def import_file(path: Path, map_path: Path | None = None, vehicle: str = "compac
         "vehicle": {"name": "measured"},
         "controller": "measured",
         "measured": {
-            "file": path.name, "columns": taken, "axes": chosen.axes, "notes": notes, "shown_as": vehicle,
-            "time_offset_s": start_s,
+            "file": ", ".join(file.name for file in paths), "columns": taken, "axes": chosen.axes, "notes": notes,
+            "shown_as": vehicle, "time_offset_s": start_s,
         },
         "versions": {"activesteer": __version__},
     }  # fmt: skip
@@ -151,9 +160,24 @@ def _words(source: _Source) -> str:
     return name if split_unit(name)[1] == unit else f"{name} [{unit}]"
 
 
-def _mapped(
-    chosen: MeasurementMap, columns: list[Column], table: Mapping[str, Channel], path: Path
-) -> dict[str, _Source]:
+def _check_shifts(chosen: MeasurementMap, paths: Sequence[Path]) -> None:
+    """Refuse a time shift of a file that is not imported."""
+    names = [path.name for path in paths]
+    for name in chosen.shift_s:
+        if name not in names:
+            raise RecordingError(f"is no imported file; {nearest_names(name, names)}", key=f"shift_s.{name}")
+
+
+def _found(name: str, files: _Files) -> tuple[Column, Path]:
+    """Return the column with a name, and its file."""
+    having = [path for path, columns in files.items() if any(column.name == name for column in columns)]
+    if len(having) > 1:
+        raise RecordingError(f"column {shown(name)} is in {' and in '.join(path.name for path in having)}; rename one")
+    file = having[0] if having else next(iter(files))
+    return find(files[file] if having else [each for columns in files.values() for each in columns], name, file), file
+
+
+def _mapped(chosen: MeasurementMap, files: _Files, table: Mapping[str, Channel]) -> dict[str, _Source]:
     """Return the sources of channels by the map."""
     sources = {}
     for name, given in chosen.channels.items():
@@ -162,18 +186,19 @@ def _mapped(
                 f"is a channel in another unit; name it {field_in_unit(name, table)[0]} and give `unit`",
                 key=f"channels.{name}",
             )
-        column = find(columns, given.column, path)
-        known = Known(name, given.unit or column.unit or _si_unit(name, table), given.sign)
-        sources[name] = _Source(column, known, given)
+        column, file = _found(given.column, files)
+        known = Known(name, given.unit or column.unit or _si_unit(name, table), given.sign * given.factor)
+        sources[name] = _Source(column, known, given, file)
     return sources
 
 
-def _by_name(columns: list[Column], table: Mapping[str, Channel], path: Path, notes: list[str]) -> dict[str, _Source]:
+def _by_name(files: _Files, table: Mapping[str, Channel], notes: list[str]) -> dict[str, _Source]:
     """Return the sources of channels by the names of columns."""
-    names = {column.name for column in columns}
+    every = [(path, column) for path, columns in files.items() for column in columns]
+    names = {column.name for _, column in every}
     channels = [*table, "brake_pedal"]
     sources: dict[str, _Source] = {}
-    for column in columns:
+    for path, column in every:
         known = known_column(column.name, names, channels)
         if known is None:
             if (base := before_bracket(column.name)) and known_column(base, names, channels) is not None:
@@ -190,11 +215,12 @@ def _by_name(columns: list[Column], table: Mapping[str, Channel], path: Path, no
             unit = _si_unit(known.channel, table)
             if unit and not known.sure:
                 notes.append(f"{column.name} has no unit; {unit} is assumed (a map can set another)")
-        sources[known.channel] = _Source(column, known._replace(unit=unit), None)
+        sources[known.channel] = _Source(column, known._replace(unit=unit), None, path)
     if not sources:
         some = ", ".join(shown(name) for name in sorted(names)[:8])
         raise RecordingError(
-            f"no column has a known name (there are {some}); describe the columns in a map: --map", file=path.name
+            f"no column has a known name (there are {some}); describe the columns in a map: --map",
+            file=", ".join(path.name for path in files),
         )
     return sources
 
@@ -209,21 +235,29 @@ def _own_time(source: _Source) -> Array | None:
     return source.column.read()[1]
 
 
-def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, needed: bool) -> Array | None:
-    """Return the times that columns without own times share [s]."""
-    if not needed:
-        if chosen.time:
-            raise RecordingError("every column has its own time; leave this key out", key="time", value=chosen.time)
-        return None
-    if chosen.time:
+def _shared_times(files: _Files, chosen: MeasurementMap, sources: Mapping[str, _Source]) -> dict[Path, Array | None]:
+    """Return the times that the columns of each file without own times share [s]."""
+    needing = {source.file for source in sources.values() if _own_time(source) is None}
+    if chosen.time and not needing:
+        raise RecordingError("every column has its own time; leave this key out", key="time", value=chosen.time)
+    named = [path for path in needing if any(column.name == chosen.time for column in files[path])]
+    return {
+        path: _shared_time(columns, chosen, path, named=path in named or not named) if path in needing else None
+        for path, columns in files.items()
+    }
+
+
+def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, named: bool) -> Array:
+    """Return the times of a file [s]; of several files, `time` of the map may name the column of some."""
+    if chosen.time and named:
         column = find(columns, chosen.time, path)
     else:
-        named = [column for column in columns if is_time(column.name)]
-        if len(named) != 1:
-            what = "no column is named like a time" if not named else "several columns are named like times"
+        times = [column for column in columns if is_time(column.name)]
+        if len(times) != 1:
+            what = "no column is named like a time" if not times else "several columns are named like times"
             words = nearest_names("time", [column.name for column in columns])
             raise RecordingError(f"{what}: {words}; name it in a map: time = NAME", file=path.name)
-        column = named[0]
+        column = times[0]
     unit = chosen.time_unit or column.unit or known_time_unit(column.name)
     found = si_of(unit)
     if found is None or found[0] != "s":
@@ -237,11 +271,9 @@ def known_time_unit(name: str) -> str:
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 
 
-def _signal(
-    name: str, wanted: str, source: _Source, shared: Array | None, chosen: MeasurementMap, path: Path
-) -> Samples:
+def _signal(name: str, wanted: str, source: _Source, shared: Array | None, chosen: MeasurementMap) -> Samples:
     """Return the samples of a channel, in SI units and with the signs of ISO 8855."""
-    column, known, given = source
+    column, known, given, path = source
     found = si_of(known.unit)
     if found is None or found[0] != wanted:
         raise RecordingError(
@@ -254,7 +286,8 @@ def _signal(
     values, own = column.read()
     time_s = own if own is not None else shared
     assert time_s is not None
-    signal = samples(column.name, np.asarray(time_s, np.float64), values, path.name)
+    shift_s = chosen.shift_s.get(path.name, 0.0)
+    signal = samples(column.name, np.asarray(time_s, np.float64) + shift_s, values, path.name)
     inside = np.ones(len(signal.time_s), bool)
     if chosen.start_s is not None:
         inside &= signal.time_s >= chosen.start_s

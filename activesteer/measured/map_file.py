@@ -20,8 +20,10 @@ class ChannelMap:
     """Unit of the column; by default that of the file, or SI."""
     sign: Literal[1, -1] = 1
     """-1 if the sign of the column is opposite to ISO 8855 (or `axes`)."""
+    factor: Annotated[float, Range(1e-12)] = 1.0
+    """Scale of the column, for a signal in a unit of its own: `factor` x column has the unit."""
     offset: float = 0.0
-    """Offset added to the column, in its unit."""
+    """Offset added to the column, in its unit, before the scale."""
     zero_until_s: Annotated[float, Range(0.0)] | None = None
     """The mean of the column before this time is subtracted."""
 
@@ -35,9 +37,11 @@ class MeasurementMap:
     axes: Literal["iso8855", "sae_j670"] = "iso8855"
     """Axes of the file: SAE J670 has y to the right and z down."""
     time: str = ""
-    """Name of the time column; recognised by its name by default."""
+    """Name of the time column; recognised by its name by default, as in further files without this column."""
     time_unit: str = ""
     """Unit of the time; by default that of the file, or s."""
+    shift_s: dict[str, float] = field(default_factory=dict)
+    """File -> time to add to its clock, if several files have clocks of their own [s]."""
     step_s: Annotated[float, Range(1e-4, 1.0)] | None = None
     """Step of the recording; that of the file by default."""
     max_gap_s: Annotated[float, Range(0.0)] = 0.1

@@ -26,6 +26,9 @@ _LONGEST_STEP_S: Final = 1.0
 _STEER_RANGE: Final = (0.001, 0.15)
 """Plausible yaw rate over speed and steering wheel angle [1/m]. The value 1/(wheelbase x ratio) is 0.02, divided by 1
 + (v/v_ch)^2, and less at the limit. Degrees taken as radians are off by a factor of 57."""
+_SHORTEST_M: Final = 2.4
+"""Wheelbase of a short car [m]. With the angle of the road wheels, yaw rate over speed and angle is 1/wheelbase in a
+neutral car and less in one that understeers."""
 _FASTEST_RADPS: Final = 4.0
 """Yaw rate that no car on its wheels reaches [rad/s]."""
 
@@ -37,9 +40,8 @@ def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]
         channels: Values by channel name, SI, of equal length.
         step_s: Time between two values [s].
     """
-    speed, rate, ay, wheel = (
-        channels.get(name) for name in ("speed_mps", "yaw_rate_radps", "ay_mps2", "steering_wheel_rad")
-    )
+    rate, ay, wheel = (channels.get(name) for name in ("yaw_rate_radps", "ay_mps2", "steering_wheel_rad"))
+    speed = channels.get("speed_mps", channels.get("vx_mps"))
     found: list[str] = []
     if step_s >= _LONGEST_STEP_S:
         found.append(f"the time has steps of {step_s:g} s: it looks like ms or us that were taken as s (time_unit)")
@@ -113,6 +115,13 @@ def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:
         return [
             f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
             "steering_wheel_rad looks like deg that were taken as rad"
+        ]
+    if gain > 1.0 / _SHORTEST_M:
+        return [
+            f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
+            "steering_wheel_rad is too small even for the angle of the road wheels (0.1 to 0.4); it looks like rad "
+            "that were taken as deg (0.2 to 1.7), or has a scale of its own: give its `factor` in a map, or fit "
+            "steering.factor"
         ]
     if gain > _STEER_RANGE[1]:
         return [

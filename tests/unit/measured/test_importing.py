@@ -282,7 +282,8 @@ def test_gaps_are_bridged_as_long_as_the_map_allows(tmp_path):
         ({"yaw_rate_radps": -1.0}, "yaw_rate_radps is positive to the right"),
         ({"steering_wheel_rad": -1.0}, "steering_wheel_rad and yaw_rate_radps are of opposite sign"),
         ({"steering_wheel_rad": math.degrees(1.0)}, "deg that were taken as rad"),
-        ({"steering_wheel_rad": 1.0 / 16.0}, "angle of the road wheels"),
+        ({"steering_wheel_rad": 1.0 / 16.0}, "angle of the road wheels, or"),
+        ({"steering_wheel_rad": 1.0 / 48.0}, "has a scale of its own: give its `factor`"),
     ],
 )
 def test_a_wrong_unit_or_sign_is_suspected_in_one_line(factors, said):
@@ -334,3 +335,33 @@ def test_a_map_that_names_what_is_not_there_is_an_error(tmp_path):
         with pytest.raises(RecordingError) as caught:
             import_file(path, tmp_path / "map.toml")
         assert said in str(caught.value)
+
+
+def test_several_files_with_clocks_of_their_own_are_one_recording(tmp_path):
+    late = np.sort(np.append(TIME_S + 0.003 * np.sin(40.0 * TIME_S), TIME_S[5]))  # irregular, and one time twice
+    car = write(tmp_path / "car.csv", "car_time,r,vel", [late, np.interp(late, TIME_S, RATE_RADPS), 0.0 * late + 20.0])
+    driver = write(tmp_path / "driver.csv", "time,hand", [TIME_S - 0.5, WHEEL_RAD / 28.0])
+    text = """time = "car_time"
+shift_s = { "driver.csv" = 0.5 }
+[channels]
+steering_wheel_rad = { column = "hand", factor = 28.0 }
+yaw_rate_radps = { column = "r" }
+speed_mps = { column = "vel" }
+"""
+    (tmp_path / "map.toml").write_text(text)
+    found = import_file([car, driver], tmp_path / "map.toml")
+    run = found.recording
+    assert [note for note in found.notes if "time begins" not in note] == []
+    offset = run.metadata["measured"]["time_offset_s"]
+    np.testing.assert_allclose(run["steering_wheel_rad"], np.interp(run.time_s + offset, TIME_S, WHEEL_RAD), atol=1e-4)
+    inside = run.time_s + offset <= TIME_S[-1] - 0.02
+    np.testing.assert_allclose(
+        run["yaw_rate_radps"][inside], np.interp(run.time_s + offset, TIME_S, RATE_RADPS)[inside], atol=1e-4
+    )
+    (tmp_path / "map.toml").write_text(text.replace("driver.csv", "drivers.csv"))
+    with raises(RecordingError, key="shift_s.drivers.csv"):
+        import_file([car, driver], tmp_path / "map.toml")
+    write(driver, "time,r", [TIME_S, WHEEL_RAD])
+    (tmp_path / "map.toml").write_text('time = "car_time"\n[channels]\nyaw_rate_radps = { column = "r" }\n')
+    with pytest.raises(RecordingError, match=r"column 'r' is in car.csv and in driver.csv"):
+        import_file([car, driver], tmp_path / "map.toml")

@@ -1,0 +1,337 @@
+"""Validation of a car against the measured runs of a folder: predicted, fitted, checked.
+
+The *prediction* uses the vehicle file; of the factors, only those in `predict.factors` are free. The *fit* frees all
+factors. Both see the fit windows alone and are judged in the check windows. The band around the prediction contains
+the curves with each interval at either end, after `predict.factors` were found again; effects of several intervals
+are added.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.analysis.series import rms
+from activesteer.config import field_in_unit
+from activesteer.conventions import Array
+from activesteer.errors import ParameterError, RecordingError, StudyError
+from activesteer.measured.comparison import Compared, assumptions, compare
+from activesteer.measured.fit_result import Fit
+from activesteer.measured.fitting import SPEED_HOLD, fit
+from activesteer.measured.importing import import_file
+from activesteer.recording import Recording
+from activesteer.simulation.runner import simulate
+from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.validation.measured_file import MeasuredFile, RunTable
+
+PARTS: Final = ("fit", "check")
+_LEAST_SAMPLES: Final = 10
+
+
+class Part(NamedTuple):
+    """Comparison of one channel in one window.
+
+    Attributes:
+        run: Name of the run.
+        part: One of `PARTS`.
+        stage: `predicted` or `fitted`.
+        compared: The comparison.
+    """
+
+    run: str
+    part: str
+    stage: str
+    compared: Compared
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values, SI."""
+        return {"run": self.run, "part": self.part, "stage": self.stage, **self.compared.to_json()}
+
+
+class End(NamedTuple):
+    """Effect of an interval.
+
+    Attributes:
+        key: Key of the value.
+        source: Where its ends come from.
+        ends: The ends.
+        found: Values of the free factors of the prediction at either end.
+        effect: Channel -> rms of its change in the check windows at the end that changes it more, SI.
+    """
+
+    key: str
+    source: str
+    ends: tuple[float, ...]
+    found: tuple[dict[str, float], ...]
+    effect: dict[str, float]
+
+
+class Band(NamedTuple):
+    """Band around the prediction in a check window.
+
+    Attributes:
+        part: The prediction.
+        low: Lower edge, without the tolerance, shape (n,).
+        high: Upper edge.
+    """
+
+    part: Part
+    low: Array
+    high: Array
+
+    @property
+    def share_inside(self) -> float:
+        """Proportion of the measured samples in the band, widened by the noise."""
+        one = self.part.compared
+        return float(np.mean((one.measured >= self.low - one.noise) & (one.measured <= self.high + one.noise)))
+
+    @property
+    def width(self) -> float:
+        """Mean width, SI."""
+        return float(np.mean(self.high - self.low))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values, SI."""
+        channel = self.part.compared.channel
+        return {"run": self.part.run, "channel": channel, "width": self.width, "share_inside": self.share_inside}
+
+
+@dataclass(frozen=True)
+class MeasuredValidation:
+    """Result of a validation against measured runs.
+
+    Attributes:
+        file: The checked file.
+        predicted: Fit of the free factors of the prediction; None if nothing is free.
+        fitted: Fit of all factors; None without further factors.
+        parts: The comparisons.
+        bands: Bands around the prediction; empty without intervals.
+        ends: Effect of each interval.
+        notes: What the import noted, by run.
+        assumptions: What was assumed, by the file and by the method.
+    """
+
+    file: MeasuredFile
+    predicted: Fit | None
+    fitted: Fit | None
+    parts: tuple[Part, ...]
+    bands: tuple[Band, ...]
+    ends: tuple[End, ...]
+    notes: tuple[str, ...]
+    assumptions: tuple[str, ...]
+
+    @property
+    def judged(self) -> list[Part]:
+        """Comparisons that decide: the last stage, in the check windows."""
+        stage = "predicted" if self.fitted is None else "fitted"
+        return [one for one in self.parts if one.stage == stage and one.part == "check"]
+
+    @property
+    def inside(self) -> bool:
+        """True if every quantity of the last stage is inside its tolerance in the check windows."""
+        return all(one.compared.inside for one in self.judged)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values, SI."""
+        return {
+            "vehicle": self.file.table.vehicle, "title": self.file.table.title, "inside": self.inside,
+            "predicted": None if self.predicted is None else self.predicted.to_json(),
+            "fitted": None if self.fitted is None else self.fitted.to_json(),
+            "quantities": [one.to_json() for one in self.parts],
+            "box": [band.to_json() for band in self.bands],
+            "intervals": [end._asdict() for end in self.ends],
+            "notes": list(self.notes), "assumptions": list(self.assumptions),
+        }  # fmt: skip
+
+
+def validate_measured(
+    file: MeasuredFile,
+    jobs: int | None = None,
+    *,
+    scheduler: str | None = None,
+    progress: Callable[[float, str], None] = lambda _share, _what: None,
+) -> MeasuredValidation:
+    """Predict, fit and check a car against measured runs.
+
+    Args:
+        file: The checked file.
+        jobs: Number of processes; by default the number of processors.
+        scheduler: Address of a Dask scheduler.
+        progress: Called with the finished fraction and the name of the step.
+
+    Returns:
+        The result.
+
+    Raises:
+        ActiveSteerError: a file cannot be imported, a window lies outside its run, or a run failed.
+    """
+    free = [factor.key for factor in file.factors if factor.key in file.table.predict.factors]
+    with tempfile.TemporaryDirectory() as scratch:
+        progress(0.0, "import")
+        case = _Case(file, Path(scratch))
+        progress(0.1, "prediction")
+        predicted = case.fit(free, case.predict_channels, {}, jobs, scheduler)
+        known = {} if predicted is None else predicted.overrides
+        stages = {"predicted": case.runs(known)}
+        parts = case.parts("predicted", stages["predicted"])
+        fitted = None
+        if len(file.factors) > len(free):
+            progress(0.3, "fit")
+            fitted = case.fit([factor.key for factor in file.factors], tuple(file.noise), known, jobs, scheduler)
+            assert fitted is not None
+            stages["fitted"] = case.runs(fitted.overrides)
+            parts += case.parts("fitted", stages["fitted"])
+        calls = [(case, free, known, key, end) for key, each in file.table.intervals.items() for end in each.ends]
+        beside = in_parallel(
+            _at_end, calls, jobs, lambda _, done: progress(0.5 + 0.5 * done / len(calls), "band"), scheduler=scheduler
+        )
+    checked = [one for one in parts if one.part == "check" and one.stage == "predicted"]
+    bands, ends = _bands(file, checked, beside)
+    method = [*case.assumptions, "The measured steering and speed are driven again; their errors are in the residuals."]
+    if ends:
+        method.append("Effects of several intervals add up in the band; each is taken at its two ends only.")
+    return MeasuredValidation(
+        file, predicted, fitted, tuple(parts), bands, ends, case.notes, (*file.table.assumptions, *method)
+    )
+
+
+class _Case:
+    """Imported runs, and the car that repeats them."""
+
+    def __init__(self, file: MeasuredFile, scratch: Path) -> None:
+        self._file, self._scratch = file, scratch
+        self._recordings: dict[str, Recording] = {}
+        self._offsets: dict[str, float] = {}
+        notes = []
+        for number, run in enumerate(file.table.runs):
+            try:
+                found = import_file(
+                    [file.folder / name for name in run.files], file.folder / run.map if run.map else None
+                )
+            except RecordingError as reason:
+                raise RecordingError(
+                    f"run {run.name}: {reason.problem}", file=reason.file, line=reason.line, key=reason.key
+                ) from reason
+            found.recording.save(scratch / f"{run.name}.mcap")
+            self._recordings[run.name] = found.recording
+            self._offsets[run.name] = float(found.recording.metadata["measured"]["time_offset_s"])
+            self._check_windows(run, number)
+            notes += [f"{run.name}: {note}" for note in found.notes]
+        self.notes = tuple(notes)
+        self.assumptions: tuple[str, ...] = ()
+        self.predict_channels = file.predict_channels
+
+    def _check_windows(self, run: RunTable, number: int) -> None:
+        recording, offset = self._recordings[run.name], self._offsets[run.name]
+        first, last = offset + recording.time_s[0], offset + recording.time_s[-1]
+        for key, window in (("fit_s", run.fit_s), ("check_s", run.check_s)):
+            if window and (window[0] < first - 0.01 or window[1] > last + 0.01):
+                raise self._file.source.fail(
+                    ("runs", str(number), key),
+                    f"{list(window)} s is not inside the imported part, {first:.2f} to {last:.2f} s", window,
+                )  # fmt: skip
+        for channel in self._file.tolerances:
+            if channel not in recording:
+                key = next(key for key in self._file.table.quantities if field_in_unit(key, (channel,))[0])
+                raise self._file.source.fail(("quantities", key), f"run {run.name} has no such channel", channel)
+
+    def fit(
+        self,
+        keys: list[str],
+        channels: tuple[str, ...],
+        start: Mapping[str, Any],
+        jobs: int | None,
+        scheduler: str | None,
+        overrides: Mapping[str, Any] | None = None,
+    ) -> Fit | None:
+        """Find factors in the fit windows; None without factors."""
+        if not keys:
+            return None
+        used = [run for run in self._file.table.runs if run.fit_s]
+        windows = {run.name: [second - self._offsets[run.name] for second in run.fit_s] for run in used}
+        study = {
+            "maneuvers": [str(self._scratch / f"{run.name}.mcap") for run in used],
+            "vehicles": [self._file.vehicle],
+            "overrides": {**self._file.table.overrides, **(overrides or {})},
+            "factors": {key: self._file.table.factors[key] for key in keys},
+            "fit": {
+                "noise": {channel: self._file.noise[channel] for channel in channels},
+                "start": {key: value for key, value in start.items() if key in keys},
+                "windows": windows,
+            },
+        }
+        try:
+            return fit(study, jobs=jobs, scheduler=scheduler)
+        except StudyError as reason:  # its keys are those of a study, of which the file has the factors
+            where = reason.key.split(".", 1) if reason.key else []
+            raise self._file.source.fail(where, reason.problem, reason.value, reason.allowed) from reason
+
+    def runs(self, overrides: Mapping[str, Any]) -> dict[str, Recording]:
+        """Drive all runs."""
+        values = {**SPEED_HOLD, **self._file.table.overrides, **overrides}
+        return {
+            name: simulate(str(self._scratch / f"{name}.mcap"), "none", self._file.vehicle, values)
+            for name in self._recordings
+        }
+
+    def parts(self, stage: str, runs: Mapping[str, Recording]) -> list[Part]:
+        """Compare runs in all windows."""
+        table, found = self._file.table, []
+        for run in table.runs:
+            result = compare(
+                [self._recordings[run.name]], runs[run.name], filtered=table.filter, noise=table.noise_allowance,
+                tolerances=self._file.tolerances, aligned=False,
+            )  # fmt: skip
+            self.assumptions = tuple(assumptions(result))
+            for part, window in zip(PARTS, (run.fit_s, run.check_s), strict=True):
+                if window:
+                    begin, end = (second - self._offsets[run.name] for second in window)
+                    found += [Part(run.name, part, stage, _cut(one, begin, end)) for one in result.quantities]
+        return found
+
+
+def _cut(one: Compared, begin: float, end: float) -> Compared:
+    """Return a comparison in a window."""
+    rows = (one.x >= begin) & (one.x <= end)
+    if np.count_nonzero(rows) < _LEAST_SAMPLES:
+        raise ParameterError(f"a window of {end - begin:g} s has fewer than {_LEAST_SAMPLES} samples")
+    names = ("x", "measured", "confidence", "simulated", "low", "high", "within")
+    return one._replace(**{name: getattr(one, name)[rows] for name in names})
+
+
+def _at_end(
+    case: _Case, free: list[str], start: Mapping[str, Any], key: str, value: float
+) -> tuple[dict[str, float], list[Array]]:
+    """Return the free factors and the predictions in the check windows with one value at an end of its interval."""
+    found = case.fit(free, case.predict_channels, start, 1, None, {key: value})
+    known = {key: value} | ({} if found is None else found.overrides)
+    parts = case.parts("predicted", case.runs(known))
+    values = {} if found is None else {one.key: one.value for one in found.parameters}
+    return values, [one.compared.simulated for one in parts if one.part == "check"]
+
+
+def _bands(
+    file: MeasuredFile, checked: list[Part], beside: list[tuple[dict[str, float], list[Array]]]
+) -> tuple[tuple[Band, ...], tuple[End, ...]]:
+    """Return the bands, and the effect of each interval."""
+    if not beside:
+        return (), ()
+    ends = []
+    for (key, interval), low, high in zip(file.table.intervals.items(), beside[::2], beside[1::2], strict=True):
+        effect: dict[str, float] = {}
+        for place, one in enumerate(checked):
+            change = max(rms(side[1][place] - one.compared.simulated) for side in (low, high))
+            effect[one.compared.channel] = max(effect.get(one.compared.channel, 0.0), change)
+        ends.append(End(key, interval.source, interval.ends, (low[0], high[0]), effect))
+    bands = []
+    for place, one in enumerate(checked):
+        changes = np.stack([side[1][place] - one.compared.simulated for side in beside])
+        pairs = changes.reshape(len(ends), 2, -1)
+        low, high = np.minimum(pairs.min(axis=1), 0.0).sum(axis=0), np.maximum(pairs.max(axis=1), 0.0).sum(axis=0)
+        bands.append(Band(one, one.compared.simulated + low, one.compared.simulated + high))
+    return tuple(bands), tuple(ends)
