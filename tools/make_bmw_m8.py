@@ -22,6 +22,10 @@ RATIO: Final = 14.3
 TESLA_RATIO: Final = 15.48
 TYRES: Final = {"front": ("275/35 ZR 20", 0.275), "rear": ("285/35 ZR 20", 0.285)}
 """Axle -> size and width [m]; aspect ratio 0.35, rim 20 in."""
+SERVOS: Final = """# The front servo turns its hinge with 8 rad/s: quicker at the road wheels than with the compact's ratio.
+[controllers.servos]
+superposition_rate_degps = 32.0
+"""
 _RIM_M: Final = 0.254
 
 
@@ -60,7 +64,7 @@ def main() -> None:
     file = models / "vehicles" / f"{NAME}.toml"
     text = file.read_text(encoding="utf-8")
     note = f"# BMW M8: models/reference/{NAME}/kc/car.toml gives the source of each number.\n"
-    file.write_text(note + text, encoding="utf-8")
+    file.write_text(f"{note}{text}\n{SERVOS}", encoding="utf-8")
 
 
 if __name__ == "__main__":
