@@ -22,7 +22,7 @@ RATIO: Final = 14.3
 TESLA_RATIO: Final = 15.48
 TYRES: Final = {"front": ("275/35 ZR 20", 0.275), "rear": ("285/35 ZR 20", 0.285)}
 """Axle -> size and width [m]; aspect ratio 0.35, rim 20 in."""
-SERVOS: Final = """# The front servo turns its hinge with 8 rad/s: quicker at the road wheels than with the compact's ratio.
+SERVOS: Final = """# The front servo turns its hinge with 8 rad/s: quicker at the wheels than with the compact's ratio.
 [controllers.servos]
 superposition_rate_degps = 32.0
 """
