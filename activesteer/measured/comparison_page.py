@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -44,14 +45,15 @@ def write_page(found: Comparison, measured: list[str], simulated: str, path: Pat
     return write_text(path, render_page(page), ParameterError)
 
 
-def picture(found: Compared, standard: str, runs: int) -> Picture:
-    """Return the overlay with its corridor, and the residual in the same corridor."""
+def picture(found: Compared, standard: str, runs: int, more: Sequence[Area] = ()) -> Picture:
+    """Return the overlay with its corridor and more areas, and the residual in the same corridor."""
     across = standard == "iso19364"
     x_label = "lateral acceleration [m/s²]" if across else "time of the simulation [s]"
     shown = quantity_of(found.channel)
-    panels = (_across if across else _over_time)(
+    overlay, residual = (_across if across else _over_time)(
         found, shown.factor, "measured" if runs == 1 else f"measured, mean of {runs}"
     )
+    panels = overlay._replace(areas=[*more, *overlay.areas]), residual
     titles = (shown.title, f"Measured less simulated [{shown.unit.name}]")
     return Picture(
         "", [panel._replace(x_label=x_label, title=title) for panel, title in zip(panels, titles, strict=True)],

@@ -124,11 +124,9 @@ def _end_rows(result: MeasuredValidation) -> list[tuple[str, str]]:
 
 
 def _picture(result: MeasuredValidation, one: Part) -> Picture:
-    shown = picture(one.compared, "iso19365", 1)
     band = next((band for band in result.bands if band.part is one), None)
     if band is None:
-        return shown
+        return picture(one.compared, "iso19365", 1)
     factor = quantity_of(one.compared.channel).factor
     area = Area(one.compared.x, factor * band.low, factor * band.high, "band of the intervals", _BAND_COLOUR, 0.25)
-    first, *others = shown.panels
-    return shown._replace(panels=[first._replace(areas=[*first.areas, area]), *others])
+    return picture(one.compared, "iso19365", 1, [area])
