@@ -38,7 +38,7 @@ HOST: Final = "127.0.0.1"
 _MAX_MESSAGE: Final = 20_000
 """Most bytes of a message from the page; its choices have some hundred."""
 _TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
-_OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css")
+_OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css", "car.js")
 """Files that the page shares with the report."""
 _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "

@@ -240,6 +240,40 @@ def test_place_of_the_cars_at_the_cursor_is_on_the_track_and_back(open_page):
     assert float(told(yaw_rate)[0]) == pytest.approx(4.0, abs=0.05)
 
 
+def test_slider_and_play_button_move_the_cars_and_the_cursor(open_page):
+    page = open_page(**DESK)
+    yaw_rate, track = plot(page, "Yaw rate", 2), plot(page, "Track of the front axle centre", 2)
+    slider, button = page.locator("#group-2 input.time"), page.locator("#group-2 button.play")
+    body = track.locator(".car").first
+    slider.evaluate("(slider) => { slider.value = slider.max / 2; slider.dispatchEvent(new Event('input')); }")
+    halfway = float(told(yaw_rate)[0])
+    assert body.is_visible()
+    before = body.get_attribute("d")
+    button.click()
+    assert "Pause" in button.inner_text()
+    page.wait_for_timeout(800)
+    button.click()
+    after = float(told(yaw_rate)[0])
+    # Real time, with room for a slow machine.
+    assert halfway + 0.1 < after < halfway + 8.0
+    assert body.get_attribute("d") != before
+    assert slider.input_value() != "0"
+    page.wait_for_timeout(200)
+    assert float(told(yaw_rate)[0]) == after
+
+
+def test_contents_stay_in_view_and_mark_the_manoeuvre_that_is_read(open_page):
+    page = open_page(**DESK)
+    page.locator("#group-2 .plots figure").last.scroll_into_view_if_needed()
+    page.wait_for_selector('.jump a[href="#group-2"][aria-current=true]')
+    box = page.locator(".jump").bounding_box()
+    assert box
+    assert box["y"] == pytest.approx(0.0, abs=1.0)
+    bar = page.locator("#group-2 .toolbar").bounding_box()
+    assert bar
+    assert bar["y"] >= box["y"] + box["height"] - 1.0
+
+
 def test_zoom_holds_for_all_plots_of_a_group_and_can_be_undone(open_page):
     page = open_page(**DESK)
     yaw_rate, other = plot(page, "Yaw rate"), plot(page, "Lateral acceleration")

@@ -17,6 +17,7 @@ from activesteer.analysis.source import read_course, read_footprint
 from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS, Array
 from activesteer.display_units import ESTIMATED, MEASURED, Quantity, quantity_of
+from activesteer.drawing import wheel_angles
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M, Course
@@ -226,6 +227,7 @@ def _marks(group: Group) -> list[dict[str, Any]]:
 def _track(group: Group, grid: Array) -> dict[str, Any] | None:
     """Return course, tracks of the front axle centre [m], heading [rad] and sizes of the cars [m]."""
     tracks = []
+    factors = wheel_angles.factors([run.recording for run in group.runs])
     for number, run in enumerate(group.runs):
         try:
             x, y = (_sampled(run.recording.time_s, values, grid) for values in front_axle(run.recording))
@@ -235,7 +237,12 @@ def _track(group: Group, grid: Array) -> dict[str, Any] | None:
         with suppress(RecordingError):
             yaw = _rounded(_sampled(run.recording.time_s, run.recording["yaw_rad"], grid), 3)
             car = read_footprint(run.recording)
-            track |= {"yaw": yaw, "car": {"ends": [car.rear_m, car.front_m], "width": car.width_m}}
+            wheels = [[round(float(value), 3) for value in wheel] for wheel in wheel_angles.wheel_centres(car)]
+            size = {"ends": [car.rear_m, car.front_m], "width": car.width_m, "wheels": wheels, "factors": factors}
+            track |= {"yaw": yaw, "car": size}
+            angles = wheel_angles.angles_at(run.recording, np.clip(grid, *run.recording.time_s[[0, -1]]))
+            if np.isfinite(angles).any():
+                track["steer"] = [_rounded(angles[:, axle : axle + 2].mean(axis=1), 3) for axle in (0, 2)]
         tracks.append(track)
     if not tracks:
         return None

@@ -137,11 +137,12 @@ export class Track {
         line(track.x, track.y);
         const i = Math.min(Math.round((this.time - run.plots.start_s) / run.plots.step_s), track.x.length - 1);
         if (tail || !track.yaw || track.x[i] == null) continue;
-        const [back, front] = track.car.ends, half = track.car.width / 2, cos = Math.cos(track.yaw[i]), sin = Math.sin(track.yaw[i]);
-        pen.fillStyle = runColour(run.place);
-        pen.beginPath();
-        for (const [a, b] of [[front, half], [front, -half], [back, -half], [back, half]]) pen.lineTo(...place(track.x[i] + a * cos - b * sin, track.y[i] + a * sin + b * cos));
-        pen.fill();
+        carFromAbove(track, i).forEach((polygon, part) => {
+          pen.fillStyle = part ? paint("ink") : runColour(run.place);
+          pen.beginPath();
+          for (const corner of polygon) pen.lineTo(...place(...corner));
+          pen.fill();
+        });
       }
     }
     pen.fillStyle = paint("quiet");

@@ -97,7 +97,40 @@
       const reset = element("button", { type: "button", class: "reset" }, "Whole run");
       reset.addEventListener("click", () => { this.zoom(null); if (this.track) this.track.whole(); });
       const touch = matchMedia("(pointer: coarse)").matches;
-      bar.append(reset, element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values, tap a run to hide it." : "Drag to zoom, double-click for the whole run; point at a run to see it alone, click to hide it."));
+      bar.append(reset, ...this.player(), element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values, tap a run to hide it." : "Drag to zoom, double-click for the whole run; point at a run to see it alone, click to hide it."));
+    }
+
+    // A button that plays the run, and a slider for its time.
+    player() {
+      this.button = element("button", { type: "button", class: "play" }, "\u25b6 Play");
+      this.slider = element("input", { type: "range", class: "time", min: 0, max: this.data.samples - 1, value: 0, "aria-label": "Time" });
+      this.clock = element("output", { class: "quiet" });
+      this.button.addEventListener("click", () => this.play(!this.playing));
+      this.slider.addEventListener("input", () => { this.play(false); this.held = true; this.pointAt(+this.slider.value); });
+      return [this.button, this.slider, this.clock];
+    }
+
+    play(on) {
+      this.playing = on;
+      this.button.textContent = on ? "\u23f8 Pause" : "\u25b6 Play";
+      if (!on) return;
+      this.held = true;
+      const last = this.data.samples - 1;
+      let exact = +this.slider.value < last ? +this.slider.value : 0, before = null;
+      const step = (now) => {
+        if (!this.playing) return;
+        if (before != null) exact += (now - before) / 1000 / this.data.step_s;
+        before = now;
+        this.pointAt(Math.min(Math.floor(exact), last));
+        if (exact >= last) this.play(false); else requestAnimationFrame(step);
+      };
+      requestAnimationFrame(step);
+    }
+
+    show(i) {
+      this.slider.value = i;
+      this.clock.textContent = `${this.time[i].toFixed(2)} s`;
+      if (this.track) this.track.at(i);
     }
 
     panel(panel) {
@@ -127,14 +160,15 @@
     read(u, panel, values) {
       const i = u.cursor.idx;
       values.replaceChildren();
-      if (i == null || u.cursor.left < 0) { if (this.track) this.track.at(null); return; }
+      if (i == null || u.cursor.left < 0) { if (this.track && !this.held) this.track.at(null); return; }
       values.append(`${this.time[i].toFixed(2)} s`);
       panel.series.forEach((series, k) => {
         // The value of the first curve of each run; desired values are not shown.
         if (panel.series.findIndex((other) => other.run === series.run) !== k || !this.visible[series.run]) return;
         values.append(" ", element("span", { style: `--run: var(--run-${this.data.runs[series.run].place})` }, shown(series.values[i])));
       });
-      if (this.track) this.track.at(i);
+      // While it plays, the places of the cars come from the clock.
+      if (!this.playing) this.show(i);
     }
 
     marks(u) {
@@ -164,6 +198,7 @@
 
     pointAt(i) {
       const plot = this.plots[0];
+      this.show(i);
       if (plot) plot.setCursor({ left: plot.valToPos(this.time[i], "x"), top: 1 }, true, true);
     }
 
@@ -206,19 +241,18 @@
       }, [x, y], holder);
       const cars = this.plot.over.appendChild(document.createElementNS(SVG, "svg"));
       cars.setAttribute("class", "cars");
-      this.cars = data.tracks.map((track) => {
-        const car = cars.appendChild(document.createElementNS(SVG, "path"));
-        car.setAttribute("class", "car");
-        car.style.setProperty("--run", `var(--run-${group.data.runs[track.run].place})`);
-        car.toggleAttribute("hidden", true);
-        return car;
-      });
+      this.cars = data.tracks.map((track) => ["car", "wheels"].map((part) => {
+        const path = cars.appendChild(document.createElementNS(SVG, "path"));
+        path.setAttribute("class", part);
+        path.style.setProperty("--run", `var(--run-${group.data.runs[track.run].place})`);
+        path.toggleAttribute("hidden", true);
+        return path;
+      }));
       touchable(this.plot, (range) => (range ? this.plot.setScale("x", range) : this.whole()));
     }
 
     height(printed = false) {
-      const [plot, track, gap] = printed ? [PRINTED_PLOT_HEIGHT, PRINTED_TRACK_HEIGHT, 4] : [PLOT_HEIGHT, TRACK_HEIGHT, PLOT_GAP];
-      return this.tall ? 2 * plot + PLOT_HEAD + gap : track;
+      return printed ? PRINTED_TRACK_HEIGHT : this.tall ? 2 * PLOT_HEIGHT + PLOT_HEAD + PLOT_GAP : TRACK_HEIGHT;
     }
 
     ends(values) {
@@ -251,7 +285,7 @@
     redraw() { this.plot.redraw(false, false); this.place(); }
 
     fit(width) {
-      const room = width == null ? this.plot.root.parentElement.clientWidth : this.tall ? (width - PRINTED_GAP) / 2 : width;
+      const room = width == null ? this.plot.root.parentElement.clientWidth : width;
       if (room > 0 && room !== this.plot.width) { this.plot.setSize({ width: room, height: this.height(width != null) }); this.whole(); }
     }
 
@@ -259,7 +293,11 @@
       const { ctx, bbox } = u, dpr = devicePixelRatio;
       const px = (x) => u.valToPos(x, "x", true), py = (y) => u.valToPos(y, "y", true);
       const metre = (px(1) - px(0)), stretch = (py(0) - py(1)) / metre;
-      this.note.textContent = stretch > 1.05 || stretch < 0.95 ? `lateral positions stretched ${stretch.toFixed(1)} times` : "";
+      const factors = this.data.tracks.find((track) => track.steer)?.car.factors;
+      this.note.textContent = [
+        ...(stretch > 1.05 || stretch < 0.95 ? [`lateral positions stretched ${stretch.toFixed(1)} times`] : []),
+        ...(factors ? [`wheels turned ${[...new Set(factors)].join(" and ")} times as far`] : []),
+      ].join(", ");
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
       ctx.lineJoin = "round";
@@ -284,7 +322,7 @@
         this.along({ x, y }, (i) => {
           if (!track.car || track.yaw[i] == null) return;
           ctx.setLineDash([]); ctx.lineWidth = dpr; ctx.strokeStyle = colour;
-          ctx.stroke(new Path2D(this.outline({ x, y, ...track }, i, true)));
+          ctx.stroke(new Path2D(this.outline(carFromAbove({ x, y, ...track }, i).slice(0, 1), true)));
         });
       }
       for (const [x, y, struck] of this.data.cones) {
@@ -316,13 +354,10 @@
       }
     }
 
-    // The body of a car from above as an SVG path, in pixels of the screen or of the canvas.
-    outline({ x, y, yaw, car }, i, canvas) {
-      const cos = Math.cos(yaw[i]), sin = Math.sin(yaw[i]), [rear, front] = car.ends, half = car.width / 2;
-      const corners = [[rear, half], [front - 0.4, half], [front, 0.6 * half], [front, -0.6 * half], [front - 0.4, -half], [rear, -half]];
-      return `M${corners.map(([ahead, left]) => [
-        this.plot.valToPos(x[i] + ahead * cos - left * sin, "x", canvas), this.plot.valToPos(y[i] + ahead * sin + left * cos, "y", canvas),
-      ].map((at) => at.toFixed(1)).join(" ")).join("L")}Z`;
+    // Polygons as an SVG path, in pixels of the screen or of the canvas.
+    outline(polygons, canvas) {
+      const place = ([x, y]) => [this.plot.valToPos(x, "x", canvas), this.plot.valToPos(y, "y", canvas)].map((at) => at.toFixed(1)).join(" ");
+      return polygons.map((corners) => `M${corners.map(place).join("L")}Z`).join("");
     }
 
     // Places of the cars at the instant under the cursor of the plots over time.
@@ -333,8 +368,11 @@
       const i = this.instant;
       this.data.tracks.forEach((track, k) => {
         const there = i != null && track.x[i] != null && track.car && track.yaw[i] != null && this.group.visible[track.run];
-        this.cars[k].toggleAttribute("hidden", !there);
-        if (there) this.cars[k].setAttribute("d", this.outline(track, i, false));
+        const [body, ...wheels] = there ? carFromAbove(track, i) : [[]];
+        [[body], wheels].forEach((polygons, part) => {
+          this.cars[k][part].toggleAttribute("hidden", !there);
+          if (there) this.cars[k][part].setAttribute("d", this.outline(polygons, false));
+        });
       });
     }
 
@@ -387,12 +425,18 @@
   }
 
   const groups = JSON.parse(document.getElementById("data").textContent).map((data) => new Group(data));
+  // The contents mark the manoeuvre that is read.
+  const seen = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) document.querySelector(`.jump a[href="#${target.id}"]`)?.setAttribute("aria-current", isIntersecting);
+  }, { rootMargin: "-15% 0px -84% 0px" });
+  for (const section of document.querySelectorAll(".group")) seen.observe(section);
   const repaint = () => { mix(); for (const group of groups) group.repaint(); };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   addEventListener("beforeprint", () => {
     document.documentElement.classList.add("paper");
     repaint();
-    for (const details of document.querySelectorAll(".group details")) details.open = true;
+    for (const group of groups) group.play(false);
+    for (const details of document.querySelectorAll(".group > details")) details.open = true;
     for (const group of groups) group.fit(PRINTED);
   });
   addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaint(); for (const group of groups) group.fit(); });

@@ -293,7 +293,23 @@ def test_track_shows_which_cones_are_hit_and_the_cars_in_their_size():
     # The first stands on the side of the lane, and so outside it by its radius; the second in the way.
     assert track["cones"] == [[30, pytest.approx(1.6 + CONE_RADIUS_M), False], [45, 0.5, True]]
     assert track["cone_radius"] == CONE_RADIUS_M
-    assert track["tracks"][0]["car"] == {"ends": [pytest.approx(-2.6 - 0.75), 0.85], "width": 1.8}
+    car = track["tracks"][0]["car"]
+    assert (car["ends"], car["width"]) == ([pytest.approx(-2.6 - 0.75), 0.85], 1.8)
+    assert [wheel[0] for wheel in car["wheels"]] == [0.0, 0.0, -2.6, -2.6]
+    assert [np.sign(wheel[1]) for wheel in car["wheels"]] == [1.0, -1.0, 1.0, -1.0]
+
+
+def test_wheels_of_the_cars_on_the_track_are_steered_axle_by_axle():
+    run = along_path(cones=((30.0, 1.6),))
+    run.channels |= {
+        f"{corner}_steer_rad": np.full_like(run.time_s, angle)
+        for corner, angle in (("fl", 0.06), ("fr", 0.05), ("rl", -0.02), ("rr", -0.03))
+    }
+    track = data_of(report_page({"a.mcap": recording_of(run, maneuver={"name": "cones"})}))[0]["track"]["tracks"][0]
+    front, rear = track["steer"]
+    assert np.allclose(front, 0.055)
+    assert np.allclose(rear, -0.025)
+    assert track["car"]["factors"] == [10, 10, 10, 10]
 
 
 def test_car_that_leaves_the_course_stays_in_the_picture():
