@@ -52,10 +52,6 @@ def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> It
     No one can read half a file: if the body fails, the new file is deleted and the old one stays. A device is written
     directly.
 
-    Args:
-        path: The file.
-        error: Class of the errors.
-
     Yields:
         Path to write to, with the ending of `path`.
 

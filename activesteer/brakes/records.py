@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from activesteer.brakes.parameters import Antilock, Brakes, Hydraulics, TractionControl
 from activesteer.conventions import CORNERS
+from activesteer.native_records import numbers_type
 
-_FOUR: Final = (len(CORNERS),)
 _HYDRAULICS: Final = ("full_pedal_pressure_Pa", "rise_Paps", "fall_Paps", "pump_rise_Paps")
 _ANTILOCK: Final = tuple(Antilock.__dataclass_fields__)
 _OF_WHEELS: Final = (
@@ -21,16 +21,10 @@ _OF_WHEELS: Final = (
 )  # fmt: skip
 _TRACTION: Final = tuple(TractionControl.__dataclass_fields__)
 
-BRAKE_SETUP: Final = np.dtype(
-    (
-        np.record,
-        [
-            *((name, np.float64) for name in (*_HYDRAULICS, *_ANTILOCK, *_TRACTION)),
-            *((name, np.float64) for name in ("timestep_s", "follow", "abs", "tcs", "interval_steps", "interval_s")),
-            *((name, np.float64, _FOUR) for name in _OF_WHEELS),
-        ],
-    )
-)
+BRAKE_SETUP: Final = numbers_type(
+    *_HYDRAULICS, *_ANTILOCK, *_TRACTION, "timestep_s", "follow", "abs", "tcs", "interval_steps", "interval_s",
+    *((name, len(CORNERS)) for name in _OF_WHEELS),
+)  # fmt: skip
 """Constants of a run; names as in the vehicle file. `follow` is the fraction of the difference between pressure and
 demand that closes in one step."""
 
@@ -42,9 +36,7 @@ ALONE: Final = (
     "drive_limit_Nm", "traction_Nm", "reference_mps", "offset_mps2", "side_Pa", "steps_left",
     "tcs_active",
 )  # fmt: skip
-BRAKE_STATE: Final = np.dtype(
-    (np.record, [*((name, np.float64, _FOUR) for name in PER_WHEEL), *((name, np.float64) for name in ALONE)])
-)
+BRAKE_STATE: Final = numbers_type(*((name, len(CORNERS)) for name in PER_WHEEL), *ALONE)
 """Variables, saved and restored with the engine's state.
 
 demand_Pa: pressure that driver and controller demand;

@@ -14,6 +14,7 @@ from typing import Any, Final
 from activesteer.errors import RecordingError
 from activesteer.files import MAX_NUMBER
 from activesteer.recording.events import events_of
+from activesteer.recording.schemas import WORLD
 from activesteer.road.course import course_of
 from activesteer.road.drawn import surface_in
 from activesteer.road.footprint import footprint_of
@@ -220,6 +221,19 @@ def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
     for name in names:
         if not isinstance(name, str) or not 0 < len(name) <= 255 or not name.isprintable():
             raise RecordingError(f"{what}: {name!r:.{_SHOWN}} is no name of 1 to 255 letters")
+
+
+def check_bodies(names: Sequence[Any]) -> None:
+    """Check the names of bodies.
+
+    Raises:
+        RecordingError: see `check_names`; or a name occurs twice, or is that of the world.
+    """
+    check_names(names, "bodies", MAX_BODIES)
+    if len({WORLD, *names}) != len(names) + 1:
+        raise RecordingError(
+            f"body names must differ from each other and from {WORLD!r}: {', '.join(names)}", value=tuple(names)
+        )
 
 
 def check_numbers(values: Sequence[Any], what: str, low: float, high: float) -> None:

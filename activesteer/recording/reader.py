@@ -18,12 +18,12 @@ from activesteer.errors import RecordingError
 from activesteer.files import shown_path
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.contents import (
-    MAX_BODIES,
     MAX_CHANNELS,
     MAX_CHUNK_BYTES,
     MAX_FILE_BYTES,
     MAX_OTHER_RECORDS,
     MAX_ROWS,
+    check_bodies,
     check_metadata,
     check_metrics,
     check_names,
@@ -53,7 +53,7 @@ from activesteer.recording.rows import (
     values_of,
 )
 from activesteer.recording.scene import ScenePart, decode_scene
-from activesteer.recording.schemas import WORLD, state_fields
+from activesteer.recording.schemas import state_fields
 from activesteer.signals import Channel as SignalChannel
 
 MAX_LOADED_VALUES: Final = 2**25
@@ -282,7 +282,5 @@ def _bodies(topic: Channel | None) -> tuple[str, ...]:
     names = json.loads(topic.metadata["bodies"])
     if not isinstance(names, list):
         raise RecordingError("its bodies are no list")
-    check_names(names, "bodies", MAX_BODIES)
-    if len({WORLD, *names}) != len(names) + 1:
-        raise RecordingError(f"body names must differ from each other and from {WORLD!r}")
+    check_bodies(names)
     return tuple(names)

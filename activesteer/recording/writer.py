@@ -20,12 +20,12 @@ from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.container import McapFile
 from activesteer.recording.contents import (
-    MAX_BODIES,
     MAX_CHANNELS,
     MAX_CHUNK_BYTES,
     MAX_OTHER_BYTES,
     MAX_OTHER_RECORDS,
     MAX_ROWS,
+    check_bodies,
     check_names,
 )
 from activesteer.recording.encoder import BlockEncoder, few_messages
@@ -48,7 +48,6 @@ from activesteer.recording.schemas import (
     LOG_SCHEMA,
     SCENE_SCHEMA,
     TRANSFORMS_SCHEMA,
-    WORLD,
     foxglove_schema,
     state_schema,
     state_schema_name,
@@ -102,16 +101,11 @@ class McapWriter:
         self.path = Path(path)
         self.channels = ChannelTable(channels)
         self.body_names = tuple(body_names)
-        if len({WORLD, *self.body_names}) != len(self.body_names) + 1:
-            raise RecordingError(
-                f"body names must differ from each other and from {WORLD!r}: {', '.join(self.body_names)}",
-                value=self.body_names,
-            )
+        check_bodies(self.body_names)
         if len(self.channels) > MAX_CHANNELS:
             raise RecordingError(
                 f"{len(self.channels)} channels, a recording has at most {MAX_CHANNELS}", allowed=MAX_CHANNELS
             )
-        check_names(self.body_names, "bodies", MAX_BODIES)
         check_names(list(attachments or {}), "attachments", MAX_OTHER_RECORDS)
         if (size := sum(map(len, (attachments or {}).values()))) > MAX_OTHER_BYTES // 2:
             raise RecordingError(f"the attachments have {size} bytes, at most {MAX_OTHER_BYTES // 2} are allowed")

@@ -10,6 +10,7 @@ import numpy as np
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
+from activesteer.native_records import numbers_type
 
 Side = Literal["both", "left", "right"]
 Height = Annotated[float, Range(0.0, 2.0)]
@@ -27,15 +28,9 @@ _SMOOTH: Final = ("cosine_bump", "cross_slope_ramp", "sine_wave")
 _LONG_M: Final = 1.5
 """Length from which a smooth obstacle hardly bends within the contact patch [m]: ten patches of 0.15 m."""
 
-OBSTACLE: Final = np.dtype(
-    (
-        np.record,
-        [
-            (name, np.float64)
-            for name in ("shape", "start_m", "length_m", "height_m", "right_m", "left_m", "edge_m", "skew", "waves")
-        ],
-    )
-)
+OBSTACLE: Final = numbers_type(
+    "shape", "start_m", "length_m", "height_m", "right_m", "left_m", "edge_m", "skew", "waves"
+)  # fmt: skip
 """An obstacle for the kernels; see `height_of`. `skew`: metres by which it begins earlier per metre to the left."""
 
 
@@ -71,11 +66,7 @@ class Obstacle:
     """Number of waves of a `sine_wave`; 0 for no end."""
 
     def __post_init__(self) -> None:
-        """Check that the obstacle has what its kind needs, and nothing without effect.
-
-        Raises:
-            ManeuverError: a key is missing or has no effect, or the borders or edges leave nothing of the obstacle.
-        """
+        """Check that the obstacle has what its kind needs, and nothing without effect."""
         ramp = self.kind == "cross_slope_ramp"
         for key, needed in (
             ("length_m", self.kind != "kerb"), ("height_m", not ramp), ("slope", ramp)

@@ -17,19 +17,12 @@ from typing import Final
 import numpy as np
 
 from activesteer.compilation import compiled
+from activesteer.native_records import numbers_type
 from activesteer.road.obstacle import COSINE_BUMP, CROSS_SLOPE, PLATEAU, SINE
 
-SURFACE: Final = np.dtype(
-    (
-        np.record,
-        [
-            (name, np.float64)
-            for name in (
-                "contact", "blend_m", "start_m", "grid_s_m", "grid_per_s", "rows", "grid_d_m", "grid_per_d", "columns",
-                "slope_s_m", "slope_per_s", "slopes", "rise_per_s", "rises", "coarse_m", "ends",
-            )
-        ],
-    )
+SURFACE: Final = numbers_type(
+    "contact", "blend_m", "start_m", "grid_s_m", "grid_per_s", "rows", "grid_d_m", "grid_per_d", "columns", "slope_s_m",
+    "slope_per_s", "slopes", "rise_per_s", "rises", "coarse_m", "ends",
 )  # fmt: skip
 """Head of an uneven road. Its numbers are the grid, row by row along s, the cross slopes, and the rises.
 

@@ -57,11 +57,7 @@ class SensorBlock:
         self.outputs = self.memory[: len(MEASURED)]
 
     def reset(self, truth: Measurement) -> None:
-        """Start anew, as if the truth had been constant for long.
-
-        Args:
-            truth: The true measurement.
-        """
+        """Start anew, as if the truth had been constant for long."""
         self.memory[:] = 0.0
         self.say(truth)
         for chain, value in zip(self.chains, self.outputs[1:], strict=True):

@@ -1,16 +1,18 @@
 """The table [sensors] of a vehicle file: the errors of each sensor, by a preset and by single values.
 
-The default of each key comes from the preset: no error of any kind for `ideal`, those in `presets` for `production`.
+The default of each key comes from the preset: no error of any kind for `ideal`, those of production.toml for
+`production`.
 """
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
 
-from activesteer.config import Range
+from activesteer.config import Range, build, read_toml
 from activesteer.errors import ParameterError
-from activesteer.sensors.presets import PRESETS
 from activesteer.sensors.sensor_kinds import (
     AccelerationSensor,
     AngleSensor,
@@ -59,13 +61,10 @@ class Sensors:
     radius; else it is the car's own."""
 
     def __post_init__(self) -> None:
-        """Fill in the values of the preset.
-
-        Raises:
-            ParameterError: there is a seed but nothing random.
-        """
-        for name, preset in PRESETS[self.preset].items():
-            object.__setattr__(self, name, _filled(getattr(self, name), preset))
+        """Fill in the values of the preset."""
+        for name, preset in (vars(_production()) if self.preset == "production" else {}).items():
+            if name not in ("preset", "seed"):
+                object.__setattr__(self, name, _filled(getattr(self, name), preset))
         random = any(sensor.amount(word) for sensor in self.all().values() for word in RANDOM)
         if random and self.seed is None:
             object.__setattr__(self, "seed", 0)
@@ -84,6 +83,11 @@ class Sensors:
     def is_ideal(self) -> bool:
         """True if the measurement is the truth."""
         return not self.speed_from_wheels and all(sensor.is_ideal for sensor in self.all().values())
+
+
+@functools.cache
+def _production() -> Sensors:
+    return build(Sensors, *read_toml(Path(__file__).with_name("production.toml")))
 
 
 def _filled(given: Any, preset: Any) -> Any:

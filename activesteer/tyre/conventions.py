@@ -53,11 +53,7 @@ class TyreConventions:
     """Friction of the road to which the file's peaks belong; the road's friction is divided by it [-]."""
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            ParameterError: a word is unknown, or a number out of range.
-        """
+        """Check the values."""
         for key, words in _CHOICES.items():
             if (word := getattr(self, key)) not in words:
                 raise ParameterError(f"there is no {word!r}; {nearest_names(str(word), words)}", key=key, value=word)

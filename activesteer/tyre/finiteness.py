@@ -42,10 +42,6 @@ def is_finite(tyre: np.record) -> bool:
 def culprit(tyre: np.record, names: Iterable[str]) -> str | None:
     """Return the enormous coefficient whose default makes the tyre finite; the largest one if there are several.
 
-    Args:
-        tyre: A tyre that is not finite.
-        names: Coefficients to try.
-
     Returns:
         Its name; None if no single coefficient is the cause.
     """

@@ -58,11 +58,7 @@ class TyreParameters(Mapping[str, float]):
     conventions: TyreConventions = TyreConventions()
 
     def __post_init__(self) -> None:
-        """Check the values and derive what the file leaves open.
-
-        Raises:
-            ParameterError: a key is missing, unknown, or outside its range, or the tyre is not finite inside its own.
-        """
+        """Check the values and derive what the file leaves open."""
         source = str(self.source or "tyre")
         values = _resolve(self.given, source)
         object.__setattr__(self, "_values", MappingProxyType(values))

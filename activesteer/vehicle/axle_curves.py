@@ -72,11 +72,7 @@ class AxleCurves:
     """Rotation of the left knuckle in side view [rad]."""
 
     def __post_init__(self) -> None:
-        """Check lengths, order, and that the stiffness holds the wheel.
-
-        Raises:
-            ParameterError: a check fails.
-        """
+        """Check lengths, order, and that the stiffness holds the wheel."""
         _check_curves(self, "travel_m", (*OVER_TRAVEL, "load_N"))
         if self.is_steered or any(getattr(self, name) for name in OVER_RACK):
             _check_curves(self, "rack_m", OVER_RACK)
@@ -150,11 +146,7 @@ class Curves:
     """The rear axle; default the links of the model."""
 
     def __post_init__(self) -> None:
-        """Check that the rack steers in front.
-
-        Raises:
-            ParameterError: the rack does not steer the front axle, or it steers the rear axle.
-        """
+        """Check that the rack steers in front."""
         if self.front is not None and not self.front.is_steered:
             raise ParameterError("the rack must steer the front wheels: curves over rack_m are needed", key="front")
         if self.rear is not None and self.rear.is_steered:

@@ -32,9 +32,9 @@ from activesteer.vehicle import native_step
 from activesteer.vehicle.actuator_records import ActuatorRecords
 from activesteer.vehicle.channels import ChannelMap
 from activesteer.vehicle.chassis_heading import YAW_DOF, turn_chassis_back
+from activesteer.vehicle.command_row import write_estimate
 from activesteer.vehicle.divergence import raise_if_diverged
 from activesteer.vehicle.equilibrium import static_ride
-from activesteer.vehicle.estimate_row import write_estimate
 from activesteer.vehicle.implicit_plan import ImplicitPlan, drop_metric
 from activesteer.vehicle.loading import load_model
 from activesteer.vehicle.motor_records import ENERGY, ElectricDrive

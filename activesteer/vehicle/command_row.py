@@ -1,7 +1,8 @@
-"""The commands of a step as one row of numbers, which the native step carries out and the recorder keeps."""
+"""Commands and estimate of a step as rows of numbers, which the native step carries out and the recorder keeps."""
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Final
@@ -10,8 +11,9 @@ import numpy as np
 from numba import types
 
 from activesteer.compilation import compiled_call, inlined
+from activesteer.display_units import ESTIMATED
 from activesteer.native_messages import native_type, store_numbers
-from activesteer.signals import ActuatorCommand, Channel, DriverCommand, Number, numbers_of
+from activesteer.signals import ActuatorCommand, Channel, DriverCommand, Estimate, Number, numbers_of
 
 
 def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
@@ -56,6 +58,14 @@ TORQUES: Final = COMMANDS.index("fl_wheel_torque_demand_Nm")
 """Place of the additional drive torque of the first wheel in a row."""
 DRIVER_COMMAND, ACTUATOR_COMMAND = native_type(DriverCommand), native_type(ActuatorCommand)
 """The commands as compiled code takes them from Python."""
+ESTIMATE_CHANNELS: Final = tuple(
+    Channel(f"{ESTIMATED}_{number.name}", about.unit, f"{about.meaning}, estimated by the controller", "control")
+    for number in numbers_of(Estimate)
+    if (about := number.recorded) is not None
+)
+"""Channels of the fields of an `Estimate`, in their order."""
+write_estimate: Final = struct.Struct(f"{len(Estimate._fields)}d").pack_into
+"""`write_estimate(row, 0, *estimate)` writes a row into the memory of an array; the arguments must be numbers."""
 _SIZE_DRIVER: Final = 8 * len(numbers_of(DriverCommand))
 """Bytes of a row that hold the driver's command."""
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Annotated, Any, Final, Self
 
-from activesteer.config import Range
+from activesteer.config import Range, build, read_toml
 from activesteer.errors import ParameterError
 
 Positive = Annotated[float, Range(1e-9)]
@@ -49,9 +50,6 @@ class ElectricActuator:
     def refuse_keys(self, problem: str) -> None:
         """Refuse keys of a motor for an actuator without one.
 
-        Args:
-            problem: The problem and its remedy.
-
         Raises:
             ParameterError: a key other than `preset` is given.
         """
@@ -83,6 +81,14 @@ class ElectricActuator:
             "friction_Nm": known(self.friction_torque_Nm),
             "load_friction": known(self.load_friction),
         }
+
+
+def presets_of(kind: type[ElectricActuator], table: str) -> dict[str, dict[str, Any]]:
+    """Return the presets of a kind of actuator: name -> key -> value in SI."""
+    given, source = read_toml(Path(__file__).with_name("actuator_presets.toml"))
+    built = {name: build(kind, {"preset": name, **keys}, source, (table, name)) for name, keys in given[table].items()}
+    return {name: {key: value for key, value in vars(preset).items() if value is not None and key != "preset"}
+            for name, preset in built.items()}  # fmt: skip
 
 
 def known(value: float | None) -> float:

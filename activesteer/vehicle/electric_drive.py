@@ -51,11 +51,7 @@ class Motor:
     """Largest difference of the torques at the two wheels behind a splitting differential [N m]."""
 
     def __post_init__(self) -> None:
-        """Check the map and the differential.
-
-        Raises:
-            ParameterError: the map is no map, or a key of the differential is missing or has no effect.
-        """
+        """Check the map and the differential."""
         count = len(self.speed_radps)
         if not 2 <= count <= MAX_MAP_POINTS or len(self.torque_Nm) != count:
             raise ParameterError(
@@ -115,11 +111,7 @@ class Motors:
     """Motor of the rear right wheel."""
 
     def __post_init__(self) -> None:
-        """Check that each axle has one motor or a pair, and that only an axle has a differential.
-
-        Raises:
-            ParameterError: this is not so.
-        """
+        """Check that each axle has one motor or a pair, and that only an axle has a differential."""
         for axle, wheels in AXLES.items():
             pair = [name for name in wheels if getattr(self, name) is not None]
             if pair and getattr(self, axle) is not None:

@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.native_records import numbers_type
 from activesteer.road.obstacle import OBSTACLE
 from activesteer.road.surface_kernels import SURFACE
 from activesteer.tyre.kernels.record import TYRE_RECORD
@@ -32,34 +33,20 @@ MAX_CURVE_POINTS: Final = 12
 POWERS: Final = 5
 """Coefficients of a polynomial without a constant term."""
 
-
-def _record(*fields: str | tuple[str, int]) -> np.dtype[Any]:
-    """Return a record type of numbers, and of rows of numbers where a length is given."""
-    return np.dtype(
-        (
-            np.record,
-            [
-                (field, np.float64) if isinstance(field, str) else (field[0], np.float64, (field[1],))
-                for field in fields
-            ],
-        )
-    )
-
-
-WHEEL: Final = _record(
+WHEEL: Final = numbers_type(
     "body", "root", "act_x", "act_y", "act_z", "mu", "pressure_Pa", "low_speed_mps", "low_speed_damping_Nspm",
     "spin_dof", "drive_fraction", "chain_length", ("chain", MAX_CHAIN),
 )  # fmt: skip
 """A wheel, with the degrees of freedom between the world and it; its tyre has the same place in its section."""
 
-DAMPER: Final = _record(
+DAMPER: Final = numbers_type(
     "tendon", "row", "length", "points", ("chain", MAX_CHAIN), ("velocity_mps", MAX_CURVE_POINTS),
     ("force_N", MAX_CURVE_POINTS),
 )  # fmt: skip
 """A damper: a tendon, its place in the sparse tendon Jacobian, and a piecewise linear curve, velocities positive in
 compression, forces positive when they push apart."""
 
-ACTUATOR: Final = _record(
+ACTUATOR: Final = numbers_type(
     "kind", "act", "low", "high", "scale", "offset", "lag_s", "rate_limit", "userdata", "stiffness", "drive_fraction",
     "dof", "tendon", "vibration", "wound_limit", "record", "motor",
 )  # fmt: skip
@@ -73,22 +60,22 @@ KIND_LINK, KIND_SCREW, KIND_MOTOR = 6.0, 7.0, 8.0
 IN_ORDER: Final = {"scale": 1.0, "offset": -0.0}
 """Values for an actuator without a fault; adding -0.0 changes nothing, not even the sign of a zero."""
 
-AREA: Final = _record("start_m", "end_m", "right_m", "left_m", "mu", "slope_1pm")
+AREA: Final = numbers_type("start_m", "end_m", "right_m", "left_m", "mu", "slope_1pm")
 """An area of the road with its own friction (`activesteer.road.road.Area`): a rectangle in world axes, or along the
 path where there is one; where areas overlap, the later one counts. Areas count while the header's `areas_felt` is 1,
 which `Vehicle.rebase` sets, since the road has no origin before."""
 
-PATH_GRID: Final = _record("x0_m", "y0_m", "cell_m", "columns", "rows", "spacing_m")
+PATH_GRID: Final = numbers_type("x0_m", "y0_m", "cell_m", "columns", "rows", "spacing_m")
 """Head of the grid of the path that the friction follows (`PathGrid`); points and cells have sections of their own."""
 
-LINK: Final = _record(
+LINK: Final = numbers_type(
     "tendon", "rest_m", "stiffness_Npm", "backlash_m", "act", "screw_act", "sign", "userdata",
     ("angle", POWERS),
 )  # fmt: skip
 """A toe link with a screw in it (`toe_link_screws`), with the coefficients of angle over travel. `act` is its change of
 length, `screw_act` the position of its screw; the callback writes its angle to `userdata` for its sensor."""
 
-SCREW: Final = _record(
+SCREW: Final = numbers_type(
     "act", "motor_act", "command", "lead_mprad", "inertia_kgm2", "position_gain_1ps", "speed_gain_1ps",
     "speed_limit_radps", "peak_Nm", "stall_Nm", "slope_Nmsprad", "power_W", "friction_Nm", "load_friction", "stop_m",
     "tolerance_m", "seized", "userdata", "n_links", ("links", 2), "column", "column_stiffness_Npm", "column_rest_m",
@@ -99,7 +86,7 @@ motor
 has such a record too: its travel is an angle [rad], and its link is the steering column. The callback writes torque and
 limit flag to `userdata` for its sensor; `command` is the actuator whose command it follows."""
 
-CURVE_AXLE_WHEEL: Final = _record(
+CURVE_AXLE_WHEEL: Final = numbers_type(
     "qpos", "dof", "side", "rack", "rack_dof", "travel_table", "rack_table", ("stiffness", 25), ("damping", 25),
     ("held_stiffness", 25), ("held_damping", 25), ("square", 2), ("hardening", 10), ("travel_slope", 5),
     ("rack_slope", 5),
@@ -108,7 +95,7 @@ CURVE_AXLE_WHEEL: Final = _record(
 stiffness and damping, row by row, and the part of them in the engine's tendons; hardening springs, and slopes of the
 curves in the design position."""
 
-CURVE_TABLE: Final = _record("start_m", "per_m", "intervals", "count")
+CURVE_TABLE: Final = numbers_type("start_m", "per_m", "intervals", "count")
 """Head of a table of curves; the curves follow as cubics on even intervals."""
 
 _SECTIONS: Final[Mapping[str, Any]] = {
@@ -117,7 +104,7 @@ _SECTIONS: Final[Mapping[str, Any]] = {
     "curve_axle_wheels": CURVE_AXLE_WHEEL, "curves": np.float64, "surfaces": SURFACE, "obstacles": OBSTACLE,
     "cams": CAM, "heights": np.float64,
 }  # fmt: skip
-HEADER: Final = _record(
+HEADER: Final = numbers_type(
     "n_dofs", "n_bodies", "n_userdata", "n_activations", "n_controls", "n_tendons", "n_tendon_jacobian",
     "n_coordinates", "chassis_body", "chassis_root", "n_chassis_dofs", ("chassis_dofs", MAX_CHAIN), "drag_Ns2pm2",
     ("aero_point_m", 3), "engine_torque_Nm", "engine_power_W", "engine_limit_radps", "engine_drag_Nm", "gear",
@@ -127,7 +114,7 @@ HEADER: Final = _record(
 `powertrain.drive_limits`, the first place of the screws' sensors in `sensordata`, and start and number of each section,
 counted in numbers from the block's start."""
 
-WHEEL_OUTPUT: Final = _record(
+WHEEL_OUTPUT: Final = numbers_type(
     "fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm", "slip_ratio", "slip_angle_rad", "inclination_rad",
     "deflection_x_rate_mps", "deflection_y_rate_mps", "deflection_z_rate_radps", "loaded_radius_m", "limited",
     "friction_utilisation", "mu", "contact_x_m", "contact_y_m", "road_z_m", "road_slope_x", "road_slope_y",

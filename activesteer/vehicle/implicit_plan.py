@@ -28,6 +28,7 @@ from mujoco import _functions
 from numpy.typing import NDArray
 
 from activesteer.errors import ModelError
+from activesteer.native_records import numbers_type
 from activesteer.vehicle.direct_solution_limits import ARRAYS, OPTIONS, handed_over, servos
 from activesteer.vehicle.native_watch import NEGATIVE, UNCHANGED, watch
 
@@ -71,19 +72,12 @@ _STRUCTURE: Final = (
 )  # fmt: skip
 """Arrays of the model that decide the tables."""
 _MAX_STRUCTURES: Final = 64
-_WORDS: Final = ("model", "data", *_STAGES, *_OF_MODEL, *_OF_DATA, *_TABLES, *(f"n_{name}" for name in _TABLES))
-IMPLICIT_PLAN: Final = np.dtype(
-    (
-        np.record,
-        [
-            ("direct", np.intp),
-            *((name, np.intp) for name in _WORDS),
-            *((name, np.intp) for name in ("n_mass_elements", "n_forces", "factor", "n_factor", "right_side")),
-            *((name, np.intp) for name in ("gravity", "sensed_body", "first_dof", "n_dofs", "inertia_warning")),
-            ("timestep_s", np.float64),
-        ],
-    )
-)
+_WORDS: Final = (
+    "direct", "model", "data", *_STAGES, *_OF_MODEL, *_OF_DATA, *_TABLES, *(f"n_{name}" for name in _TABLES),
+    "n_mass_elements", "n_forces", "factor", "n_factor", "right_side", "gravity", "sensed_body", "first_dof", "n_dofs",
+    "inertia_warning",
+)  # fmt: skip
+IMPLICIT_PLAN: Final = numbers_type("timestep_s", words=_WORDS)
 """direct: 1 if the direct solution covers everything in the model, 0 if the engine's own step is needed.
 sensed_body, first_dof, n_dofs: The only body whose acceleration is sensed, and its degrees of freedom; 0 if the engine
 must find the accelerations of all bodies, and the forces between them.
@@ -98,12 +92,7 @@ class ImplicitPlan:
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Find the order of elimination and look up all addresses.
-
-        Args:
-            model: The car.
-            data: Its state.
-        """
+        """Find the order of elimination and look up all addresses."""
         self._model, self._data = model, data
         self.plan = np.zeros(1, IMPLICIT_PLAN)
         self._make()

@@ -9,20 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS
+from activesteer.native_records import numbers_type
 from activesteer.vehicle.electric_drive import AXLES, MAX_MAP_POINTS, Battery, Motors
 
-MOTOR: Final = np.dtype(
-    (
-        np.record,
-        [
-            *((name, np.float64) for name in (
-                "left", "right", "gear", "points", "power_W", "regeneration", "efficiency", "idle_W", "follow",
-                "step_Nm", "split_Nm", "scale", "offset", "stuck",
-            )),
-            ("speed_radps", np.float64, (MAX_MAP_POINTS,)),
-            ("torque_Nm", np.float64, (MAX_MAP_POINTS,)),
-        ],
-    )
+MOTOR: Final = numbers_type(
+    "left", "right", "gear", "points", "power_W", "regeneration", "efficiency", "idle_W", "follow", "step_Nm",
+    "split_Nm", "scale", "offset", "stuck", ("speed_radps", MAX_MAP_POINTS), ("torque_Nm", MAX_MAP_POINTS),
 )  # fmt: skip
 """A motor. Torques are those at its wheels together, except for its map (shaft). `left` and `right` are its wheels, the
 same one for the motor of a wheel; `follow` is the fraction of the difference between torque and demand that closes in
@@ -30,15 +22,13 @@ one step, `step_Nm` the largest change in one step; a fault sets `scale`, `offse
 HEALTHY: Final = {"scale": 1.0, "offset": 0.0, "stuck": 0.0}
 """Fields of a motor without a fault."""
 
-BATTERY: Final = np.dtype((np.record, [(name, np.float64) for name in ("discharge_W", "charge_W", "auxiliary_W")]))
+BATTERY: Final = numbers_type("discharge_W", "charge_W", "auxiliary_W")
 """Limits of the battery."""
 
-MOTOR_STATE: Final = np.dtype(
-    (np.record, [(name, np.float64) for name in ("torque_Nm", "difference_Nm", "demand_Nm", "power_W", "limited")])
-)
+MOTOR_STATE: Final = numbers_type("torque_Nm", "difference_Nm", "demand_Nm", "power_W", "limited")
 """State of a motor: torque at its wheels together, torque of the right wheel less that of the left one (0 behind an
 open differential), demand before limits, electric power, and whether a limit acts."""
-BATTERY_STATE: Final = np.dtype((np.record, [(name, np.float64) for name in ("power_W", "energy_J", "limited")]))
+BATTERY_STATE: Final = numbers_type("power_W", "energy_J", "limited")
 """Power at the terminals, positive when the battery gives it, energy given since the start, and whether a limit acts.
 """
 FULL_TORQUE_NM: Final = 1e9

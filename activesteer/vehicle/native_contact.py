@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.compilation import compiled
+from activesteer.native_records import numbers_type
 from activesteer.road.obstacle import PLATEAU
 from activesteer.road.surface_kernels import (
     COARSE_M,
@@ -58,17 +59,7 @@ _GRID_M: Final = 0.002
 _LEAST_RATE: Final = 1e-3
 """Sine of the least angle between a wheel's heading and the edge of a step at which it rolls over that edge."""
 
-CAM: Final = np.dtype(
-    (
-        np.record,
-        [
-            ("distance_m", np.float64),
-            ("reach_m", np.float64),
-            ("beside_m", np.float64),
-            ("drop_m", np.float64, (CAM_POINTS,)),
-        ],
-    )
-)
+CAM: Final = numbers_type("distance_m", "reach_m", "beside_m", ("drop_m", CAM_POINTS))
 """Cams of a wheel: their distance, the half length of the table of `drop_m`, the height of the cam above its lowest
 point in steps of `_CAM_STEP_M`, and half the width over which the sideways slope is taken."""
 

@@ -69,11 +69,7 @@ class DamperCurve:
     """Forces that resist these velocities [N]."""
 
     def __post_init__(self) -> None:
-        """Check the points.
-
-        Raises:
-            ParameterError: there are too few or too many, or the velocities do not increase.
-        """
+        """Check the points."""
         count = len(self.velocity_mps)
         if not 2 <= count <= MAX_CURVE_POINTS or len(self.force_N) != count:
             raise ParameterError(
@@ -192,11 +188,7 @@ class Load:
     """Forward shift of it [m]."""
 
     def __post_init__(self) -> None:
-        """Check the positions.
-
-        Raises:
-            ParameterError: a position does not have three numbers.
-        """
+        """Check the positions."""
         for name in ("payload_position_m", "fuel_position_m"):
             position = getattr(self, name)
             if position is not None and len(position) != 3:
@@ -299,12 +291,7 @@ class VehicleParameters:
     """Factors; default 1."""
 
     def __post_init__(self) -> None:
-        """Refuse keys without effect.
-
-        Raises:
-            ParameterError: there is a factor on the lag of servos but no servo, a battery without a motor, or an
-                inertia or lag of an engine that drives no wheel.
-        """
+        """Refuse keys without effect."""
         if self.battery != Battery() and not list(self.motors):
             raise ParameterError("has no effect on a car without [motors]", key="battery")
         engine = self.powertrain

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS
+from activesteer.native_records import numbers_type
 from activesteer.sensors.block import SensorBlock
 from activesteer.vehicle.channels.raw_rows import RawRows
 from activesteer.vehicle.engine_layout import engine_layout
@@ -74,12 +75,7 @@ STEP_BINDINGS: Final = np.dtype(
         ],
     )
 )
-TAPE: Final = np.dtype(
-    (
-        np.record,
-        [(name, np.intp) for name in ("room", "row", "row_bytes", "rows", "pose_every", "position", "quaternion")],
-    )
-)
+TAPE: Final = numbers_type(words=("room", "row", "row_bytes", "rows", "pose_every", "position", "quaternion"))
 
 
 class Tape:

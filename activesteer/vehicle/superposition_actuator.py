@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from activesteer.config import Range
 from activesteer.errors import ModelError
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.electric_actuator import STOP_BEYOND, ElectricActuator, known
+from activesteer.vehicle.electric_actuator import STOP_BEYOND, ElectricActuator, known, presets_of
 from activesteer.vehicle.named_parts import tendon_arms
 
 NAME: Final = "superposition"
@@ -36,11 +36,7 @@ class SuperpositionActuator(ElectricActuator):
     """Error of the angle behind the gear at which the motor is switched off, if the gear then holds by itself [rad]."""
 
     def __post_init__(self) -> None:
-        """Refuse a key without effect.
-
-        Raises:
-            ParameterError: a key of the motor is given for the servo.
-        """
+        """Refuse a key without effect."""
         if not self.is_geared:
             self.refuse_keys(
                 "has no effect on the servo, whose numbers are in the model; preset strain_wave has a motor"
@@ -62,26 +58,7 @@ class SuperpositionActuator(ElectricActuator):
         return self.filled(STRAIN_WAVE)
 
 
-STRAIN_WAVE: Final = {
-    # A strain-wave gear (Audi) or a planetary one (BMW), a motor, and an electromagnetic lock that holds it where it
-    # is: press and training texts. Their numbers are not published; all of these are assumptions: 8 rad/s behind the
-    # gear as the servo has (29 deg/s at the road wheel), 60 N m, three quarters of the power through a gear under load.
-    "gear": 50.0,
-    "friction_torque_Nm": 0.03,
-    "load_friction": 0.3,
-    "rotor_inertia_kgm2": 2e-5,
-    "peak_torque_Nm": 1.6,
-    "stall_torque_Nm": 3.0,
-    "no_load_speed_radps": 800.0,
-    "speed_limit_radps": 400.0,
-    "nominal_voltage_V": 13.0,
-    "supply_voltage_V": 13.0,
-    "supply_power_W": 250.0,
-    "position_gain_1ps": 50.0,
-    "speed_gain_1ps": 200.0,
-    "lock_torque_Nm": 2.0,
-    "position_tolerance_rad": 1e-3,
-}
+STRAIN_WAVE: Final = presets_of(SuperpositionActuator, "superposition_actuator")["strain_wave"]
 """Defaults of the preset `strain_wave`."""
 
 

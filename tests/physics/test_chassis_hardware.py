@@ -9,8 +9,7 @@ import pytest
 
 from activesteer import Simulation
 from activesteer.faults import fault_table
-from activesteer.sensors.parameters import RANDOM
-from activesteer.sensors.presets import PRESETS
+from activesteer.sensors.parameters import RANDOM, Sensors
 from activesteer.sensors.sensor_kinds import Sensor
 from tests.physics.runs import assert_goes_on_bit_by_bit
 
@@ -25,7 +24,7 @@ FAULTS = [
 ]
 WITHOUT_CHANCE = {
     f"sensors.{name}.{key}": 0.0
-    for name, sensor in PRESETS["production"].items()
+    for name, sensor in vars(Sensors(preset="production")).items()
     if isinstance(sensor, Sensor)
     for key, value in vars(sensor).items()
     if key.startswith(RANDOM) and value

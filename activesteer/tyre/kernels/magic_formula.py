@@ -39,21 +39,7 @@ from activesteer.tyre.kernels.pure_slip import (
     longitudinal_force,
     longitudinal_stiffness,
 )
-from activesteer.tyre.kernels.relaxation import relaxation_lengths
 from activesteer.tyre.kernels.turn_slip import turn_slip_factors
-from activesteer.tyre.kernels.vertical import effective_rolling_radius, vertical_force
-
-__all__ = [
-    "clamp",
-    "effective_rolling_radius",
-    "magic_formula",
-    "relative_pressure",
-    "relaxation_lengths",
-    "rolling_direction",
-    "slip_stiffnesses",
-    "steady_state",
-    "vertical_force",
-]
 
 
 class SteadyState(NamedTuple):

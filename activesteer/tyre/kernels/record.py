@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
+from activesteer.native_records import numbers_type
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.file.coefficients import COEFFICIENTS
 
@@ -26,5 +25,5 @@ _WORKED_OUT: Final = (
 
 _FIELDS: Final = (*(coefficient.name for coefficient in COEFFICIENTS), *_WORKED_OUT, *TyreConventions().numbers())
 
-TYRE_RECORD: Final = np.dtype((np.record, [(name, np.float64) for name in _FIELDS]))
+TYRE_RECORD: Final = numbers_type(*_FIELDS)
 """Coefficients in the order of their table, derived fields, and the conventions."""

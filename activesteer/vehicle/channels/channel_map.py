@@ -28,8 +28,7 @@ from activesteer.vehicle.channels.raw_rows import (
     signal,
 )
 from activesteer.vehicle.channels.steering import steering_signals
-from activesteer.vehicle.command_row import COMMAND_CHANNELS
-from activesteer.vehicle.estimate_row import ESTIMATE_CHANNELS
+from activesteer.vehicle.command_row import COMMAND_CHANNELS, ESTIMATE_CHANNELS
 from activesteer.vehicle.parameters import VehicleParameters
 
 MAX_VALUE: Final = float(np.finfo(np.float32).max)

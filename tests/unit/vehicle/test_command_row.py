@@ -25,11 +25,11 @@ from activesteer.signals import (
 from activesteer.vehicle.command_row import (
     CARRIED_OUT,
     COMMANDS,
+    ESTIMATE_CHANNELS,
     command_channels,
     command_numbers,
     write_commands_at,
 )
-from activesteer.vehicle.estimate_row import ESTIMATE_CHANNELS
 
 
 def distinct(kind: type[Any], first: float = 1.0) -> Any:
