@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, shown
 from activesteer.learning.tasks import ACTUATORS, HANDS, TASKS, Task, bounds, sampled_overrides
-from activesteer.road.path_search import PathSearch
-from activesteer.signals import ActuatorCommand, DriverCommand
+from activesteer.road.path_search import PathSearches
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, arrays_of, numbers_of
 from activesteer.simulation.batch import Batch
 from activesteer.theory.single_track import SingleTrack, yaw_rate_gain
 
@@ -28,6 +28,8 @@ _MEASURED: Final = (
     ("rear_steer_rad", -0.2, 0.2),
     ("superposition_rad", -0.2, 0.2),
 )
+_MEASUREMENTS: Final = [number.name for number in numbers_of(Measurement)]
+_COMMANDS: Final = [number.name for number in numbers_of(DriverCommand)]
 _SPEEDS: Final = tuple((f"{corner}_wheel_speed_radps", -400.0, 400.0) for corner in ("fl", "fr", "rl", "rr"))
 _DEMANDS: Final = (("front_steer_demand_rad", -1.5, 1.5), ("brake_pedal", 0.0, 1.0))
 _AHEAD_S: Final = (0.3, 0.6, 1.0, 1.5)
@@ -36,7 +38,11 @@ _ROAD: Final = (
     ("heading_error_rad", -math.pi, math.pi),
     *((f"path_left_{ahead:g}s_m", -100.0, 100.0) for ahead in _AHEAD_S),
 )
+_DISTANCES_M, _DISTANCES_S = np.array([0.0, 0.1, *(0.0 for _ in _AHEAD_S)]), np.array([0.0, 0.0, *_AHEAD_S])
+"""Points of the path that are looked at: distances [m], and times at the present speed [s]."""
 _WINDOW_M: Final = 5.0
+_ENDS: Final = ("", "time", "off course", "lost", "stopped", "diverged")
+_END_NAMES: Final = np.array(_ENDS, dtype=object)
 _SIDESLIP_RAD, _RATE_RADPS, _OFFSET_M = math.radians(5.0), math.radians(10.0), 1.0
 """Errors that cost as much as each other."""
 _SLOW_MPS: Final = 2.0
@@ -146,11 +152,13 @@ class Episodes:
         if self._every < 1 or abs(self._every * self.batch.loops[0].vehicle.timestep_s - interval_s) > 1e-9:
             raise ParameterError(f"is {shown(interval_s)} s; a whole number of steps is needed", key="interval_s")
         self._low = np.array([low for _, low, _ in self.actions])
-        paths = [loop.maneuver.setpoint(0.0).path for loop in self.batch.loops]
-        self._lines = [None if path is None else PathSearch(path) for path in paths]
-        self._on_road = task.radius_m > 0.0 or self._lines[0] is not None
+        paths = [path for loop in self.batch.loops if (path := loop.maneuver.setpoint(0.0).path) is not None]
+        self._paths = PathSearches(paths) if paths else None
+        self._on_road = task.radius_m > 0.0 or bool(paths)
         road = _ROAD if self._on_road and self._agent_drives else ()
         self.observations = (*_MEASURED, *_SPEEDS, *_DEMANDS, *road)
+        self._measured = [_MEASUREMENTS.index(name) for name, _, _ in (*_MEASURED, *_SPEEDS)]
+        self._demands = [_COMMANDS.index(name) for name, _, _ in _DEMANDS]
         self._bounds = bounds(self.observations)
         ones = np.ones(len(self.actions), np.float32)
         self.action_space = gymnasium.spaces.Box(self._low.astype(np.float32), ones)
@@ -160,6 +168,7 @@ class Episodes:
             characteristic_speed_mps=np.array([track.characteristic_speed_mps for track in tracks]),
             wheelbase_m=np.array([track.wheelbase_m for track in tracks]),
         )
+        self._steps = self.batch.steps
         self._along_m = np.zeros(n * cars)
         self._started = np.zeros(n, dtype=bool)
 
@@ -210,19 +219,20 @@ class Episodes:
         self._drive(given, chosen)
         tracked = self._tracked()
         terms, sideslip = self._terms(given, tracked)
-        end = np.full(self._n, "", dtype=object)
-        end[self.batch.step_count[self._active] >= self.batch.steps[self._active]] = "time"
+        cars = self._active
+        end = np.where(self.batch.step_count[cars] >= self._steps[cars], _ENDS.index("time"), 0)
         if self._on_road:
-            end[np.abs(tracked[0]) > self.task.most_offset_m] = "off course"
-        end[np.abs(sideslip) > self.task.most_sideslip_rad] = "lost"
+            end[np.abs(tracked[0]) > self.task.most_offset_m] = _ENDS.index("off course")
+        end[np.abs(sideslip) > self.task.most_sideslip_rad] = _ENDS.index("lost")
         if self.task.radius_m:
-            end[self.batch.motion.speed_mps[self._active] < _SLOW_MPS] = "stopped"
-        end[[car in self.batch.failures for car in self._active.tolist()]] = "diverged"
-        terminated = ~np.isin(end, ("", "time"))
-        terms["lost"] = -self.task.weights.get("lost", 0.0) * terminated.astype(np.float64)
-        reward = np.nan_to_num(sum(terms.values(), np.zeros(self._n)), nan=-self.task.weights.get("lost", 0.0))
-        observation = self._observe(tracked)
-        return Outcome(observation, reward, terminated, end == "time", terms, sideslip, end)
+            end[self.batch.motion.speed_mps[cars] < _SLOW_MPS] = _ENDS.index("stopped")
+        if self.batch.failures:
+            end[np.isin(cars, list(self.batch.failures))] = _ENDS.index("diverged")
+        truncated = end == _ENDS.index("time")
+        terminated = (end != 0) & ~truncated
+        terms["lost"] = -self.task.weights.get("lost", 0.0) * terminated
+        reward = np.nan_to_num(sum(terms.values()), nan=-self.task.weights.get("lost", 0.0))
+        return Outcome(self._observe(tracked), reward, terminated, truncated, terms, sideslip, _END_NAMES[end])
 
     def _drive(self, actions: Array, chosen: NDArray[np.bool_]) -> None:
         columns: dict[str, Any] = {}
@@ -238,61 +248,54 @@ class Episodes:
 
     def _tracked(self) -> tuple[Array, Array, Array]:
         """Return distance to the left of the path [m], heading relative to it [rad], and points ahead [m], (n, k)."""
-        offset, error, ahead = np.zeros(self._n), np.zeros(self._n), np.zeros((self._n, len(_AHEAD_S)))
         if not self._on_road:
-            return offset, error, ahead
-        motion = self.batch.motion
-        for episode, car in enumerate(self._active.tolist()):
-            x, y, yaw = float(motion.x_m[car]), float(motion.y_m[car]), float(motion.yaw_rad[car])
-            if not math.isfinite(x + y + yaw):
-                continue
-            distances = np.array([0.0, 0.1, *(float(motion.speed_mps[car]) * after for after in _AHEAD_S)])
-            if radius := self.task.radius_m:
-                around = math.atan2(x, radius - y)
-                px, py = (
-                    radius * np.sin(around + distances / radius),
-                    radius - radius * np.cos(around + distances / radius),
-                )
-            else:
-                search = self._lines[car]
-                assert search is not None  # the task has a path
-                along = self._along_m[car] = search.nearest(x, y, float(self._along_m[car]), _WINDOW_M)
-                px, py = search.at(along + distances)
-            heading = math.atan2(py[1] - py[0], px[1] - px[0])
-            offset[episode] = math.cos(heading) * (y - py[0]) - math.sin(heading) * (x - px[0])
-            error[episode] = math.remainder(yaw - heading, math.tau)
-            ahead[episode] = math.cos(yaw) * (py[2:] - y) - math.sin(yaw) * (px[2:] - x)
-        return offset, error, ahead
+            return np.zeros(self._n), np.zeros(self._n), np.zeros((self._n, len(_AHEAD_S)))
+        motion, cars = arrays_of(Motion, self.batch.rows(Motion, self._active)), self._active
+        x, y, yaw = (np.nan_to_num(place, posinf=0.0, neginf=0.0) for place in (motion.x_m, motion.y_m, motion.yaw_rad))
+        distances = np.nan_to_num(motion.speed_mps)[:, np.newaxis] * _DISTANCES_S + _DISTANCES_M
+        if radius := self.task.radius_m:
+            around = np.arctan2(x, radius - y)[:, np.newaxis] + distances / radius
+            px, py = radius * np.sin(around), radius - radius * np.cos(around)
+        else:
+            assert self._paths is not None  # the task has a path
+            found = self._paths.ahead(cars, x, y, self._along_m[cars], _WINDOW_M, distances)
+            self._along_m[cars], px, py = found
+        heading = np.arctan2(py[:, 1] - py[:, 0], px[:, 1] - px[:, 0])
+        offset = np.cos(heading) * (y - py[:, 0]) - np.sin(heading) * (x - px[:, 0])
+        error = (yaw - heading + math.pi) % math.tau - math.pi
+        ahead = np.cos(yaw) * (py[:, 2:] - y[:, np.newaxis]).T - np.sin(yaw) * (px[:, 2:] - x[:, np.newaxis]).T
+        return offset, error, ahead.T
 
     def _observe(self, tracked: tuple[Array, Array, Array]) -> NDArray[np.float32]:
-        measured, driver, cars = self.batch.measurement, self.batch.driver_command, self._active
-        columns = [getattr(measured, name)[cars] for name, _, _ in _MEASURED]
-        columns += [*measured.wheel_speed_radps[cars].T, *(getattr(driver, name)[cars] for name, _, _ in _DEMANDS)]
-        if len(self.observations) > len(columns):
-            columns += [tracked[0], tracked[1], *tracked[2].T]
-        return np.clip(np.nan_to_num(np.column_stack(columns)).astype(np.float32), *self._bounds)
+        parts = [self.batch.rows(Measurement, self._active)[:, self._measured]]
+        parts.append(self.batch.rows(DriverCommand, self._active)[:, self._demands])
+        if len(self.observations) > len(self._measured) + len(self._demands):
+            parts += [tracked[0][:, np.newaxis], tracked[1][:, np.newaxis], tracked[2]]
+        return np.clip(np.nan_to_num(np.hstack(parts)).astype(np.float32), *self._bounds)
 
     def _terms(self, actions: Array, tracked: tuple[Array, Array, Array]) -> tuple[dict[str, Array], Array]:
-        cars, motion, measured = self._active, self.batch.motion, self.batch.measurement
-        speed, rate = motion.speed_mps[cars], motion.yaw_rate_radps[cars]
-        rolls = np.hypot(speed, motion.lateral_speed_mps[cars]) > _SLOW_MPS
-        sideslip = np.where(rolls, np.arctan2(motion.lateral_speed_mps[cars], speed), 0.0)
-        model: Any = SimpleNamespace(**{name: value[cars] for name, value in vars(self._model).items()})
-        most = _MOST_AY_MPS2 / np.maximum(speed, 3.0)
-        front_rad = self.batch.driver_command.front_steer_demand_rad[cars]
-        desired = np.clip(yaw_rate_gain(model, speed) * front_rad, -most, most)
-        task = self.task
-        found = {
-            "sideslip": -((sideslip / _SIDESLIP_RAD) ** 2),
-            "yaw_rate": -(((rate - desired) / _RATE_RADPS) ** 2),
-            "offset": -((tracked[0] / _OFFSET_M) ** 2),
-            "braking": -measured.ax_mps2[cars] / 9.81,
-            "effort": -np.mean(actions**2, axis=1),
-            "drift": np.exp(-(((sideslip - task.sideslip_rad) / math.radians(10.0)) ** 2)),
-            "circle": np.exp(-((tracked[0] / 3.0) ** 2)),
+        cars, task = self._active, self.task
+        motion = arrays_of(Motion, self.batch.rows(Motion, cars))
+        speed, rate, lateral = motion.speed_mps, motion.yaw_rate_radps, motion.lateral_speed_mps
+        sideslip = np.where(np.hypot(speed, lateral) > _SLOW_MPS, np.arctan2(lateral, speed), 0.0)
+
+        def yaw_rate_error() -> Array:
+            model: Any = SimpleNamespace(**{name: value[cars] for name, value in vars(self._model).items()})
+            most = _MOST_AY_MPS2 / np.maximum(speed, 3.0)
+            front_rad = self.batch.rows(DriverCommand, cars)[:, _COMMANDS.index("front_steer_demand_rad")]
+            return rate - np.clip(yaw_rate_gain(model, speed) * front_rad, -most, most)
+
+        formulas = {
+            "sideslip": lambda: -((sideslip / _SIDESLIP_RAD) ** 2),
+            "yaw_rate": lambda: -((yaw_rate_error() / _RATE_RADPS) ** 2),
+            "offset": lambda: -((tracked[0] / _OFFSET_M) ** 2),
+            "braking": lambda: -self.batch.rows(Measurement, cars)[:, _MEASUREMENTS.index("ax_mps2")] / 9.81,
+            "effort": lambda: -np.mean(actions**2, axis=1),
+            "drift": lambda: np.exp(-(((sideslip - task.sideslip_rad) / math.radians(10.0)) ** 2)),
+            "circle": lambda: np.exp(-((tracked[0] / 3.0) ** 2)),
         }
-        weights = {name: weight for name, weight in task.weights.items() if name in found}
-        return {name: weight * self.interval_s * found[name] for name, weight in weights.items()}, sideslip
+        weights = {name: weight for name, weight in task.weights.items() if name in formulas}
+        return {name: weight * self.interval_s * formulas[name]() for name, weight in weights.items()}, sideslip
 
 
 def _task(task: str | Task) -> Task:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.compilation import compiled
 from activesteer.conventions import Array
@@ -54,6 +56,43 @@ class PathSearch:
         return nearest(x_m, y_m, around_m, window_m, *self.line)
 
 
+class PathSearches:
+    """Positions of many cars, each along its own path; see `PathSearch`."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        """Prepare the arguments of the kernel.
+
+        Args:
+            paths: The path of each car.
+        """
+        different = {id(path): path for path in paths}
+        places = {key: place for place, key in enumerate(different)}
+        self._path = np.array([places[id(path)] for path in paths])
+        lines = [PathSearch(path).line for path in different.values()]
+        spacings, xs, ys, firsts, lasts = zip(*lines, strict=True)
+        self._starts = np.cumsum([0, *map(len, xs)])
+        self._points = np.concatenate(xs), np.concatenate(ys)
+        self._ends = np.array([spacings, firsts, lasts]).T.copy()
+
+    def ahead(
+        self, cars: NDArray[np.intp], x_m: Array, y_m: Array, around_m: Array, window_m: float, ahead_m: Array
+    ) -> tuple[Array, Array, Array]:
+        """Find the nearest points of the paths, and points ahead of them.
+
+        Args:
+            cars: Numbers of the cars, shape (n,).
+            x_m: Their world x [m], shape (n,).
+            y_m: Their world y [m], shape (n,).
+            around_m: Arc lengths to search around [m], shape (n,).
+            window_m: Search distance to either side [m].
+            ahead_m: Distances from the nearest point along the path [m], shape (n, k).
+
+        Returns:
+            Arc lengths of the nearest points [m], shape (n,); world x and y of the points ahead [m], shape (n, k) each.
+        """
+        return _ahead(self._path[cars], x_m, y_m, around_m, window_m, ahead_m, self._starts, *self._points, self._ends)
+
+
 @compiled
 def point_at(s, spacing, xs, ys, heading_first, heading_last):
     """Return one point: linear between points, straight beyond the ends."""
@@ -96,3 +135,17 @@ def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
     bend = before - 2.0 * minimum + after
     shift = 0.5 * (before - after) / bend if 0.0 < bend < math.inf else 0.0
     return around - window + (best + min(max(shift, -1.0), 1.0)) * SPACING_M
+
+
+@compiled
+def _ahead(path, x, y, around, window, ahead, starts, xs, ys, ends):
+    """`PathSearches.ahead` as native code."""
+    along, px, py = np.empty(len(path)), np.empty(ahead.shape), np.empty(ahead.shape)
+    for car, own in enumerate(path):
+        own_xs, own_ys = xs[starts[own] : starts[own + 1]], ys[starts[own] : starts[own + 1]]
+        spacing, first, last = ends[own]
+        along[car] = nearest(x[car], y[car], around[car], window, spacing, own_xs, own_ys, first, last)
+        for place in range(ahead.shape[1]):
+            s = along[car] + ahead[car, place]
+            px[car, place], py[car, place] = point_at(s, spacing, own_xs, own_ys, first, last)
+    return along, px, py

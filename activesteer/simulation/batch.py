@@ -196,22 +196,31 @@ class Batch:
     @property
     def measurement(self) -> Any:
         """Present signals of the sensors, a `Measurement`; each field has shape (n,), or (n, 4) for the wheels."""
-        return arrays_of(Measurement, self._native.measurements.copy())
+        return arrays_of(Measurement, self.rows(Measurement))
 
     @property
     def motion(self) -> Any:
         """Present positions and motions as the drivers see them, a `Motion`; each field has shape (n,)."""
-        return arrays_of(Motion, self._native.motions.copy())
+        return arrays_of(Motion, self.rows(Motion))
 
     @property
     def driver_command(self) -> Any:
         """Last commands of the drivers, a `DriverCommand`; each field has shape (n,)."""
-        return arrays_of(DriverCommand, self._native.driver_commands.copy())
+        return arrays_of(DriverCommand, self.rows(DriverCommand))
 
     @property
     def actuator_command(self) -> Any:
         """Last commands of the controllers, an `ActuatorCommand`; each field has shape (n,), for the wheels (n, 4)."""
-        return arrays_of(ActuatorCommand, self._native.actuator_commands.copy())
+        return arrays_of(ActuatorCommand, self.rows(ActuatorCommand))
+
+    def rows(self, kind: type[Any], cars: NDArray[np.intp] | slice = slice(None)) -> Array:
+        """Return the numbers of present messages, a copy of shape (cars, numbers); see `signals.arrays_of`.
+
+        Args:
+            kind: `Measurement`, `Motion`, `DriverCommand` or `ActuatorCommand`.
+            cars: Numbers of the cars; by default all.
+        """
+        return self._native.rows[kind][cars].copy()
 
     def advance(
         self,
@@ -486,7 +495,11 @@ def _columns(kind: Kind, message: Any, n: int) -> Array:
         raise kind.fail("", f"is {shown(message)}; an activesteer.{kind.result.__name__} of arrays is needed", message)
     rows = np.zeros((n, len(numbers_of(kind.result))))
     place = 0
+    defaults = kind.result._field_defaults
     for name, width, value in zip(message._fields, widths_of(kind.result), message, strict=True):
+        if value is defaults.get(name) and not value:
+            place += width
+            continue
         if not width:
             if value is not None:
                 raise kind.fail("", f"{name} cannot be given to a batch", value)

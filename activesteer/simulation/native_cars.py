@@ -124,6 +124,7 @@ class NativeCars:
         actuator_commands: Numbers of the last commands of the controllers, shape (n, numbers).
         measurements: Numbers of the present measurements, shape (n, numbers).
         motions: Present motions, shape (n, 6).
+        rows: These four by the kind of their message.
     """
 
     def __init__(self, loops: Sequence[Any]) -> None:
@@ -135,12 +136,11 @@ class NativeCars:
         self._loops, count = loops, len(loops)
         self.cars = np.zeros(count, CAR)
         kinds = ("driver_command", DriverCommand), ("actuator_command", ActuatorCommand), ("measurement", Measurement)
-        rows: dict[str, Array] = {}
+        self.rows: dict[type[Any], Array] = {}
         for name, kind in (*kinds, ("motion", Motion)):
-            rows[name] = row = np.zeros((count, len(numbers_of(kind))))
+            self.rows[kind] = row = np.zeros((count, len(numbers_of(kind))))
             self.cars[name] = row.ctypes.data + row.strides[0] * np.arange(count)
-        self.driver_commands, self.actuator_commands = rows["driver_command"], rows["actuator_command"]
-        self.measurements, self.motions = rows["measurement"], rows["motion"]
+        self.driver_commands, self.actuator_commands, self.measurements, self.motions = self.rows.values()
         self._tables: list[SetpointTable | None] = [None] * count
         self._buses: list[Array] = [np.zeros(0)] * count
         for index, loop in enumerate(loops):
