@@ -1,7 +1,7 @@
 """Drive the population again, or its missing runs, store the results with the package, and write its page.
 
     python tools/renew_population.py [-o DIR] [--samples N] [--jobs N]
-    python tools/renew_population.py --comparison [-o DIR] [--samples N] [--jobs N]
+    python tools/renew_population.py --comparison [--controllers C,C...] [-o DIR] [--samples N] [--jobs N]
     python tools/renew_population.py --judge S2=S1 W2=W2 W3=W3
 
 500 samples take half an hour on two idle processors. The tool resumes an interrupted run and accepts a folder that
@@ -52,7 +52,7 @@ CHASSIS_CONTROL: Final = DOCS / "chassis_control.md"
 BEGIN: Final = "<!-- the table is written by tools/renew_population.py -->\n"
 END: Final = "<!-- end of the table -->\n"
 COMPARED: Final = ("none", "ars", "afs", "esc", "lqr", "mpc", "integrated")
-"""Controllers of the comparison that belongs to the package."""
+"""Controllers of the comparison, unless others are given."""
 RUNS: Final = "runs.parquet"
 _EVERY: Final = 2
 """Interval of the stored values of a band, which is smoother than the curves."""
@@ -396,6 +396,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--comparison", action="store_true", help="compare controllers, not claims")
     parser.add_argument(
+        "--controllers", default=",".join(COMPARED), metavar="C,C...", help="controllers to compare (%(default)s)"
+    )
+    parser.add_argument(
         "-o", "--output", type=Path, metavar="DIR", help="default: build/population or build/comparison"
     )
     parser.add_argument("--samples", type=int, metavar="N", help="default: that of studies/population.toml")
@@ -408,7 +411,7 @@ def main() -> None:
         return
     output = options.output or Path("build", "comparison" if options.comparison else "population")
     with RunCounter("population", quiet=False) as counter:
-        controllers = COMPARED if options.comparison else None
+        controllers = options.controllers.split(",") if options.comparison else None
         found = population(options.samples, controllers, output=output, jobs=options.jobs, progress=counter)
     if options.comparison:
         print(comparison_text(found))
