@@ -6,7 +6,7 @@ The limits of a criterion come from the words of the statement and from what a d
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -64,7 +64,14 @@ class Statement:
     rejects: frozenset[Fake]
 
     @classmethod
-    def about(cls, kind: Kind, number: str, text: str, criterion: str, *rejects: Fake) -> Statement:
+    def about(
+        cls,
+        kind: Kind,
+        number: str,
+        text: str,
+        criterion: str,
+        rejects: Iterable[Fake] = (Fake.NO_EFFECT, Fake.REVERSED),
+    ) -> Statement:
         """Return a statement that rejects these fakes besides those that every statement rejects."""
         return cls(number, text, criterion, kind, _NO_PROOF | frozenset(rejects))
 

@@ -11,7 +11,7 @@ from itertools import combinations
 from typing import Final
 
 from activesteer.analysis import path_following, track
-from activesteer.analysis.claims.claim import SYSTEMS, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.claim import SYSTEMS, Claim, Kind, Statement
 from activesteer.analysis.claims.condition import at_least, at_most
 from activesteer.analysis.claims.path_following import (
     AFTER_SIDESLIP,
@@ -41,6 +41,7 @@ L1: Final = Statement.about(
     "The three tracks look alike.",
     "From the first gate to the last, the tracks of the front axle centre of any two runs are at most "
     f"{ALIKE_M:g} m apart at the same x. The number of cones that each body hits is given, and does not decide.",
+    rejects=(),
 )
 L2: Final = Statement.about(
     Kind.DRIVER,
@@ -50,8 +51,6 @@ L2: Final = Statement.about(
     f"{math.degrees(SETTLED_YAW_RATE_RADPS):g} deg/s. The root mean squares of yaw rate and sideslip {CALMED_WORDS}. "
     "The root mean squares of lateral acceleration and steering wheel angle are also at most "
     f"{100.0 * CALMED:.0f} % of the values of none.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 L3: Final = Statement.about(
     Kind.DRIVER,
@@ -60,8 +59,6 @@ L3: Final = Statement.about(
     "The largest magnitudes of yaw rate and of sideslip of ars and of afs are at most "
     f"{100.0 * PEAK_FRACTION:.0f} % of the values of none, and smaller by at least {math.degrees(YAW_RATE_RADPS):g} "
     f"deg/s and {math.degrees(SIDESLIP_RAD):g} deg.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 L4: Final = held_statement("L4")
 STATEMENTS: Final = (L1, L2, L3, L4)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Kind, Statement
 from activesteer.analysis.claims.condition import Condition, at_most
 from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.path_following import AFTER_S
@@ -52,8 +52,6 @@ def held_statement(number: str) -> Statement:
         "Rear steering holds the sideslip low.",
         f"The peak of the sideslip of ars is at most {math.degrees(LOW_SIDESLIP_RAD):g} deg, and at least "
         f"{math.degrees(SIDESLIP_RAD):g} deg below the peaks of none and of afs.",
-        Fake.NO_EFFECT,
-        Fake.REVERSED,
     )
 
 

@@ -52,8 +52,6 @@ def _kept_statement(number: str, system: str, text: str) -> Statement:
         f"peak after the steering reversal (FMVSS 126), and its sideslip stays within "
         f"{math.degrees(KEPT_SIDESLIP_RAD):.0f} deg; none breaks these limits, and the peak of its sideslip is "
         f"at least {math.degrees(SIDESLIP_RAD):g} deg larger.",
-        Fake.NO_EFFECT,
-        Fake.REVERSED,
     )
 
 
@@ -63,8 +61,6 @@ D1: Final = Statement.about(
     "Without control the car is lost.",
     f"The yaw rate of none is above at least one of the limits of FMVSS 126 ({_LIMITS} after the completion of steer), "
     f"and its sideslip exceeds {math.degrees(LOST_SIDESLIP_RAD):.0f} deg and twice the sideslip of ars and of afs.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 D2: Final = _kept_statement("D2", "ars", "Rear steering keeps the car.")
 D3: Final = _kept_statement("D3", "afs", "Front superposition keeps the car.")
@@ -76,7 +72,7 @@ D4: Final = Statement.about(
     "by ars times the angle demanded by afs integrates to less than 0, and while both are larger than "
     f"{math.degrees(MIN_ANGLE_RAD):.1f} deg, at least {MIN_COMMON_S:.1f} s in all, they are opposite for "
     f"{100.0 * OPPOSITE_FRACTION:.0f} % of the time.",
-    Fake.ONE_REVERSED,
+    rejects=(Fake.ONE_REVERSED,),
 )
 D5: Final = Statement.about(
     Kind.SYSTEMS,
@@ -84,8 +80,6 @@ D5: Final = Statement.about(
     "Rear steering is somewhat more effective than front superposition.",
     f"The peak of the sideslip of ars is at least {math.degrees(SIDESLIP_RAD):g} deg below the peak of afs, and the "
     "magnitude of its yaw rate ratio 1.00 s after the completion of steer is not larger; ars keeps the limits of D2.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 STATEMENTS: Final = (D1, D2, D3, D4, D5)
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from activesteer.analysis import path_following
-from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Kind, Statement
 from activesteer.analysis.claims.condition import at_least, true
 from activesteer.analysis.claims.path_following import (
     AFTER_SIDESLIP,
@@ -49,16 +49,12 @@ Z1: Final = Statement.about(
     "The amplitude of the front axle centre's track between first and last cone (half the distance of its leftmost "
     f"and rightmost place) is at least {TRACK_M:g} m larger for none than for ars and for afs. The number of "
     "cones that each body hits is given, and does not decide.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 Z2: Final = Statement.about(
     Kind.DRIVER,
     "Z2",
     "Each system reduces the oscillation of yaw rate and sideslip after the last gate.",
     f"The root mean squares of yaw rate and sideslip {CALMED_WORDS}.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 Z3: Final = Statement.about(
     Kind.DRIVER,
@@ -68,8 +64,6 @@ Z3: Final = Statement.about(
     f"{100.0 * (1.0 - NOT_REDUCED):.0f} % below the values of none. The root mean square of its steering wheel angle "
     f"is the largest of the three by at least {math.degrees(STEERING_WHEEL_RAD):g} deg, and the angle exceeds "
     f"{math.degrees(LARGE_STEERING_WHEEL_RAD):.0f} deg. afs passes every cone on the right side.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 Z4: Final = Statement.about(
     Kind.DRIVER,
@@ -77,8 +71,6 @@ Z4: Final = Statement.about(
     "Rear steering has the smallest amplitudes of yaw rate and sideslip.",
     "Between the cones, the root mean squares of yaw rate and of sideslip of ars are below the values of none and "
     f"afs by at least {math.degrees(YAW_RATE_RADPS):g} deg/s and {math.degrees(SIDESLIP_RAD):g} deg.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 Z5: Final = held_statement("Z5")
 STATEMENTS: Final = (Z1, Z2, Z3, Z4, Z5)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from activesteer.analysis import path_following
-from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
+from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Kind, Statement
 from activesteer.analysis.claims.condition import Condition, at_least, at_most
 from activesteer.analysis.claims.path_following import (
     LARGE_STEERING_WHEEL_RAD,
@@ -52,8 +52,6 @@ def _stays_statement(number: str, system: str, text: str) -> Statement:
         f"does not, and gets at least {TRACK_M:g} m further out. {system} is under control: its sideslip stays within "
         f"{math.degrees(KEPT_SIDESLIP_RAD):.0f} deg, and in the last {END_S:g} s of the run the root mean square of "
         f"its yaw rate is at most {math.degrees(SETTLED_YAW_RATE_RADPS):g} deg/s.",
-        Fake.NO_EFFECT,
-        Fake.REVERSED,
     )
 
 
@@ -66,8 +64,6 @@ W1: Final = Statement.about(
     f"{math.degrees(LARGE_STEERING_WHEEL_RAD):.0f} deg and {LARGER:g} times the angles of ars and of afs; in the last "
     f"{END_S:g} s of the run the root mean squares of its yaw rate and sideslip are above "
     f"{math.degrees(LARGE_YAW_RATE_RADPS):.0f} deg/s and {math.degrees(LARGE_SIDESLIP_RAD):.0f} deg.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 W2: Final = _stays_statement("W2", "ars", "Rear steering keeps the car on the track.")
 W3: Final = _stays_statement("W3", "afs", "Front superposition keeps the car on the track.")

@@ -47,8 +47,6 @@ S1: Final = Statement.about(
     "S1",
     "Both systems lower the peak of the yaw rate.",
     f"The peak yaw rates of ars and of afs are {_LOWER}.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 S2: Final = Statement.about(
     Kind.SYSTEMS,
@@ -59,8 +57,6 @@ S2: Final = Statement.about(
     "The paper's figure has the three curves in one diagram, where a delay is a distance at one level. The times to "
     "90 % of each run's own steady-state value are given, and do not decide: a system that raises its steady state "
     "reaches 90 % of it later without answering later.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 S3: Final = Statement.about(
     Kind.SYSTEMS,
@@ -69,7 +65,7 @@ S3: Final = Statement.about(
     "The steady-state rear angle of ars, counted from straight ahead, less the angle of none (the give "
     f"of the hinges), has the opposite sign to the front wheels, and at least {math.degrees(STEER_RAD):g} deg; "
     f"{_HELPS.format('ars')}.",
-    Fake.REVERSED,
+    rejects=(Fake.REVERSED,),
 )
 S4: Final = Statement.about(
     Kind.SYSTEMS,
@@ -78,7 +74,7 @@ S4: Final = Statement.about(
     "The steady-state superposition angle of afs, counted from straight ahead, less the angle of none (the give of "
     f"the gear), has the sign of the steering wheel angle, and at least {math.degrees(STEER_RAD):g} deg; "
     f"{_HELPS.format('afs')}.",
-    Fake.REVERSED,
+    rejects=(Fake.REVERSED,),
 )
 S5: Final = Statement.about(
     Kind.SYSTEMS,
@@ -86,8 +82,6 @@ S5: Final = Statement.about(
     "Rear steering makes the sideslip angle larger.",
     "The magnitude of the steady-state sideslip angle of ars, counted from straight ahead, is above the values of none "
     f"and of afs by at least {math.degrees(SETTLED_SIDESLIP_RAD):g} deg; {_HELPS.format('ars')}.",
-    Fake.NO_EFFECT,
-    Fake.REVERSED,
 )
 STATEMENTS: Final = (S1, S2, S3, S4, S5)
 
