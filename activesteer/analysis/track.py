@@ -116,13 +116,6 @@ def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
 
 
 def largest_difference(first: RecordingLike, second: RecordingLike, from_x_m: float, to_x_m: float) -> float:
-    """Return the largest lateral distance between two tracks at the same x [m]; nan if one does not cover the range.
-
-    Args:
-        first: A run.
-        second: Another run.
-        from_x_m: Beginning of the range, world x [m].
-        to_x_m: End of the range [m].
-    """
+    """Return the largest lateral distance between two tracks at the same x [m]; nan if one does not cover the range."""
     x = np.linspace(from_x_m, to_x_m, max(2, math.ceil((to_x_m - from_x_m) / 0.1) + 1))
     return float(np.abs(track_over_x(first, x) - track_over_x(second, x)).max())

@@ -138,13 +138,7 @@ def within(value: float, most: float) -> float:
 
 
 def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
-    """Check that the car drives forwards and fast enough for a search.
-
-    Args:
-        speed_mps: Speed of the manoeuvre [m/s].
-        aim: Key that makes the search necessary.
-        amplitude: Key to give instead.
-    """
+    """Check that the car drives forwards and fast enough for a search."""
     if speed_mps < MIN_SEARCH_SPEED_MPS:
         minimum = 3.6 * MIN_SEARCH_SPEED_MPS
         raise ManeuverError(

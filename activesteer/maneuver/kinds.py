@@ -42,12 +42,7 @@ KINDS: Final[dict[str, type[Maneuver]]] = {
 
 
 def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
-    """Return the class of a manoeuvre table.
-
-    Args:
-        table: The table.
-        source: For error messages; its error class is raised.
-    """
+    """Return the class of a manoeuvre table."""
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         problem = "is missing" if kind is None else f"there is no kind {shown(kind)}"

@@ -36,13 +36,7 @@ class PathSpeed:
     """
 
     def __init__(self, maneuver: Maneuver, path: Path, speed_mps: Array) -> None:
-        """Begin at the start of the path.
-
-        Args:
-            maneuver: The manoeuvre.
-            path: Its path.
-            speed_mps: Speeds at the points of the path [m/s].
-        """
+        """Begin at the start of the path."""
         self.maneuver, self.present = maneuver, maneuver.setpoint(0.0)
         self.began: list[tuple[float, str]] = []
         self._search, self._along_m = PathSearch(path), 0.0

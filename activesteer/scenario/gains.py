@@ -23,12 +23,7 @@ def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> dict[str, frozenset[str]]:
-    """Return the overrides that none of these controllers reads: key -> keys of the table [controllers] it replaces.
-
-    Args:
-        overrides: Dotted key -> value, as for `resolve`.
-        controllers: Controllers, as for `simulate`.
-    """
+    """Return the overrides that none of these controllers reads: key -> keys of the table [controllers] it replaces."""
     read = frozenset[str]().union(*map(keys_read, controllers))
     replaced = {
         key: _KEYS.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))
@@ -48,10 +43,6 @@ def read_by(overrides: Mapping[str, Any], controller: Any) -> dict[str, Any]:
 
 def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> None:
     """Check that every override of the table [controllers] is read by one of these controllers.
-
-    Args:
-        overrides: Dotted key -> value, as for `resolve`.
-        controllers: Controllers, as for `simulate`; may be empty.
 
     Raises:
         ParameterError: no controller reads an override; `allowed` has the keys that they read.

@@ -37,12 +37,7 @@ def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
 
 
 def own_values(overrides: Mapping[str, Any], controllers: Mapping[str, Sequence[Plugin]]) -> dict[str, dict[str, Any]]:
-    """Return the checked overrides of users' controllers: class -> name -> value.
-
-    Args:
-        overrides: Dotted key -> value, of these controllers only.
-        controllers: Users' controllers, as from `own_controllers`.
-    """
+    """Return the checked overrides of users' controllers: class -> name -> value."""
     given: dict[str, dict[str, Any]] = {}
     for key, value in overrides.items():
         name, parameter = own_path(key) or ("", "")

@@ -24,10 +24,6 @@ _BEGIN_S: Final = 0.5
 def after_one_second(run: Run, begin_s: float) -> dict[str, float]:
     """Return the motion of the car 1 s after the beginning of braking.
 
-    Args:
-        run: The run, straight along x before the brake.
-        begin_s: Beginning of braking [s].
-
     Returns:
         Yaw rate, yaw angle and lateral deviation, left positive; nan if the run ends before.
     """

@@ -19,11 +19,6 @@ _LONGEST_S: Final = 30.0
 def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float:
     """Return the angle from a slow ramp to the left at constant speed.
 
-    Args:
-        ground: The proving ground.
-        speed_kmh: Speed [km/h].
-        ay_mps2: Lateral acceleration [m/s2].
-
     Returns:
         Steering wheel angle, to 0.1 deg [deg].
     """

@@ -82,12 +82,6 @@ def controller_digest(controller: str) -> str:
 def run_id(scenario: Scenario, controller: str, seed: int, timestep_s: float) -> str:
     """Return the identity of a run: equal if and only if everything that decides the result is equal.
 
-    Args:
-        scenario: Manoeuvre and car with all overrides applied, not yet prepared.
-        controller: Name or file of the controller.
-        seed: Seed of the study.
-        timestep_s: Step of the simulation [s].
-
     Returns:
         16 hexadecimal digits.
     """

@@ -243,13 +243,6 @@ def driver_loops(
 ) -> list[LoopAtSpeed]:
     """Return the loop with every controller at every speed.
 
-    Args:
-        driver: Name, path or table of a driver.
-        vehicle: Name, path, or table of a vehicle.
-        controllers: `none`, `ars`, `afs`, or variants.
-        speeds_kmh: Speeds [km/h].
-        overrides: Dotted key -> value, of vehicle and driver.
-
     Raises:
         DriverError: the driver is a user's own class, which has no linear form.
         ActiveSteerError: an input is wrong.

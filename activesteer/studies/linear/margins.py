@@ -237,12 +237,6 @@ def loop_margins(
     """Return the margins of every loop of every controller at every speed; an unused actuator has none.
 
     If a controller uses both actuators, the margins of both together come last.
-
-    Args:
-        controllers: As for `simulate`.
-        vehicle: Name, path, or table of a vehicle.
-        speeds_kmh: Speeds [km/h].
-        overrides: Dotted key -> value.
     """
     check_gains(overrides or {}, controllers)
     return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}]))

@@ -34,15 +34,7 @@ def small_step(
     overrides: Mapping[str, Any] | None = None,
     driver: Any = DEFAULT_DRIVER,
 ) -> RecordingLike:
-    """Return the run for the damping: a straight path that begins `STEP_M` to the left of the car.
-
-    Args:
-        speed_mps: Speed [m/s].
-        controller: See `simulate`.
-        vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value.
-        driver: The driver.
-    """
+    """Return the run for the damping: a straight path that begins `STEP_M` to the left of the car."""
     x_m = np.arange(0.0, speed_mps * (DURATION_S + 6.0), _SPACING_M)
     path = {"x_m": x_m.tolist(), "y_m": [STEP_M] * len(x_m)}
     table = {

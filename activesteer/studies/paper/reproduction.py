@@ -188,10 +188,6 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
 def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None) -> list[Claim]:
     """Return the claims of the nominal scenarios, without files.
 
-    Args:
-        vehicle: Name, path, or table of a vehicle.
-        jobs: Number of processes; default: the number of processors.
-
     Returns:
         All claims, in the order of the paper.
     """
