@@ -42,8 +42,7 @@ from activesteer.studies.engine.run_task import CLAIM, CURVE, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
 from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.studies.paper.comparison_population import comparison_text
-from activesteer.studies.paper.population import population, summarise
-from activesteer.studies.paper.population_studies import STUDY, population_study
+from activesteer.studies.paper.population import STUDY, population, population_study, summarise
 from activesteer.theory.proportions import percent
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"

@@ -201,9 +201,10 @@ def _compare(options: argparse.Namespace) -> int:
         print(f"{scenario} {name} failed: {problem}", file=sys.stderr)
     figures = []
     if options.figures:
-        from activesteer.studies.paper.comparison_figure import draw_comparison
+        from activesteer.plotting import save
+        from activesteer.studies.paper.comparison_figure import comparison_figure
 
-        figures = [draw_comparison(made, options.output / "comparison.png")]
+        figures = [save(comparison_figure(made), options.output / "comparison.png")]
     if options.json:
         print_json({**made.to_json(), "figures": [str(path) for path in figures]})
     else:
@@ -251,9 +252,10 @@ def _population(options: argparse.Namespace) -> int:
         )
     table, figures = found.to_json() if controllers is None else comparison_json(found), []
     if options.figures:
-        from activesteer.studies.paper.comparison_figure import draw_comparison_population
+        from activesteer.plotting import save
+        from activesteer.studies.paper.comparison_figure import comparison_population_figure
 
-        figures = [draw_comparison_population(found, options.output / "comparison_population.png")]
+        figures = [save(comparison_population_figure(found), options.output / "comparison_population.png")]
         table["figures"] = [str(path) for path in figures]
     if options.json:
         print_json(table)

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.analysis.handling import CarGeometry, Handling, evaluate
+from activesteer.analysis.handling import CarGeometry, evaluate
 from activesteer.conventions import Array
 from activesteer.display_units import quantity_of
 from activesteer.errors import RecordingError
@@ -59,7 +59,8 @@ def _examine(ground: Ground) -> Findings:
         values[method] = []
         for side, run in zip(SIDES, runs, strict=True):
             try:
-                found[side] = _defined(evaluate(run, car))
+                metrics = evaluate(run, car)._asdict().items()
+                found[side] = {name: value for name, value in metrics if not math.isnan(value)}
                 values[method].append({"direction": side, **found[side]})
             except RecordingError as error:
                 values[method].append({"direction": side, "error": str(error)})
@@ -93,11 +94,6 @@ def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
         ground.drive(f"constant_angle_{side}", {**maneuver, **case}, [{"speed_kmh": _START_KMH}], curves=_CHANNELS)[0]
         for side, case in zip(SIDES, cases, strict=True)
     ]
-
-
-def _defined(found: Handling) -> dict[str, float]:
-    """Return the metrics that a method defines."""
-    return {name: value for name, value in found._asdict().items() if not math.isnan(value)}
 
 
 def _words(found: dict[str, dict[str, float]]) -> str:

@@ -14,7 +14,7 @@ from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
-from activesteer.studies.paper.fault_figures import FIGURES
+from activesteer.studies.paper.fault_situations import FIGURES
 
 
 class Effort(NamedTuple):

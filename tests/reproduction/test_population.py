@@ -20,8 +20,7 @@ from activesteer.analysis.loss_of_control import is_lost
 from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.run_task import CLAIM, Row, drive
-from activesteer.studies.paper.population import CHANGES, summarise
-from activesteer.studies.paper.population_studies import population_study
+from activesteer.studies.paper.population import CHANGES, population_study, summarise
 from tools.renew_population import CHASSIS_CONTROL, PAGE, comparison_page, page, stored_runs
 
 TOLERANCE = 1e-3

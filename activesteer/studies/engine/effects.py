@@ -35,12 +35,13 @@ def without_effect(plan: Plan, rows: Iterable[Row]) -> list[str]:
     for row in rows:
         if row["status"] == Status.OK:
             known.setdefault(_place(plan, row), {})[tuple(row[key] for key in keys)] = _metrics(row, keys)
-    plain = [(number, factor) for number, factor in enumerate(plan.study.factors) if not _has_lists(factor)]
-    return [factor.key for number, factor in plain if known and not _has_effect(plan, number, known)]
-
-
-def _has_lists(factor: Factor) -> bool:
-    return any(isinstance(value, (list, dict)) for value in factor.values)
+    return [
+        factor.key
+        for number, factor in enumerate(plan.study.factors)
+        if known
+        and not any(isinstance(value, (list, dict)) for value in factor.values)
+        and not _has_effect(plan, number, known)
+    ]
 
 
 def _has_effect(plan: Plan, number: int, known: Mapping[Place, Mapping[Point, str]]) -> bool:

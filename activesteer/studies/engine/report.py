@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -24,6 +22,7 @@ from activesteer.metric_table import recorded_metric
 from activesteer.pages import render
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
+from activesteer.studies.engine.run_command import run_command
 from activesteer.studies.engine.run_task import CURVE
 from activesteer.studies.engine.sensitivity import MAX_SAMPLES, indices
 from activesteer.studies.engine.store import Store
@@ -251,11 +250,9 @@ def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
         return ""
     sample = {key: row[key] for key in study.keys}
     values = study.overrides | factor_values.overrides(place["maneuver"], place["vehicle"], sample)
-    words = ["activesteer", "run", given["maneuver"], "-c", given["controller"], "--vehicle", given["vehicle"]]
-    for key, value in values.items():
-        words += ["--set", f"{key}={value if isinstance(value, str) else json.dumps(value)}"]
+    command = run_command(given["maneuver"], given["controller"], given["vehicle"], values, study.driver)
     file = f"run-{row['run']}.mcap"
-    return f"{shlex.join([*words, '-o', file])} && activesteer replay {file}"
+    return f"{command} -o {file} && activesteer replay {file}"
 
 
 def _json(column: Array) -> list[float | None]:

@@ -148,14 +148,8 @@ def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, 
 def _recording_path(settings: Settings, request: Request) -> Path | None:
     if settings.folder is None or settings.study.recordings == "none":
         return None
-    return settings.folder / recording_name(
-        request.run, settings.maneuvers[request.maneuver][0], settings.controllers[request.controller][0]
-    )
-
-
-def recording_name(run: int, maneuver: str, controller: str) -> str:
-    """Return the file name of a run's recording."""
-    return f"{run:07d}-{maneuver}-{file_word(controller)}.mcap"
+    maneuver, controller = settings.maneuvers[request.maneuver][0], settings.controllers[request.controller][0]
+    return settings.folder / f"{request.run:07d}-{maneuver}-{file_word(controller)}.mcap"
 
 
 @functools.lru_cache(maxsize=4096)

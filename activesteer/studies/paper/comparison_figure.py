@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from activesteer.analysis.claims.population import Population
 from activesteer.analysis.report.significance import Change, significance
 from activesteer.metric_table import metric as declared
-from activesteer.plotting import Heat, Picture, draw, save
+from activesteer.plotting import Heat, Picture, draw
 from activesteer.studies.paper.comparison import Comparison
 from activesteer.studies.paper.comparison_targets import short
 from activesteer.theory.proportions import percent
@@ -34,13 +33,8 @@ _PROPORTIONS: Final = {
 """Proportion of an effect -> title of its panel, and place in the colours, from -1 to 1, of none and of all runs."""
 
 
-def draw_comparison(made: Comparison, path: Path) -> Path:
-    """Draw a comparison and return its file."""
-    return save(comparison_figure(made), path)
-
-
 def comparison_figure(made: Comparison) -> Figure:
-    """Return the figure that `draw_comparison` writes."""
+    """Return the figure of a comparison in the nominal runs."""
     lines, first = made.shown(), made.controllers[0]
     shades = np.full((len(lines), len(made.controllers)), math.nan)
     texts = [[""] * len(made.controllers) for _ in lines]
@@ -80,13 +74,8 @@ def _legend(better: str, worse: str, neutral: str) -> list[tuple[str, str]]:
     return [(better, _BETTER), (worse, _WORSE), (neutral, _NEUTRAL)]
 
 
-def draw_comparison_population(made: Population, path: Path) -> Path:
-    """Draw a comparison over a population and return its file."""
-    return save(comparison_population_figure(made), path)
-
-
 def comparison_population_figure(made: Population) -> Figure:
-    """Return the figure that `draw_comparison_population` writes: proportions in percent by scenario and controller."""
+    """Return the figure of a comparison over a population: proportions in percent by scenario and controller."""
     names = list(dict.fromkeys(effect.controller for effect in made.systems))
     scenarios = list(dict.fromkeys(effect.scenario for effect in made.systems))
     panels = []

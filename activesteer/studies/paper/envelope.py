@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
@@ -51,26 +51,18 @@ class Line(NamedTuple):
     kept: Callable[[Mapping[str, float]], bool]
 
 
-def _stays_in_lanes(metrics: Mapping[str, float]) -> bool:
-    return metrics["stays_in_lanes"] == 1.0
-
-
-def _passes_cones(metrics: Mapping[str, float]) -> bool:
-    return metrics["cones_hit"] == 0.0 and metrics["cones_missed"] == 0.0
-
-
 LINES: Final = {
     "lane_change": Line(
         "lane.margin_m",
         "margin between the car and the lanes",
         (0.0, 0.04, 0.08, 0.12, 0.16, 0.2),
-        _stays_in_lanes,
+        lambda metrics: metrics["stays_in_lanes"] == 1.0,
     ),
     "slalom": Line(
         "cones.offset_m",
         "distance of the line from the cones",
         (1.3, 1.6, 1.9, 2.2, 2.5, 2.8),
-        _passes_cones,
+        lambda metrics: metrics["cones_hit"] == 0.0 and metrics["cones_missed"] == 0.0,
     ),
 }
 """Kind of manoeuvre -> its second axis."""
@@ -128,41 +120,31 @@ class Envelope:
         """Drivers of the map."""
         return list(dict.fromkeys(entry["driver"] for entry in self.entry_speeds))
 
-    def cells(self, driver: str) -> dict[tuple[float, float], State]:
-        """Return speed [km/h] and line [m] -> outcomes of the cars."""
-        kept: dict[tuple[float, float], dict[str, bool]] = {}
+    def kept(self, driver: str) -> dict[tuple[float, float], dict[str, bool]]:
+        """Return speed [km/h] and line [m] -> controller -> whether its car succeeds."""
+        found: dict[tuple[float, float], dict[str, bool]] = {}
         for row in self.rows:
             if row["driver"] == driver:
-                kept.setdefault((row["speed_kmh"], row["line_m"]), {})[row["controller"]] = row["kept"]
-        return {place: _state(cars) for place, cars in kept.items()}
+                found.setdefault((row["speed_kmh"], row["line_m"]), {})[row["controller"]] = row["kept"]
+        return found
 
-    def kept_by(self, driver: str, place: tuple[float, float]) -> list[str]:
-        """Return the controllers whose car succeeds."""
-        wanted = (driver, *place)
-        return [
-            row["controller"]
-            for row in self.rows
-            if row["kept"] and (row["driver"], row["speed_kmh"], row["line_m"]) == wanted
-        ]
+    def cells(self, driver: str) -> dict[tuple[float, float], State]:
+        """Return speed [km/h] and line [m] -> outcomes of the cars."""
+        return {place: _state(cars) for place, cars in self.kept(driver).items()}
 
     @property
     def exceptions(self) -> list[dict[str, Any]]:
         """Return pairs of neighbouring cells in which the faster car succeeds and the slower one fails."""
-        found = []
-        for row, faster in self._neighbours():
-            if faster["kept"] and not row["kept"]:
-                keys = ("driver", "controller", "line_m")
-                found.append(
-                    {key: row[key] for key in keys} | {"lost_kmh": row["speed_kmh"], "kept_kmh": faster["speed_kmh"]}
-                )
-        return found
-
-    def _neighbours(self) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+        keys = ("driver", "controller", "line_m")
         columns: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
-        for row in self.rows:
-            columns.setdefault((row["driver"], row["controller"], row["line_m"]), []).append(row)
-        for column in columns.values():
-            yield from pairwise(sorted(column, key=lambda row: row["speed_kmh"]))
+        for row in sorted(self.rows, key=lambda row: row["speed_kmh"]):
+            columns.setdefault(tuple(row[key] for key in keys), []).append(row)
+        return [
+            {key: row[key] for key in keys} | {"lost_kmh": row["speed_kmh"], "kept_kmh": faster["speed_kmh"]}
+            for column in columns.values()
+            for row, faster in pairwise(column)
+            if faster["kept"] and not row["kept"]
+        ]
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""

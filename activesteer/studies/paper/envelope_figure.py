@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -11,9 +11,6 @@ from activesteer.conventions import run_looks
 from activesteer.errors import StudyError
 from activesteer.plotting import Area, Curve, Panel, Picture, draw, save
 from activesteer.studies.paper.envelope import Envelope, State
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _COLOURS: Final = {
     State.NOBODY: "#d9ead3",
@@ -25,11 +22,6 @@ _COLOURS: Final = {
 
 def draw_envelope(made: Envelope, path: Path) -> Path:
     """Draw an envelope and return its file."""
-    return save(envelope_figure(made), path, StudyError)
-
-
-def envelope_figure(made: Envelope) -> Figure:
-    """Return the figure that `draw_envelope` writes."""
     title = (
         f"{made.maneuver}: cars that get through\nDots: highest entry speed by bisection; cross: the manoeuvre's own"
     )
@@ -37,11 +29,12 @@ def envelope_figure(made: Envelope) -> Figure:
     legend = [(str(state), _COLOURS[state]) for state in State if state in shown]
     panels = [_map(made, driver) for driver in made.drivers]
     width_in = 1.2 + 4.6 * len(panels)
-    return draw(Picture(title, panels, None, len(panels), width_in, 4.2, legend, shared_legend=True))
+    picture = Picture(title, panels, None, len(panels), width_in, 4.2, legend, shared_legend=True)
+    return save(draw(picture), path, StudyError)
 
 
 def _map(made: Envelope, driver: str) -> Panel:
-    cells = made.cells(driver)
+    cells, kept = made.cells(driver), made.kept(driver)
     speeds, lines = (sorted({place[axis] for place in cells}) for axis in (0, 1))
     areas, notes = [], []
     for place, state in cells.items():
@@ -49,7 +42,7 @@ def _map(made: Envelope, driver: str) -> Panel:
         areas.append(Area(_edges(speeds, place[0]), low, high, "", _COLOURS[state], edge="white"))
         if state is State.SOME:
             # At the top of the cell: dots and cross are on a line through the middle of some cells.
-            notes.append((place[0], high, ", ".join(made.kept_by(driver, place))))
+            notes.append((place[0], high, ", ".join(name for name, passes in kept[place].items() if passes)))
     looks = run_looks(entry["controller"] for entry in made.entry_speeds)
     mine = [entry for entry in made.entry_speeds if entry["driver"] == driver and entry["entry_speed_kmh"] is not None]
     curves = [

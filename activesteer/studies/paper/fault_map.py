@@ -27,8 +27,7 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
 from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.studies.engine.workers import Workers
-from activesteer.studies.paper.fault_figures import FIGURES
-from activesteer.studies.paper.fault_situations import LANE_M, PRESETS, SITUATIONS, path_of
+from activesteer.studies.paper.fault_situations import FIGURES, LANE_M, PRESETS, SITUATIONS, path_of
 
 OFFSET_AT_S: Final = 1.0
 """Time after the beginning of a fault at which the lateral offset is taken [s]."""
@@ -116,7 +115,10 @@ def fault_map(
         progress: Called after every pair of speed and situation with the number of finished pairs and the total.
     """
     limits = Limits() if limits is None else limits
-    chosen = {text: _fault(text) for text in faults or usual_faults(str(controller))}
+    chosen = {
+        text: build(Fault, fault_table(text, start_s=0.0), Source(f"--fault {text}"))
+        for text in faults or usual_faults(str(controller))
+    }
     check_gains(overrides or {}, [controller])
     for name in situations:
         if name not in SITUATIONS:
@@ -132,10 +134,6 @@ def fault_map(
     rows = [row for cell in done for row in cell]
     order = list(chosen)
     return FaultMap(limits, sorted(rows, key=lambda row: order.index(row["fault"])))
-
-
-def _fault(text: str) -> Fault:
-    return build(Fault, fault_table(text, start_s=0.0), Source(f"--fault {text}"))
 
 
 def _cell(
@@ -212,13 +210,10 @@ class _FaultRuns:
 
     def hands_fixed(self, fault: Fault) -> _Signals:
         """Return the motion with a fault and hands fixed."""
-        return self._again(fault, _HandsFixed(self._commands))
+        return self.again(fault, _HandsFixed(self._commands))
 
-    def with_driver(self, fault: Fault) -> _Signals:
-        """Return the motion with a fault and a responding driver."""
-        return self._again(fault, None)
-
-    def _again(self, fault: Fault, driver: Any) -> _Signals:
+    def again(self, fault: Fault, driver: Any = None) -> _Signals:
+        """Return the motion with a fault; without a driver, that of the loop responds."""
         loop = self.loop
         loop.fail(())
         loop.restore_state(self._start)
@@ -239,7 +234,7 @@ def _judged(runs: _FaultRuns, fault: Fault, limits: Limits) -> dict[str, Any]:
     """Return the values of a fault; nan for an incomplete run."""
     try:
         fixed = runs.hands_fixed(fault)
-        driven = runs.with_driver(fault)
+        driven = runs.again(fault)
         broken_s = _first_broken_s(runs, fixed, limits)
         tolerant_s = None if broken_s is None else _tolerant_s(runs, fault, limits, broken_s)
     except SimulationDiverged as error:

@@ -30,14 +30,10 @@ class _Shown(NamedTuple):
     fraction: Callable[[float, FaultMap], float]
 
 
-def _tolerated(row: Mapping[str, Any]) -> float | None:
-    return math.inf if row["fault_tolerant_time_s"] is None else row["fault_tolerant_time_s"]
-
-
 _PICTURES: Final = {
     "fault_tolerant_time": _Shown(
         "fault-tolerant time [s]; blank: the car stays within the limits",
-        _tolerated,
+        lambda row: math.inf if row["fault_tolerant_time_s"] is None else row["fault_tolerant_time_s"],
         lambda value, made: 1.0 - min(value / made.limits.window_s, 1.0) ** 0.5,
     ),
     "yaw_rate_change": _Shown(

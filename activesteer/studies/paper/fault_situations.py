@@ -1,4 +1,4 @@
-"""Situations of the fault map, which are paths at a speed, and presets."""
+"""Situations of the fault map, which are paths at a speed, presets, and the names of its values."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ TURN_MPS2: Final = 4.0
 """Lateral acceleration of the turn, and largest one of the lane change [m/s2]."""
 LANE_M: Final = 3.5
 """Width of a lane, and lateral distance to the next one [m]."""
+FIGURES: Final = (
+    "yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m",
+    "steering_correction_rad", "fault_tolerant_time_s",
+)  # fmt: skip
+"""Values of a fault; see `FaultMap`."""
 _SPACING_M: Final = 1.0
 _ENTRY_S: Final = 2.0
 _STEADY_S: Final = 2.5

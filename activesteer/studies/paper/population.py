@@ -27,6 +27,7 @@ from activesteer.analysis.harm import MEASURES, harms, severity, track_harm_m
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.analysis.loss_of_control import has_spun, is_lost
 from activesteer.conventions import Array
+from activesteer.errors import ParameterError
 from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.dependence import strongest
@@ -37,12 +38,15 @@ from activesteer.studies.engine.run_command import run_command
 from activesteer.studies.engine.run_identity import versions
 from activesteer.studies.engine.run_task import CLAIM, CURVE, Row
 from activesteer.studies.engine.study import StudyProgress, study
-from activesteer.studies.engine.study_file import StudyFile
+from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.paper.comparison_targets import NONE, REFERENCES, asked
-from activesteer.studies.paper.population_studies import comparison_study, population_study
 from activesteer.studies.paper.reproduction import nominal_claims
 from activesteer.theory.proportions import Proportion
 
+STUDY: Final = "population"
+COMPARISON: Final = "comparison"
+"""Names of the study files: ranges of car, driver, friction and speed. A comparison has the sensors of production cars,
+and every sample drives one manoeuvre."""
 STEERING_EFFORT: Final = "steering_wheel_rms_rad"
 CHANGES: Final = (
     *SIDESLIP_PEAKS,
@@ -54,6 +58,40 @@ CHANGES: Final = (
 _RANGE: Final = (0.05, 0.5, 0.95)
 _WORST: Final = 10
 """Number of the worst runs of a controller."""
+
+
+def population_study(
+    samples: int | None = None, seed: int | None = None, vehicle: FileOrTable | None = None
+) -> StudyFile:
+    """Return the study of the paper's claims; values that are not given are those of its file."""
+    return _study(STUDY, samples, seed, vehicle)
+
+
+def comparison_study(
+    controllers: Sequence[str], samples: int | None = None, seed: int | None = None, vehicle: FileOrTable | None = None
+) -> StudyFile:
+    """Return the study of a comparison with `none`, which must be among the controllers."""
+    if NONE not in controllers:
+        raise ParameterError(
+            f"{NONE} is missing: the others are compared with it",
+            key="--controllers",
+            value=tuple(controllers),
+            allowed=[NONE],
+        )
+    return _study(COMPARISON, samples, seed, vehicle, controllers=list(controllers))
+
+
+def _study(
+    name: str, samples: int | None, seed: int | None, vehicle: FileOrTable | None, **changes: object
+) -> StudyFile:
+    table: dict[str, Any] = read_study(name).to_table() | changes
+    if samples is not None:
+        table["design"]["samples"] = samples
+    if seed is not None:
+        table["seed"] = seed
+    if vehicle is not None:
+        table["vehicles"] = [vehicle]
+    return read_study(table)
 
 
 def population(

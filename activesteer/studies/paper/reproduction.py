@@ -110,7 +110,7 @@ def reproduce(
         if progress is not None:
             progress(f"{name} {system}" + (" FAILED" if problem else ""), done, total)
     claims = [claim for name, runs in result.recordings().items() for claim in SCENARIOS[name](runs)]
-    result.scorecard = scorecard(claims, _name_of(scenarios), setting=setting)
+    result.scorecard = scorecard(claims, next(iter(scenarios.values())).car.name, setting=setting)
     return result
 
 
@@ -130,10 +130,6 @@ def recordings_in(folder: str | os.PathLike[str]) -> dict[str, dict[str, Recordi
 
 def _path(folder: Path, scenario: str, system: str) -> Path:
     return folder / f"{scenario}-{system}.mcap"
-
-
-def _name_of(scenarios: Mapping[str, Scenario]) -> str:
-    return next(iter(scenarios.values())).car.name
 
 
 class Outcome(NamedTuple):

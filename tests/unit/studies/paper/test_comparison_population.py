@@ -25,8 +25,7 @@ from activesteer.studies.paper.comparison_population import (
     comparison_text,
     population_targets,
 )
-from activesteer.studies.paper.population import STEERING_EFFORT, summarise
-from activesteer.studies.paper.population_studies import comparison_study
+from activesteer.studies.paper.population import STEERING_EFFORT, comparison_study, summarise
 from activesteer.theory.proportions import Proportion
 from tests.raising import raises
 

@@ -75,7 +75,7 @@ def test_cells_say_who_is_lost() -> None:
     cells = made().cells("typical")
     states = [State.NOBODY, State.NONE_ONLY, State.SOME, State.ALL, State.SOME]
     assert [cells[speed, 0.1] for speed in (60.0, 70.0, 80.0, 90.0, 100.0)] == states
-    assert made().kept_by("typical", (80.0, 0.1)) == ["ars"]
+    assert made().kept("typical")[80.0, 0.1] == {"none": False, "ars": True, "afs": False}
 
 
 def test_cells_that_speak_against_bisection_are_found() -> None:

@@ -19,8 +19,7 @@ from activesteer.metric_table import CONES_MISSED
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.paper.population import summarise
-from activesteer.studies.paper.population_studies import population_study
+from activesteer.studies.paper.population import population_study, summarise
 from activesteer.theory.proportions import Proportion, ProportionVerdict
 from tests.raising import raises
 from tools import renew_population
