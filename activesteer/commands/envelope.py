@@ -108,9 +108,11 @@ def _drawn(made: Envelope, folder: Path | None) -> list[str]:
     if folder is None:
         return []
     from activesteer.errors import StudyError
-    from activesteer.studies.paper.envelope_figure import draw_envelope
+    from activesteer.plotting import save
+    from activesteer.studies.paper.envelope_figure import envelope_figure
 
-    return [str(draw_envelope(made, make_folder(folder, StudyError) / f"envelope_{made.maneuver}.png"))]
+    path = make_folder(folder, StudyError) / f"envelope_{made.maneuver}.png"
+    return [str(save(envelope_figure(made), path, StudyError))]
 
 
 def _print(made: Envelope, figures: Sequence[str]) -> None:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from activesteer.conventions import run_looks
-from activesteer.errors import StudyError
-from activesteer.plotting import Area, Curve, Panel, Picture, draw, save
+from activesteer.plotting import Area, Curve, Panel, Picture, draw
 from activesteer.studies.paper.envelope import Envelope, State
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _COLOURS: Final = {
     State.NOBODY: "#d9ead3",
@@ -20,8 +21,8 @@ _COLOURS: Final = {
 }
 
 
-def draw_envelope(made: Envelope, path: Path) -> Path:
-    """Draw an envelope and return its file."""
+def envelope_figure(made: Envelope) -> Figure:
+    """Return the figure of an envelope."""
     title = (
         f"{made.maneuver}: cars that get through\nDots: highest entry speed by bisection; cross: the manoeuvre's own"
     )
@@ -29,8 +30,7 @@ def draw_envelope(made: Envelope, path: Path) -> Path:
     legend = [(str(state), _COLOURS[state]) for state in State if state in shown]
     panels = [_map(made, driver) for driver in made.drivers]
     width_in = 1.2 + 4.6 * len(panels)
-    picture = Picture(title, panels, None, len(panels), width_in, 4.2, legend, shared_legend=True)
-    return save(draw(picture), path, StudyError)
+    return draw(Picture(title, panels, None, len(panels), width_in, 4.2, legend, shared_legend=True))
 
 
 def _map(made: Envelope, driver: str) -> Panel:

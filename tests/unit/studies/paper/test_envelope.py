@@ -12,10 +12,11 @@ import pytest
 
 from activesteer.cli import main
 from activesteer.errors import ParameterError, SimulationDiverged, StudyError
+from activesteer.plotting import save
 from activesteer.recording import Recording
 from activesteer.studies.paper import envelope as module
 from activesteer.studies.paper.envelope import LINES, RANGE_KMH, RESOLUTION_KMH, Envelope, State, _map_row, envelope
-from activesteer.studies.paper.envelope_figure import draw_envelope
+from activesteer.studies.paper.envelope_figure import envelope_figure
 from tests.raising import raises
 
 LANES = LINES["lane_change"]
@@ -87,7 +88,7 @@ def test_json_and_picture(tmp_path: Path) -> None:
     table = made().to_json()
     assert table["line"] == "lane.margin_m"
     assert {cell["state"] for cell in table["cells"]} == {state.value for state in State}
-    assert draw_envelope(made(), tmp_path / "map.png").stat().st_size > 5000
+    assert save(envelope_figure(made()), tmp_path / "map.png").stat().st_size > 5000
 
 
 def test_command_draws_several_manoeuvres_into_one_folder(monkeypatch, tmp_path, capsys) -> None:
