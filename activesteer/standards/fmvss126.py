@@ -222,4 +222,3 @@ STANDARD: Final = Standard(
     ),
     examine=_examine,
 )
-"""FMVSS 126 / UN R140."""

@@ -178,4 +178,3 @@ STANDARD: Final = Standard(
     ),
     examine=_examine,
 )
-"""ISO 13674."""

@@ -73,4 +73,3 @@ STANDARD: Final = Standard(
     ),
     examine=_examine,
 )
-"""ISO 14512."""

@@ -58,4 +58,3 @@ STANDARD: Final = Standard(
     ),
     examine=_examine,
 )
-"""ISO 21994."""

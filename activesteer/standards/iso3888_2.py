@@ -178,4 +178,3 @@ STANDARD: Final = Standard(
     examine=_examine,
     driver=DRIVER,
 )
-"""ISO 3888-2."""

@@ -148,4 +148,3 @@ STANDARD: Final = Standard(
     ),
     examine=_examine,
 )
-"""ISO 4138."""

@@ -193,4 +193,3 @@ STANDARD: Final = Standard(
     ),
     examine=_examine,
 )
-"""ISO 7401."""

@@ -88,4 +88,3 @@ STANDARD: Final = Standard(
     ),
     examine=_examine,
 )
-"""ISO 7975."""

@@ -261,4 +261,3 @@ STANDARD: Final = Standard(
     ),
     examine=_examine,
 )
-"""UN R79."""

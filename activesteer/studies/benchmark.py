@@ -42,27 +42,10 @@ _RUNS_PER_PROCESS: Final = 4
 
 
 def bench(rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measure one step at several stages, and the blocks of the loop one by one.
+    """Measure one step at several stages, and the blocks of the loop; `docs/performance.md` explains the results.
 
     Args:
         rounds: How often everything is measured; the best counts.
-
-    Returns:
-        Microseconds per step: `bare_step_us` (the engine as it comes, `mj_step` of the same model, without tyres and
-        without motion, so that its solver has little to do), `plant_step_us` (with tyres, dampers, actuators,
-        standing), `engine_step_us` (our step of the engine, solved directly, with tyres, dampers and actuators in the
-        step steer that the closed loop drives: its inputs played back in one native call), `path_engine_step_us` (the
-        same in the slalom), `closed_loop_step_us` (the step steer with manoeuvre, driver, controller, every channel
-        recorded in memory), `path_following_step_us` (the same in a slalom, with a driver who looks at a path),
-        `with_file_step_us` (the step steer written as MCAP), `sedan_step_us` (the second car, in memory),
-        `production_step_us` (the step steer in memory with the sensors of production cars); `sensors_and_brakes_us`
-        (their share of a step: sensors, brakes and the working anti-lock system, see `chassis_benchmark`);
-        `estimator_lqr_us`, `integrated_us`, `mpc_us` (what these controllers, each with its estimator, add to a step of
-        the same step steer in which their commands are given again; the last two where their solver is installed); the
-        ratios of the closed loops to `bare_step_us`, and to the engine alone on the same drive; real-time factors;
-        `threads_2_speedup` (how much faster two simulations come to their ends in two threads of one process than one
-        after the other); `step_steers_per_min` (whole runs, building the car included, by as many processes as there
-        are processors); and `*_us` for each block of the loop.
     """
     scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
     sedan = prepared(resolve("step_steer", "sedan"))

@@ -3,24 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from activesteer.errors import nearest_names, shown
-from activesteer.scenario import FileOrTable, resolve, value_of
-from activesteer.studies.engine.study_file import StudyFile
-
-
-def label_of(item: FileOrTable) -> str:
-    """Return the name of a manoeuvre, vehicle or controller in the results."""
-    if isinstance(item, Mapping):
-        return str(item.get("name") or "table")
-    # Look only before the parameters: a parameter's value may contain a colon too.
-    named, mark, parameters = str(item).partition("?")
-    path, colon, class_name = named.rpartition(":")
-    if colon:
-        return f"{Path(path).name}:{class_name}{mark}{parameters}"
-    return Path(item).stem if str(item).endswith((".toml", ".mcap")) else str(item)
+from activesteer.scenario import resolve, value_of
+from activesteer.studies.engine.study_file import StudyFile, label_of
 
 
 class FactorValues:

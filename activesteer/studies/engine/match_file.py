@@ -110,7 +110,6 @@ class Statements:
         seeds = given.pop("seeds", [])
         self.table = build(MatchTable, given, source, ("match",))
         self._names = [label_of(item) for item in study.maneuvers]
-        self._controllers = [label_of(item) for item in study.controllers]
         self._own: dict[str, list[OwnStatement]] = {name: [] for name in self._names}
         self.of = {
             name: [claim for claim, scenario in SCENARIO_OF.items() if study.claims and scenario == name]
@@ -124,18 +123,16 @@ class Statements:
 
     def _add(self, study: StudyFile, number: int, statement: OwnStatement) -> None:
         place = ("match", "statements", str(number))
-        maneuver = statement.maneuver or (self._names[0] if len(self._names) == 1 else "")
-        if maneuver not in self._names:
-            raise study.source.fail((*place, "maneuver"), nearest_names(maneuver, self._names), maneuver)
+        study.check_runs(place, statement.maneuver, {})
+        maneuver = statement.maneuver or self._names[0]
         if any(statement.id in known for known in self.of.values()) or not statement.id:
             raise study.source.fail((*place, "id"), f"{shown(statement.id)} is used twice, or empty", statement.id)
         if not statement.criteria:
             raise study.source.fail((*place, "criteria"), "at least one is needed")
         for index, criterion in enumerate(statement.criteria):
             where = (*place, "criteria", str(index))
-            for key in ("controller", "relative_to", "minus"):
-                if ((name := getattr(criterion, key)) or key == "controller") and name not in self._controllers:
-                    raise study.source.fail((*where, key), nearest_names(name, self._controllers), name)
+            keys = ("controller", "relative_to", "minus")
+            study.check_runs(where, maneuver, {key: getattr(criterion, key) for key in keys})
             if criterion.low == -_OPEN and criterion.high == _OPEN:
                 raise study.source.fail(where, "has no bound; low, high or both are needed")
         self._own[maneuver].append(statement)
@@ -143,13 +140,9 @@ class Statements:
 
     def check_metrics(self, study: StudyFile, maneuver: str, rows: Sequence[Row]) -> None:
         """Check that the runs have every metric of the user's statements."""
-        known = [name for name, value in rows[0].items() if isinstance(value, float) and name not in study.keys]
-        for statement in self._own[maneuver]:
-            for criterion in statement.criteria:
-                if criterion.metric not in known:
-                    number = [own.id for own in self.table.statements].index(statement.id)
-                    where = ("match", "statements", str(number), "criteria")
-                    raise study.source.fail(where, nearest_names(criterion.metric, known), criterion.metric)
+        for number, statement in enumerate(self.table.statements):
+            for criterion in statement.criteria if statement in self._own[maneuver] else ():
+                study.check_metric(("match", "statements", str(number), "criteria"), criterion.metric, rows[0])
 
     def distances(self, maneuver: str, rows: Sequence[Row]) -> dict[str, float]:
         """Return the distance of every statement from holding in the runs of a scenario; see `Claim.distance`."""

@@ -33,6 +33,18 @@ SEARCHES: Final = {
 _KEPT: Final = ("none", "failed", "all")
 
 
+def label_of(item: FileOrTable) -> str:
+    """Return the name of a manoeuvre, vehicle or controller in the results."""
+    if isinstance(item, Mapping):
+        return str(item.get("name") or "table")
+    # Look only before the parameters: a parameter's value may contain a colon too.
+    named, mark, parameters = str(item).partition("?")
+    path, colon, class_name = named.rpartition(":")
+    if colon:
+        return f"{Path(path).name}:{class_name}{mark}{parameters}"
+    return Path(item).stem if str(item).endswith((".toml", ".mcap")) else str(item)
+
+
 @dataclass(frozen=True)
 class StudyFile:
     """A study as in its file, with absolute paths.
@@ -94,6 +106,22 @@ class StudyFile:
     def keys(self) -> tuple[str, ...]:
         """Varied keys, in the order of the file."""
         return tuple(self.case_list.columns) if self.case_list else tuple(factor.key for factor in self.factors)
+
+    def check_runs(self, where: tuple[str, ...], maneuver: str, controllers: Mapping[str, str]) -> None:
+        """Check that a part of a search names a manoeuvre of the study, or needs none, and its controllers."""
+        names = [label_of(item) for item in self.maneuvers]
+        if maneuver not in names and (maneuver or len(names) > 1):
+            raise self.source.fail((*where, "maneuver"), nearest_names(maneuver, names), maneuver)
+        names = [label_of(item) for item in self.controllers]
+        for key, name in controllers.items():
+            if name not in names and (name or key == "controller"):
+                raise self.source.fail((*where, key), nearest_names(name, names), name)
+
+    def check_metric(self, where: tuple[str, ...], metric: str, row: Mapping[str, Any]) -> None:
+        """Check that a run has the metric of a search."""
+        known = [name for name, value in row.items() if isinstance(value, float) and name not in self.keys]
+        if metric not in known:
+            raise self.source.fail(where, nearest_names(metric, known), metric)
 
     def to_table(self) -> dict[str, Any]:
         """Return the study as the table of a study file."""

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
 from activesteer.config import Range, build
-from activesteer.errors import StudyError, nearest_names
+from activesteer.errors import StudyError
 from activesteer.files import make_folder, write_text
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.effects import without_effect
-from activesteer.studies.engine.factor_values import label_of
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.run_task import Row, Status
 from activesteer.studies.engine.search import Judgement, claim_folder, import_optuna, search
@@ -171,13 +170,8 @@ def _table(study: StudyFile) -> TuneTable:
     table = build(TuneTable, study.tune or {}, study.source, ("tune",))
     if not table.objectives:
         raise study.source.fail(("tune", "objectives"), "at least one is needed")
-    names, controllers = ([label_of(item) for item in items] for items in (study.maneuvers, study.controllers))
     for place, part in _parts(table):
-        if part.maneuver not in names and (part.maneuver or len(names) > 1):
-            raise study.source.fail((*place, "maneuver"), nearest_names(part.maneuver, names), part.maneuver)
-        for key in ("controller", "relative_to"):
-            if (name := getattr(part, key, "")) and name not in controllers:
-                raise study.source.fail((*place, key), nearest_names(name, controllers), name)
+        study.check_runs(place, part.maneuver, {key: getattr(part, key, "") for key in ("controller", "relative_to")})
     return table
 
 
@@ -194,9 +188,7 @@ def _check_metrics(study: StudyFile, table: TuneTable, rows: Sequence[Row]) -> N
     """Check that the runs have every metric; the first set without a failure shows their names."""
     for place, part in _parts(table):
         for row in _rows_of(part.controller, part.maneuver, rows):
-            if part.metric not in row:
-                known = [name for name, value in row.items() if isinstance(value, float) and name not in study.keys]
-                raise study.source.fail((*place, "metric"), nearest_names(part.metric, known), part.metric)
+            study.check_metric((*place, "metric"), part.metric, row)
 
 
 def _judged(table: TuneTable, rows: Sequence[Row]) -> tuple[list[float] | None, float]:
