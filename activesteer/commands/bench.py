@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from activesteer.commands.arguments import add_json, add_output
-from activesteer.commands.output import print_json
+from activesteer.commands.output import print_json, tell
 from activesteer.errors import ParameterError
 
 
@@ -51,11 +51,7 @@ def _bench(options: argparse.Namespace) -> int:
     if options.batch:
         return _batch(options)
     results = (bench_tyre if options.tyre else bench)(options.rounds or 5)
-    if options.json:
-        print_json(results)
-        return 0
-    for name, value in results.items():
-        print(f"{name:28} {value:8.2f}")
+    tell(options, results, (f"{name:28} {value:8.2f}" for name, value in results.items()))
     return 0
 
 
@@ -63,10 +59,7 @@ def _batch(options: argparse.Namespace) -> int:
     from activesteer.studies.batch_benchmark import bench_batch, table_of
 
     results = bench_batch(options.rounds or 5)
-    if options.json:
-        print_json(results)
-    else:
-        print(table_of(results))
+    tell(options, results, [table_of(results)])
     return 0
 
 

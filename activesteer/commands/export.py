@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.commands.arguments import add_json, add_overrides, overrides_of
-from activesteer.commands.output import print_json
+from activesteer.commands.output import tell
 from activesteer.errors import ParameterError
 
 
@@ -49,9 +49,6 @@ def _export(options: argparse.Namespace) -> int:
     size = sum(file.stat().st_size for file in output.iterdir()) if options.header else output.stat().st_size
     count = {cause: sum(v.causality == cause for v in export.variables) for cause in ("input", "output", "parameter")}
     about = {"file": str(output), "bytes": size, "token": export.token, "timestep_s": export.timestep_s, **count}
-    if options.json:
-        print_json(about)
-    else:
-        words = ", ".join(f"{number} {cause}s" for cause, number in count.items())
-        print(f"{output}: {size / 1e6:.1f} MB, {words}; steps of {1e3 * export.timestep_s:g} ms")
+    words = ", ".join(f"{number} {cause}s" for cause, number in count.items())
+    tell(options, about, [f"{output}: {size / 1e6:.1f} MB, {words}; steps of {1e3 * export.timestep_s:g} ms"])
     return 0

@@ -18,7 +18,7 @@ from activesteer.commands.arguments import (
     overrides_of,
     pairs,
 )
-from activesteer.commands.output import print_json
+from activesteer.commands.output import tell
 from activesteer.commands.progress import ProgressBar
 from activesteer.config import Source, build
 from activesteer.errors import ParameterError
@@ -88,15 +88,8 @@ def _fault_map(options: argparse.Namespace) -> int:
         from activesteer.studies.paper.fault_map_figure import draw_fault_map
 
         figures = draw_fault_map(made, options.output)
-    if options.json:
-        print_json({"faults": made.rows, "figures": [str(path) for path in figures]})
-        return 0
-    for words in _HEADS:
-        print(_ROW.format(*words))
-    for row in made.rows:
-        print(_line(row))
-    for path in figures:
-        print(f"figure: {path}")
+    lines = [*(_ROW.format(*words) for words in _HEADS), *map(_line, made.rows)]
+    tell(options, {"faults": made.rows}, lines, figures)
     return 0
 
 

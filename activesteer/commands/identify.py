@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 from activesteer.commands.arguments import add_car, add_json, overrides_of
-from activesteer.commands.output import print_json
+from activesteer.commands.output import tell
 from activesteer.errors import ParameterError
 
 
@@ -40,10 +40,7 @@ def _identify(options: argparse.Namespace) -> int:
         check_own(file)
         options.output = file
     result = identify(options.vehicle, overrides, progress)
-    if options.json:
-        print_json(result.to_json())
-    else:
-        print(result.table())
+    tell(options, result.to_json(), [result.table()])
     if options.write:
         vehicle = f" --vehicle {options.vehicle}" if options.vehicle != "compact" else ""
         command = f"activesteer identify{vehicle} --write"

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.commands.arguments import add_car, add_figures_folder, add_json, overrides_of
-from activesteer.commands.output import print_json
+from activesteer.commands.output import tell, tell_files
 
 
 def add_to(commands: Any) -> None:
@@ -29,10 +29,7 @@ def _kc(options: argparse.Namespace) -> int:
     from activesteer.rigs import kinematics_compliance
 
     result = kinematics_compliance(options.vehicle, overrides_of(options))
-    if options.json:
-        print_json(result.to_json())
-    else:
-        print(result.table())
+    tell(options, result.to_json(), [result.table()])
     if options.tables is not None:
         from activesteer.errors import ParameterError
         from activesteer.files import write_text
@@ -48,7 +45,5 @@ def _kc(options: argparse.Namespace) -> int:
     if options.output is not None:
         from activesteer.rigs.kc import draw
 
-        for path in draw(result, options.output):
-            if not options.json:
-                print(f"figure: {path}")
+        tell_files(options, draw(result, options.output))
     return 0

@@ -6,7 +6,7 @@ import argparse
 from typing import Any, Final
 
 from activesteer.commands.arguments import add_car, add_figures_folder, add_json, overrides_of
-from activesteer.commands.output import print_json
+from activesteer.commands.output import tell
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder
 
@@ -43,12 +43,6 @@ def _linearise(options: argparse.Namespace) -> int:
             draw_bode({label: car.state_space()}, options.output / "bode.png"),
             draw_root_locus(systems, speeds, options.output / "root_locus.png"),
         ]
-    if options.json:
-        rows = [mode.to_json() for mode in modes]
-        print_json({"speed_mps": car.speed_mps, "modes": rows, "figures": [str(path) for path in figures]})
-        return 0
-    print(f"{options.vehicle} at {label}")
-    print(eigenvalue_table(modes))
-    for path in figures:
-        print(f"figure: {path}")
+    values = {"speed_mps": car.speed_mps, "modes": [mode.to_json() for mode in modes]}
+    tell(options, values, [f"{options.vehicle} at {label}", eigenvalue_table(modes)], figures)
     return 0

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from activesteer.commands.arguments import add_json, add_output, add_workers
-from activesteer.commands.output import print_json
+from activesteer.commands.output import tell
 from activesteer.commands.progress import ProgressBar
 
 
@@ -48,9 +48,7 @@ def _match(options: argparse.Namespace) -> int:
                 min(1.0, done / total), f"{done}/{total} evaluations, {best} of {of} hold"
             ),
         )
-    if options.json:
-        quantiles = {} if options.least is None else found.quantiles(options.least)
-        print_json({**found.to_json(), "quantiles": {key: list(ends) for key, ends in quantiles.items()}})
-    else:
-        print("\n".join(lines_of(found, options.least)))
+    quantiles = {} if options.least is None else found.quantiles(options.least)
+    values = {**found.to_json(), "quantiles": {key: list(ends) for key, ends in quantiles.items()}}
+    tell(options, values, lines_of(found, options.least))
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import logging
 import os
 import re
@@ -9,6 +10,7 @@ import sys
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
 from typing import Any, Final, TextIO
 
 from activesteer.files import json_text
@@ -59,6 +61,23 @@ def print_json(value: Any, *, one_line: bool = False) -> None:
     text = json_text(value)
     text = " ".join(line.strip() for line in text.splitlines()) if one_line else text
     print(text, file=_for_json[-1] if _for_json else None, flush=one_line)
+
+
+def tell(options: argparse.Namespace, values: Any, lines: Iterable[str], figures: Iterable[Path] | None = None) -> None:
+    """Print values with `--json`, else lines; if figures can be drawn, the values have their paths as `figures`."""
+    if options.json:
+        print_json(values if figures is None else values | {"figures": [str(path) for path in figures]})
+        return
+    for line in lines:
+        print(line)
+    tell_files(options, figures or ())
+
+
+def tell_files(options: argparse.Namespace, paths: Iterable[Path], word: str = "figure") -> None:
+    """Print the paths of files as they are written, but nothing with `--json`."""
+    for path in paths:
+        if not options.json:
+            print(f"{word}: {path}")
 
 
 _for_json: Final[list[TextIO]] = []

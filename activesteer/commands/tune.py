@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_json, add_output, add_workers
-from activesteer.commands.output import print_json
+from activesteer.commands.output import tell
 from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -39,21 +40,17 @@ def _tune(options: argparse.Namespace) -> int:
             progress=lambda done, total: bar(done / total, f"{done}/{total} sets"),
         )
     figures = _draw(result, options.output)
-    if options.json:
-        front = [vars(trial) for trial in result.front]
-        about = {"done": result.done, "failed": result.failed, "without_effect": result.without_effect}
-        print_json(about | {"front": front, "figures": list(map(str, figures))})
-        return 0
-    print(f"{result.done} sets tried, {result.failed} with a failed run; the best:")
-    for trial in result.front:
-        print("  ".join(f"{name} {value:.4g}" for name, value in trial.objectives.items()))
-        for key, value in trial.values.items():
-            print(f"  {key} = {value!r}")
-    for key in result.without_effect:
-        print(f"without effect: {key} changes no metric of any run")
-    for path in figures:
-        print(f"figure: {path}")
+    about = {"done": result.done, "failed": result.failed, "without_effect": result.without_effect}
+    tell(options, about | {"front": [vars(trial) for trial in result.front]}, _lines(result), figures)
     return 0
+
+
+def _lines(result: Tuning) -> Iterator[str]:
+    yield f"{result.done} sets tried, {result.failed} with a failed run; the best:"
+    for trial in result.front:
+        yield "  ".join(f"{name} {value:.4g}" for name, value in trial.objectives.items())
+        yield from (f"  {key} = {value!r}" for key, value in trial.values.items())
+    yield from (f"without effect: {key} changes no metric of any run" for key in result.without_effect)
 
 
 def _draw(result: Tuning, folder: Path) -> list[Path]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.commands.arguments import add_figures_folder, add_json
-from activesteer.commands.output import print_json
+from activesteer.commands.output import tell, tell_files
 from activesteer.errors import TyreFileError, nearest_names
 
 
@@ -25,16 +25,11 @@ def _tyre(options: argparse.Namespace) -> int:
     from activesteer.tyre.report import describe, key_figures
 
     params = load_tir(_find(options.file))
-    if options.json:
-        print_json(key_figures(params))
-    else:
-        print(describe(params))
+    tell(options, key_figures(params), [describe(params)])
     if options.output is not None:
         from activesteer.tyre.figures import draw
 
-        for path in draw(params, options.output):
-            if not options.json:
-                print(f"figure: {path}")
+        tell_files(options, draw(params, options.output))
     return 0
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_json, add_output, add_workers
-from activesteer.commands.output import BAD, painted, print_json, print_notes
+from activesteer.commands.output import BAD, painted, print_json, print_notes, tell, tell_files
 from activesteer.commands.progress import ProgressBar
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
@@ -113,14 +113,9 @@ def _circle(options: argparse.Namespace) -> int:
         result = validate_circle(
             options.name, options.samples or SAMPLES, options.jobs, scheduler=options.scheduler, progress=bar
         )  # fmt: skip
-    if options.json:
-        print_json(result.as_table())
-    else:
-        print(result.text())
+    tell(options, result.as_table(), [result.text()])
     if options.output is not None:
-        page = write_circle_page(result, options.output / "validation.html")
-        if not options.json:
-            print(f"page: {page}")
+        tell_files(options, [write_circle_page(result, options.output / "validation.html")], "page")
     return 0 if result.inside else 1
 
 

@@ -102,14 +102,11 @@ def _table(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from activesteer.commands.output import print_json
+    from activesteer.commands.output import tell
     from activesteer.vehicle_builder import check_vehicle
 
     report = check_vehicle(options.vehicle)
-    if options.json:
-        print_json(report.as_table())
-    else:
-        print(report.table())
+    tell(options, report.as_table(), [report.table()])
     return 1 if report.count("error") else 0
 
 
