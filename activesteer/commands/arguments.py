@@ -23,11 +23,6 @@ class Commands:
     """All commands of the program, listed by `--help` in groups."""
 
     def __init__(self, version: str) -> None:
-        """Create a command line without commands.
-
-        Args:
-            version: Text that `--version` prints.
-        """
         self._parser = argparse.ArgumentParser(
             prog="activesteer",
             usage="activesteer [-h] [--version] COMMAND ...",

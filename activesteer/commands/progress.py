@@ -18,22 +18,14 @@ class ProgressBar:
     """Bar that shows which fraction of the work is done."""
 
     def __init__(self, label: str, *, quiet: bool) -> None:
-        """Create the bar without showing it.
-
-        Args:
-            label: Text before the bar.
-            quiet: Whether to show nothing at all.
-        """
         self._label = label
         self._shown = not quiet and sys.stderr.isatty()
         self._width = 0
 
     def __enter__(self) -> ProgressBar:
-        """Return the bar; the first value draws it."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Clear the line."""
         if self._shown:
             print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)
 
@@ -53,23 +45,15 @@ class RunCounter:
     """
 
     def __init__(self, label: str, *, quiet: bool) -> None:
-        """Create the bar without showing it.
-
-        Args:
-            label: Text before the bar.
-            quiet: Whether to show nothing at all.
-        """
         self._bar = ProgressBar(label, quiet=quiet)
         self._as_lines = not quiet and not sys.stderr.isatty()
         self._begun_s = self._said_s = time.monotonic()
 
     def __enter__(self) -> RunCounter:
-        """Start the clock."""
         self._begun_s = self._said_s = time.monotonic()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Clear the bar."""
         self._bar.__exit__()
 
     def __call__(self, counted: StudyProgress) -> None:

@@ -42,7 +42,6 @@ class StopSignals:
     """
 
     def __init__(self) -> None:
-        """Start without a signal."""
         self.number: int | None = None
         self.options: argparse.Namespace | None = None
         self.finished = False

@@ -44,11 +44,7 @@ class BrakeInTurn(Maneuver):
     """The brake."""
 
     def __post_init__(self) -> None:
-        """Check that turn and brake follow each other within the run.
-
-        Raises:
-            ManeuverError: the brake begins before the turn or after the end, or the car is too slow for a search.
-        """
+        """Check that turn and brake follow each other within the run."""
         turn, brake = self.turn, self.brake
         if brake.start_s <= turn.start_s:
             raise ManeuverError(

@@ -59,12 +59,7 @@ class OpenLoop(Maneuver):
         return with_tables(table, folder, source)
 
     def __post_init__(self) -> None:
-        """Check the tables.
-
-        Raises:
-            ManeuverError: the columns of a table differ in length, its times do not increase, it ends too early, or two
-                tables contradict each other.
-        """
+        """Check the tables."""
         torques = self.wheel_torques
         tables = [("steering", self.steering.time_s, self.steering.values)]
         if self.speed is not None:

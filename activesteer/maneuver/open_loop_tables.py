@@ -42,11 +42,7 @@ class SteeringTable:
     """Time by which the column comes later, for a recorded signal with a clock of its own [s]."""
 
     def __post_init__(self) -> None:
-        """Check that times come with one of the two columns.
-
-        Raises:
-            ManeuverError: both columns are given, or times alone.
-        """
+        """Check that times come with one of the two columns."""
         if self.steering_wheel_rad is not None and self.rack_m is not None:
             raise ManeuverError("steering_wheel_rad and rack_m both steer the front wheels; leave one out")
         if self.steering_wheel_rad is None and self.rack_m is None:

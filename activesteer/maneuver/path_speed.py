@@ -36,7 +36,6 @@ class PathSpeed:
     """
 
     def __init__(self, maneuver: Maneuver, path: Path, speed_mps: Array) -> None:
-        """Begin at the start of the path."""
         self.maneuver, self.present = maneuver, maneuver.setpoint(0.0)
         self.began: list[tuple[float, str]] = []
         self._search, self._along_m = PathSearch(path), 0.0

@@ -167,7 +167,6 @@ class Watched:
     """A user's block whose errors and wrong commands are reported with file, class and line."""
 
     def __init__(self, inner: Any, kind: Kind, name: str, setup: Any, files: tuple[str, ...] = ()) -> None:
-        """Wrap a block."""
         self.inner = inner
         self._about = kind, name, setup, files
 

@@ -28,7 +28,6 @@ class DrivenStop:
     """A stop from 100 km/h with a working anti-lock system and the sensors of production cars."""
 
     def __init__(self) -> None:
-        """Drive the stop."""
         scenario = resolve(_STOP, overrides=_PRODUCTION)
         recording = run_scenario(scenario)
         speeds = [recording[f"{corner}_wheel_speed_radps"] for corner in CORNERS]

@@ -29,11 +29,7 @@ class DaskCluster:
     """
 
     def __init__(self, client: Any) -> None:
-        """Check the cluster. The client still belongs to the caller.
-
-        Args:
-            client: A `distributed.Client`.
-        """
+        """Check the cluster. The client still belongs to the caller."""
         self._client = client
         self._executor = client.get_executor(pure=False)
         try:

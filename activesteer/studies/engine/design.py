@@ -53,7 +53,6 @@ class Samples:
     count: int
 
     def __len__(self) -> int:
-        """Number of combinations."""
         return self.count
 
     def __getitem__(self, number: int) -> dict[str, Value]:

@@ -59,7 +59,6 @@ class Plan:
         self.digest = digest({"study": table, "inputs": self.settings.expected})
 
     def __len__(self) -> int:
-        """Number of runs."""
         shared, driven = self.settings, len(self.settings.maneuvers) if self._maneuver_of is None else 1
         return driven * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
 

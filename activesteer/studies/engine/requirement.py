@@ -39,7 +39,6 @@ class Requirement:
     """A requirement."""
 
     def __init__(self, text: str, source: Source, where: tuple[str, ...]) -> None:
-        """Parse a requirement."""
         self.text, self.controllers, self.metrics = text, list[str](), list[str]()
         self._fail = lambda problem: source.fail(where, f"{problem} in {shown(text)}", text)
         if len(text) > _LONGEST:

@@ -57,7 +57,6 @@ class TaskQueue:
     """Waiting tasks, running tasks, and the results of finished tasks."""
 
     def __init__(self, workers: Workers) -> None:
-        """Make an empty queue."""
         self._workers = workers
         self._waiting: deque[_Task] = deque()
         self._suspects: deque[_Task] = deque()
