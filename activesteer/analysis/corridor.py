@@ -13,13 +13,7 @@ TIME_TOLERANCE_S: Final = 0.02
 
 
 def corridor(time_s: Array, values: Array, width: float | Array) -> tuple[Array, Array]:
-    """Return the lower and the upper edge around a signal: `TIME_TOLERANCE_S` in time, and a tolerance in the value.
-
-    Args:
-        time_s: Time, ascending [s], shape (n,).
-        values: The signal, shape (n,).
-        width: Tolerance in the unit of the signal, shape (n,) or a number.
-    """
+    """Return the lower and the upper edge around a signal: `TIME_TOLERANCE_S` in time, and a tolerance in the value."""
     fine = np.linspace(-TIME_TOLERANCE_S, TIME_TOLERANCE_S, 9)
     moved = np.stack([np.interp(time_s + shift, time_s, values) for shift in fine])
     return moved.min(axis=0) - width, moved.max(axis=0) + width

@@ -57,13 +57,7 @@ def loop(x: Array, y: Array) -> Loop:
 
 
 def crossings(x: Array, y: Array, *, rising: bool) -> Array:
-    """Return the interpolated values of one signal where another signal passes through zero.
-
-    Args:
-        x: The other signal, shape (n,).
-        y: The signal, shape (n,).
-        rising: Whether the other signal passes upwards.
-    """
+    """Return the interpolated values of y where x passes through zero, upwards or downwards."""
     sign = 1.0 if rising else -1.0
     places = np.flatnonzero((sign * x[:-1] < 0.0) & (sign * x[1:] >= 0.0))
     if places.size == 0:
@@ -73,12 +67,6 @@ def crossings(x: Array, y: Array, *, rising: bool) -> Array:
 
 
 def slope_at_zero(x: Array, y: Array, within: float) -> float:
-    """Return the slope of the line through the points near abscissa zero; nan for fewer than three points.
-
-    Args:
-        x: Abscissa, shape (n,).
-        y: Ordinate, shape (n,).
-        within: Largest magnitude of the abscissa.
-    """
+    """Return the slope of the line through the points near abscissa zero; nan for fewer than three points."""
     near = np.abs(x) <= within
     return float(np.polynomial.Polynomial.fit(x[near], y[near], 1).convert().coef[1]) if near.sum() > 2 else math.nan

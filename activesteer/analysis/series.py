@@ -103,15 +103,7 @@ def largest_rate(values: Array, timestep_s: float) -> float:
 
 
 def rate_rms(values: Array, timestep_s: float) -> float:
-    """Return the root mean square of the rate of change over `RATE_SPAN_S`.
-
-    Args:
-        values: Samples at equal distances, shape (n,).
-        timestep_s: Interval between the samples [s].
-
-    Returns:
-        Root mean square, in the unit of `values` per second; nan if the signal is shorter than the span.
-    """
+    """Return the root mean square of the rate of change over `RATE_SPAN_S`; see `largest_rate`."""
     span = max(1, round(RATE_SPAN_S / timestep_s))
     return rms(values[span:] - values[:-span]) / (span * timestep_s)
 

@@ -48,16 +48,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def angle_at(steering_rad: Array, ay_mps2: Array, wanted_mps2: float) -> float:
-    """Return the steering wheel angle at a lateral acceleration, by the line through the range of `FIT`.
-
-    Args:
-        steering_rad: Steering wheel angle of a slow ramp to the left [rad], shape (n,).
-        ay_mps2: Lateral acceleration, which must cover the range [m/s2], shape (n,).
-        wanted_mps2: Wanted lateral acceleration [m/s2].
-
-    Returns:
-        Angle [rad].
-    """
+    """Return the steering wheel angle [rad] at a lateral acceleration, by the line through the range of `FIT`."""
     low, high = (fraction * wanted_mps2 for fraction in FIT)
     line = slice(int(np.argmax(ay_mps2 > low)), int(np.argmax(ay_mps2 > high)))
     slope, offset = np.polynomial.Polynomial.fit(steering_rad[line], ay_mps2[line], 1).convert().coef[::-1]

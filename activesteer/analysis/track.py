@@ -79,13 +79,7 @@ def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -
 
 
 def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
-    """Return distance along a path and distance to its left [m] of a car that follows it; the path may cross itself.
-
-    Args:
-        x_m: World x of the car, from the start of the path on [m], shape (n,).
-        y_m: World y of the car [m], shape (n,).
-        path: The path.
-    """
+    """Return distance along a path and distance to its left [m] of a car that follows it; the path may cross itself."""
     along, beside = np.empty(len(x_m)), np.empty(len(x_m))
     at = 0
     for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):
@@ -100,14 +94,9 @@ def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
 
 
 def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
-    """Return world y of the front axle centre at its first passage of each x, interpolated.
+    """Return world y of the front axle centre at its first passage of each x, interpolated [m], shape (n,).
 
-    Args:
-        recording: The run.
-        x_m: World x, ascending [m], shape (n,).
-
-    Returns:
-        World y [m], shape (n,); nan if the run never gets there.
+    The values of x ascend; y is nan where the run never gets there.
     """
     x, y = front_axle(recording)
     # A car that spins may go back: only samples ahead of all earlier ones count.

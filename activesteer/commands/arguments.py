@@ -138,13 +138,7 @@ def add_overrides(parser: argparse.ArgumentParser) -> None:
 
 
 def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: str = "none") -> None:
-    """Add `-c`.
-
-    Args:
-        parser: Parser of the command.
-        several: Whether the option may be repeated. `options.controller` then is a list, or None for the default.
-        default: Default in words, for the help.
-    """
+    """Add `-c`; with several, `options.controller` is a list, or None for the default, which is given in words."""
     words = (
         "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
     )
@@ -156,13 +150,7 @@ def add_controller(parser: argparse.ArgumentParser, *, several: bool, default: s
 
 
 def add_driver(parser: argparse.ArgumentParser, default: str = "", *, several: bool = False) -> None:
-    """Add `--driver`.
-
-    Args:
-        parser: Parser of the command.
-        default: Default in words; `options.driver` is None by default then.
-        several: Whether the option may be repeated. `options.driver` then is a list, or None.
-    """
+    """Add `--driver`; with several or a default in words, `options.driver` is None without the option."""
     more = "; may be repeated" if several else ""
     words = f"novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu{more}"
     parser.add_argument(
@@ -186,14 +174,7 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 
 def add_output(parser: argparse.ArgumentParser, metavar: str, words: str, default: str | None = None) -> None:
-    """Add `-o`.
-
-    Args:
-        parser: Parser of the command.
-        metavar: Form of the value: DIR, FILE.html.
-        words: Help: what is written there, and what happens without the option if it has no default.
-        default: Default path.
-    """
+    """Add `-o`; the help says what is written there, and what happens without the option if it has no default."""
     parser.add_argument(
         "-o", "--output", type=Path, metavar=metavar, default=None if default is None else Path(default),
         help=words if default is None else f"{words} (default: {default})",
@@ -274,13 +255,9 @@ def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = 
 
 
 def pairs(texts: Sequence[str], option: str, example: str, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the keys and values of a repeated option. A value is written as in TOML; any other value is a text.
+    """Return the keys and values of a repeated option `key=value`, beside those that are given already.
 
-    Args:
-        texts: Values of the option, `key=value` each.
-        option: Name of the option, for error messages.
-        example: Example of a value.
-        given: Keys that already have values.
+    A value is written as in TOML; any other value is a text.
     """
     values = dict(given or {})
     for text in texts:

@@ -88,9 +88,6 @@ def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle:
 def models_beside(run: Recording) -> dict[str, dict[str, NDArray[np.float64]]]:
     """Return responses of linear models to the steering of a run: single track and, on a level road, the full car.
 
-    Args:
-        run: A run without control; its metadata describe car and manoeuvre.
-
     Returns:
         Name of the model -> channel -> values over the time of the run.
     """

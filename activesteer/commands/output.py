@@ -137,13 +137,9 @@ def print_notes(notes: Iterable[str]) -> None:
 
 
 def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = None) -> None:
-    """Print a text in lines of 80 columns.
+    """Print a head and a text in lines of 80 columns; further lines are indented.
 
-    Args:
-        head: Beginning of the first line, printed as it is.
-        text: Text after it. It may come from any file: control characters are printed as escape sequences.
-        hanging: Indent of further lines.
-        file: Where to print; standard output by default.
+    The text may come from any file: control characters are printed as escape sequences.
     """
     plain = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
     lines = textwrap.wrap(plain, _COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **_WHOLE)

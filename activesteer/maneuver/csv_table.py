@@ -11,14 +11,7 @@ from activesteer.files import csv_number, is_file, read_csv, user_path
 
 
 def find_csv(name: str, folder: Path | None, source: Source, key: Sequence[str]) -> Path:
-    """Find a CSV that a manoeuvre names.
-
-    Args:
-        name: Its name in the manoeuvre file.
-        folder: Folder of the manoeuvre file; None for a table that has no file.
-        source: For error messages.
-        key: Key that names it.
-    """
+    """Find the CSV that a key of a manoeuvre names, in the folder of its file; None for a table that has no file."""
     beside = () if folder is None else (folder / name,)
     for candidate in (*beside, user_path(name, source.error)):
         if name.isprintable() and is_file(candidate):
@@ -33,14 +26,9 @@ def find_csv(name: str, folder: Path | None, source: Source, key: Sequence[str])
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
 ) -> tuple[dict[str, list[float]], list[int]]:
-    """Read columns of a CSV whose first line names them; other columns are ignored.
+    """Read required and optional columns of a CSV whose first line names them; other columns are ignored.
 
     A column may be in degrees or km/h, as in a TOML file: `steering_wheel_deg` fills `steering_wheel_rad`.
-
-    Args:
-        path: The file.
-        required: Names of the columns that must be there.
-        optional: Names of the columns that may be there.
 
     Returns:
         Column name to values in SI, and the line number of each row.

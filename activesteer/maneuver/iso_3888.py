@@ -48,15 +48,10 @@ def lanes(
     length_factor: float = 1.0,
     offset_factor: float = 1.0,
 ) -> tuple[Lane, ...]:
-    """Return the three lanes.
+    """Return entry, side and exit lane.
 
-    Args:
-        standard: Standard of the lanes.
-        vehicle_width_m: Width of the vehicle, b [m].
-        start_x_m: Beginning of the entry lane, whose centre line is y = 0 [m].
-        side: 1 for a side lane on the left, -1 on the right.
-        length_factor: Factor on all lengths of the standard [-].
-        offset_factor: Factor on the offset of the side lane and the exit lane [-].
+    The centre line of the entry lane is y = 0. The side is 1 for a side lane on the left and -1 on the right. The offset
+    of side lane and exit lane has a factor of its own.
     """
     b = vehicle_width_m
     entry, exit_first = 1.1 * b + 0.25, 1.3 * b + 0.25

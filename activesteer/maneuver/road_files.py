@@ -20,13 +20,7 @@ def with_road_files(
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
     """Fill the contents of the road's files into the table of a manoeuvre; see `Maneuver.filled_from_csv`.
 
-    Args:
-        table: The table.
-        folder: Folder of the manoeuvre file; None for a table that has no file.
-        source: For error messages.
-
-    Returns:
-        The table, and the CSV file by its name, to be kept with the recording; the table holds the OpenCRG file.
+    The files to be kept with the recording are the CSV files; the table itself holds the OpenCRG file.
     """
     road = table.get("road")
     files: dict[str, bytes] = {}

@@ -92,17 +92,7 @@ def takes_any(origin: Any) -> bool:
 def read_values(
     declared: Mapping[str, Declared], values: Mapping[str, Any], source: Source, path: tuple[str, ...]
 ) -> dict[str, Any]:
-    """Check values of declared parameters, in any of their units, and return them by the names of the arguments.
-
-    Args:
-        declared: The declared parameters.
-        values: Name -> value; `limit_deg` fills `limit_rad`.
-        source: Source of the values, for error messages.
-        path: Path of names to the values.
-
-    Raises:
-        ActiveSteerError: a parameter does not exist or is given twice, or a value is wrong.
-    """
+    """Check values of declared parameters, in any of their units, and return them by the names of the arguments."""
     found: dict[str, Any] = {}
     for key, value in values.items():
         name, factor = field_in_unit(key, declared)

@@ -148,10 +148,7 @@ class Kind:
 def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
     """Describe an error of foreign code in one line, with its place.
 
-    Args:
-        error: The error.
-        files: Names of the user's files. The place is the last line in one of them, else the last line that is not in
-            a library.
+    The place is the last line in one of the user's files, else the last line that is not in a library.
     """
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if Path(frame.filename).name in files]

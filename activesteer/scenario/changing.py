@@ -38,15 +38,7 @@ class Change(NamedTuple):
 
 
 def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s: float) -> Change:
-    """Change one key of a running scenario.
-
-    Args:
-        scenario: The scenario as it runs.
-        key: Dotted key, as for the overrides of `resolve`.
-        value: New value.
-        controller: The controller that drives.
-        time_s: Present time of the run [s].
-    """
+    """Change one key of a scenario that runs with a controller, at a time of the run [s]."""
     value = plain({key: value})[key]
     part, path = part_of(key, type(scenario.maneuver), own_controllers([controller]))
     overrides = {**scenario.overrides, key: value}

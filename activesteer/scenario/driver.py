@@ -45,16 +45,7 @@ class ChosenDriver:
 
 
 def driver_with(given: Any, overrides: list[Override]) -> ChosenDriver:
-    """Read a driver with overrides of the driver file only.
-
-    Args:
-        given: Name, path or table of a driver, or a user's code; see `find_driver`.
-        overrides: Keys of the driver file to replace.
-
-    Raises:
-        DriverError: there is no such driver, or the file is wrong.
-        ParameterError: an override names a key that does not exist.
-    """
+    """Read a driver, or a user's code, with overrides of the driver file only."""
     plugin, is_file = find_driver(given), is_driver_file(given)
     table, source, _, files = read_table(given if is_file else DEFAULT_DRIVER, "driver", find_driver_file, DriverError)
     of_code = {} if is_file else {one.path[1:]: one for one in overrides if one.path[0] == plugin.key and one.path[1:]}

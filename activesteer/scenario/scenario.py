@@ -202,15 +202,9 @@ def part_of(
 
 
 def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> Any:
-    """Return the value of a key of the manoeuvre, the vehicle or the driver.
+    """Return the value of a key of the manoeuvre, the vehicle or the driver; a number in the unit of the key.
 
-    Args:
-        scenario: The scenario.
-        key: Dotted key, as for the overrides of `resolve`.
-        controllers: Controllers, as for `resolve`.
-
-    Returns:
-        The value; a number in the unit of the key.
+    Keys and controllers are those of `resolve`.
     """
     part, path = part_of(key, type(scenario.maneuver))
     if part == "controllers":

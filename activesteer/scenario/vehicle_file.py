@@ -25,14 +25,7 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     """Replace values in a table of a vehicle file.
 
     Keys keep their place and their comments; missing keys are added at the end of the table, and a missing table at the
-    end of the file. A comment below the header of the table names command and date.
-
-    Args:
-        vehicle_file: The file.
-        table: Name of the table.
-        values: Key -> value as text.
-        command: Command that found the values.
-        date: Date, such as 2026-11-21.
+    end of the file. A comment below the header of the table names command and date, such as 2026-11-21.
     """
     before, source = read_toml(vehicle_file)
     lines = source.text.splitlines()

@@ -33,13 +33,9 @@ Try = Callable[[str, Sequence[float]], list[bool]]
 
 
 def highest_clean(attempt: Try) -> float | None:
-    """Return the highest clean speed: first from `COARSE_KMH`, then between it and the next coarse speed.
+    """Return the highest clean speed [km/h]: first from `COARSE_KMH`, then between it and the next coarse speed.
 
-    Args:
-        attempt: Function that drives several speeds.
-
-    Returns:
-        Speed [km/h]; None if the car is clean at no speed. The search does not go beyond the highest coarse speed.
+    It is None if the car is clean at no speed. The search does not go beyond the highest coarse speed.
     """
     clean = [speed for speed, good in zip(COARSE_KMH, attempt("coarse", COARSE_KMH), strict=True) if good]
     if not clean or clean[-1] == COARSE_KMH[-1]:
@@ -56,15 +52,7 @@ def is_clean(run: Run) -> bool:
 
 
 def best_run(runs: Sequence[Run], highest_kmh: float | None) -> Run | None:
-    """Return the run with the largest clearance at the highest clean speed, or at any speed if none is clean.
-
-    Args:
-        runs: The runs to one side.
-        highest_kmh: The highest clean speed; None without one.
-
-    Returns:
-        The run; None if no run could be evaluated.
-    """
+    """Return the run with the largest clearance at the highest clean speed, or at any speed if none is clean."""
     good = [run for run in runs if highest_kmh in (None, run.case["speed_kmh"]) and not run.error]
     return min(good, key=lambda run: run.metric("lane_overstep_m"), default=None)
 

@@ -42,14 +42,7 @@ class OverTime(Protocol):
 
 
 def time_panels(runs: Mapping[str, OverTime], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
-    """Return channels of runs over time, a panel each.
-
-    Args:
-        runs: Label -> run.
-        channels: Channels.
-        begin_s: Instant that time counts from [s].
-        begin: This instant in words.
-    """
+    """Return channels of runs over time, a panel each; time counts from an instant, which is also given in words."""
     return [
         Panel(
             f"time from {begin} [s]",

@@ -56,20 +56,7 @@ class DrivenStop:
 
 @compiled
 def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
-    """Do the part of `native_step.step` that belongs to sensors and brakes.
-
-    Args:
-        rows: True values of `Measurement` in each step, without the pressures, and the pedal.
-        chains: See `SensorBlock`.
-        memory: See `SensorBlock`.
-        radii_m: See `measured`.
-        timestep_s: Step [s].
-        setup: A `BRAKE_SETUP`.
-        state: Its `BRAKE_STATE`.
-
-    Returns:
-        Number of steps in which the anti-lock system reduces pressure.
-    """
+    """Step sensors and brakes as `native_step.step` does; return the number of steps with reduced pressure."""
     asked_Nm, held = np.zeros(4), 0
     for row in rows:
         speeds = memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4]

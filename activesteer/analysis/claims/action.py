@@ -38,14 +38,9 @@ def means(values: Array, timestep_s: float) -> Array:
 
 
 def largest_action(recording: RecordingLike, demand: str) -> float:
-    """Return by how much more a system turns wheels in a manoeuvre than straight ahead before it.
+    """Return by how much more a system turns wheels in a manoeuvre than straight ahead before it [rad].
 
-    Args:
-        recording: The run.
-        demand: Channel of the demanded angle [rad].
-
-    Returns:
-        Largest magnitude of the angle's mean over `MEAN_S`, less its largest magnitude straight ahead [rad].
+    Both are the largest magnitudes of the demanded angle's mean over `MEAN_S`.
     """
     step_s, values = timestep(recording.time_s), recording[demand]
     ahead = np.abs(means(values[straight_ahead(recording)], step_s))

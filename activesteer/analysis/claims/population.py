@@ -294,12 +294,7 @@ class Population:
 
 
 def read_population(name: str) -> Population | None:
-    """Return the results that the package stores of a study; None if it stores none.
-
-    Args:
-        name: Folder of the results, in the folder of the study files: `population`, or `comparison` for the comparison
-            of controllers.
-    """
+    """Return the results that the package stores of a study, `population` or `comparison`; None if it stores none."""
     path = studies_dir() / name / SUMMARY
     if not path.is_file():
         return None

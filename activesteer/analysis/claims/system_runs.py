@@ -71,14 +71,7 @@ class SystemRuns:
         return abs(self.metrics[system][name])
 
     def lowers(self, system: str, name: str, fraction: float, minimum: float) -> list[Condition]:
-        """Return the conditions that a system lowers the magnitude of a metric to a fraction, and noticeably.
-
-        Args:
-            system: The system.
-            name: The metric.
-            fraction: Largest fraction of the value without control that may be left.
-            minimum: Least difference from the value without control.
-        """
+        """Return the conditions that a system lowers the magnitude of a metric to a fraction, and noticeably."""
         none, value = self.size("none", name), self.size(system, name)
         noticeable = [at_least(none - value, minimum)] if minimum else []
         return [at_most(value, fraction * none), *noticeable]

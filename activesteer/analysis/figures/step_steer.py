@@ -55,12 +55,7 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 
 def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.PathLike[str]) -> Path:
-    """Draw `figure_11` and save it.
-
-    Args:
-        recordings: Runs by label; see `figure_11`.
-        path: File to write; its ending gives the format (.png, .pdf, .svg).
-    """
+    """Draw `figure_11` and save it; the ending of the path gives the format (.png, .pdf, .svg)."""
     return save(figure_11(recordings), Path(path), RecordingError)
 
 

@@ -47,13 +47,7 @@ _AFTER: Final = 0.2
 
 
 def fill_panels(axes: Sequence[Axes], drawn: Sequence[DrawnRun], panels: Sequence[Quantity]) -> None:
-    """Draw panels over one time axis that shows the transient.
-
-    Args:
-        axes: One for each panel, from the top.
-        drawn: The runs.
-        panels: Quantity of each axis; the curves of the first axis carry the labels.
-    """
+    """Draw panels over one time axis that shows the transient; the curves of the first panel carry the labels."""
     for row, (axis, panel) in enumerate(zip(axes, panels, strict=True)):
         for curve in drawn:
             label = curve.look.label if row == 0 else ""

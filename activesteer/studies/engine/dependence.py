@@ -39,15 +39,7 @@ class Dependence(NamedTuple):
 def strongest(
     factors: Mapping[str, Sequence[float] | NDArray[np.float64]], outcome: Sequence[bool] | NDArray[np.bool_]
 ) -> Dependence | None:
-    """Return the factor that an outcome depends on most.
-
-    Args:
-        factors: Key -> value in every sample.
-        outcome: Whether the outcome occurred, for every sample.
-
-    Returns:
-        The factor; None if none is significant or there are too few samples.
-    """
+    """Return the factor that an outcome depends on most; None if none is significant or there are too few samples."""
     happened = np.asarray(outcome, dtype=np.float64)
     if happened.size == 0:
         return None

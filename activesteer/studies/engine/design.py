@@ -64,14 +64,7 @@ def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: in
     """Return the combinations of a design.
 
     Grid factors are crossed with each other and with the sample of the other factors, so that each grid value meets the
-    same sample.
-
-    Args:
-        factors: Factors of the study.
-        kind: One of `DESIGNS` but `list`.
-        count: Size of the sample; unused for a grid.
-        seed: Seed of the random numbers.
-        stream: Number of the independent sample with this seed.
+    same sample. `stream` is the number of the independent sample with this seed.
     """
     grids = [factor for factor in factors if factor.kind == "grid"]
     sampled = [factor for factor in factors if factor.kind != "grid"]
@@ -158,17 +151,7 @@ def read_cases(path: Path) -> Samples:
 
 
 def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool, source: Source) -> DesignTable:
-    """Return the checked design with its kind chosen.
-
-    Args:
-        table: The table [design] of the study file.
-        factors: Factors of the study.
-        has_cases: Whether the study has a list of cases.
-        source: Source of the study, for error messages.
-
-    Raises:
-        ActiveSteerError: parts of the design contradict each other.
-    """
+    """Return the design with its kind chosen, after checking that its parts do not contradict each other."""
     all_grids = all(factor.kind == "grid" for factor in factors)
     if table.maneuvers not in ("all", "one"):
         raise source.fail(("design", "maneuvers"), f"{shown(table.maneuvers)} is neither all nor one", table.maneuvers)
@@ -205,13 +188,7 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
 
 
 def _check_size(factors: Sequence[Factor], points: int, source: Source) -> None:
-    """Refuse a design with too many combinations before any of them is made.
-
-    Args:
-        factors: Factors of the study; its grids are crossed with each other and with the points of the sample.
-        points: Points of the sample of all other factors.
-        source: Source of the study, for the error message.
-    """
+    """Refuse a design with too many combinations, of grids and sample, before any of them is made."""
     sizes = [len(factor.values) for factor in factors if factor.kind == "grid"]
     count = math.prod(sizes) * points
     if count > MAX_SAMPLES:

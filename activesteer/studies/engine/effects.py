@@ -25,10 +25,6 @@ def without_effect(plan: Plan, rows: Iterable[Row]) -> list[str]:
 
     Rows that differ in one factor only are compared. If there are none for a factor, as in a random sample, the first
     sample is driven again with the ends of the factor's range.
-
-    Args:
-        plan: The study; one with a list of cases has no factors to change.
-        rows: Rows of its runs.
     """
     keys = plan.study.keys
     known: dict[Place, dict[Point, str]] = {}

@@ -46,16 +46,7 @@ class FactorValues:
                     raise study.source.fail(place, f"is no other range; {nearest_names(other, ranges)}", other)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the overrides of a run.
-
-        Args:
-            maneuver: Number of the manoeuvre in the study.
-            vehicle: Number of the vehicle.
-            values: Key -> value of the sample; None for a key that keeps the value of the files.
-
-        Returns:
-            Dotted key -> value, for the keys that vary in this manoeuvre.
-        """
+        """Return the overrides of a run for the keys that vary in its manoeuvre; None keeps the value of the files."""
         label = label_of(self.study.maneuvers[maneuver])
         found = {}
         # In the order of the file, in which a factor follows the one to which it is relative.

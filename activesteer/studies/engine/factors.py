@@ -64,14 +64,7 @@ class Factor:
     when: Mapping[str, Value] = field(default_factory=dict)
 
     def from_unit(self, unit: NDArray[np.float64]) -> list[Value]:
-        """Convert a sample of the unit cube to values of the factor.
-
-        Args:
-            unit: Probabilities, 0 to 1, shape (n,).
-
-        Returns:
-            Values at these cumulative probabilities, shape (n,).
-        """
+        """Convert cumulative probabilities, 0 to 1, shape (n,), to values of the factor."""
         if self.kind in ("grid", "choice"):
             weights = self.weights or [1.0] * len(self.values)
             ends = np.cumsum(weights) / np.sum(weights)

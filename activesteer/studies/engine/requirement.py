@@ -59,11 +59,7 @@ class Requirement:
     def robustness(self, rows: Rows, examined: str) -> float:
         """Return the margin to the limit; nan if neither side is defined.
 
-        A metric that a run does not define counts as infinitely bad.
-
-        Args:
-            rows: Metrics by controller.
-            examined: The controller that `controller` stands for.
+        A metric that a run does not define counts as infinitely bad. `controller` stands for the examined one.
         """
         more, less = (side(rows, examined) for side in self._sides)
         try:

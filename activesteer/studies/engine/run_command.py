@@ -21,12 +21,7 @@ def run_command(
 ) -> str:
     """Return the `activesteer run` that repeats a run to the last bit.
 
-    Args:
-        maneuver: Name, path or table of the manoeuvre; a table appears as its name.
-        controller: The controller.
-        vehicle: Name, path or table of the vehicle; likewise.
-        overrides: Overrides of the run; the key `driver` replaces the driver.
-        driver: Name or path of the driver.
+    A manoeuvre or vehicle given as a table appears as its name. The override `driver` replaces the driver.
     """
     changes = dict(overrides)
     driver = changes.pop("driver", driver)

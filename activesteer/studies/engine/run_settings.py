@@ -108,11 +108,7 @@ def prepare(workers: Workers, settings: Settings) -> None:
 
 
 def prepare_worker(settings: Settings) -> str:
-    """Compile the native code and check that this machine can make the runs.
-
-    Returns:
-        The obstacles in words; empty if there are none.
-    """
+    """Compile the native code; return in words why this machine cannot make the runs, or an empty text."""
     if problem := differences(settings):
         return problem
     install_native_forces()

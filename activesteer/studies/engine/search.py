@@ -60,18 +60,10 @@ def search(
     workers: Workers,
     progress: Callable[[int, int], None] | None = None,
 ) -> Any:
-    """Try sets of values until a number of sets is reached.
+    """Try sets of values until a number of sets is reached, and return the study of Optuna.
 
-    Args:
-        plan: The study; every set is driven in all of its manoeuvres with all of its controllers.
-        folder: Folder of the journal; a search found there is resumed.
-        name: Name of the search and of its journal.
-        sampler: Function from a seed to a sampler of Optuna.
-        objectives: Number of objectives.
-        trials: Total number of sets.
-        judge: Function from the rows of a set to its judgement.
-        workers: Workers that make the runs.
-        progress: Called after every set with the number of finished sets and the total.
+    Every set is driven in all manoeuvres with all controllers, and judged by the rows of its runs. `sampler` makes a
+    sampler of Optuna from a seed. A search found in the folder is resumed.
     """
     optuna = import_optuna(name)
     from optuna.storages import JournalStorage, journal  # noqa: PLC0415 - an extra

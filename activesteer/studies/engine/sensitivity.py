@@ -49,15 +49,8 @@ def indices(
 ) -> list[Index]:
     """Return the indices of one metric of one controller in one manoeuvre with one vehicle.
 
-    Args:
-        kind: Kind of the design.
-        factors: Factors of the study.
-        columns: Values of the factors by key, in the order of the design.
-        values: The metric in the same order; nan if a run has none.
-
-    Returns:
-        The indices. Empty if the design or the values allow none: a grid or a list, failed runs in a design that needs
-        all of them, or a metric that does not vary.
+    Columns and values are in the order of the design. There are no indices for a grid or a list, for failed runs in a
+    design that needs all of them, or for a metric that does not vary.
     """
     finite = np.isfinite(values)
     discrete = kind in ("grid", "list") or any(factor.kind in ("grid", "choice") for factor in factors)

@@ -140,18 +140,10 @@ def in_parallel(
     scheduler: str | None = None,
     workers: Workers | None = None,
 ) -> list[Any]:
-    """Call a function with each set of arguments, in several processes.
+    """Call a function of a module with each set of arguments, and return the results in the order of the arguments.
 
-    Args:
-        function: Function of a module, so that it can be pickled.
-        arguments: Arguments, one tuple per call.
-        jobs: Number of processes; default: the number of processors. With 1, this process makes all calls.
-        report: Called after each call with the index of its arguments and the number of finished calls.
-        scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
-        workers: Workers to use instead; they still belong to the caller.
-
-    Returns:
-        The results, in the order of the arguments.
+    `report` gets the index of the arguments and the number of finished calls. Given workers still belong to the caller;
+    otherwise see `workers_for`.
     """
     results: dict[int, Any] = {}
     with workers_for(jobs, scheduler=scheduler) if workers is None else contextlib.nullcontext(workers) as crew:

@@ -131,15 +131,7 @@ class DriverLoop:
 def driver_loop(
     car: LinearCar, controller: LinearController, driver: DriverParameters, gains: SteeringGains, steering_ratio: float
 ) -> DriverLoop:
-    """Assemble the loop.
-
-    Args:
-        car: The linearised car.
-        controller: The controller at its speed, with the car's step.
-        driver: The driver.
-        gains: Gains of the driver at that speed.
-        steering_ratio: Steering wheel angle over road-wheel angle [-].
-    """
+    """Assemble the loop of a car, a controller with the car's step, and a driver with his gains, all at one speed."""
     steps = round(PREVIEW_INTERVAL_S / car.timestep_s)
     waiting = round(driver.reaction_delay_s / PREVIEW_INTERVAL_S)
     n, states = len(car.a), len(controller.a)

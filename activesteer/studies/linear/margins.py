@@ -253,13 +253,9 @@ def margins_of_cars(
     speeds_kmh: Sequence[float],
     cars: Iterable[Mapping[str, Any]],
 ) -> Iterator[list[LoopMargins]]:
-    """Yield the margins of several cars; a controller that knows the same about two cars is evaluated once.
+    """Yield the margins of several cars, given by their overrides.
 
-    Args:
-        controllers: As for `simulate`.
-        vehicle: Name, path, or table of a vehicle.
-        speeds_kmh: Speeds [km/h].
-        cars: Overrides of each car: dotted key -> value.
+    A controller that knows the same about two cars is evaluated once.
     """
     plugins = [find_controller(given) for given in controllers]
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}

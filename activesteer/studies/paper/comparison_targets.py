@@ -54,12 +54,7 @@ class _Rule(NamedTuple):
     strict: bool = False
 
     def judged(self, controller: str, values: Mapping[str, float]) -> Target | None:
-        """Return the verdict: failed if the value was sought and not found, None if it was not sought.
-
-        Args:
-            controller: The controller.
-            values: Controller -> value of the metric.
-        """
+        """Return the verdict: failed if the value was sought and not found, None if it was not sought."""
         if not values:
             return None
         value = abs(values.get(controller, math.nan))
@@ -95,12 +90,7 @@ def asked(controllers: Iterable[str]) -> list[str]:
 
 
 def targets(controllers: Sequence[str], rows: Iterable[Any]) -> list[Target]:
-    """Judge the nominal runs.
-
-    Args:
-        controllers: The compared controllers.
-        rows: `scenario`, `controller`, `metric` and `value` of each number.
-    """
+    """Judge the nominal runs by their rows of `scenario`, `controller`, `metric` and `value`."""
     known: dict[tuple[str, str], dict[str, float]] = {}
     for row in rows:
         known.setdefault((row.scenario, row.metric), {})[row.controller] = row.value

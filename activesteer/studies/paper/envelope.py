@@ -276,19 +276,9 @@ def entry_speed(
     driver: FileOrTable,
     controller: str,
 ) -> float | None:
-    """Return the highest speed at which a car succeeds, by bisection.
+    """Return the highest speed [km/h] at which a car succeeds, by bisection within `RESOLUTION_KMH`.
 
-    Args:
-        maneuver: Name, path, or table of a lane change or a slalom.
-        vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value; neither speed nor duration.
-        line: Line of the manoeuvre, of `LINES`.
-        driver: The driver.
-        controller: As for `simulate`.
-
-    Returns:
-        The speed [km/h], within `RESOLUTION_KMH` below the lowest speed at which the car fails; None if it fails at
-        every speed of `RANGE_KMH`, the upper end if it succeeds at every one.
+    It is None if the car fails at every speed of `RANGE_KMH`, and the upper end if the car succeeds at every one.
     """
     read = read_by(overrides, controller)
     base = resolve(maneuver, vehicle, read, driver, [controller])

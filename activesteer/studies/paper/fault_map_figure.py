@@ -51,12 +51,7 @@ _PICTURES: Final = {
 
 
 def draw_fault_map(made: FaultMap, folder: str | os.PathLike[str]) -> list[Path]:
-    """Draw the heat maps and return their files.
-
-    Args:
-        made: The map.
-        folder: Folder for the files; it is created if it does not exist.
-    """
+    """Draw the heat maps into a folder and return their files."""
     directory = make_folder(folder, StudyError)
     return [
         save(draw(_picture(made, shown)), directory / f"{name}.png", StudyError) for name, shown in _PICTURES.items()

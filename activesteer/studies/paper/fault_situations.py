@@ -80,13 +80,7 @@ PRESETS: Final = {
 
 
 def path_of(situation: str, speed_mps: float, duration_s: float) -> dict[str, Any]:
-    """Return the manoeuvre of a situation: its path, some seconds longer than the run.
-
-    Args:
-        situation: Name of one of `SITUATIONS`.
-        speed_mps: Speed [m/s].
-        duration_s: Length of the run [s].
-    """
+    """Return the manoeuvre of a situation: its path, some seconds longer than the run."""
     curvature = SITUATIONS[situation].curvature
     steps = math.ceil(speed_mps * (duration_s + 4.0) / _SPACING_M)
     times = (np.arange(steps) + 0.5) * _SPACING_M / speed_mps

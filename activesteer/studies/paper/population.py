@@ -128,16 +128,7 @@ def population(
 
 
 def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()) -> Population:
-    """Count the results of a population's runs.
-
-    Args:
-        table: The study's table, or as much of it as there is.
-        planned: The study.
-        nominal: The claims of the nominal runs; none for a comparison.
-
-    Returns:
-        Proportions, in the order of the nominal claims, and effects.
-    """
+    """Count the results of a population's runs as far as it is; a comparison has no nominal claims."""
     rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
     names = [label_of(controller) for controller in planned.controllers]
     without = [row for row in rows if row["controller"] == NONE]

@@ -149,13 +149,7 @@ class Outcome(NamedTuple):
 def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
 ) -> Iterator[Outcome]:
-    """Make all runs and yield each as it ends; a search is made once for all controllers.
-
-    Args:
-        scenarios: Scenarios by name.
-        paths: Name of the scenario -> controller -> file.
-        jobs: Number of processes; default: the number of processors.
-    """
+    """Make all runs and yield each as it ends; a search is made once for all controllers."""
     with workers_for(jobs) as workers:
         queue = TaskQueue(workers)
         for name, scenario in scenarios.items():
