@@ -37,13 +37,10 @@ def has_spun(metrics: Metrics) -> bool:
 
 
 def is_lost(metrics: Metrics) -> bool:
-    """Return whether the car was lost.
+    """Return whether the car was lost, by the metrics of its run.
 
     A car is lost if it spins, if it does not keep to the lanes of its course, or if it passes a cone of a slalom on the
     wrong side or not at all. A cone that is touched does not count.
-
-    Args:
-        metrics: Metrics of the run; those that the manoeuvre does not have are no keys.
     """
     if has_spun(metrics) or (STAYS_IN_LANES in metrics and _number(metrics, STAYS_IN_LANES) != 1.0):
         return True

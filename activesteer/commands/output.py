@@ -29,12 +29,7 @@ _WHOLE: Final[dict[str, Any]] = {"break_on_hyphens": False, "break_long_words": 
 
 
 def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
-    """Print a table; numbers have three digits.
-
-    Args:
-        rows: Rows, key -> text or number.
-        columns: Key -> head of its column.
-    """
+    """Print a table of rows, a column for each key with its head; numbers have three digits."""
     texts = {key: [row[key] for row in rows if isinstance(row[key], str)] for key in columns}
     widths = {key: max(10, len(head), *map(len, texts[key])) for key, head in columns.items()}
     print(" ".join(f"{head:>{widths[key]}}" for key, head in columns.items()))
@@ -52,12 +47,7 @@ def print_wrapped(text: str) -> None:
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:
-    """Print a value as JSON; see `json_text`.
-
-    Args:
-        value: The value.
-        one_line: Whether another program reads the value as one line while this program goes on.
-    """
+    """Print a value as JSON; in one line for another program that reads it while this program goes on."""
     text = json_text(value)
     text = " ".join(line.strip() for line in text.splitlines()) if one_line else text
     print(text, file=_for_json[-1] if _for_json else None, flush=one_line)

@@ -70,14 +70,9 @@ def toml_value(value: Any) -> str:
 
 
 def toml_text(table: Mapping[str, Any], remarks: Mapping[str, str] | None = None) -> str:
-    """Return a table as the text of a file, each inner table below its header.
+    """Return a table as the text of a file, each inner table below its header; `read_toml` restores it.
 
-    Args:
-        table: Keys without quotes, and values; a list of tables is written in one line.
-        remarks: Dotted name of a table -> comment above its header.
-
-    Returns:
-        The text; `read_toml` restores the table.
+    A list of tables is written in one line. Remarks are comments above the header of a table, by its dotted name.
     """
     return "\n".join(_lines(table, remarks or {}, "")).lstrip("\n") + "\n"
 

@@ -50,7 +50,7 @@ def lanes(
 ) -> tuple[Lane, ...]:
     """Return entry, side and exit lane.
 
-    The centre line of the entry lane is y = 0. The side is 1 for a side lane on the left and -1 on the right. The offset
+    The centre line of the entry lane is y = 0. The side is 1 for a side lane on the left, -1 on the right. The offset
     of side lane and exit lane has a factor of its own.
     """
     b = vehicle_width_m

@@ -30,12 +30,7 @@ def recorded_inputs(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def led(table: dict[str, Any], lag_s: float) -> dict[str, Any]:
-    """Advance the steering demand of a manoeuvre, so that the steering wheel angle equals the recorded one.
-
-    Args:
-        table: Table of an open-loop manoeuvre.
-        lag_s: Time by which to advance it [s]; see `Vehicle.steering_lag_s`.
-    """
+    """Advance the steering demand of a manoeuvre by a lag [s], so that the steering wheel angle is as recorded."""
     steering = table["steering"]
     return table | {"steering": steering | {"time_s": [time_s - lag_s for time_s in steering["time_s"]]}}
 

@@ -72,18 +72,11 @@ def examine(
     scheduler: str | None = None,
     progress: Callable[[str, str, int, int], None] | None = None,
 ) -> Examination:
-    """Drive and evaluate a standard.
+    """Drive and evaluate a standard, one of `catalogue.STANDARDS`, with each controller separately.
 
-    Args:
-        name: Name of the standard, one of `catalogue.STANDARDS`.
-        controllers: Names or files of controllers; each is tested separately.
-        vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value, of car, driver or road; the standard defines the manoeuvres.
-        driver: Driver, as for `simulate`; by default the standard's.
-        output: Folder for the runs, which can be resumed; without it the runs are not kept.
-        jobs: Number of processes; by default the number of processors.
-        scheduler: Address of a Dask scheduler that drives the runs instead.
-        progress: Called with controller, series, number of finished runs, and number of all runs.
+    Overrides may change car, driver and road; the standard defines the manoeuvres, and the driver if none is given. The
+    runs in the folder can be resumed; without a folder, they are not kept. `progress` is called with controller,
+    series, finished runs, and all runs.
     """
     standard = standard_of(name)
     driver = standard.driver if driver is None else driver

@@ -13,12 +13,7 @@ from activesteer.plotting import Curve, Panel
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return a table of metrics with a column for each run.
-
-    Args:
-        title: Title of the table.
-        runs: Head of a column -> metrics; a run without a metric has an empty cell.
-    """
+    """Return a table of metrics with a column for each run; a run without a metric has an empty cell."""
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [
         [shown.label, shown.unit.name, *(shown.text(metrics.get(shown.name, math.nan)) for metrics in runs.values())]

@@ -64,12 +64,7 @@ class Reached(NamedTuple):
 
 
 def reached(run: Run, radius_m: float) -> Reached:
-    """Return time and force to reach a radius.
-
-    Args:
-        run: A spiral that begins at `_BEGIN_S`.
-        radius_m: Radius of the path of the centre of gravity [m].
-    """
+    """Return time and force to reach a radius of the centre of gravity's path [m] in a spiral from `_BEGIN_S` on."""
     if not run.channels:
         return Reached(math.nan, math.nan)
     tighter = np.abs(run["yaw_rate_radps"]) * radius_m >= run["speed_mps"]

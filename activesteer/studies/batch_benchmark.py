@@ -20,10 +20,7 @@ _INTERVAL: Final = 10
 
 
 def bench_batch(rounds: int = 5) -> dict[str, float]:
-    """Measure batches of cars in the sine with dwell, with ideal sensors.
-
-    Args:
-        rounds: How often everything is measured, interleaved; the best counts.
+    """Measure batches of cars in the sine with dwell, with ideal sensors, and keep the best of some interleaved rounds.
 
     Returns:
         `batch_cpu_us_per_car_step` (processor time, native code alone, one thread), `batch_cpu_us_two_threads` (the

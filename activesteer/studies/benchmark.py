@@ -227,12 +227,8 @@ def _with_file(scenario: Scenario, path: Path) -> float:
 def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
     """Measure the cost of the tyres: one evaluation of the front tyre, and all four in the engine.
 
-    Args:
-        rounds: How often everything is measured; the best counts.
-
-    Returns:
-        The results of `activesteer.tyre.benchmark`, and `four_tyres_us`: microseconds that four tyres with contact,
-        relaxation and the application of their forces add to the engine's passive forces, in the same state.
+    `four_tyres_us` are the microseconds that four tyres with contact, relaxation and the application of their forces
+    add to the engine's passive forces, in the same state.
     """
     scenario = resolve("straight_line")
     simulation = ClosedLoop(scenario)

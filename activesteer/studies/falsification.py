@@ -105,17 +105,10 @@ def falsify(
     scheduler: str | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[Falsified]:
-    """Search for the worst case of a requirement, for each controller in each manoeuvre.
+    """Search for the worst case of a requirement, for each controller in each manoeuvre, by default of the file.
 
-    Args:
-        requirement_file: Name or path of a study file with a table [falsify], or its table.
-        output: Folder; searches found there are resumed.
-        controllers: Controllers to examine; default: those of the file.
-        maneuvers: Manoeuvres of the file to search in; default: all.
-        runs: Budget of runs of each search; default: that of the file.
-        jobs: Number of processes; default: the number of processors.
-        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
-        progress: Called after every set with the search, the number of its finished sets and the total.
+    `runs` is the budget of each search. Searches found in the folder are resumed. `progress` is called after every set
+    with the search, its finished sets and the total. See `study` for the other arguments.
     """
     study = read_study(requirement_file, "falsify")
     table = build(FalsifyTable, study.falsify or {}, study.source, ("falsify",))

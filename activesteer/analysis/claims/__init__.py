@@ -21,15 +21,10 @@ _NO_SETTING: Final = frozenset({"vehicle", "duration_s", "settle_s", "title"})
 
 
 def claims_for(recording: RecordingLike) -> Claims | None:
-    """Return the paper's claims about the manoeuvre of a run.
+    """Return the function that checks the paper's claims about the manoeuvre of a run; None if it has none.
 
-    Args:
-        recording: The run. The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a
-            user's step steer is a step steer. The paper has no claims about a manoeuvre with other settings, except
-            those of `setting`.
-
-    Returns:
-        Function that checks them; None if the paper has no claims about the manoeuvre.
+    The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a user's step steer is a step
+    steer. The paper has no claims about a manoeuvre with other settings, except those of `setting`.
     """
     maneuver = recording.metadata.get("maneuver")
     if not isinstance(maneuver, Mapping):

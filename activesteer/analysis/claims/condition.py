@@ -37,13 +37,9 @@ class Condition(NamedTuple):
 
 
 def at_most(value: float, limit: float, scale: float | None = None, *, strict: bool = False) -> Condition:
-    """Return the condition that a value is at most a limit; an undefined value (nan) breaks it.
+    """Return the condition that a value is at most a limit, or below it; an undefined value (nan) breaks it.
 
-    Args:
-        value: The value.
-        limit: The limit.
-        scale: Difference that counts as 1; default: the magnitude of the limit.
-        strict: Whether the value must be below the limit.
+    The difference that counts as 1 is by default the magnitude of the limit.
     """
     room = limit - value
     unit = abs(limit) if scale is None else scale

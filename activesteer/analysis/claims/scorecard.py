@@ -142,14 +142,10 @@ def scorecard(
     population: Population | None = None,
     setting: str = HUMAN,
 ) -> Scorecard:
-    """Judge claims with the list of claims that are not reproduced.
+    """Judge claims with the vehicle's list of claims that are not reproduced, and its stored population.
 
-    Args:
-        claims: Checked claims.
-        vehicle: Name of the vehicle, for its list (see `not_reproduced`) and its stored population.
-        known: Number -> reason of the claims that are not reproduced, in place of the list.
-        population: Population in place of the stored one.
-        setting: Setting of the runs. The paper's has a list of its own, and no population.
+    `known`, number -> reason, replaces the list, and `population` the stored one. The paper's setting has a list of its
+    own and no population.
     """
     if setting == PAPER:
         known, vehicle = read_setting(PAPER).fails, ""

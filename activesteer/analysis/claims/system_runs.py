@@ -37,13 +37,7 @@ class SystemRuns:
     def __init__(
         self, recordings: Mapping[str, RecordingLike], metrics: Callable[[RecordingLike], Metrics], what: str
     ) -> None:
-        """Evaluate the runs.
-
-        Args:
-            recordings: Runs by system; further runs are ignored.
-            metrics: Function that evaluates a run.
-            what: Name of the manoeuvre, for errors.
-        """
+        """Evaluate the three runs; `what` names the manoeuvre in errors."""
         check_systems(recordings, what)
         self.recordings = {system: recordings[system] for system in SYSTEMS}
         cut = [system for system in SYSTEMS if _is_cut_short(recordings[system])]

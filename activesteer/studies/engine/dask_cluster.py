@@ -85,11 +85,7 @@ class DaskCluster:
 
 @contextlib.contextmanager
 def connected(scheduler: str) -> Iterator[Any]:
-    """Yield a client of a running scheduler.
-
-    Args:
-        scheduler: Its address, such as tcp://host:8786, or the scheduler file that it wrote.
-    """
+    """Yield a client of the scheduler at an address, such as tcp://host:8786, or of the file that it wrote."""
     try:
         from distributed import Client  # noqa: PLC0415 - an extra
     except ImportError as reason:

@@ -66,10 +66,8 @@ class MatchStore:
     def __init__(self, folder: Path, study_toml: str, *, reads: bool = False) -> None:
         """Open the folder, or resume the search in it.
 
-        Args:
-            folder: The folder.
-            study_toml: The study as it runs, behind a line with the digest of everything that decides its results.
-            reads: Whether the search is only read, which another version may do too.
+        The study stands behind a line with the digest of everything that decides its results; another version may read
+        it.
         """
         self.candidates: dict[int, Candidate] = {}
         self.known: dict[tuple[str, str], Evaluation] = {}

@@ -170,16 +170,9 @@ def match(
 ) -> Match:
     """Search for settings in which as many statements as possible hold; a search found in the folder is resumed.
 
-    Args:
-        study_file: Name or path of a study file with a table [match], or its table.
-        output: Folder of the search.
-        evaluations: Total number of evaluations; default: the number in the file.
-        least: Draw settings in which at least this number of statements hold, in place of the search.
-        neighbours: Drive settings whose numbers differ from those of the best one by up to this fraction, in place of
-            the search.
-        jobs: Number of processes; default: the number of processors.
-        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
-        progress: Called after every evaluation.
+    In place of the search, `least` draws settings in which at least so many statements hold, and `neighbours` drives
+    settings whose numbers differ from those of the best one by up to this fraction. `evaluations` is the total number,
+    by default that of the file. See `study` for the other arguments.
     """
     study = read_study(study_file, "match")
     search = _Search(study, Path(output), progress)

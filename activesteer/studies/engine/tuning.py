@@ -127,14 +127,8 @@ def tune(
 ) -> Tuning:
     """Search for the best set of a study's factors, driving each set in all manoeuvres with all controllers.
 
-    Args:
-        study_file: Name or path of a study file with a table [tune], or its table.
-        output: Folder; a search found there is resumed.
-        trials: Total number of sets; default: the number in the file.
-        jobs: Number of processes; default: the number of processors.
-        client: A `distributed.Client` whose cluster makes the runs.
-        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
-        progress: Called after every set with the number of finished sets and the total.
+    A search found in the folder is resumed, up to `trials` sets in total, by default the number of the file. `progress`
+    is called after every set with the finished sets and the total. See `study` for the other arguments.
     """
     study = read_study(study_file, "tune")
     table = _table(study)

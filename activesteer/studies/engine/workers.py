@@ -159,13 +159,9 @@ def _end_with(sentinel: int) -> None:
 
 @contextlib.contextmanager
 def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str | None = None) -> Iterator[Workers]:
-    """Yield the workers that the arguments name; if the body fails, their tasks are abandoned.
+    """Yield this machine's processes, by default one per processor, or a Dask cluster; abandon tasks if the body fails.
 
-    Args:
-        jobs: Number of processes of this machine; default: the number of available processors. With 1, this process
-            does the work.
-        client: A `distributed.Client` instead.
-        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
+    With one job, this process does the work. The scheduler is given by its address or its file.
 
     Raises:
         ParameterError: `jobs` is below 1 or above four times the number of processors, or is given with a scheduler.

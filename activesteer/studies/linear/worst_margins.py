@@ -34,19 +34,9 @@ def worst_margins(
 ) -> list[LoopMargins]:
     """Return the smallest margins of every loop at every speed over the samples of a study.
 
-    Args:
-        study_file: Study with factors, design and overrides. Factors for single manoeuvres are left out; manoeuvres,
-            cars and controllers of the study have no effect.
-        controllers: As for `simulate`.
-        vehicle: Name, path, or table of a vehicle.
-        speeds_kmh: Speeds [km/h].
-        overrides: Dotted key -> value, of no key that the study varies.
-        progress: Called after each group of samples.
-        jobs: Number of processes; default: the number of processors. With more than one, controllers must be picklable.
-        scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
-
-    Returns:
-        The smallest of each margin over all samples; `factors` are those of the smallest disk margin.
+    Factors for single manoeuvres are left out; manoeuvres, cars and controllers of the study have no effect. Overrides
+    may not set a key that the study varies. With more than one process, controllers must be picklable. `factors` are
+    those of the smallest disk margin; each margin is the smallest over all samples.
     """
     given, changed = read_study(study_file), dict(overrides or {})
     for key in changed:

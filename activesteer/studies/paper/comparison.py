@@ -158,17 +158,8 @@ def compare(
     """Drive `CASES` with every controller and find their entry speeds in the severe lane change.
 
     `entry_speed_mps` is the median over `ENTRY_SEEDS`; `entry_speed_min_mps` and `entry_speed_max_mps` are the
-    extremes.
-
-    Args:
-        controllers: As for `simulate`.
-        folder: Folder of the recordings SCENARIO-CONTROLLER.mcap; it is made if it does not exist.
-        vehicle: Name, path, or table of a vehicle.
-        jobs: Number of processes; default: the number of processors.
-        progress: Called after every run.
-
-    Raises:
-        ActiveSteerError: an input is wrong. A failed run stops no other run; `failures` names it.
+    extremes. The recordings are SCENARIO-CONTROLLER.mcap in the folder. A failed run stops no other run; `failures`
+    names it.
     """
     labels = {find_controller(given).label: given for given in controllers}
     if len(labels) < len(controllers):

@@ -187,21 +187,12 @@ def envelope(
     scheduler: str | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Envelope:
-    """Find the entry speeds and drive the map.
+    """Find the entry speeds of a lane change or a slalom, and drive the map of each driver.
 
-    Args:
-        maneuver: Name, path, or table of a lane change or a slalom.
-        controllers: Controllers, as for `simulate`.
-        vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value; neither speed nor duration nor line.
-        drivers: The drivers; each gets a map.
-        speeds_kmh: Speeds of the map [km/h]; default: from 30 below to 30 above that of the manoeuvre.
-        lines_m: Values of the line of the map [m]; default: those of `LINES`.
-        output: Folder for the studies of the maps, which can be resumed, each below the names of manoeuvre and driver.
-            Without a folder, they are not stored.
-        jobs: Number of processes; default: the number of processors.
-        scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
-        progress: Called with the current item, the number of finished runs or searches, and the total.
+    The overrides set neither speed nor duration nor line. The speeds of the map are by default from 30 below to 30
+    above that of the manoeuvre [km/h], its lines those of `LINES` [m]. The studies of the maps are stored below the
+    names of manoeuvre and driver in `output`, and can be resumed. `progress` is called with the current item, the
+    finished runs or searches, and the total.
     """
     given = dict(overrides or {})
     scenario = resolve(maneuver, vehicle, given, drivers[0], controllers)

@@ -98,21 +98,10 @@ def fault_map(
     workers: Workers | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FaultMap:
-    """Drive every fault at every speed in every situation.
+    """Drive every fault at every speed [km/h] in every situation, a name of `SITUATIONS`.
 
-    Args:
-        controller: The controller, as for `simulate`.
-        vehicle: The vehicle.
-        overrides: Dotted key -> value, such as `road.mu`.
-        faults: Faults without a time, such as `rear:offset=1deg`; default: those of the controller's actuators.
-        speeds_kmh: Speeds [km/h].
-        situations: Names of `SITUATIONS`.
-        limits: Limits for the effect of a fault.
-        driver: The driver.
-        jobs: Number of processes; default: the number of processors.
-        scheduler: Address of a Dask scheduler, or its scheduler file, to use instead.
-        workers: Workers to use instead; they still belong to the caller.
-        progress: Called after every pair of speed and situation with the number of finished pairs and the total.
+    Faults have no time, such as `rear:offset=1deg`; by default they are those of the controller's actuators and
+    sensors. `progress` is called after every pair of speed and situation with the finished pairs and the total.
     """
     limits = Limits() if limits is None else limits
     chosen = {

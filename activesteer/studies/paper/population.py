@@ -105,19 +105,9 @@ def population(
     scheduler: str | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> Population:
-    """Check the paper's claims over a population, or compare controllers.
+    """Check the paper's claims over a population, with 15 runs for each sample, or compare controllers.
 
-    See `study` for the arguments that are not listed.
-
-    Args:
-        samples: Number of samples; for the claims, 15 runs each.
-        controllers: Controllers to compare, see `comparison_study`; default: the claims of the paper's systems.
-        seed: Seed of the sample.
-        vehicle: The car of which the samples are variations.
-        output: Folder of the study; a study found there is resumed. Without a folder, nothing is stored.
-        jobs: Number of processes.
-        scheduler: Address of a Dask scheduler, or its scheduler file, instead.
-        progress: Called after every task.
+    A study found in the folder is resumed; without a folder, nothing is stored. See `study` for the other arguments.
     """
     if controllers is None:
         planned = population_study(samples, seed, vehicle)

@@ -77,19 +77,9 @@ def reproduce(
 ) -> Reproduction:
     """Drive all five scenarios with all three systems and check the paper's claims.
 
-    With more than one job, the runs are made in newly started processes: a script that calls this function needs
-    `if __name__ == "__main__":`.
-
-    Args:
-        folder: Folder of the recordings SCENARIO-SYSTEM.mcap; it is made if it does not exist.
-        vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value, for all runs; see `simulate`.
-        setting: `human` or `paper`; see `activesteer.analysis.claims.setting`.
-        jobs: Number of processes; default: the number of processors.
-        progress: Called after every run.
-
-    Raises:
-        ActiveSteerError: an input is wrong. A failed run stops no other run; `failures` names it.
+    With more than one job, the runs are made in newly started processes: a script that calls this function needs `if
+    __name__ == "__main__":`. The recordings are SCENARIO-SYSTEM.mcap in the folder. The setting is `human` or `paper`,
+    see `activesteer.analysis.claims.setting`. A failed run stops no other run; `failures` names it.
     """
     if setting == PAPER and vehicle != VEHICLE:
         raise ParameterError(
