@@ -70,10 +70,6 @@ class Panel(NamedTuple):
 def without_tail(panel: Panel, size: Footprint) -> tuple[Panel, Panel]:
     """Divide a panel of a body: the low part around and behind the rear wheels hides them from a camera behind the car.
 
-    Args:
-        panel: A panel of the body.
-        size: Size of the car.
-
     Returns:
         The panel without its tail, and the tail; either can be empty.
     """

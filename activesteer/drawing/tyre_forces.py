@@ -30,9 +30,6 @@ def force_scale(recordings: Sequence[Recording]) -> float:
     """Return the force per length of an arrow [N/m], the same for all runs that are shown together.
 
     It is proportional to the largest friction under any of their tyres.
-
-    Args:
-        recordings: The runs.
     """
     names = [f"{corner}_mu" for corner in CORNERS]
     values = [run[name] for run in recordings for name in names if name in run]

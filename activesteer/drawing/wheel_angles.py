@@ -36,12 +36,6 @@ def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
     """Return the factors that enlarge the angles of each wheel, the same for all runs that are shown together.
 
     The factor is ten, and less for an axle that steers by more than 9 deg.
-
-    Args:
-        recordings: The runs.
-
-    Returns:
-        A factor for each wheel, the same at both wheels of an axle.
     """
     found: list[int] = []
     for axle in (CHANNELS[:2], CHANNELS[2:]):

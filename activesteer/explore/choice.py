@@ -45,11 +45,7 @@ class Folder:
     """Names that the page may use: those of the package, and files directly in one folder."""
 
     def __init__(self, path: Path) -> None:
-        """Take the folder.
-
-        Args:
-            path: The folder of the user's own files.
-        """
+        """Take the folder."""
         self.path = path
 
     def names(self) -> dict[str, list[str]]:
@@ -67,9 +63,6 @@ class Folder:
         Args:
             message: The message, without its numbers.
             courses: Names that stand for the manoeuvre; those of the package by default.
-
-        Raises:
-            ParameterError: a name is unknown, or a value has the wrong type.
         """
         chosen = build(Choice, message, _SOURCE)
         names = self.names()
@@ -108,9 +101,6 @@ def numbers(values: object, allowed: Mapping[str, tuple[float, float]]) -> dict[
     Args:
         values: Key -> number, from the page.
         allowed: Key -> least and greatest number.
-
-    Raises:
-        ParameterError: a key has no slider, or a value is no number within its range.
     """
     if not isinstance(values, Mapping):
         raise ParameterError(f"is {shown(values)}; a number for each changed key is needed", key="values")

@@ -80,11 +80,7 @@ class Hands(NamedTuple):
 
     @classmethod
     def read(cls, message: Mapping[str, Any]) -> Hands:
-        """Read a message of the page.
-
-        Raises:
-            ParameterError: a position is no number within its range.
-        """
+        """Read a message of the page."""
         values = []
         for key, low in (("steer", -1.0), ("throttle", 0.0), ("brake", 0.0)):
             value = message.get(key, 0.0)
@@ -148,11 +144,7 @@ def _towards(value: float, target: float, most: float) -> float:
 
 
 class Drive:
-    """A drive in real time, recorded to a file.
-
-    Attributes:
-        path: The recording.
-    """
+    """A drive in real time, recorded to a file."""
 
     def __init__(self, message: Mapping[str, Any], folder: Folder, pacer: Pacer | None = None) -> None:
         """Put the car at the start of a course.
@@ -161,9 +153,6 @@ class Drive:
             message: The choice of the page; `maneuver` is one of `COURSES`.
             folder: The user's own files, and the place of the recording.
             pacer: Keeper of the pace; that of the clock by default.
-
-        Raises:
-            ActiveSteerError: the choice is wrong, or the car cannot be built.
         """
         choice: Choice = folder.choice(message, COURSES)
         self._course = course = COURSES[choice.maneuver]
@@ -206,11 +195,7 @@ class Drive:
         )  # fmt: skip
 
     def act(self, message: Mapping[str, Any]) -> None:
-        """Carry out a message of the page: hands, controller, speed to hold.
-
-        Raises:
-            ActiveSteerError: a value is wrong, or there is no such controller.
-        """
+        """Carry out a message of the page: hands, controller, speed to hold."""
         if "controller" in message:
             loop, name = self._simulation.loop, str(message["controller"])
             _, loop.controller = control_unit(name, self._simulation.scenario, loop.vehicle)

@@ -46,11 +46,7 @@ class Reply(NamedTuple):
 
 
 class Runs:
-    """Runs for the sliders, with what is worth keeping between two of them.
-
-    Attributes:
-        folder: The user's own files, and the place of saved recordings.
-    """
+    """Runs for the sliders, with what is worth keeping between two of them."""
 
     def __init__(self, folder: Folder) -> None:
         """Start without a run."""
@@ -81,9 +77,6 @@ class Runs:
             message: The choice.
             values: Values of the sliders that were moved.
             stale: Whether the page has made a newer choice, for which this one is dropped.
-
-        Raises:
-            ActiveSteerError: the choice is wrong.
         """
         choice = self.folder.choice(message)
         allowed = {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
@@ -108,11 +101,7 @@ class Runs:
         yield Reply({"kind": "finished", **self._commands(choice, overrides)})
 
     def save(self) -> Reply:
-        """Write the last runs as recordings.
-
-        Raises:
-            ParameterError: there is no run yet.
-        """
+        """Write the last runs as recordings."""
         paths = []
         for name, recording in self._runs().items():
             path = self._free(f"{recording.metadata['maneuver']['name']}_{_plain(name)}", ".mcap")
@@ -121,11 +110,7 @@ class Runs:
         return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": str(self.folder.path)})
 
     def report(self, path: Path) -> Reply:
-        """Write a report of the last runs.
-
-        Raises:
-            ParameterError: there is no run yet.
-        """
+        """Write a report of the last runs."""
         write_report({f"{_plain(name)}.mcap": recording for name, recording in self._runs().items()}, path)
         return Reply({"kind": "report"})
 

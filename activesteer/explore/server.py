@@ -47,11 +47,7 @@ _POLICY: Final = (
 
 
 class ExploreServer:
-    """The server and its worker process.
-
-    Attributes:
-        url: Address of the page, with its token.
-    """
+    """The server and its worker process."""
 
     def __init__(self, folder: Path, port: int) -> None:
         """Open the port and start the worker process.
@@ -59,9 +55,6 @@ class ExploreServer:
         Args:
             folder: Folder of the user's own files and of recordings.
             port: Port; 0 for any free one.
-
-        Raises:
-            ActiveSteerError: the port is taken.
         """
         self._socket = socket.socket()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

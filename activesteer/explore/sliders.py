@@ -71,9 +71,6 @@ def sliders(scenario: Scenario, controllers: Sequence[str]) -> list[Slider]:
     Args:
         scenario: Manoeuvre and car with the values of their files.
         controllers: The controllers, whose gains follow; a file with its folder.
-
-    Raises:
-        ControllerError: there is no such controller.
     """
     found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
     for name in controllers:

@@ -21,12 +21,7 @@ from activesteer.explore.runs import Reply, Runs
 
 
 def work(connection: Connection, folder: str) -> None:
-    """Answer messages until the server closes the pipe.
-
-    Args:
-        connection: Pipe to the server.
-        folder: Folder of the user's own files and of recordings.
-    """
+    """Answer messages until the server closes the pipe."""
     # Ctrl-C reaches every process of the terminal; the server ends this one by closing the pipe.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, OSError):

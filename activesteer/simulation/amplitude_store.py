@@ -29,11 +29,7 @@ _writes = True
 
 
 def folder() -> Path:
-    """Return the folder of the numbers, which need not exist.
-
-    Raises:
-        RuntimeError: the user has no home folder.
-    """
+    """Return the folder of the numbers, which need not exist."""
     given = Path(os.environ.get("XDG_CACHE_HOME", ""))
     # XDG base directory specification: ignore a path that is not absolute.
     cache = given if given.is_absolute() else Path.home() / ".cache"
@@ -41,11 +37,7 @@ def folder() -> Path:
 
 
 def recall(key: str) -> float | None:
-    """Return a stored number, bit for bit; None if there is none.
-
-    Args:
-        key: Hexadecimal digest of everything that the number depends on.
-    """
+    """Return a stored number, bit for bit; None if there is none."""
     if _reads and key not in _in_process:
         with contextlib.suppress(ActiveSteerError, RuntimeError, ValueError):
             text = read_bytes(folder() / f"{key}{_SUFFIX}", ActiveSteerError, _MAX_BYTES).decode("ascii")
@@ -56,12 +48,7 @@ def recall(key: str) -> float | None:
 
 
 def keep(key: str, value: float) -> None:
-    """Store a number.
-
-    Args:
-        key: Hexadecimal digest of everything that the number depends on.
-        value: The number.
-    """
+    """Store a number."""
     _remember(key, value)
     if not _writes:
         return

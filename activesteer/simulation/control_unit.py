@@ -18,11 +18,7 @@ _FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 
 
 class ControlUnit:
-    """A controller that is called at its own rate, and whose held command arrives after the delay of the bus.
-
-    Attributes:
-        inner: The controller.
-    """
+    """A controller that is called at its own rate, and whose held command arrives after the delay of the bus."""
 
     def __init__(
         self,
@@ -52,12 +48,7 @@ class ControlUnit:
         self._on_bus: deque[ActuatorCommand] = deque([self._held] * delay, maxlen=delay + 1)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return the command that reaches the actuators now.
-
-        Args:
-            command: Command of the driver.
-            measurement: Signals of the sensors.
-        """
+        """Return the command that reaches the actuators now."""
         if self._steps % self._every == 0:
             if self._truth is not None:
                 self._held = self.inner.step(command, *self._truth())

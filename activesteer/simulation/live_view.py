@@ -118,9 +118,6 @@ def scene_for(simulation: ClosedLoop, maneuver: Maneuver, *, cutaway: bool = Fal
         simulation: The simulation.
         maneuver: The manoeuvre, whose road and course are shown.
         cutaway: Whether the body is transparent.
-
-    Raises:
-        PlaybackError: the car cannot be drawn.
     """
     vehicle = simulation.vehicle
     size = Footprint.from_table(vehicle.dimensions())
@@ -139,9 +136,6 @@ def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pac
         scene: Scene with its car only.
         viewer: The viewer of the scene.
         pacer: Keeper of the pace.
-
-    Raises:
-        ActiveSteerError: the run failed.
     """
     vehicle, timestep_s = simulation.vehicle, simulation.vehicle.timestep_s
     follow = _Follow(simulation)

@@ -25,11 +25,7 @@ def _class(module: str, name: str) -> Any:
 
 
 def pickled(portable: Any) -> bytes:
-    """Pickle the inputs and the state of a simulation.
-
-    Raises:
-        ParameterError: a part of them cannot be pickled, such as a controller whose class is local to a function.
-    """
+    """Pickle the inputs and the state of a simulation."""
     buffer = io.BytesIO()
     try:
         _Pickler(buffer, pickle.HIGHEST_PROTOCOL).dump(portable)
@@ -44,9 +40,6 @@ def unpickled(kind: Any, content: bytes) -> Any:
     Args:
         kind: Class of the simulation.
         content: Return value of `pickled`.
-
-    Raises:
-        ActiveSteerError: a part cannot be restored here, such as a controller whose file is missing.
     """
     try:
         portable = pickle.loads(content)

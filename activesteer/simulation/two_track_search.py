@@ -45,9 +45,6 @@ def two_track_of(vehicle: FileOrTable, run: Run, overrides: Mapping[str, Any] | 
         vehicle: Name, path, or table of a vehicle; it needs no table [two_track].
         run: Function that runs a scenario.
         overrides: Dotted key -> value, for the vehicle or the road.
-
-    Raises:
-        ActiveSteerError: the car cannot drive the tests.
     """
     scenario = resolve(_steps(vehicle, overrides), vehicle, overrides)
     car = scenario.car.on()
