@@ -52,12 +52,7 @@ _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "s
 
 
 class Reached(NamedTuple):
-    """Time and force to reach a radius.
-
-    Attributes:
-        time_s: Time from the beginning of steer; nan for a radius that is not reached [s].
-        effort_N: Greatest force at the rim until then; nan for a radius that is not reached [N].
-    """
+    """Time from the beginning of steer to a radius, and greatest force at the rim until then; nan if not reached."""
 
     time_s: float
     effort_N: float

@@ -41,13 +41,8 @@ Baseline = dict[str, dict[str, dict[str, float]]]
 class BenchmarkRun(NamedTuple):
     """One manoeuvre driven with one controller.
 
-    Attributes:
-        maneuver: Name of the manoeuvre.
-        kind: Kind of the manoeuvre.
-        controller: Name of the controller.
-        simulated_s: Simulated time, settling included [s].
-        wall_s: Time from building the car to the metrics [s].
-        metrics: Key metrics [SI], in the order of their declaration.
+    The simulated time includes settling; the wall time lasts from building the car to the metrics. The key metrics [SI]
+    are in the order of their declaration.
     """
 
     maneuver: str
@@ -86,16 +81,7 @@ class Benchmark(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """A key metric that differs from the baseline by more than its tolerance.
-
-    Attributes:
-        maneuver: Name of the manoeuvre.
-        controller: Name of the controller.
-        metric: Name of the metric.
-        old: Value in the baseline [SI]; None where the baseline has none.
-        new: Value found [SI]; None where there is no such run or metric any more.
-        tolerance: Largest difference that counts as unchanged [SI].
-    """
+    """A key metric [SI] that differs from the baseline by more than its tolerance; None where a side has none."""
 
     maneuver: str
     controller: str

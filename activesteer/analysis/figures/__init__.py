@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from activesteer.analysis.figures import theory, time_histories, tracks
-from activesteer.analysis.figures.step_steer import figure_2, figure_11, step_steer_figure
+from activesteer.analysis.figures.step_steer import figure_2, figure_11
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.files import make_folder
@@ -106,7 +106,9 @@ def figure_for(kind: str) -> Callable[[Mapping[str, RecordingLike], str | os.Pat
         kind: Kind of the manoeuvre.
 
     Returns:
-        Function that draws its runs, by system, and saves the figure; it raises the errors of `step_steer_figure`.
+        Function that draws its runs, by system, and saves the figure; the ending of the path gives the format. It
+        raises `ParameterError` without matplotlib or a run, and `RecordingError` for a missing channel or a file that
+        cannot be written.
     """
     draw = BY_KIND.get(kind, time_histories.general)
 
@@ -120,4 +122,4 @@ def _write(figure: Figure, folder: Path, name: str) -> list[Path]:
     return [save(figure, folder / f"{name}{ending}", RecordingError) for ending in FORMATS]
 
 
-__all__ = ["draw_all", "figure_2", "figure_for", "step_steer_figure"]
+__all__ = ["draw_all", "figure_2", "figure_for"]

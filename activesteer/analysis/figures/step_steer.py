@@ -54,11 +54,6 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     return figure
 
 
-def step_steer_figure(recordings: Mapping[str, RecordingLike], path: str | os.PathLike[str]) -> Path:
-    """Draw `figure_11` and save it; the ending of the path gives the format (.png, .pdf, .svg)."""
-    return save(figure_11(recordings), Path(path), RecordingError)
-
-
 def figure_2(
     recording: RecordingLike,
     path: str | os.PathLike[str],

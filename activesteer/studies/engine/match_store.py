@@ -16,12 +16,7 @@ _STUDY: Final = "match.toml"
 
 
 class Evaluation(NamedTuple):
-    """A scenario, driven with all controllers.
-
-    Attributes:
-        distances: Statement -> distance from holding; see `Claim.distance`.
-        metrics: Controller -> metric -> value.
-    """
+    """A scenario, driven with all controllers: `Claim.distance` by statement, and metrics by controller."""
 
     distances: dict[str, float]
     metrics: dict[str, dict[str, float]]

@@ -17,12 +17,9 @@ from activesteer.studies.engine.workers import Workers
 
 
 class Judgement(NamedTuple):
-    """Judgement of a set of values.
+    """Judgement of a set of values: objectives that shall be small, and further results to keep with the set.
 
-    Attributes:
-        objectives: Values that shall be small; None for a set that cannot be judged.
-        attributes: Further results to keep with the set.
-        violation: Size of the violation of the constraints; None without constraints.
+    The objectives are None for a set that cannot be judged, the violation is None without constraints.
     """
 
     objectives: list[float] | None

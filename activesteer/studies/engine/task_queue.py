@@ -27,13 +27,7 @@ class WorkerDied(StudyError):  # noqa: N818 - an event, named as one
 
 
 class Outcome(NamedTuple):
-    """Outcome of a task.
-
-    Attributes:
-        key: Key of the task.
-        value: Result of its function.
-        error: Error that it raised instead.
-    """
+    """Outcome of a task by its key: the result of its function, or the error that it raised instead."""
 
     key: Any
     value: Any

@@ -81,14 +81,7 @@ class TuneTable:
 
 @dataclass(frozen=True)
 class Trial:
-    """A set of values that was tried.
-
-    Attributes:
-        number: Number of the set.
-        values: Factor -> value.
-        objectives: Objective -> value.
-        violation: Size of the violation of the constraints; 0 if there is none.
-    """
+    """A set of values that was tried; the size of the violation of its constraints is 0 if there is none."""
 
     number: int
     values: dict[str, Any]

@@ -73,14 +73,7 @@ _COLUMN: Final = 7
 
 
 class Row(NamedTuple):
-    """One value of the table.
-
-    Attributes:
-        scenario: A name of `CASES`.
-        controller: The controller.
-        metric: Name of the metric in the recording.
-        value: Value [SI]; nan if the run does not define it.
-    """
+    """One value of the table by its recorded metric [SI]; nan if the run does not define it."""
 
     scenario: str
     controller: str

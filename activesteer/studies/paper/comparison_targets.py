@@ -21,13 +21,7 @@ TRACK_HARM_M: Final = 0.10
 
 
 class Target(NamedTuple):
-    """Verdict on a target.
-
-    Attributes:
-        controller: The controller.
-        text: The target and the result.
-        passed: Whether the target is met.
-    """
+    """Verdict on a target of a controller; the text holds the target and the result."""
 
     controller: str
     text: str

@@ -17,12 +17,9 @@ from activesteer.studies.paper.fault_map import FaultMap
 
 
 class _Shown(NamedTuple):
-    """A value of a row.
+    """A value of a row: its title with the unit, the function that finds it (None without a result), and its colour.
 
-    Attributes:
-        title: Name and unit of the value.
-        value: Function from a row to the text of its field; None without a result.
-        fraction: Function from the value and the limits to the colour, from 0 (good) to 1 (bad).
+    The colour is a function of the value and the limits, from 0 (good) to 1 (bad).
     """
 
     title: str

@@ -123,13 +123,7 @@ def _path(folder: Path, scenario: str, system: str) -> Path:
 
 
 class Outcome(NamedTuple):
-    """Outcome of a run.
-
-    Attributes:
-        scenario: Name of the scenario.
-        system: The controller.
-        problem: Reason why the run ended early; empty for a complete run.
-    """
+    """Outcome of a run with a controller: the reason why it ended early, or an empty text."""
 
     scenario: str
     system: str

@@ -8,10 +8,12 @@ import sys
 import numpy as np
 import pytest
 
-from activesteer.analysis.figures import step_steer_figure
+from activesteer.analysis.figures import figure_for
 from activesteer.errors import ParameterError, RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import step_steer
+
+step_steer_figure = figure_for("step_steer")
 
 
 def three():
