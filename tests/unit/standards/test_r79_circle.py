@@ -13,8 +13,7 @@ from activesteer.files import json_text
 from activesteer.standards.examination import examine
 from activesteer.standards.r79_circle import EFFORTS, RIM_RADIUS_M, STANDARD, reached
 from activesteer.standards.standard import Run
-from activesteer.studies.paper.fault_figures import FIGURES
-from activesteer.studies.paper.fault_situations import PRESETS
+from activesteer.studies.paper.fault_situations import FIGURES, PRESETS
 from tests.unit.standards.grounds import WrittenGround
 from tests.unit.standards.signals import run_of, times
 
