@@ -128,14 +128,9 @@ def _measured(options: argparse.Namespace, folder: Path) -> int:
     with ProgressBar("validate", quiet=options.json) as bar:
         result = validate_measured(file, options.jobs, scheduler=options.scheduler, progress=bar)
     print_notes(result.notes)
-    if options.json:
-        print_json(result.to_json())
-    else:
-        print(measured_text(result))
+    tell(options, result.to_json(), [measured_text(result)])
     if options.output is not None:
-        page = write_measured_page(result, options.output / "validation.html")
-        if not options.json:
-            print(f"page: {page}")
+        tell_files(options, [write_measured_page(result, options.output / "validation.html")], "page")
     return 0 if result.inside else 1
 
 
