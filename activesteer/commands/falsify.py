@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.arguments import add_controller, add_json, add_output, add_workers
-from activesteer.commands.output import BAD, GOOD, painted, print_json
+from activesteer.commands.output import BAD, GOOD, painted, tell
 from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -57,33 +58,25 @@ def _falsify(options: argparse.Namespace) -> int:
         )
     figures = _draw(found, options.output)
     violated = any(one.violated for one in found)
-    if options.json:
-        table = [one.to_json() for one in found]
-        print_json({"violated": violated, "searches": table, "figures": [str(path) for path in figures]})
-        return int(violated)
-    for one in found:
-        _print(one)
-    for path in figures:
-        print(f"figure: {path}")
+    table = {"violated": violated, "searches": [one.to_json() for one in found]}
+    tell(options, table, (line for one in found for line in _lines(one)), figures)
     return int(violated)
 
 
-def _print(one: Falsified) -> None:
+def _lines(one: Falsified) -> Iterator[str]:
     verdict = painted("VIOLATED", BAD) if one.violated else painted("not violated", GOOD)
     failed = f", {one.failed} sets not judged" if one.failed else ""
-    print(f"{one.controller}, {one.maneuver}: {one.requirement}")
+    yield f"{one.controller}, {one.maneuver}: {one.requirement}"
     if math.isnan(one.robustness):
-        print(f"  no set could be judged in {one.runs} runs{failed}")
+        yield f"  no set could be judged in {one.runs} runs{failed}"
         return
-    print(f"  {verdict} in {one.violations} of {len(one.sets)} sets ({one.runs} runs{failed})")
-    print(f"  least robustness {one.robustness:.4g}")
+    yield f"  {verdict} in {one.violations} of {len(one.sets)} sets ({one.runs} runs{failed})"
+    yield f"  least robustness {one.robustness:.4g}"
     falls = list(one.fall)
     shown = falls if len(falls) <= _SHOWN_FALLS else [*falls[:1], *falls[1 - _SHOWN_FALLS :]]
-    print("  fell: " + ", ".join(f"{value:.3g} after {runs} runs" for runs, value in shown))
-    for key, value in one.values.items():
-        print(f"    {key} = {value!r}")
-    for command in one.commands.values():
-        print(f"  {command}")
+    yield "  fell: " + ", ".join(f"{value:.3g} after {runs} runs" for runs, value in shown)
+    yield from (f"    {key} = {value!r}" for key, value in one.values.items())
+    yield from (f"  {command}" for command in one.commands.values())
 
 
 def _draw(found: list[Falsified], folder: Path) -> list[Path]:

@@ -38,12 +38,12 @@ def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -
         print(" ".join(f"{cell:>{w}}" if isinstance(cell, str) else f"{cell:{w}.3g}" for cell, w in cells))
 
 
-def print_wrapped(text: str) -> None:
-    """Print lines in 80 columns; the continuation of a longer line is indented four columns further than the line."""
+def wrapped(text: str) -> Iterator[str]:
+    """Yield lines of 80 columns; the continuation of a longer line is indented four columns further than the line."""
     for line in text.splitlines():
         indent = " " * (len(line) - len(line.lstrip()) + 4)
-        wrapped = textwrap.wrap(line, _COLUMNS, subsequent_indent=indent, **_WHOLE) if len(line) > _COLUMNS else [line]
-        print(coloured("\n".join(wrapped)))
+        parts = textwrap.wrap(line, _COLUMNS, subsequent_indent=indent, **_WHOLE) if len(line) > _COLUMNS else [line]
+        yield coloured("\n".join(parts))
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:

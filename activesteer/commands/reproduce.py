@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands.arguments import add_json, add_output, add_vehicle, add_workers
-from activesteer.commands.output import print_entry, print_json, print_wrapped
+from activesteer.commands.output import print_entry, print_json, tell, wrapped
 from activesteer.commands.progress import ProgressBar, RunCounter
 from activesteer.errors import ParameterError
 
@@ -121,7 +121,7 @@ def _tell(
         if options.all:
             if len(results) > 1:
                 print(f"{SETTINGS[name]}:")
-            print_wrapped(result.scorecard.to_text())
+            print("\n".join(wrapped(result.scorecard.to_text())))
         print(f"recordings: {3 * len(result.paths)} MCAP files in {folders[name]}")
     if report is not None:
         print(f"report: {report}")
@@ -180,10 +180,11 @@ def _print_settings(results: Mapping[str, Reproduction]) -> None:
     for name, result in results.items():
         failed = [item.claim.id for item in result.scorecard.judged if not item.claim.passed]
         print_entry(f"not in the {SETTINGS[name]}: ", " ".join(failed) or "-", hanging=4)
-    print_wrapped(
+    words = (
         "The paper's setting was selected by its verdicts, within ranges of everything that the paper leaves open; the "
         "population varies the setting with the human driver (mean share of the claims)."
     )
+    print("\n".join(wrapped(words)))
 
 
 def _compare(options: argparse.Namespace) -> int:
@@ -205,12 +206,7 @@ def _compare(options: argparse.Namespace) -> int:
         from activesteer.studies.paper.comparison_figure import comparison_figure
 
         figures = [save(comparison_figure(made), options.output / "comparison.png")]
-    if options.json:
-        print_json({**made.to_json(), "figures": [str(path) for path in figures]})
-    else:
-        print_wrapped(made.to_text())
-        for path in figures:
-            print(f"figure: {path}")
+    tell(options, made.to_json(), wrapped(made.to_text()), figures)
     return 1 if made.failures else 0
 
 
@@ -250,19 +246,14 @@ def _population(options: argparse.Namespace) -> int:
             scheduler=options.scheduler,
             progress=counter,
         )
-    table, figures = found.to_json() if controllers is None else comparison_json(found), []
+    figures = None
     if options.figures:
         from activesteer.plotting import save
         from activesteer.studies.paper.comparison_figure import comparison_population_figure
 
         figures = [save(comparison_population_figure(found), options.output / "comparison_population.png")]
-        table["figures"] = [str(path) for path in figures]
-    if options.json:
-        print_json(table)
-        return 0
-    print_wrapped(found.to_text() if controllers is None else comparison_text(found))
-    for path in figures:
-        print(f"figure: {path}")
+    table = found.to_json() if controllers is None else comparison_json(found)
+    tell(options, table, wrapped(found.to_text() if controllers is None else comparison_text(found)), figures)
     return 0
 
 
