@@ -29,6 +29,9 @@ def add_to(commands: Any) -> None:
         help="a car of the package: sedan, tesla_model_s, bmw_m8 (default: sedan); or a folder with measured runs and "
         "a validation.toml",
     )
+    parser.add_argument(
+        "--new", type=Path, metavar="FOLDER", help="make a folder with an example, to be replaced by your measured runs"
+    )
     add_output(parser, "DIR", "folder for page, JSON and runs (default: no files)")
     parser.add_argument(
         "--reference", type=Path, metavar="DIR", help="folder with further reference runs NAME.csv in the same columns"
@@ -49,6 +52,13 @@ def add_to(commands: Any) -> None:
 
 
 def _validate(options: argparse.Namespace) -> int:
+    if options.new is not None:
+        from activesteer.validation.template import write_template
+
+        for file in write_template(options.new):
+            print(file)
+        print(f"next: activesteer validate {options.new} -o {options.new}/page; then replace the lines marked with <-")
+        return 0
     from activesteer.validation.measured_circle import is_measured
     from activesteer.validation.measured_file import measured_folder
 

@@ -16,6 +16,8 @@ from activesteer.recording import Recording
 from activesteer.resources import models_dir
 from activesteer.validation.measured_file import measured_folder, read_measured
 from activesteer.validation.measured_folder import validate_measured
+from activesteer.validation.measured_page import write_measured_page
+from activesteer.validation.template import write_template
 from tests.raising import raises
 
 FOLDER = models_dir() / "reference" / "bmw_m8"
@@ -85,7 +87,8 @@ def folder(tmp_path: Path) -> Path:
         ('"steering.factor" = { uniform', '"steering.facto" = { uniform', "factors.steering.facto"),
         ('"steering.factor" = { uniform', '"steering.factor" = { grid', "factors.steering.factor"),
         ("ends = [0.9, 1.1]", "ends = [1.1, 0.9]", "intervals.factors.tyre_friction"),
-        ('"factors.yaw_inertia"', '"factors.yaw_inerti"', "intervals.factors.yaw_inerti"),
+        ('"factors.yaw_inertia"', '"factors.yaw_inerti"', "factors.factors.yaw_inerti"),
+        ('"powertrain.front_fraction"', '"powertrain.front"', "intervals.powertrain.front"),
         ("filter", "filters", "filters"),
     ],
 )
@@ -113,3 +116,44 @@ def test_a_folder_without_the_file_is_an_error_and_another_comparison_is_none(tm
         measured_folder(str(tmp_path))
     with raises(ActiveSteerError, value=str(tmp_path / "none")):
         measured_folder(str(tmp_path / "none"))
+
+
+def test_the_example_is_complete_and_is_never_written_over(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    files = write_template(folder)
+    assert {path.name for path in files} == {"run.csv", "map.toml", "validation.toml"}
+    file = read_measured(folder)
+    assert set(file.tolerances) == {"yaw_rate_radps", "ay_mps2"}
+    assert import_file(folder / "run.csv", folder / "map.toml").notes == ()
+    with raises(ActiveSteerError, value=str(folder)):
+        write_template(folder)
+
+
+@pytest.mark.slow
+def test_the_example_finds_the_parameters_of_its_car_and_predicts_the_second_lane_change(tmp_path: Path) -> None:
+    write_template(tmp_path / "mine")
+    result = validate_measured(read_measured(tmp_path / "mine"), 1)
+    assert result.inside
+    assert result.fitted is not None
+    truth = {"steering.factor": 1.25, "factors.front_cornering_stiffness": 0.9}
+    for one in result.fitted.parameters:
+        assert abs(one.value - truth[one.key]) < 1.5 * one.half_width  # one noise, 95 % intervals
+    page = write_measured_page(result, tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 4
+    assert "The road is level and dry." in page
+    assert {row["part"] for row in result.to_json()["quantities"]} == {"fit", "check"}
+
+
+@pytest.mark.slow
+def test_the_fitted_m8_predicts_the_second_lane_change_better_than_the_first_guess(folder: Path) -> None:
+    path = folder / "validation.toml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text[: text.index("[intervals]")], encoding="utf-8")
+    result = validate_measured(read_measured(folder), 1)
+    checked = {(one.stage, one.compared.channel): one.compared for one in result.parts if one.part == "check"}
+    # As written in docs/measured.md.
+    assert checked["predicted", "yaw_rate_radps"].share_inside == pytest.approx(0.96, abs=0.02)
+    assert not checked["predicted", "roll_rad"].inside
+    assert checked["fitted", "yaw_rate_radps"].inside
+    assert checked["fitted", "ay_mps2"].inside
+    assert not result.inside  # the roll angle
