@@ -55,7 +55,7 @@ class QuantityTable:
 
 @dataclass(frozen=True)
 class PredictTable:
-    """What is free in the prediction."""
+    """Table of the factors that are free in the prediction."""
 
     factors: tuple[str, ...] = ()
     """Factors that the data must give before anything can be predicted, such as an unknown scale."""

@@ -72,9 +72,7 @@ def _page(result: MeasuredValidation) -> Page:
                 tables.append(correlation_table(found))
         pictures = [as_svg(draw(_picture(result, one))) for one in shown if one.part == "check"]
         points = [] if found is None else [*found.notes, *rests_on(found)]
-        sections.append(
-            Section(f"{name.capitalize()}: {_free(found)}", pictures=pictures, tables=tables, points=points)
-        )
+        sections.append(Section(name.capitalize(), [_free(found)], pictures, tables, points))
     if result.bands:
         text = (
             "The band contains the prediction with each value at either end of its interval. Before that, the free "
@@ -99,7 +97,9 @@ def _stages(result: MeasuredValidation) -> Iterator[tuple[str, Fit | None]]:
 
 
 def _free(found: Fit | None) -> str:
-    return "nothing free" if found is None else f"free: {', '.join(one.key for one in found.parameters)}"
+    if found is None:
+        return "no value comes from the data"
+    return f"free in the fit windows: {', '.join(one.key for one in found.parameters)}"
 
 
 def _row(one: Part) -> tuple[str, ...]:
