@@ -39,11 +39,7 @@ SCREW: Final = "_screw"
 
 
 def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:
-    """Change a model.
-
-    Args:
-        spec: The model with hinges.
-        actuator: The actuator with all keys.
+    """Replace the hinges of a model by actuators along its rear toe links.
 
     Raises:
         ModelError: the rear suspension has no toe link whose stiffness is one number, or no hinge.
@@ -118,10 +114,6 @@ class Screws:
 
 def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
     """Solve the kinematics and build the records for the callbacks.
-
-    Args:
-        model: The model with screws, compiled.
-        actuator: The actuator with all keys.
 
     Raises:
         ModelError: the toe links do not steer the wheels so far.

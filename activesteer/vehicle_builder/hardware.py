@@ -47,9 +47,6 @@ class Hardware(Protocol):
 def hardware_tables(part: Hardware) -> dict[str, Any]:
     """Return the tables of actuators, motors, battery and sensors that are not empty.
 
-    Args:
-        part: A table of a car, or a vehicle file.
-
     Returns:
         Name to table, without the values of its preset, angles in degrees.
     """

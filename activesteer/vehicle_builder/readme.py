@@ -15,13 +15,7 @@ _TEMPLATE: Final = Path(__file__).resolve().parent / "templates" / "README.md"
 
 
 def readme_text(car: Car, trimmed: Trimmed, table_name: str) -> str:
-    """Return the text of README.md.
-
-    Args:
-        car: The car, with its assumptions.
-        trimmed: Result of the trim.
-        table_name: Name of the copy of the table in the folder.
-    """
+    """Return the text of README.md."""
     kinds = " and ".join(f"{axle.kind.name.replace('_', ' ')} {axle.name}" for axle in car.axles)
     rows = [f"| `{item.key}` | {item.value} | {item.rule} |" for item in car.assumptions]
     trim_rows = [_trim_row(trimmed, axle.name) for axle in car.axles]

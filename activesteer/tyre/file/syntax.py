@@ -96,10 +96,6 @@ def _value(text: str) -> float | str:
 def parse(text: str, source: str) -> Syntax:
     """Split a .tir file into its entries and tables.
 
-    Args:
-        text: The file's content.
-        source: Name of the file, for messages.
-
     Raises:
         TyreFileError: a line is neither a section, `KEY = value`, a row of numbers, a `{heading}` nor a comment; or a
             value is above `MAX_NUMBER`.

@@ -44,19 +44,15 @@ _NEEDED: Final = {
 
 
 def missing_parts(model: mujoco.MjModel) -> Iterator[Finding]:
-    """Return one error for each missing part, or one line if none is missing.
-
-    Args:
-        model: The compiled model.
-    """
-    none = True
+    """Return one error for each missing part, or one line if none is missing."""
+    complete = True
     for word, (kind, count) in _KINDS.items():
         there = [mujoco.mj_id2name(model, kind, index) or "" for index in range(getattr(model, count))]
         for name in _NEEDED[word]:
             if name not in there:
-                none = False
+                complete = False
                 words = nearest_names(name, [other for other in there if other and other not in _NEEDED[word]])
                 yield Finding("parts", f"{word} {name}", "error", "missing", "", f"add it to the MJCF; {words}")
-    if none:
+    if complete:
         total = sum(len(names) for names in _NEEDED.values())
         yield Finding("parts", "bodies, joints, sites, tendons, actuators, sensors", "ok", f"all {total} there")
