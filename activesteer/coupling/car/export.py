@@ -30,11 +30,13 @@ from activesteer.coupling.car.variables import (
     SEEDS,
     Laws,
     Variable,
+    faulty_parts,
     inputs_of,
     outputs_of,
     parameters_of,
 )  # fmt: skip
 from activesteer.errors import ModelError, ParameterError
+from activesteer.faults import ACTUATORS
 from activesteer.files import replacing
 from activesteer.scenario import Scenario
 from activesteer.sensors.signal_chain import CHAIN
@@ -59,6 +61,8 @@ _KEPT: Final = ("electric_state", "sensor_memory")
 """Parts of the memory that change in a step, beside the arrays of a recorded row."""
 _READ: Final = ("sensordata", "ten_length", "ten_velocity", "ctrl", "act", "actuator_force")
 """Arrays that car.c reads by name."""
+_RECORD: Final = {"SCALE": "scale", "OFFSET": "offset", "RATE": "rate_limit", "LOW": "low", "HIGH": "high"}
+"""Fields of an actuator's record that faults change or read."""
 _OPTIONS: Final = (
     "-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-march=x86-64-v3", "-Wall",
     "-Wno-unused-parameter",
@@ -196,11 +200,37 @@ def _state(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable]) -> n
             engine,
             [variable.start for variable in variables],
             [1.0, *numbers_in(loop.measurement), *numbers_in(loop.motion)],
+            np.zeros(3 * len(_parts(loop, [variable.name for variable in variables]))),
             *vehicle.rows.live(),
             *(parts[name] for name in _KEPT if name in parts),
             [0.0, 0.0],
         ]
     )
+
+
+def _parts(loop: ClosedLoop, names: Sequence[str]) -> list[tuple[int | float, ...]]:
+    """Return the actuators that can fail as car.c takes them."""
+    vehicle, model = loop.vehicle, loop.vehicle.model
+    first = model.numeric_data.ctypes.data + 8 * int(model.numeric_data[-fb.TRAILER_SIZE])
+    rows: list[tuple[int | float, ...]] = []
+
+    def place(record: Any, field: str) -> int:
+        return (record[field].ctypes.data - first) // 8
+
+    for part in faulty_parts(loop):
+        about = ACTUATORS[part]
+        for name in about.members:
+            index = model.actuator(name).id
+            joint, screw = model.actuator_trnid[index, 0], vehicle.actuators.screw(index)
+            linked = len(screw) == 2
+            rows.append((
+                names.index(f"{part}_fault"), index, place(vehicle.actuators.of(index), "kind"), int(about.has_torque),
+                int(model.actuator_actadr[index]), int(model.jnt_qposadr[joint]),
+                place(screw[-1], "seized") if screw else 0, place(screw[0], "backlash_m") if linked else 0,
+                float(vehicle.parameters.steering.ratio) if about.by_ratio else 1.0,
+                4.0 * float(screw[1]["stop_m"][0]) if linked else 0.0,
+            ))  # fmt: skip
+    return rows
 
 
 def _seeds(loop: ClosedLoop) -> bytes:
@@ -243,6 +273,7 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         return record.fields[field][1]
 
     rows = {name: index for index, name in enumerate(RawRows._fields)}
+    parts_that_fail = _parts(loop, names)
     constants: dict[str, Any] = {
         "TIMESTEP_S": vehicle.timestep_s, "STEERING_RATIO": vehicle.parameters.steering.ratio,
         "ENGINE_VERSION": mujoco.mj_version(), "STATE_SIZE": mujoco.mj_stateSize(model, _STATE),
@@ -270,6 +301,8 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         "PLACE_BINDINGS": memory.places["bindings"], "PLACE_SENSORS": memory.places.get("sensors", 0),
         "N_SENSORS": 0 if sensors is None else len(sensors.chains), "SENSOR_BYTES": CHAIN.itemsize,
         "SENSOR_BIAS": offset(CHAIN, "bias"), "SENSOR_KEY": offset(CHAIN, "key"),
+        "N_PARTS": len(parts_that_fail),
+        **{f"RECORD_{word}": offset(fb.ACTUATOR, field) // 8 for word, field in _RECORD.items()},
         **{f"TYRE_{name}": offset(TYRE_RECORD, name) // 8 for name in ("LMUX", "LMUY", "LKY", "LKX")},
         "CHASSIS": chassis, "CG_SITE": model.site("cg").id, "SETTLING_STEPS": round(_SETTLING_S / vehicle.timestep_s),
     }  # fmt: skip
@@ -304,6 +337,7 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         "Relocation RELOCATIONS": [tuple(relocation) for relocation in memory.relocations],
         "Target TARGETS": [(t.kind, t.base, t.added, size) for t, size in memory.targets.values()],
         "Target KEPT": kept,
+        "Part PARTS": parts_that_fail,
         "Force FORCES": [tuple(force) for force in laws.forces],
         "Limit LIMITS": [tuple(limit) for limit in laws.limits],
     }

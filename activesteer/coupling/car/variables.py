@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 from activesteer.controllers import CONTROLLER
 from activesteer.conventions import CORNERS
 from activesteer.driver import DRIVER
+from activesteer.faults import ACTUATORS
 from activesteer.signals import CORNERS_IN_WORDS, Measurement, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, Column, RawRows
@@ -103,6 +104,32 @@ def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
         *found,
         Variable("wheel_torques_set", "", meaning, INPUT, 0.0, 0.0, 1.0),
         Variable("road_mu", "", "friction of the road outside of patches", INPUT, road_mu, 0.01, 2.0),
+        *(variable for part in faulty_parts(loop) for variable in _fault_inputs(part)),
+    ]
+
+
+FAULT_KINDS: Final = ("works", "stuck", "runaway to the left or to its strength", "runaway to the right", "float",
+                      "reversed", "dropout")  # fmt: skip
+"""Kinds of an actuator's fault by the number that the input takes, as in car.c."""
+
+
+def faulty_parts(loop: ClosedLoop) -> list[str]:
+    """Return the steering actuators and brakes that can fail; see `faults.ACTUATORS`."""
+    rear = ("rear",) if loop.vehicle.parameters.rear_actuator.is_central else ("rear_left", "rear_right")
+    return [*rear, "superposition", *(f"{corner}_brake" for corner in CORNERS)]
+
+
+def _fault_inputs(part: str) -> list[Variable]:
+    """Return the inputs for the faults of a part: kind, and offset of its demand."""
+    unit, name = ACTUATORS[part].unit, part.replace("_", " ")
+    kinds = [f"{number} {kind}" for number, kind in enumerate(FAULT_KINDS)
+             if unit != "Nm" or kind not in ("float", "runaway to the right")]  # fmt: skip
+    most = _MAX_TORQUE_NM if unit == "Nm" else math.pi
+    return [
+        Variable(f"{part}_fault", "", f"fault of {name}: {', '.join(kinds)}", INPUT, 0.0, 0.0, len(FAULT_KINDS) - 1.0),
+        Variable(
+            f"{part}_offset_{unit}", unit, f"offset of the demand of {name} while it works", INPUT, 0.0, -most, most
+        ),
     ]
 
 

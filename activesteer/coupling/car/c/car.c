@@ -28,6 +28,8 @@ typedef struct { int64_t place, kind, base, added; } Relocation;
 typedef struct { int64_t kind, base, added, size; } Target;
 typedef struct { int64_t tendon; double first, second, third, damping, low, high; } Force;
 typedef struct { int64_t control, activation; double lag, rate, low, high, low_torque, high_torque; } Limit;
+typedef struct { int64_t variable, actuator, record, has_torque, act, qpos, seized, backlash; double ratio, free_m; } Part;
+enum { WORKS, STUCK, RUNS_LEFT, RUNS_RIGHT, FLOATS, REVERSED, DROPS_OUT };
 enum { INPUT, OUTPUT, PARAMETER };
 enum { FROM_ROW = 16, FROM_RESULT, FROM_FORCE, FROM_LIMIT, FROM_MOTION, FROM_INPUT };
 typedef struct { const char *name; int causality, from, column; double start, low, high; } Variable;
@@ -68,6 +70,8 @@ struct as_car {
     double force[N_FORCES + 1], limit[N_LIMITS + 1], motion[N_MOTION];
     double *at[N_VARIABLES];             /* where each variable is read */
     double *block;                       /* parameters of the native forces, in the model */
+    double fault[N_PARTS][3];            /* kind and offset that act, and the demand at which a brake sticks */
+    double healthy[N_PARTS][5 + mjNGAIN + mjNBIAS];
     int64_t steps;
     int changed, modified, failed;       /* parameters wait for the start; the model is changed; the state is not sane */
     char message[256];
@@ -148,6 +152,68 @@ static void set_friction(as_car *c, double mu) {
     for (int wheel = 0; wheel < 4; wheel++) c->block[WHEEL_MU[wheel]] = mu;
 }
 
+static double *copy(double *state, double *mine, size_t size, int save) {
+    if (size) memcpy(save ? state : mine, save ? mine : state, 8 * size);
+    return state + size;
+}
+
+/* Exchange the numbers of an actuator that faults change with those of its healthy state. */
+static void exchange_health(as_car *c, int part, int save) {
+    const Part *p = PARTS + part;
+    double *record = c->block + p->record, *healthy = c->healthy[part];
+    double *mine[] = {record + RECORD_SCALE, record + RECORD_OFFSET, record + RECORD_RATE, c->block + p->seized, c->block + p->backlash};
+    for (int i = 0; i < 5; i++) healthy = copy(healthy, mine[i], 1, save);
+    healthy = copy(healthy, c->model->actuator_gainprm + mjNGAIN * p->actuator, mjNGAIN, save);
+    copy(healthy, c->model->actuator_biasprm + mjNBIAS * p->actuator, mjNBIAS, save);
+}
+
+/* Write the fault of an actuator into the model, as vehicle/faults.py does. */
+static void apply_fault(as_car *c, int part) {
+    const Part *p = PARTS + part;
+    double *record = c->block + p->record, *fault = c->fault[part];
+    exchange_health(c, part, 0);
+    switch ((int)fault[0]) {
+    case WORKS:
+        if (fault[1] != 0.0) record[RECORD_OFFSET] = fault[1] * p->ratio;
+        break;
+    case STUCK:
+        if (p->seized) c->block[p->seized] = 1.0;
+        else if (p->has_torque) record[RECORD_SCALE] = 0.0, record[RECORD_OFFSET] = fault[2];
+        else record[RECORD_RATE] = 0.0;
+        break;
+    case FLOATS:
+        if (p->backlash) {
+            c->block[p->backlash] = p->free_m;
+            break;
+        }
+        mju_zero(c->model->actuator_gainprm + mjNGAIN * p->actuator, mjNGAIN);
+        mju_zero(c->model->actuator_biasprm + mjNBIAS * p->actuator, mjNBIAS);
+        break;
+    case REVERSED: record[RECORD_SCALE] = -1.0; break;
+    default:
+        record[RECORD_SCALE] = 0.0;
+        record[RECORD_OFFSET] = fault[0] == DROPS_OUT ? 0.0 : record[fault[0] == RUNS_LEFT ? RECORD_HIGH : RECORD_LOW];
+    }
+}
+
+/* Let the faults begin and end that the inputs have changed. */
+static void follow_faults(as_car *c) {
+    int active = 0;
+    for (int part = 0; part < N_PARTS; part++) {
+        const Part *p = PARTS + part;
+        const double *wanted = c->values + p->variable;
+        double *fault = c->fault[part];
+        active += wanted[0] != WORKS || wanted[1] != 0.0;
+        if (wanted[0] == fault[0] && wanted[1] == fault[1]) continue;
+        /* A servo that was free starts at its present angle. */
+        if (fault[0] == FLOATS && wanted[0] != FLOATS && !p->seized) c->data->act[p->act] = c->data->qpos[p->qpos];
+        if (wanted[0] == STUCK && fault[0] != STUCK) fault[2] = c->data->ctrl[p->actuator];
+        fault[0] = wanted[0], fault[1] = wanted[1];
+        apply_fault(c, part);
+    }
+    c->data->userdata[c->model->nuserdata - 1] = active;
+}
+
 /* What the engine prepared for its own solution is forgotten, as in drop_metric. */
 static void forward(as_car *c) {
     mj_forward(c->model, c->data);
@@ -158,15 +224,10 @@ static void forward(as_car *c) {
 }
 
 static size_t state_numbers(void) {
-    size_t size = STATE_SIZE + N_VARIABLES + 1 + N_RESULT + 2;
+    size_t size = STATE_SIZE + N_VARIABLES + 1 + N_RESULT + 2 + 3 * N_PARTS;
     for (int i = 0; i < N_TARGETS; i++) size += TARGETS[i].size;
     for (int i = 0; i < COUNT(KEPT); i++) size += KEPT[i].size;
     return size;
-}
-
-static double *copy(double *state, double *mine, size_t size, int save) {
-    if (size) memcpy(save ? state : mine, save ? mine : state, 8 * size);
-    return state + size;
 }
 
 /* Copy the state of the car to numbers, or back. */
@@ -176,6 +237,7 @@ static void exchange(as_car *c, double *state, int save) {
     state += STATE_SIZE;
     state = copy(state, c->values, N_VARIABLES, save);
     state = copy(state, c->result, 1 + N_RESULT, save);
+    state = copy(state, c->fault[0], 3 * N_PARTS, save);
     for (int i = 0; i < N_TARGETS; i++) state = copy(state, c->row[i], TARGETS[i].size, save);
     for (int i = 0; i < COUNT(KEPT); i++) state = copy(state, (double *)(c->memory + KEPT[i].added), KEPT[i].size, save);
     if (save) {
@@ -188,6 +250,7 @@ static void exchange(as_car *c, double *state, int save) {
     for (int w = 0; w < mjNWARNING; w++) c->data->warning[w].number = c->data->warning[w].lastinfo = 0;
     engage(c, c->values[IN_TORQUES_SET] != 0.0 ? 0.0 : c->values[IN_GEAR]);
     set_friction(c, c->values[IN_ROAD_MU]);
+    for (int part = 0; part < N_PARTS; part++) apply_fault(c, part);
     derive(c);
 }
 
@@ -206,7 +269,6 @@ static void place_memory(as_car *c) {
         *(char **)(c->memory + r->place) = address(c, r->kind, r->base, r->added);
     }
     for (int i = 0; i < N_TARGETS; i++) c->row[i] = (double *)address(c, TARGETS[i].kind, TARGETS[i].base, TARGETS[i].added);
-    c->block = c->model->numeric_data + BLOCK_START;
     for (int i = 0; i < N_VARIABLES; i++) {
         const Variable *v = VARIABLES + i;
         switch (v->from) {
@@ -229,7 +291,10 @@ static int load(as_car *c) {
     c->model = mj_loadModelBuffer(as_model, as_model_end - as_model);
     c->data = c->model ? mj_makeData(c->model) : NULL;
     c->modified = 0;
-    return !c->data || mj_stateSize(c->model, mjSTATE_INTEGRATION) != STATE_SIZE ? refuse(c, "the model cannot be loaded") : 0;
+    if (!c->data) return refuse(c, "the model cannot be loaded");
+    c->block = c->model->numeric_data + BLOCK_START;
+    for (int part = 0; part < N_PARTS; part++) exchange_health(c, part, 1);
+    return mj_stateSize(c->model, mjSTATE_INTEGRATION) != STATE_SIZE ? refuse(c, "the model cannot be loaded") : 0;
 }
 
 /* Go to the exported start. */
@@ -299,6 +364,9 @@ int as_set(as_car *c, int variable, double value) {
     if (v->causality == OUTPUT) return refuse(c, "%s is an output and cannot be set", v->name);
     if (!(v->low <= value && value <= v->high)) return refuse(c, "%s = %g; a number from %g to %g is needed", v->name, value, v->low, v->high);
     if (variable == IN_GEAR && value != rint(value)) return refuse(c, "%s = %g; -1, 0 or 1 is needed", v->name, value);
+    for (int part = 0; part < N_PARTS; part++)
+        if (variable == PARTS[part].variable && (value != rint(value) || (PARTS[part].has_torque && (value == RUNS_RIGHT || value == FLOATS))))
+            return refuse(c, "%s = %g; %s is needed", v->name, value, PARTS[part].has_torque ? "0, 1, 2, 5 or 6" : "a whole number");
     if (v->causality == PARAMETER) {
         if (c->steps) return refuse(c, "%s is a parameter and must be set before the first step", v->name);
         c->changed |= value != c->values[variable];
@@ -317,6 +385,7 @@ static int step(as_car *c) {
     commands[COMMAND_FRONT_STEER] = commands[COMMAND_STEERING_WHEEL] / STEERING_RATIO;
     for (int wheel = 0; wheel < 4; wheel++)
         commands[COMMAND_BRAKES + wheel] += u[IN_PRESSURES + wheel] * TORQUE_PER_PRESSURE[wheel];
+    follow_faults(c);
     int torques_set = u[IN_TORQUES_SET] != 0.0;
     double gear = torques_set ? 0.0 : u[IN_GEAR];
     if (c->block[HEADER_GEAR] != gear) engage(c, gear);
@@ -441,6 +510,7 @@ int as_settle(as_car *c) {
     u[IN_GEAR] = 1.0;
     u[IN_TORQUES_SET] = 0.0;
     for (int i = IN_PRESSURES; i < IN_TORQUES_SET; i++) u[i] = 0.0;
+    for (int part = 0; part < N_PARTS; part++) u[PARTS[part].variable] = u[PARTS[part].variable + 1] = 0.0;
     set_friction(c, u[IN_ROAD_MU]);
     c->block[HEADER_AREAS_FELT] = 0.0;
     double mass = c->model->body_subtreemass[CHASSIS];

@@ -206,6 +206,50 @@ def test_a_parameter_acts_like_the_key_of_a_vehicle_file(library, parameters, ov
     assert "before the first step" in base.message
 
 
+@pytest.mark.parametrize("faults", [
+    {"rear_left": ("stuck", 1), "fl_brake": ("stuck", 1), "superposition": ("runaway=right", 3)},
+    {"rear_right": ("float", 4), "superposition": ("reversed", 5), "rr_brake": ("dropout", 6)},
+    {"rear_left": ("runaway=left", 2), "rl_brake": ("runaway", 2), "superposition": ("offset=1deg", 0)},
+])  # fmt: skip
+def test_a_fault_acts_as_in_a_simulation_to_the_last_bit(library, faults):
+    begins, ends = 950, 1100
+    simulation, car = activesteer.Simulation("straight_line", overrides=SENSORS), Car(library)
+    for step in range(1250):
+        if step == begins:
+            for part, (fault, kind) in faults.items():
+                simulation.fail(f"{part}:{fault}@0.95-1.1")
+                car[f"{part}_fault"] = kind
+                if not kind:
+                    car[f"{part}_offset_rad"] = np.radians(1.0)
+        if step == ends:
+            for part, (_, kind) in faults.items():
+                car[f"{part}_fault"] = 0
+                if not kind:
+                    car[f"{part}_offset_rad"] = 0.0
+        measurement = simulation.step(*commands(step))
+        driven_one(car, step)
+        if step == begins + 50:
+            state = car.save()
+            later = [(driven_one(car, step + 1 + more), car.all())[1] for more in range(100)]
+            assert car["active_faults"] == 3
+            assert car.lib.as_reset(car.car) == 0
+            assert car.restore(state) == 0
+            assert [(driven_one(car, step + 1 + more), car.all())[1] for more in range(100)] == later
+            assert car.restore(state) == 0
+        names = [f"measured_{number.name}" for number in numbers_of(Measurement) if number.recorded is not None]
+        expected = [
+            n for n, number in zip(numbers_in(measurement), numbers_of(Measurement), strict=True) if number.recorded
+        ]
+        assert [car[name] for name in names] == expected, step
+
+
+def test_a_fault_that_a_part_cannot_have_is_refused(library):
+    car = Car(library)
+    for name, value in (("fl_brake_fault", 4.0), ("rear_left_fault", 1.5), ("rear_left_fault", 7.0)):
+        assert car.lib.as_set(car.car, car.lib.as_find(name.encode()), value) == 1
+        assert name in car.message
+
+
 def test_inputs_act(library):
     slow, quick, free = Car(library), Car(library), Car(library)
     slow["road_mu"], free["wheel_torques_set"] = 0.2, 1.0
