@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from activesteer.commands.arguments import add_json, add_output, add_workers
 from activesteer.commands.output import BAD, painted, print_json, print_notes, tell, tell_files
 from activesteer.commands.progress import ProgressBar
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
-
-if TYPE_CHECKING:
-    from activesteer.validation.reference import ReferenceData
-    from activesteer.validation.study import Response
 
 
 def add_to(commands: Any) -> None:
@@ -75,7 +70,7 @@ def _validate(options: argparse.Namespace) -> int:
         return _measured(options, folder)
     from activesteer.validation import to_json, validate
     from activesteer.validation.programme import write_json, write_runs
-    from activesteer.validation.study import as_text
+    from activesteer.validation.study import TITLES, as_text, responses
     from activesteer.validation.validation_page import write_page
 
     with ProgressBar("validate", quiet=options.json) as bar:
@@ -88,11 +83,15 @@ def _validate(options: argparse.Namespace) -> int:
             unknown_runs=options.output is not None,
             progress=bar,
         )
-    tables = _study(result.reference, options) if options.study else {}
+    tables = {}
+    if options.study:
+        with ProgressBar("study", quiet=options.json) as bar:
+            tables = responses(result.reference, bar, options.jobs, scheduler=options.scheduler)
+    titled = {TITLES[key]: rows for key, rows in tables.items()}
     files: list[Path] = []
     if options.output is not None:
         files = [
-            write_page(result, options.output / "validation.html", _titled(tables)),
+            write_page(result, options.output / "validation.html", titled),
             write_json(result, options.output / "validation.json"),
             *write_runs(result, options.output / "runs"),
         ]
@@ -109,9 +108,8 @@ def _validate(options: argparse.Namespace) -> int:
     print(f"{kept} of {result.judged} comparisons within tolerance (! outside, ~ no tolerance)")
     if options.output is not None:
         print(f"page: {files[0]}\nruns: {len(result.runs)} CSV files in {options.output / 'runs'}")
-    if tables:
-        for title, rows in _titled(tables).items():
-            print(as_text(title, rows))
+    for title, rows in titled.items():
+        print(as_text(title, rows))
     return status
 
 
@@ -142,20 +140,3 @@ def _measured(options: argparse.Namespace, folder: Path) -> int:
     if options.output is not None:
         tell_files(options, [write_measured_page(result, options.output / "validation.html")], "page")
     return 0 if result.inside else 1
-
-
-def _study(data: ReferenceData, options: argparse.Namespace) -> dict[str, list[Response]]:
-    from activesteer.validation.study import conventions, step_sizes
-
-    run, jobs, scheduler = data.study_run, options.jobs, options.scheduler
-    with ProgressBar("study", quiet=options.json) as bar:
-        return {
-            "conventions": conventions(data, run, lambda what: bar(0.0, what), jobs, scheduler=scheduler),
-            "step_sizes": step_sizes(data, run, lambda what: bar(0.5, what), jobs, scheduler=scheduler),
-        }
-
-
-def _titled(tables: Mapping[str, list[Response]]) -> dict[str, list[Response]]:
-    """Return the tables by their titles."""
-    titles = {"conventions": "Effect of the other code's conventions", "step_sizes": "Effect of the step size"}
-    return {titles[key]: rows for key, rows in tables.items()}

@@ -211,7 +211,7 @@ def validate_circle(
     table, _ = read_toml(find_vehicle(name))
     assumed = Case({**table, "name": name}, float(data["radius_m"]), float(data["ay_mean_mps2"]))
     main = measured_only(assumed)
-    roll = _roll_rad(main)
+    roll = _on_circle(main, "roll_rad")
     known = intervals(roll)
     draws = np.random.default_rng(_SEED).normal(size=(samples, 3))
     variations = [*EFFECTS.items(), *DECISIONS.items()]
@@ -257,23 +257,21 @@ def _drawn(case: Case, draw: Array) -> Case:
 
 def steering_wheel_deg(case: Case) -> float:
     """Return the steering wheel angle that holds a laterally symmetric car on a circle [deg]."""
+    # With a stiff column, the rack shows the angle.
+    return math.degrees(_on_circle(case, "rack_m" if case.stiff_column else "steering_wheel_rad")) + case.zero_deg
+
+
+def _on_circle(case: Case, channel: str) -> float:
+    """Return the size of a channel at the lateral acceleration of the circle, a rack as its steering wheel angle."""
     simulation, late = _driven(case)
     run = simulation.recording()
-    angle = run["steering_wheel_rad"]
-    if case.stiff_column:
+    values = run[channel]
+    if channel == "rack_m":
         rack_m = simulation.loop.vehicle.rack_per_steering_wheel_m
         assert rack_m is not None
-        angle = run["rack_m"] / rack_m
-    # The speed range is narrow, so the angle over lateral acceleration is a straight line.
-    line = np.polyfit(np.abs(run["ay_mps2"][late]), np.degrees(np.abs(angle[late])), 1)
-    return float(np.polyval(line, case.ay_mps2)) + case.zero_deg
-
-
-def _roll_rad(case: Case) -> float:
-    """Return the size of the roll angle on the circle [rad]."""
-    simulation, late = _driven(case)
-    run = simulation.recording()
-    line = np.polyfit(np.abs(run["ay_mps2"][late]), np.abs(run["roll_rad"][late]), 1)
+        values = values / rack_m
+    # The speed range is narrow, so a channel over lateral acceleration is a straight line.
+    line = np.polyfit(np.abs(run["ay_mps2"][late]), np.abs(values[late]), 1)
     return float(np.polyval(line, case.ay_mps2))
 
 

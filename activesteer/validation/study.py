@@ -15,7 +15,7 @@ from activesteer.validation.reference_columns import reference_columns
 
 _STEADY_S: Final = 0.5
 _STEPS_S: Final = (0.000125, 0.00025, 0.0005, 0.001)
-"""Step sizes [s]; the first is the base of the comparison."""
+"""Step sizes [s]."""
 _TYRE: Final = "vehicle.tyres.conventions."
 _RELAXATION: Final = {f"{_TYRE}relaxation": True}
 _CAMBER: Final = {f"{_TYRE}camber": True}
@@ -24,7 +24,7 @@ _OURS: Final = {
     **_RELAXATION, **_CAMBER, **_COMBINED, f"{_TYRE}slip_velocity": "contact_point", f"{_TYRE}rolling_radius": "file",
     f"{_TYRE}trail_load": "nominal", f"{_TYRE}friction_scales": "formula", f"{_TYRE}speed_offset_mps": 0.0,
 }  # fmt: skip
-VARIANTS: Final[dict[str, dict[str, Any]]] = {
+_VARIANTS: Final[dict[str, dict[str, Any]]] = {
     "as the other code": {},
     "with relaxation lengths": _RELAXATION,
     "with camber": _CAMBER,
@@ -32,7 +32,12 @@ VARIANTS: Final[dict[str, dict[str, Any]]] = {
     "with all three": {**_RELAXATION, **_CAMBER, **_COMBINED},
     "all conventions ours": _OURS,
 }
-"""Name -> overrides."""
+_TABLES: Final = {
+    "conventions": [(name, overrides, DEFAULT_TIMESTEP_S) for name, overrides in _VARIANTS.items()],
+    "step_sizes": [(f"{1e3 * step_s:g} ms", {}, step_s) for step_s in _STEPS_S],
+}
+"""Table -> its rows: name, overrides, step size [s]; the first row is the base of the comparison."""
+TITLES: Final = {"conventions": "Effect of the other code's conventions", "step_sizes": "Effect of the step size"}
 
 
 class Response(NamedTuple):
@@ -56,59 +61,39 @@ class Response(NamedTuple):
         return changes | {"peak_time_s": self.peak_time_s - other.peak_time_s}
 
 
-def step_sizes(
+def responses(
     data: ReferenceData,
-    run: str,
-    report: Callable[[str], None] = lambda _: None,
+    progress: Callable[[float, str], None],
     jobs: int | None = None,
     *,
     scheduler: str | None = None,
-) -> list[Response]:
-    """Drive the step steer with several step sizes, the smallest first.
+) -> dict[str, list[Response]]:
+    """Drive the reference's step steer with each row of the tables.
 
     Args:
         data: The reference data.
-        run: Name of a step steer.
-        report: Called with the name of a finished run.
+        progress: Called with the finished fraction and the name of the finished row.
         jobs: Number of processes; by default the number of processors.
         scheduler: See `in_parallel`.
 
     Returns:
-        A response for each step.
+        Table -> responses, in the order of its rows.
     """
-    names = [f"{1e3 * step_s:g} ms" for step_s in _STEPS_S]
-    tasks = [(data, run, name, {}, step_s) for name, step_s in zip(names, _STEPS_S, strict=True)]
-    return in_parallel(
-        _response, tasks, jobs, lambda place, _: report(f"step size {names[place]}"), scheduler=scheduler
+    rows = [row for table in _TABLES.values() for row in table]
+    found = iter(
+        in_parallel(
+            _response,
+            [(data, *row) for row in rows],
+            jobs,
+            lambda place, done: progress(done / len(rows), rows[place][0]),
+            scheduler=scheduler,
+        )
     )
+    return {name: [next(found) for _ in table] for name, table in _TABLES.items()}
 
 
-def conventions(
-    data: ReferenceData,
-    run: str,
-    report: Callable[[str], None] = lambda _: None,
-    jobs: int | None = None,
-    *,
-    scheduler: str | None = None,
-) -> list[Response]:
-    """Drive the step steer with the other code's tyre conventions, and with our conventions, singly and combined.
-
-    Args:
-        data: The reference data.
-        run: Name of a step steer.
-        report: Called with the name of a finished run.
-        jobs: Number of processes; by default the number of processors.
-        scheduler: See `in_parallel`.
-
-    Returns:
-        A response for each of `VARIANTS`.
-    """
-    tasks = [(data, run, name, overrides, DEFAULT_TIMESTEP_S) for name, overrides in VARIANTS.items()]
-    return in_parallel(_response, tasks, jobs, lambda place, _: report(tasks[place][2]), scheduler=scheduler)
-
-
-def _response(data: ReferenceData, run: str, name: str, overrides: Mapping[str, Any], step_s: float) -> Response:
-    recording = simulate(data.maneuver(run), vehicle=data.vehicle, overrides=overrides, timestep_s=step_s)
+def _response(data: ReferenceData, name: str, overrides: Mapping[str, Any], step_s: float) -> Response:
+    recording = simulate(data.maneuver(data.study_run), vehicle=data.vehicle, overrides=overrides, timestep_s=step_s)
     columns = reference_columns(recording, data.point_from_cg_m)
     end = columns["t"] >= columns["t"][-1] - _STEADY_S
     turn = float(np.sign(columns["r"][end].mean()))

@@ -37,3 +37,28 @@ def test_validate_writes_page_json_and_every_run(tmp_path: Path, capsys: pytest.
     own = [row for row in rows if row["run"].startswith(("step", "sine", "swd", "sis", "brake"))]
     assert {row["run"] for row in own} >= {"step_0p6g_L", "swd_0p7Hz", "brake_0p4g"}
     assert np.abs([row["error"] for row in own if row["error"] is not None]).max() < 2e-3
+
+
+@pytest.mark.slow
+def test_the_study_shows_the_effect_of_conventions_and_step_sizes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "--study", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    conventions = {row["name"]: row["steady_yaw_rate_radps"] for row in found["conventions"]}
+    steps = {row["name"]: row["steady_yaw_rate_radps"] for row in found["step_sizes"]}
+    assert conventions["as the other code"] == steps["1 ms"]
+    assert steps["0.125 ms"] == pytest.approx(steps["1 ms"], rel=1e-3)
+    assert conventions["with camber"] > 1.01 * conventions["as the other code"]
+
+
+def test_the_options_of_another_comparison_are_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for name, option in (
+        ("bmw_m8", ["--samples", "20"]),
+        ("tesla_model_s", ["--study"]),
+        ("sedan", ["--samples", "9"]),
+    ):
+        assert main(["validate", name, *option]) == 1
+        assert f"{option[0]}: belongs to a comparison with" in capsys.readouterr().err
+    assert main(["validate", "--new", str(tmp_path / "mine")]) == 0
+    assert "validation.toml" in capsys.readouterr().out
+    assert main(["validate", "--new", str(tmp_path / "mine")]) == 1
+    assert "is not empty" in capsys.readouterr().err
