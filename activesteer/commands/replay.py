@@ -69,5 +69,6 @@ def _replay(options: argparse.Namespace) -> int:
 def _announce(url: str) -> None:
     import webbrowser
 
-    print(f"serving at {url}; Ctrl-C ends it", flush=True)
+    print(url, flush=True)
+    print("Ctrl-C ends the server", file=sys.stderr, flush=True)
     webbrowser.open(url)

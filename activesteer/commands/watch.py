@@ -51,24 +51,31 @@ def _show(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
     import mujoco.viewer
 
     from activesteer.simulation.closed_loop import ClosedLoop
-    from activesteer.simulation.live_view import Pacer, drive, scene_for
+    from activesteer.simulation.live_view import Keys, Pacer, drive, scene_for
 
-    simulation = ClosedLoop(scenario, controller)
-    scene = scene_for(simulation, scenario.maneuver, cutaway=cutaway)
+    simulation, keys = ClosedLoop(scenario, controller), Keys()
+    scene = scene_for(simulation, scenario.maneuver, controller, cutaway=cutaway)
     with (
         _threads_joined(),
-        mujoco.viewer.launch_passive(scene.model, scene.data, show_left_ui=False, show_right_ui=False) as viewer,
+        mujoco.viewer.launch_passive(
+            scene.model, scene.data, show_left_ui=False, show_right_ui=False, key_callback=keys
+        ) as viewer,
     ):
         pacer = Pacer(speed)
-        driven = drive(simulation, scene, viewer, pacer)
-        slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
-        if not driven.finished:
-            print(f"closed at {driven.simulated_s:.1f} s{slow}", file=sys.stderr)
-            return
-        print(f"{driven.simulated_s:.1f} s driven{slow}; close the window to end", file=sys.stderr)
         while viewer.is_running():
-            time.sleep(0.05)
-            viewer.sync()
+            driven = drive(simulation, scene, viewer, pacer, keys)
+            slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
+            if driven.finished:
+                print(
+                    f"{driven.simulated_s:.1f} s driven{slow}; R drives again, close the window to end", file=sys.stderr
+                )
+            elif not keys.restart:
+                print(f"closed at {driven.simulated_s:.1f} s{slow}", file=sys.stderr)
+            while driven.finished and viewer.is_running() and not keys.restart:
+                time.sleep(0.05)
+                viewer.sync()
+            pacer = Pacer(pacer.speed)
+            simulation = ClosedLoop(scenario, controller)
 
 
 @contextmanager

@@ -24,6 +24,12 @@ _LINK_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "
 _WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 
 
+_MARGIN: Final = 1.02
+_SLIVER: Final = 0.03
+_EDGE: Final = 1.06
+"""Room beyond the largest value relative to it, least part of an axis on either side of zero, and room at the edge."""
+
+
 class Series(NamedTuple):
     """A line of a plot.
 
@@ -64,7 +70,7 @@ MOTION: Final = (
         quantity_of("yaw_rate_radps")._replace(label="yaw rate, desired one thin").title,
         (
             Series("yaw_rate_radps"),
-            Series("yaw_rate_desired_radps", "desired", "#f0e442", 0.8),
+            Series("yaw_rate_desired_radps", "desired", "#b39b00", 0.8),
             Series("measured_yaw_rate_radps", "measured", "#a6a6a6", 0.8),
         ),
     ),
@@ -256,15 +262,27 @@ def axis_range(low: float, high: float, least: float, most: float) -> tuple[floa
         low: Smallest value, at most 0.
         high: Largest value, at least 0.
         least: Smallest height of the range.
-        most: Largest height at which the labels are that far apart, in units of that power.
+        most: Largest height at which the labels are that far apart, in units of that power; at least 2.1.
     """
-    reach = max(1.03 * high, -1.03 * low, 0.5 * least)
-    power = 10.0 ** math.floor(math.log10(reach))
-    # Three labels: 0 and two above it, or one on each side.
-    below, steps = (0.05, (2.2, 4.0, 5.2, 7.6)) if low >= -0.02 * high else (1.0, (1.1, 2.15, 2.6, 4.0))
-    fitting = [step for step in steps if (1.0 + below) * step <= most]
-    step = next(step for step in (*fitting, 10.0 * steps[0]) if step * power >= reach)
-    return -below * step * power, step * power
+    if high - low < least:
+        low, high = min(low, -0.5 * least), max(high, 0.5 * least)
+    reach = max(high, -low)
+    sides = [side if side > _SLIVER * reach else _SLIVER * reach for side in (-_MARGIN * low, _MARGIN * high)]
+    power = 10.0 ** (math.floor(math.log10(reach)) - 1)
+    while True:
+        # Coarse limits first, so that similar runs have the same.
+        for grid in (1.0, 0.5, 0.1):
+            below, above = (
+                math.ceil(side / (grid * power) - 1e-9) * grid if side > _SLIVER * reach else 0.0 for side in sides
+            )
+            missing = max(0, 2 - math.floor(below + 1e-9) - math.floor(above + 1e-9))
+            below, above = (below, above + missing) if above >= below else (below + missing, above)
+            below, above = (max(side, _SLIVER * max(below, above)) for side in (below, above))
+            if below + above <= most:
+                # A label on the edge would be cut.
+                room = min(_EDGE, most / (below + above))
+                return -room * below * power, room * above * power
+        power *= 10.0
 
 
 def _least_span(channel: str) -> float:

@@ -18,6 +18,10 @@ PLOT_RATE_HZ: Final = 100.0
 """Largest number of samples of a signal shown per second; a screen cannot show more."""
 
 
+_GREY: Final = "#8d939c"
+"""Colour of the first system: its grey on dark cannot be seen on white, and the theme of the viewer is not known."""
+
+
 class Run(NamedTuple):
     """A recording as the viewer shows it.
 
@@ -73,7 +77,7 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
         path = re.sub(r"\W", "_", name, flags=re.ASCII)
         path = f"{number}_{path}" if len(recordings) > 1 else path
         shown = recording.at(_shown(recording.time_s))
-        runs.append(Run(shown, path or "run", name, look.label, look.on_dark, poses))
+        runs.append(Run(shown, path or "run", name, look.label, look.on_dark if look.place else _GREY, poses))
     return runs
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, Final, NamedTuple, Protocol
 
+from activesteer.conventions import run_looks
 from activesteer.display_units import quantity_of
 from activesteer.drawing.direction_of_motion import SLOWEST_MPS
 from activesteer.maneuver import Maneuver
@@ -23,6 +24,10 @@ FRAME_S: Final = 0.016
 _MAX_S: Final = 0.1
 """Maximum time between two pictures [s]. If drawing or simulating takes longer, the drive becomes slower than the clock
 instead of jerky."""
+_SLOWER: Final = (ord("-"), 333)
+_FASTER: Final = (ord("="), ord("+"), 334)
+"""Codes of minus and plus, also of those of the number pad."""
+_SLOWEST, _FASTEST = 0.01, 100.0
 _TURN_S: Final = 0.4
 """Time constant of the camera's direction behind the car's direction of motion [s]."""
 
@@ -73,6 +78,20 @@ class Pacer:
         self._start_s: float | None = None
         self.lost_s = 0.0
 
+    @property
+    def speed(self) -> float:
+        """Simulated seconds per second of the clock; a new value holds from the next picture on."""
+        return self._speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        self._speed, self._start_s = speed, None
+
+    def wait(self) -> None:
+        """Wait for the time of one picture without simulated time."""
+        self._sleep(FRAME_S)
+        self._start_s = None
+
     def next(self, shown_s: float) -> float:
         """Wait until the next picture is due.
 
@@ -97,13 +116,39 @@ class Pacer:
         return shown_s + passed_s * self._speed
 
 
+class Keys:
+    """Keys of the window: space pauses, R restarts, minus and plus halve and double the speed.
+
+    Attributes:
+        paused: Whether the drive stands still.
+        restart: Whether the drive shall start anew.
+        faster: Factor of the speed, to apply before the next picture.
+    """
+
+    def __init__(self) -> None:
+        """Start with a drive that runs."""
+        self.paused = self.restart = False
+        self.faster = 1.0
+
+    def __call__(self, code: int) -> None:
+        """Take a key, by the code of GLFW, which is the upper-case letter; other keys are the viewer's own."""
+        if code == ord(" "):
+            self.paused = not self.paused
+        elif code == ord("R"):
+            self.restart, self.paused = True, False
+        elif code in _SLOWER:
+            self.faster *= 0.5
+        elif code in _FASTER:
+            self.faster *= 2.0
+
+
 class DriveResult(NamedTuple):
     """Result of a drive in a window.
 
     Attributes:
         simulated_s: Simulated time [s].
         pictures: Number of pictures shown.
-        finished: Whether the drive finished before the window was closed.
+        finished: Whether the drive finished before the window was closed or the drive was restarted.
     """
 
     simulated_s: float
@@ -111,38 +156,48 @@ class DriveResult(NamedTuple):
     finished: bool
 
 
-def scene_for(simulation: ClosedLoop, maneuver: Maneuver, *, cutaway: bool = False) -> RenderScene:
+def scene_for(
+    simulation: ClosedLoop, maneuver: Maneuver, controller: str = "none", *, cutaway: bool = False
+) -> RenderScene:
     """Return the scene for a simulation's car.
 
     Args:
         simulation: The simulation.
         maneuver: The manoeuvre, whose road and course are shown.
+        controller: Name of the controller, which gives the car its colour.
         cutaway: Whether the body is transparent.
     """
     vehicle = simulation.vehicle
     size = Footprint.from_table(vehicle.dimensions())
-    car = Car(scene_of(vehicle.model), vehicle.body_names, size=size, shell_opacity=CUTAWAY if cutaway else 1.0)
+    colour = run_looks([controller])[controller].on_dark
+    car = Car(scene_of(vehicle.model), vehicle.body_names, colour, CUTAWAY if cutaway else 1.0, size=size)
     return RenderScene([car], maneuver.course, maneuver.ground)
 
 
-def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pacer) -> DriveResult:
-    """Drive and show a manoeuvre from start to end, or until the window is closed.
+def drive(
+    simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pacer, keys: Keys | None = None
+) -> DriveResult:
+    """Drive and show a manoeuvre from start to end, or until the window is closed or the drive is restarted.
 
-    The drawn model is separate from the simulated one: actions in the window, such as pulling at the car or pausing, do
-    not affect the simulation.
+    The drawn model is separate from the simulated one: pulling at the car does not affect the simulation.
 
     Args:
         simulation: The simulation, at its start.
         scene: Scene with its car only.
         viewer: The viewer of the scene.
         pacer: Keeper of the pace.
+        keys: Keys of the window.
     """
     vehicle, timestep_s = simulation.vehicle, simulation.vehicle.timestep_s
     follow = _Follow(simulation)
+    keys = keys or Keys()
+    keys.restart = False
     done = pictures = 0
-    while viewer.is_running():
+    while viewer.is_running() and not keys.restart:
         now_s = done * timestep_s
-        viewer.set_texts((None, None, *_texts(simulation, now_s)))
+        if keys.faster != 1.0:
+            pacer.speed, keys.faster = min(max(pacer.speed * keys.faster, _SLOWEST), _FASTEST), 1.0
+        viewer.set_texts((None, None, *_texts(simulation, now_s, pacer.speed, paused=keys.paused)))
         # Under one lock: a picture in between would combine the camera of one instant with the car of another.
         with viewer.lock():
             scene.place(0, vehicle.data.xpos[1:], vehicle.data.xquat[1:])
@@ -152,6 +207,9 @@ def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pac
         pictures += 1
         if done >= simulation.steps:
             return DriveResult(now_s, pictures, finished=True)
+        if keys.paused:
+            pacer.wait()
+            continue
         target = round(pacer.next(now_s) / timestep_s)
         steps = max(1, min(target, simulation.steps) - done)
         simulation.advance(steps)
@@ -182,8 +240,8 @@ class _Follow:
         camera.lookat[:] = motion.x_m, motion.y_m, 0.5
 
 
-def _texts(simulation: ClosedLoop, time_s: float) -> tuple[str, str]:
-    """Return names and values, one line each."""
+def _texts(simulation: ClosedLoop, time_s: float, speed: float, *, paused: bool) -> tuple[str, str]:
+    """Return names and values, one line each, and the keys."""
     vehicle = simulation.vehicle
     measured, motion = vehicle.measure(), vehicle.motion()
     moving = motion.speed_mps > MIN_SPEED_MPS
@@ -197,5 +255,7 @@ def _texts(simulation: ClosedLoop, time_s: float) -> tuple[str, str]:
         "superposition_rad": measured.superposition_rad,
     }
     shown = {quantity_of(channel): value for channel, value in values.items()}
-    names = "\n".join(item.short for item in shown)
-    return names, "\n".join(f"{item.value_text(value)} {item.unit.name}" for item, value in shown.items())
+    names = [*(item.short for item in shown), "pace", "space", "R", "- +"]
+    pace = "paused" if paused else f"{speed:g} x real time"
+    told = [*(f"{item.value_text(value)} {item.unit.name}" for item, value in shown.items()), pace]
+    return "\n".join(names), "\n".join([*told, "pause", "restart", "slower, faster"])

@@ -116,6 +116,15 @@ class Headless:
         }
         return {name: Picture(pixels, reports[name]) for name, pixels in shown.items()}
 
+    def window(self, time_s: float) -> Image.Image:
+        """Return the picture of the whole window at an instant."""
+        self._client.set_time(TIMELINE, duration=time_s, play_state="paused")
+        last, self._started = b"", time.monotonic()
+        while (data := self._client.take_screenshot()) != last:
+            last = data
+            self._wait("the picture does not settle")
+        return Image.open(io.BytesIO(data)).convert("RGB")
+
     def _settled(self, view_id: str) -> NDArray[np.int16]:
         last = None
         self._started = time.monotonic()

@@ -24,7 +24,7 @@ Pictures = dict[str, Picture]
 Drives = dict[str, Recording]
 
 SKY, ASPHALT, CONE, LANE = (176, 196, 214), (58, 60, 64), (255, 120, 20), (0, 158, 115)
-NONE, ARS, AFS = RUN_COLOURS_ON_DARK[:3]
+NONE, ARS, AFS = "#8d939c", *RUN_COLOURS_ON_DARK[1:3]
 AT_S = 3.8
 """Between the gates."""
 
@@ -167,7 +167,7 @@ def test_signals_are_plotted_over_the_whole_time(alone: dict[float, Pictures]) -
 
 def test_the_names_of_the_curves_stand_beside_the_plots_in_their_colours(alone: dict[float, Pictures]) -> None:
     names = alone[AT_S][ALONE].pixels
-    for colour in (ARS, (240, 228, 66)):  # the run, and what is desired
+    for colour in (ARS, (179, 155, 0)):  # the run, and what is desired
         assert like(names, colour, 30).sum() > 30, colour
         assert like(alone[AT_S][PLOTS[0]].pixels, colour, 60).any(axis=0).mean() > 0.2, colour
 

@@ -194,9 +194,17 @@ def test_every_axis_has_room_for_three_numbers(most: float) -> None:
         for low in (0.0, -0.3 * reach, -reach):
             below, above = axis_range(low, reach, 1e-3, most)
             assert below <= low <= reach <= above
-            power = 10.0 ** math.floor(math.log10(above))
-            assert math.floor(above / power) + math.floor(-below / power) + 1 >= 3
-            assert (above - below) / power <= most
+            # The viewer labels the least power of ten of which so many fit.
+            power = 10.0 ** math.ceil(math.log10((above - below) / most) - 1e-9)
+            assert math.floor(above / power + 1e-9) + math.floor(-below / power + 1e-9) + 1 >= 3
+
+
+def test_an_axis_is_no_larger_than_its_labels_need() -> None:
+    assert axis_range(-1.0, 50.0, 1.0, 8.0) == pytest.approx((-1.06 * 1.8, 1.06 * 60.0))
+    for reach in np.geomspace(0.02, 5000.0, 200):
+        for low in (0.0, -0.02 * reach, -0.3 * reach, -reach):
+            below, above = axis_range(low, reach, 1e-3, 8.0)
+            assert (reach - low) / (above - below) > 1.0 / 3.0
 
 
 def test_axes_are_the_same_for_runs_that_are_alike_and_no_signal_is_enlarged_without_end() -> None:

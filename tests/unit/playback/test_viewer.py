@@ -131,9 +131,7 @@ def test_web_serves_the_viewer_to_this_machine_until_it_is_interrupted(file: Pat
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
-        found = re.match(
-            r"serving at (http://127\.0\.0\.1:\d+/)\?url=rerun%2Bhttp%3A%2F%2F127\.0\.0\.1%3A(\d+)%2F", line
-        )
+        found = re.match(r"(http://127\.0\.0\.1:\d+/)\?url=rerun%2Bhttp%3A%2F%2F127\.0\.0\.1%3A(\d+)%2Fproxy\n", line)
         assert found, line
         with urllib.request.urlopen(found[1], timeout=10) as page:
             assert page.status == 200

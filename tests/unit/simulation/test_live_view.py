@@ -11,9 +11,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from activesteer.conventions import run_looks
+from activesteer.drawing.colours import shares_of
 from activesteer.scenario import resolve
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.live_view import FRAME_S, Pacer, drive, scene_for
+from activesteer.simulation.live_view import FRAME_S, Keys, Pacer, drive, scene_for
 
 
 class Clock:
@@ -35,7 +37,15 @@ class Clock:
 class Viewer:
     """A view that takes `work_s` to draw and is closed after some pictures."""
 
-    def __init__(self, stage, clock: Clock, work_s: float = 0.002, pictures: int = 10**9) -> None:
+    def __init__(
+        self,
+        stage,
+        clock: Clock,
+        work_s: float = 0.002,
+        pictures: int = 10**9,
+        pressed: dict[int, str] | None = None,
+    ) -> None:
+        self.keys, self._pressed = Keys(), pressed or {}
         self.cam = mujoco.MjvCamera()
         self._stage, self._clock, self._work_s, self._left = stage, clock, work_s, pictures
         self.shown: list[tuple[float, float, str]] = []
@@ -57,6 +67,8 @@ class Viewer:
         x_m = float(self._stage.data.body("0/chassis").xpos[0])
         self.shown.append((self._clock.now_s, x_m, self._text))
         self.azimuths.append(self.cam.azimuth)
+        for key in self._pressed.get(len(self.shown), ""):
+            self.keys(ord(key))
 
 
 def watched(duration_s: float = 0.5, speed: float = 1.0, **look: Any):
@@ -68,7 +80,7 @@ def watched(duration_s: float = 0.5, speed: float = 1.0, **look: Any):
     simulation, clock = ClosedLoop(scenario), Clock()
     stage = scene_for(simulation, scenario.maneuver)
     viewer, pacer = Viewer(stage, clock, **look), Pacer(speed, clock, clock.sleep)
-    return drive(simulation, stage, viewer, pacer), viewer, clock, pacer, simulation
+    return drive(simulation, stage, viewer, pacer, viewer.keys), viewer, clock, pacer, simulation
 
 
 def test_pictures_come_when_they_are_due():
@@ -130,6 +142,7 @@ def test_last_picture_shows_the_end_and_the_words_go_with_it():
     _, viewer, _, _, simulation = watched()
     assert viewer.shown[0][2].startswith("0.00 s")
     assert viewer.shown[-1][2].startswith("0.50 s")
+    assert "1 x real time\npause\nrestart" in viewer.shown[-1][2]
     assert f"{3.6 * simulation.vehicle.measure().speed_mps:.1f} km/h" in viewer.shown[-1][2]
 
 
@@ -141,3 +154,38 @@ def test_camera_follows_and_turns_with_the_car():
     turned = math.radians(viewer.azimuths[-1] - viewer.azimuths[0])
     assert 0.5 * motion.yaw_rad < turned < motion.yaw_rad
     assert max(np.abs(np.diff(viewer.azimuths))) < 1.0
+
+
+def test_space_pauses_and_goes_on():
+    driven, viewer, clock, _, _ = watched(pressed={5: " ", 25: " "})
+    assert driven.finished
+    places = [place for _, place, _ in viewer.shown]
+    assert len(set(places[5:25])) == 1
+    assert places[30] > places[25]
+    assert "paused" in viewer.shown[10][2]
+    assert clock.now_s - 100.0 == pytest.approx(0.5 + 20 * (FRAME_S + 0.002), abs=4 * FRAME_S)
+
+
+@pytest.mark.parametrize(("key", "factor"), [("-", 0.5), ("=", 2.0)])
+def test_keys_make_the_drive_slower_and_faster(key, factor):
+    driven, viewer, clock, _, _ = watched(pressed={1: key})
+    assert driven.finished
+    assert clock.now_s - 100.0 == pytest.approx(0.5 / factor, abs=4 * FRAME_S)
+    assert f"{factor:g} x real time" in viewer.shown[-1][2]
+
+
+def test_restart_ends_the_drive_and_other_keys_do_nothing():
+    driven, viewer, *_ = watched(pressed={3: "X", 6: "R"})
+    assert not driven.finished
+    assert driven.pictures == 6
+    assert viewer.keys.restart
+
+
+def test_car_has_the_colour_of_its_controller():
+    simulation = ClosedLoop(resolve("straight_line"))
+    colours = []
+    for controller in ("ars", "afs"):
+        model = scene_for(simulation, simulation.maneuver, controller).model
+        colours.append(tuple(model.geom("0/chassis/paint").rgba[:3]))
+    expected = [shares_of(look.on_dark) for look in run_looks(["ars", "afs"]).values()]
+    assert colours == [pytest.approx(colour, abs=1e-6) for colour in expected]
