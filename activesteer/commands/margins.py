@@ -9,6 +9,7 @@ from activesteer.commands.arguments import (
     add_car,
     add_controller,
     add_json,
+    add_output,
     add_speeds,
     add_workers,
     overrides_of,
@@ -47,6 +48,7 @@ def add_to(commands: Any) -> None:
         "--study", metavar="STUDY", help="print the smallest margins over the samples of a study (file or name); "
         "controllers are designed for the car without the factors of the study",
     )  # fmt: skip
+    add_output(parser, "DIR", "folder for a page with the Nyquist curves (default: no page)")
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_margins)
@@ -57,6 +59,11 @@ def _margins(options: argparse.Namespace) -> int:
     rows = [margins.to_json() for margins in found]
     if not rows:
         raise ParameterError("none of these controllers uses a measurement, so there is no loop", key="-c")
+    page = None
+    if options.output is not None:
+        from activesteer.studies.linear.margins_page import write_margins_page
+
+        page = write_margins_page(found, str(options.vehicle), options.output)
     if options.json:
         print_json(rows)
         return 0
@@ -66,6 +73,8 @@ def _margins(options: argparse.Namespace) -> int:
         changed = ", ".join(f"{key} = {value:.3g}" for key, value in least["factors"].items())
         where = f"{least['controller']}, {least['loop']}, {least['speed_kmh']:.0f} km/h"
         print(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
+    if page is not None:
+        print(f"page: {page}")
     return 0
 
 

@@ -187,6 +187,10 @@ def _fill_heat(axis: Axes, heat: Heat) -> None:
     for row, texts in enumerate(heat.texts):
         for column, text in enumerate(texts):
             axis.text(column, row, text, ha="center", va="center", fontsize="x-small")
+    for ticks, count in ((axis.set_xticks, len(heat.columns)), (axis.set_yticks, len(heat.rows))):
+        ticks(np.arange(count + 1) - 0.5, minor=True)
+    axis.grid(visible=True, which="minor", color="0.7", linewidth=0.6)
+    axis.tick_params(which="minor", length=0)
     long = any(len(name) > _LONG_NAME for name in heat.columns)
     axis.set_xticks(range(len(heat.columns)), heat.columns, fontsize="x-small")
     axis.tick_params(axis="x", labelrotation=45.0 if long else 0.0)

@@ -147,4 +147,5 @@ STANDARD: Final = Standard(
         "Steering wheel torque. Constant speed with constant radius (variation of the radius on fixed circles).",
     ),
     examine=_examine,
+    overlaid=True,
 )

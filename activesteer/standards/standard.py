@@ -177,6 +177,7 @@ class Standard:
         examine: Function that drives and evaluates one car with one controller. A run that fails is a row; without any
             result it raises `NoResult`.
         driver: Default driver.
+        overlaid: Whether the page lays the pictures of the controllers over each other; they must have the same panels.
     """
 
     name: str
@@ -186,3 +187,4 @@ class Standard:
     left_out: Sequence[str]
     examine: Callable[[Ground], Findings]
     driver: str = DEFAULT_DRIVER
+    overlaid: bool = False

@@ -39,7 +39,12 @@ def test_kc_json_has_what_is_promised(capsys):
 def test_kc_draws_into_a_folder(tmp_path, capsys):
     assert main(["kc", "-o", str(tmp_path / "kc")]) == 0
     assert "figure: " in capsys.readouterr().out
+    page = (tmp_path / "kc" / "kc.html").read_text(encoding="utf-8")
     pictures = list((tmp_path / "kc").glob("*.png"))
+    assert page.count("<svg") == len(pictures)
+    assert page.index("<h2>Target bands") < page.index("<h2>Metrics")
+    assert "39 of 40 target bands are met" in page
+    assert 'class="outside"' in page
     assert {picture.stem for picture in pictures} >= {"rear_camber", "parallel_travel", "steering", "targets"}
     assert len(pictures) >= 5
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in pictures)

@@ -12,7 +12,7 @@ from activesteer.maneuver import KINDS
 from activesteer.resources import list_maneuvers
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-MAX_BYTES = 1_900_000
+MAX_BYTES = 1_600_000
 """Of all still pictures together."""
 MAX_STILL_BYTES, MAX_ANIMATION_BYTES = 300_000, 2_000_000
 ANIMATIONS = {"film_three_systems.webp"}

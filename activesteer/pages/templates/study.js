@@ -118,6 +118,25 @@ function heat(parent, metric, found, keyed) {
   });
 }
 
+// The mean in fields of the first two numeric factors, for designs without grids.
+function binned(rows, values) {
+  const pair = data.factors.filter((factor) => factor.numeric).slice(0, 2);
+  if (pair.length < 2 || rows.length < 4 * data.controllers.length) return null;
+  const count = Math.min(8, Math.max(2, Math.round(Math.sqrt(rows.length / data.controllers.length / 3))));
+  const ends = pair.map(({ key }) => { const all = rows.map((i) => data.rows.factors[key][i]).filter((v) => v != null); return [Math.min(...all), Math.max(...all)]; });
+  if (ends.some(([low, high]) => !(high > low))) return null;
+  const place = (k, v) => Math.min(count - 1, Math.floor(((v - ends[k][0]) / (ends[k][1] - ends[k][0])) * count));
+  const sums = data.controllers.map(() => Array.from({ length: count }, () => Array.from({ length: count }, () => [0, 0])));
+  for (const i of rows) {
+    const [a, b] = pair.map(({ key }) => data.rows.factors[key][i]);
+    if (a == null || b == null || values[i] == null) continue;
+    const field = sums[data.rows.controller[i]][place(0, a)][place(1, b)];
+    field[0] += values[i]; field[1]++;
+  }
+  const levels = ends.map(([low, high]) => Array.from({ length: count }, (_, i) => short(low + ((i + 0.5) / count) * (high - low))));
+  return { keys: pair.map(({ key }) => key), levels, maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
+}
+
 function bars(parent, controller, found, metric, [bottom, top]) {
   const names = [...new Set(found.map((index) => index[1]))], factors = [...new Set(found.map((index) => index[0]))];
   const labelled = factors.map((key) => factorTitle(data.factors.find((factor) => factor.key === key)));
@@ -169,7 +188,9 @@ function tableOf(parent, header, lines) {
 
 function replayLine(command) {
   if (!command) return document.createTextNode("the manoeuvre or the vehicle has no file");
-  const box = document.createElement("span"), button = html(box, "button", "copy");
+  const box = document.createElement("details");
+  html(box, "summary", "show");
+  const button = html(box, "button", "copy");
   const line = html(box, "code", ` ${command}`);
   line.className = "line";
   button.addEventListener("click", () => {
@@ -205,7 +226,8 @@ function draw() {
     tableOf(at("paired-table"), [`difference from ${data.controllers[0]}`, ...["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit)), "smaller in magnitude [%]"],
       found.paired.map((pair, n) => [data.controllers[n + 1], ...(pair ? [...pair.quantiles.map(number), short(100 * pair.smaller)] : ["-", "-", "-", "-"])]));
   }
-  if (found.heat) { at("heat-part").hidden = false; heat(at("heat"), metric, found, keyed); }
+  const map = found.heat || binned(rows, values);
+  if (map) { at("heat-part").hidden = false; heat(at("heat"), metric, { heat: map }, keyed); }
   if (found.indices.length) {
     at("indices-part").hidden = false;
     // All controllers have the same scale, so that they can be compared.
@@ -216,7 +238,14 @@ function draw() {
   parallel(at("parallel"), metric, rows);
   tableOf(at("extremes"), ["controller", "run", metricAxis(metric), "command to drive and replay it"],
     found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [data.controllers[c], String(run), short(value), replayLine(command)])));
-  for (const other of data.metrics) if (data.by_group[group][other.name]) histogram(at("all"), other, data.by_group[group][other.name], 300, 190);
+  const constant = [];
+  for (const other of data.metrics) {
+    if (!data.by_group[group][other.name]) continue;
+    const all = rows.map((i) => data.rows.metrics[other.name][i]).filter((v) => v != null), low = Math.min(...all), high = Math.max(...all);
+    if (high - low > 1e-3 * Math.max(Math.abs(low), Math.abs(high))) histogram(at("all"), other, data.by_group[group][other.name], 300, 190);
+    else constant.push(`${other.label} ${all.length ? short(all[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
+  }
+  at("constant").textContent = constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "";
 }
 
 data.groups.forEach((text, place) => { html(at("group"), "option", text).value = place; });

@@ -10,9 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
+from markupsafe import Markup
 
 from activesteer.conventions import Array
-from activesteer.plotting import Area, Curve, Panel, Picture, save_all
+from activesteer.errors import ParameterError
+from activesteer.files import write_text
+from activesteer.pages import Page, Section, Table, failed, passed, render_page
+from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, save_all
 from activesteer.plotting import draw as drawn
 from activesteer.rigs.kc.definitions import Axle
 from activesteer.rigs.kc.metrics_steering import mean_steer_rad, ratio_curve
@@ -65,28 +69,61 @@ def _moved(points: str, axis: int, *, outwards: bool = False) -> Callable[[Sweep
 
 
 def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
-    """Draw kinematics and compliance of a car as PNG files.
+    """Draw kinematics and compliance of a car as PNG files, and all of them on the page `kc.html`.
 
     Args:
         result: Result of the rig.
         folder: Folder for the files; it is created if it does not exist.
 
     Returns:
-        The paths written.
+        The paths written; the page comes last.
 
     Raises:
         ParameterError: matplotlib is not installed, or a file cannot be written.
     """
+    pictures = _pictures(result)
+    paths = save_all(pictures, folder, f"{result.vehicle}: ")
+    return [*paths, _write_page(result, [make() for make in pictures.values()], Path(folder))]
+
+
+def _pictures(result: KcResult) -> dict[str, Callable[[], Picture]]:
     pictures: dict[str, Callable[[KcResult], Picture]] = {
+        "targets": _targets,
         "rear_camber": _rear_camber,
         **{name: partial(_drawn_grid, grid=grid) for name, grid in _GRIDS.items()},
         "opposite_travel": _opposite_travel,
         "steering": _steering,
-        "targets": _targets,
     }
     if "rear_steering_bump" in result.curves:
         pictures["rear_steering"] = _rear_steering
-    return save_all({name: partial(make, result) for name, make in pictures.items()}, folder, f"{result.vehicle}: ")
+    return {name: partial(make, result) for name, make in pictures.items()}
+
+
+def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> Path:
+    targeted = [entry for entry in result.metrics if entry.inside is not None]
+    met = sum(entry.inside is True for entry in targeted)
+    lead = [f"{met} of {len(targeted)} target bands are met." if targeted else "The car has no target bands."]
+    rows = [
+        (
+            entry.axle,
+            Markup('<span title="{}">{}</span>').format(entry.definition, entry.name.replace("_", " ")),
+            f"{entry.value:.4g}" if math.isfinite(entry.value) else "none",
+            entry.unit,
+            f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else "",
+            {None: "", True: passed("inside", chip=True), False: failed("outside", chip=True)}[entry.inside],
+            entry.remark or entry.source,
+        )
+        for entry in result.metrics
+    ]
+    outside = frozenset(number for number, entry in enumerate(result.metrics) if entry.inside is False)
+    metrics = Table("", ["axle", "metric", "value", "unit", "target band", "", "remark or source"], rows, outside)
+    first, *others = (as_svg(drawn(picture._replace(title=""))) for picture in pictures)
+    heads = [picture.title[0].upper() + picture.title[1:] for picture in pictures]
+    sections = [Section(heads[0], pictures=[first]), Section("Metrics", tables=[metrics])]
+    sections += [Section(head, pictures=[other]) for head, other in zip(heads[1:], others, strict=True)]
+    title = f"Kinematics and compliance: {result.vehicle}"
+    page = render_page(Page(f"activesteer kc: {result.vehicle}", title, lead, sections))
+    return write_text(folder / "kc.html", page, ParameterError)
 
 
 def rear_camber_figure(result: KcResult) -> Figure:

@@ -206,6 +206,7 @@ class LoopMargins:
         speed_kmh: Speed [km/h].
         margins: The margins.
         factors: Factors of the car with the smallest disk margin, if there are many cars: key -> value.
+        curves: Loop gains at `FREQUENCIES_RADPS`; empty for many cars.
     """
 
     controller: str
@@ -213,6 +214,7 @@ class LoopMargins:
     speed_kmh: float
     margins: Margins
     factors: Mapping[str, Any] = field(default_factory=dict)
+    curves: tuple[Response, ...] = field(default=(), compare=False, repr=False)
 
     def to_json(self) -> dict[str, Any]:
         """Return the values of the margins."""
@@ -239,7 +241,7 @@ def loop_margins(
     If a controller uses both actuators, the margins of both together come last.
     """
     check_gains(overrides or {}, controllers)
-    return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}]))
+    return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}], keep_curves=True))
 
 
 def straight_on(speed_mps: float) -> dict[str, Any]:
@@ -252,10 +254,12 @@ def margins_of_cars(
     vehicle: FileOrTable,
     speeds_kmh: Sequence[float],
     cars: Iterable[Mapping[str, Any]],
+    *,
+    keep_curves: bool = False,
 ) -> Iterator[list[LoopMargins]]:
     """Yield the margins of several cars, given by their overrides.
 
-    A controller that knows the same about two cars is evaluated once.
+    A controller that knows the same about two cars is evaluated once. With `keep_curves` the loop gains are kept too.
     """
     plugins = [find_controller(given) for given in controllers]
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
@@ -270,7 +274,8 @@ def margins_of_cars(
                 if key not in answers:
                     answers[key] = _answer(controllers[number], plugin.label, scenario, setup, plugin.make(setup))
                 returned = round_trip(car, answers[key], scenario, unit_s, FREQUENCIES_RADPS)
-                found += _of_loops(plugin.label, 3.6 * car.speed_mps, returned)
+                loops = _of_loops(plugin.label, 3.6 * car.speed_mps, returned)
+                found += loops if keep_curves else [replace(loop, curves=()) for loop in loops]
         yield found
 
 
@@ -283,7 +288,11 @@ def _of_loops(controller: str, speed_kmh: float, returned: Response) -> list[Loo
         loops[BOTH] = opened_at_both(returned)
     return [
         LoopMargins(
-            controller, loop, speed_kmh, weakest([margins_of(part, FREQUENCIES_RADPS, stable) for part in parts])
+            controller,
+            loop,
+            speed_kmh,
+            weakest([margins_of(part, FREQUENCIES_RADPS, stable) for part in parts]),
+            curves=parts,
         )
         for loop, parts in loops.items()
     ]

@@ -9,7 +9,7 @@ import pytest
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.examination import Examination
-from activesteer.standards.examination_page import page
+from activesteer.standards.examination_page import _together, page
 from activesteer.standards.standard import Findings, Standard
 
 EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'
@@ -46,3 +46,19 @@ def test_a_method_without_limits_never_says_pass():
     assert ">pass<" not in text
     assert ">fail<" not in text
     assert "no limits" in text
+
+
+def test_overlaid_controllers_share_their_pictures_and_sides_differ_in_width():
+    def findings(height: float) -> Findings:
+        curves = [Curve([0.0, 1.0], [0.0, height + place], side) for place, side in enumerate(("left", "right"))]
+        return Findings({}, "", (), [Picture("Circle", [Panel("x", "y", curves)])])
+
+    found = {"none": findings(1.0), "ars": findings(2.0)}
+    (picture,) = _together(found)
+    (panel,) = picture.panels
+    assert isinstance(panel, Panel)
+    assert [curve.label for curve in panel.curves] == ["none, left", "none, right", "ars, left", "ars, right"]
+    assert len({curve.colour for curve in panel.curves}) == 4
+    wide, thin = (panel.curves[place::2] for place in (0, 1))
+    assert min(curve.width for curve in wide) > 2.0 * max(curve.width for curve in thin)
+    assert _together({"none": findings(1.0)}) == []

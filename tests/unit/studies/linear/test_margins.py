@@ -21,6 +21,7 @@ from activesteer.studies.linear.linearisation import LinearCar
 from activesteer.studies.linear.margins import (
     BOTH,
     FREQUENCIES_RADPS,
+    LoopMargins,
     is_stable,
     loop_margins,
     margins_of,
@@ -29,6 +30,7 @@ from activesteer.studies.linear.margins import (
     round_trip,
     weakest,
 )
+from activesteer.studies.linear.margins_page import disk, write_margins_page
 from activesteer.studies.linear.worst_margins import worst_margins
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup
@@ -251,3 +253,25 @@ def test_what_a_study_varies_and_the_speed_are_given_in_one_place():
         worst_margins(SPREAD, ["ars"], speeds_kmh=[100.0], overrides={"factors.servo_lag": 1.1})
     with raises(ParameterError, key="speed_kmh"):
         loop_margins(["ars"], speeds_kmh=[100.0], overrides={"speed_kmh": 80.0})
+
+
+def test_the_disk_of_a_loop_touches_its_curve():
+    loop = integrator(0.05)
+    centre, radius = disk(margins_of(loop, FREQUENCIES_RADPS).disk)
+    assert np.abs(loop - centre).min() == pytest.approx(radius, rel=1e-9)
+    # The gains at which a factor of this size makes the loop marginal are the ends of the disk.
+    assert centre - radius < -1.0 < centre + radius < 0.0
+    assert (centre - radius) * (centre + radius) == pytest.approx(1.0)
+
+
+def test_page_of_margins_shows_each_loop_with_its_disk(tmp_path):
+    pytest.importorskip("matplotlib")
+    loop = integrator(0.05)
+    margins = margins_of(loop, FREQUENCIES_RADPS)
+    found = [LoopMargins("<b>", "rear", speed, margins, curves=(loop,)) for speed in (60.0, 80.0)]
+    many = [LoopMargins("lqr", "rear", 60.0, margins, {"car.mass_kg": 1500.0})]
+    text = write_margins_page([*found, *many], "compact", tmp_path / "new").read_text(encoding="utf-8")
+    assert text.count("<svg") == 1
+    assert "&lt;b&gt;, opened at rear" in text
+    assert f"disk margin {margins.disk:.2f}" in text
+    assert "car.mass_kg = 1500.0" in text

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ParameterError
+from activesteer.plotting import Heat
 from activesteer.scenario import resolve
 from activesteer.studies.paper.fault_map import FaultMap, Limits, fault_map
-from activesteer.studies.paper.fault_map_figure import draw_fault_map
+from activesteer.studies.paper.fault_map_figure import _PICTURES, _picture, draw_fault_map
 from activesteer.studies.paper.fault_situations import SITUATIONS, TURN_MPS2, path_of
 from tests.raising import raises
 
@@ -108,5 +109,19 @@ def test_a_limit_that_is_not_written_as_a_pair_is_named() -> None:
 def test_every_figure_is_drawn(made: FaultMap, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     files = draw_fault_map(made, tmp_path)
-    assert {file.stem for file in files} == {"fault_tolerant_time", "yaw_rate_change", "lateral_offset"}
+    assert [file.name for file in files if file.suffix == ".html"] == ["fault_map.html"]
+    page = files[-1].read_text(encoding="utf-8")
+    assert page.count("<svg") == 3
+    assert "The limits are 3 deg/s of yaw rate" in page
+    assert {file.stem for file in files[:-1]} == {"fault_tolerant_time", "yaw_rate_change", "lateral_offset"}
     assert all(file.stat().st_size > 5000 for file in files)
+
+
+def test_a_blank_field_has_no_colour(made: FaultMap) -> None:
+    for name, shown in _PICTURES.items():
+        for panel in _picture(made, shown).panels:
+            assert isinstance(panel, Heat)
+            blank = np.isnan(np.asarray(panel.values))
+            assert (blank == np.array([[text in ("", "failed") for text in row] for row in panel.texts])).all()
+            if name == "fault_tolerant_time":
+                assert blank.any()
