@@ -33,8 +33,8 @@ def table() -> str:
         ]
         for statement in STATEMENTS.values():
             if statement.kind is kind:
-                nominal = "not reproduced" if statement.id in known else "reproduced"
-                paper = "fails" if statement.id in fails else "holds"
+                nominal = "\N{NOT EQUAL TO} not reproduced" if statement.id in known else "\N{CHECK MARK} reproduced"
+                paper = "\N{BALLOT X} fails" if statement.id in fails else "\N{CHECK MARK} holds"
                 cells = (statement.id, statement.text, paper, nominal, *_proportion(population, statement.id))
                 lines.append("| " + " | ".join(cells) + " |")
         lines.append("")

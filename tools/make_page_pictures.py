@@ -1,7 +1,7 @@
 """Make the pictures of HTML pages in the documentation: `python tools/make_page_pictures.py`.
 
 The tool drives short runs, writes a report, a comparison and a standard's page, and draws the top of each in Chromium.
-It also draws the page of `activesteer explore`.
+It also draws the page of `activesteer explore` and the rerun viewer.
 Run it again after a change of the look of these pages. It takes five minutes.
 """
 
@@ -21,10 +21,13 @@ from playwright.sync_api import Browser, sync_playwright
 
 from activesteer.cli import main as activesteer
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.render.headless import Headless
+
 PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 SIZE: Final = (1000, 760)
 """Width and height of the browser's window [px]."""
-COLOURS: Final = 64
+COLOURS: Final = 128
 FROM: Final = {"measured_lane_change": "Fitted"}
 """Picture -> heading at its top; by default it shows the top of the page."""
 
@@ -63,9 +66,22 @@ def draw_explore(browser: Browser, folder: Path) -> Image.Image:
         shown.wait_for_selector("#state:has-text('all after')", timeout=60_000)
         shown.locator("#time").fill("2.6")
         shown.wait_for_timeout(3000)
+        # The latencies are those of the machine that draws the pictures.
+        shown.locator("#state").evaluate("(state) => { state.textContent = ''; }")
         picture = Image.open(io.BytesIO(shown.screenshot())).convert("RGB")
         server.terminate()
     return picture
+
+
+def draw_viewer(folder: Path) -> Image.Image:
+    """Return a picture of the rerun viewer in the middle of a sine with dwell, drawn without a window."""
+    files = [str(folder / f"sine_with_dwell-{name}.mcap") for name in ("none", "ars")]
+    for file in files:
+        activesteer(["run", "sine_with_dwell", "-c", file.rpartition("-")[2].removesuffix(".mcap"), "-o", file])
+    activesteer(["replay", *files, "--compare", "-o", str(folder / "runs.rrd")])
+    with Headless(folder) as viewer:
+        viewer.open(folder / "runs.rrd")
+        return viewer.window(2.6)
 
 
 def main() -> None:
@@ -73,7 +89,7 @@ def main() -> None:
     width, height = SIZE
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        pictures = {"page_explore": draw_explore(browser, Path(folder))}
+        pictures = {"page_explore": draw_explore(browser, Path(folder)), "page_viewer": draw_viewer(Path(folder))}
         for name, page in write_pages(Path(folder)).items():
             shown = browser.new_page(viewport={"width": width, "height": height})
             shown.goto(page.as_uri())
