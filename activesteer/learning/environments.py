@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, Final
 
 import gymnasium
@@ -12,9 +13,11 @@ from gymnasium.vector.utils import batch_space
 from mujoco import MjvCamera
 from numpy.typing import NDArray
 
-from activesteer.errors import ParameterError, shown
+from activesteer.errors import ParameterError, SimulationDiverged, shown
 from activesteer.learning.episodes import Episodes, Outcome
 from activesteer.learning.tasks import Task
+from activesteer.recording import Recording
+from activesteer.simulation.simulation import Simulation
 
 _SIZE: Final = (640, 360)
 _FPS: Final = 25
@@ -67,6 +70,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.action_space = self.episodes.action_space
         self.observation_space = self.episodes.observation_space
         self._picture: _Picture | None = None
+        self._given: list[NDArray[Any]] = []
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -75,6 +79,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         super().reset(seed=seed)
         (observation,) = self.episodes.reset([0], [self.np_random])
         self._close_picture()
+        self._given = []
         if self.render_mode == "human":
             self.render()
         return observation, {"car": int(self.episodes.active[0])}
@@ -82,6 +87,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Drive until the next decision; see `gymnasium.Env.step`."""
         found = self.episodes.step(np.asarray(action)[np.newaxis])
+        self._given.append(np.array(action, dtype=np.float64))
         info = {
             "reward_terms": {name: float(value[0]) for name, value in found.terms.items()},
             "sideslip_rad": float(found.sideslip_rad[0]),
@@ -102,6 +108,20 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._picture = _Picture(loop, window=self.render_mode == "human")
         return self._picture.drawn(loop)
 
+    def recording(self) -> Recording:
+        """Drive the episode once more with the actions so far, and return its recording.
+
+        The recording equals the episode to the last bit. Its `save` writes a file for `activesteer replay`, `watch`,
+        `video` and `report`.
+        """
+        simulation = Simulation(self.episodes.loop(0).scenario)
+        with suppress(SimulationDiverged):  # the episode has diverged too
+            for action in self._given:
+                driver, controller = self.episodes.commands(self.episodes.within_bounds(action[np.newaxis]))
+                steps = min(self.episodes.steps, simulation.steps - simulation.loop.step_count)
+                simulation.advance(steps, None if driver is None else _first(driver), _first(controller))
+        return simulation.recording()
+
     def _close_picture(self) -> None:
         if self._picture is not None:
             self._picture.close()
@@ -110,6 +130,12 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def close(self) -> None:
         """Close window and canvas."""
         self._close_picture()
+
+
+def _first(command: Any) -> Any:
+    """Return the first of several commands."""
+    first = (value[0].tolist() if isinstance(value, np.ndarray) else value for value in command)
+    return type(command)(*(tuple(value) if isinstance(value, list) else value for value in first))
 
 
 class _Picture:

@@ -148,8 +148,8 @@ class Episodes:
         self._n, self._cars = n, cars
         self._active = np.arange(n) * cars
         self.interval_s = interval_s
-        self._every = round(interval_s / self.batch.loops[0].vehicle.timestep_s)
-        if self._every < 1 or abs(self._every * self.batch.loops[0].vehicle.timestep_s - interval_s) > 1e-9:
+        self.steps = round(interval_s / self.batch.loops[0].vehicle.timestep_s)
+        if self.steps < 1 or abs(self.steps * self.batch.loops[0].vehicle.timestep_s - interval_s) > 1e-9:
             raise ParameterError(f"is {shown(interval_s)} s; a whole number of steps is needed", key="interval_s")
         self._low = np.array([low for _, low, _ in self.actions])
         paths = [path for loop in self.batch.loops if (path := loop.maneuver.setpoint(0.0).path) is not None]
@@ -215,7 +215,7 @@ class Episodes:
             raise ParameterError(f"is {shown(actions)}; finite numbers are needed", key="action")
         if not self._started[chosen].all():
             raise ParameterError("reset the environment before its first step", key="step")
-        given = np.clip(np.where(chosen[:, np.newaxis], given, 0.0), self._low, 1.0)
+        given = self.within_bounds(np.where(chosen[:, np.newaxis], given, 0.0))
         self._drive(given, chosen)
         tracked = self._tracked()
         terms, sideslip = self._terms(given, tracked)
@@ -234,17 +234,33 @@ class Episodes:
         reward = np.nan_to_num(sum(terms.values()), nan=-self.task.weights.get("lost", 0.0))
         return Outcome(self._observe(tracked), reward, terminated, truncated, terms, sideslip, _END_NAMES[end])
 
+    def within_bounds(self, actions: Array) -> Array:
+        """Limit actions to their bounds."""
+        return np.clip(actions, self._low, 1.0)
+
     def _drive(self, actions: Array, chosen: NDArray[np.bool_]) -> None:
-        columns: dict[str, Any] = {}
-        for place, (name, _, scale) in enumerate(self.actions):
-            column = columns[name] = np.zeros(len(self.batch))
-            column[self._active] = scale * actions[:, place]
+        every = np.zeros((len(self.batch), len(self.actions)))
+        every[self._active] = actions
+        self.batch.advance(self.steps, *self.commands(every), self._active[chosen])
+
+    def commands(self, actions: Array) -> tuple[DriverCommand | None, ActuatorCommand]:
+        """Return actions within their bounds as commands.
+
+        Args:
+            actions: Shape (n, numbers).
+
+        Returns:
+            Command of the driver, None if the agent does not drive, and command of the controller; each field is an
+            array of length n, or zero.
+        """
+        columns: dict[str, Any] = {
+            name: scale * actions[:, place] for place, (name, _, scale) in enumerate(self.actions)
+        }
         brakes = [columns.pop(name) for name, _, _ in ACTUATORS["brakes"] if name in columns]
         if brakes:
             columns["brake_torque_demand_Nm"] = np.column_stack(brakes)
         hands = {name: columns.pop(name) for name, _, _ in HANDS if name in columns}
-        driver = DriverCommand(**hands) if self._agent_drives else None
-        self.batch.advance(self._every, driver, ActuatorCommand(**columns), self._active[chosen])
+        return DriverCommand(**hands) if self._agent_drives else None, ActuatorCommand(**columns)
 
     def _tracked(self) -> tuple[Array, Array, Array]:
         """Return distance to the left of the path [m], heading relative to it [rad], and points ahead [m], (n, k)."""

@@ -73,6 +73,28 @@ def same(one: Any, other: Any) -> None:
         assert np.array_equal(one, other), (one, other)
 
 
+@pytest.mark.parametrize(("task", "options"), [
+    ("SineWithDwell", {"actuators": ("rear", "front", "brakes"), "cars": 3}),
+    ("SplitMuBraking", {"driver": "agent", "overrides": {"duration_s": 0.75}}),
+])  # fmt: skip
+def test_the_recording_of_an_episode_is_the_episode(task: str, options: dict[str, Any]) -> None:
+    env = CarEnv(task, interval_s=0.1, **options)
+    first, _ = env.reset(seed=2)
+    env.action_space.seed(2)
+    seen, truncated = [first], False
+    while len(seen) < 12 and not truncated:
+        observation, _, _, truncated, _ = env.step(1.2 * env.action_space.sample())
+        seen.append(observation)
+    recording = env.recording()
+    names = [name for name, _, _ in env.episodes.observations]
+    assert recording.metadata["complete"] == truncated
+    for number, observation in enumerate(seen[1:-1], 1):
+        for name in ("fl_wheel_speed_radps", "rr_wheel_speed_radps", "steering_wheel_rad"):
+            recorded = recording[name][100 * number - 1]
+            assert observation[names.index(name)] == pytest.approx(recorded, rel=1e-6, abs=1e-7)
+    assert len(recording) == min(100 * (len(seen) - 1), env.episodes.batch.steps[0])
+
+
 def test_the_registered_name_makes_many_at_once() -> None:
     env = gymnasium.make_vec("activesteer/Slalom-v0", 2, vectorization_mode="vector_entry_point", interval_s=0.05)
     assert isinstance(env.unwrapped, CarVectorEnv)
