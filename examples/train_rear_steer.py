@@ -151,7 +151,7 @@ def train(minutes: float, seed: int, path: str, *, resume: bool) -> None:
             weights, curve, round_ = file["weights"], file["curve"].tolist(), int(file["rounds"])
         start -= curve[-1][0]
         minutes += curve[-1][0] / 60.0
-    best, best_cost = weights, math.inf
+    best, best_cost = weights, min((cost for _, cost in curve), default=math.inf)
     while (passed := time.perf_counter() - start) < 60.0 * minutes:
         if round_ % 5 == 0:
             costs = [fleet.drive(np.tile(weights, (len(fleet.batch), 1)))["cost"].mean() for fleet in check]
