@@ -35,8 +35,8 @@ def _import(options: argparse.Namespace) -> int:
 
     if options.output is not None and options.output.suffix != ".mcap":
         raise ParameterError(f"-o {options.output}: the name of a recording ends in .mcap")
-    output = options.output or options.files[0].with_suffix(".mcap")
     found = import_file(options.files, options.map, options.vehicle)
+    output = options.output or options.files[0].with_suffix(".mcap")
     recording = found.recording
     recording.save(output)
     print_notes(found.notes)
