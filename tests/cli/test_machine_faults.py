@@ -104,7 +104,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> pa.Table:
     "limit",
     [
         pytest.param(200, id="its own file", marks=pytest.mark.slow),
-        pytest.param(2_000, id="the first part"),
+        pytest.param(2_000, id="the first part", marks=pytest.mark.slow),
         pytest.param(7_000, id="the results", marks=pytest.mark.slow),
     ],
 )

@@ -19,7 +19,12 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 NEED_MORE = {"train_rear_steer.py", "udp_client.py"}
 """Scripts that need arguments, minutes of training or another process; tests of learning and of UDP use them."""
-SCRIPTS = sorted(path for path in EXAMPLES.glob("*.py") if path.name not in NEED_MORE)
+SLOW = {"cosimulation.py"}
+SCRIPTS = [
+    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.name in SLOW else [])
+    for path in sorted(EXAMPLES.glob("*.py"))
+    if path.name not in NEED_MORE
+]
 
 
 def example(name: str) -> dict[str, Any]:
@@ -27,7 +32,7 @@ def example(name: str) -> dict[str, Any]:
     return runpy.run_path(str(EXAMPLES / f"{name}.py"))
 
 
-@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", SCRIPTS)
 def test_script_runs_and_prints(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

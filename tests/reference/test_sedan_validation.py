@@ -129,7 +129,7 @@ def test_the_response_does_not_depend_on_the_step() -> None:
 
 
 def test_an_unknown_reference_names_those_that_exist(tmp_path) -> None:
-    with raises(ParameterError, value="sedam", allowed=["sedan", "tesla_model_s"]):
+    with raises(ParameterError, value="sedam", allowed=["bmw_m8", "sedan", "tesla_model_s"]):
         validate("sedam")
     with raises(ParameterError, value=tmp_path / "nowhere"):
         validate(more=tmp_path / "nowhere")

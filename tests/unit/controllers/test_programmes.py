@@ -171,13 +171,19 @@ def test_sides_may_not_differ_once_an_actuator_is_known_to_be_stuck(known):
 
 
 def test_brakes_turn_the_car_by_half_the_track_and_angles_by_their_axles_arms(known):
-    moments_Nm, forces_N = Integrated(known)._effects(0.5, 0.25)
+    controller = Integrated(known)
+    controller.step(steering(0.0), measured(0.0, SPEED_MPS))
+    (per_moment, per_force), effects = controller._weights, controller._effects
     car, more = known.single_track, known.estimation.two_track
-    assert forces_N == pytest.approx([0.5 * car.front_stiffness_Nprad, 0.25 * car.rear_stiffness_Nprad, 0, 0, 0, 0])
-    assert moments_Nm[:2] == pytest.approx(forces_N[:2] * (car.cg_to_front_m, -car.cg_to_rear_m))
+    stiffness_Nprad = np.array([car.front_stiffness_Nprad, car.rear_stiffness_Nprad])
+    # On the straight line, tyres have their whole cornering stiffness.
+    assert effects[1] / per_force == pytest.approx([*stiffness_Nprad, 0, 0, 0, 0], rel=0.01)
+    assert effects[0, :2] / per_moment == pytest.approx(
+        stiffness_Nprad * (car.cg_to_front_m, -car.cg_to_rear_m), rel=0.01
+    )
     # Of a force of 1 kN.
     halves_m = 0.5 * np.array([more.front_track_m] * 2 + [more.rear_track_m] * 2)
-    assert moments_Nm[2:] == pytest.approx(1000.0 * halves_m * (1, -1, 1, -1))
+    assert effects[0, 2:] / per_moment == pytest.approx(1000.0 * halves_m * (1, -1, 1, -1))
 
 
 def test_car_that_does_what_is_asked_keeps_the_angles_of_its_turn(known):

@@ -9,6 +9,7 @@ from activesteer.conventions import RUN_COLOURS_ON_DARK
 from activesteer.errors import RecordingError
 from activesteer.playback import runs_of
 from activesteer.recording import Poses, Recording
+from tests.contrast import contrast
 from tests.raising import raises
 from tests.unit.playback.synthetic import circle
 
@@ -19,7 +20,8 @@ def test_the_three_systems_have_their_order_numbers_and_colours_whatever_the_ord
     assert [r.short for r in runs] == ["none", "ars", "afs", "mine", "other"]
     assert [r.label for r in runs[:3]] == ["1 no control", "2 active rear steering", "3 active front steering"]
     assert [r.name for r in runs] == ["1_none", "2_ars", "3_afs", "4_mine", "5_other"]
-    assert [r.colour for r in runs] == list(RUN_COLOURS_ON_DARK[:5])
+    assert [r.colour for r in runs[1:]] == list(RUN_COLOURS_ON_DARK[1:5])
+    assert all(contrast(runs[0].colour, background) > 3.0 for background in ("#ffffff", "#000000"))
 
 
 def test_a_system_keeps_its_colour_without_the_others() -> None:

@@ -193,6 +193,7 @@ def _same(value: int) -> int:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.slow
 def test_ten_thousand_tasks_come_back_each_once(jobs):
     with workers_for(jobs) as workers:
         tasks = ((number, _same, number) for number in range(10_000))

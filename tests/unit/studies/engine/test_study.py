@@ -103,6 +103,7 @@ def test_a_worker_that_dies_is_replaced(tmp_path):
     assert {row["status"] for row in rows} == {"ok"}
 
 
+@pytest.mark.slow
 def test_only_the_run_is_lost_that_kills_its_worker_every_time(tmp_path):
     path = write_controller(tmp_path, 0.9)
     rows = study(short_study(*MU, key=RATIO, controllers=["none", f"{path}:Kills"]), jobs=2).to_pylist()

@@ -16,7 +16,15 @@ from tests.raising import raises
 STEP = {"maneuvers": ["step_steer"], "factors": {"road.mu": {"grid": [0.8, 1.0]}}}
 
 
-@pytest.mark.parametrize("path", sorted(studies_dir().glob("*.toml")), ids=lambda path: path.stem)
+LARGE = {"comparison", "match_paper", "population"}
+"""Studies of thousands of runs, each of which is checked. `no_harm` is as large; it stays among the quick tests."""
+STUDIES = [
+    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem in LARGE else [])
+    for path in sorted(studies_dir().glob("*.toml"))
+]
+
+
+@pytest.mark.parametrize("path", STUDIES)
 def test_every_study_that_comes_along_can_be_begun(path: Path):
     study = read_study(path)
     plan = Plan(study)

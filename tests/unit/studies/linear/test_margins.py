@@ -221,6 +221,7 @@ SPREAD = {
 }
 
 
+@pytest.mark.slow
 def test_worst_margins_are_those_of_single_cars_that_the_controller_does_not_know():
     cars = [{"factors.servo_lag": 0.5}, {"factors.servo_lag": 2.0}]
     other = {"factors.mass": 1.1, "factors.rear_cornering_stiffness": 0.9, "load.cg_forward_change_m": 0.1}

@@ -57,6 +57,7 @@ def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_processes_and_interruptions_change_no_bit(serial: Path, tmp_path: Path) -> None:
     study(shortened(2), output=tmp_path, jobs=1, limit=3)
     study(shortened(2), output=tmp_path, jobs=2)
