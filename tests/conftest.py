@@ -95,7 +95,11 @@ def browser() -> Iterator[Browser]:
         pytest.skip("needs a browser: apt-get install chromium")
     # As root, as in a container, Chromium refuses to start with its sandbox.
     arguments = ["--no-sandbox"] if os.geteuid() == 0 else []
+    # Chromium brings its own Vulkan driver; variables that hide the machine's driver would hide that one too.
+    environment: dict[str, str | float | bool] = {
+        name: value for name, value in os.environ.items() if not name.startswith("VK_")
+    }
     with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=found, args=arguments)
+        started = playwright.chromium.launch(executable_path=found, args=arguments, env=environment)
         yield started
         started.close()

@@ -83,6 +83,19 @@ def test_keys_drive_the_car_and_leave_a_recording(browser: Browser, served: tupl
 
 
 @pytest.mark.slow
+def test_without_webgl_the_page_shows_its_curves(browser: Browser, served: tuple[str, Path]) -> None:
+    page = browser.new_page()
+    page.add_init_script("""const of = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+        return kind.startsWith("webgl") ? null : of.call(this, kind, ...more); };""")
+    page.goto(served[0] + "#maneuver=step_steer&controllers=none")
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    assert len(page.evaluate(LAST_YAW_RATE)) == 1
+    assert "no WebGL" in page.inner_text("main")
+    page.close()
+
+
+@pytest.mark.slow
 def test_the_page_fits_a_phone(browser: Browser, served: tuple[str, Path]) -> None:
     page, problems = opened(browser, served[0], **PHONE)
     page.wait_for_selector(DONE, timeout=LIMIT_MS)

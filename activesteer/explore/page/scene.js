@@ -5,10 +5,24 @@ import { onTheme, paint, runColour } from "./look.js";
 const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, TURN_S = 0.35, SLOW_MPS = 1;
 const TRAIL_APART_M = 0.4, TRAIL_POINTS = 1500, ROAD_M = 1200, TILE_M = 10;
 
+/* Without WebGL the page shows its curves and tracks; a sentence stands in the place of the cars. */
+function rendererOn(canvas) {
+  try {
+    return new THREE.WebGLRenderer({ canvas, antialias: true });
+  } catch {
+    const told = document.createElement("p");
+    told.textContent = "This browser has no WebGL, so the cars are not drawn in three dimensions.";
+    canvas.after(told);
+    canvas.style.display = "none";
+    return { setPixelRatio() {}, setSize() {}, render() {} };
+  }
+}
+
+
 export class Scene {
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer = rendererOn(canvas);
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(48, 1.6, 0.3, 900);
