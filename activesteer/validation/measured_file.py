@@ -139,6 +139,8 @@ def read_measured(folder: Path) -> MeasuredFile:
         raise source.fail(("runs",), "at least one measured run [[runs]] is needed")
     for number, run in enumerate(table.runs):
         _check_run(run, folder, source, ("runs", str(number)), [other.name for other in table.runs[:number]])
+    if not any(run.check_s for run in table.runs):
+        raise source.fail(("runs",), "a verdict needs a run with check_s = [start, end]")
     own = folder / table.vehicle
     vehicle = str(own) if table.vehicle.endswith(".toml") or "/" in table.vehicle else table.vehicle
     try:

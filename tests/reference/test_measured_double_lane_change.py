@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -100,6 +101,17 @@ def test_a_wrong_key_or_value_is_one_error_with_file_and_key(folder: Path, old: 
     with raises(ActiveSteerError, key=key, file="validation.toml") as caught:
         read_measured(folder)
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_nothing_could_fail_is_an_error(folder: Path) -> None:
+    path = folder / "validation.toml"
+    text = path.read_text(encoding="utf-8")
+    for pattern, key in ((r"^check_s = .*$", "runs"), (r"^\[quantities\]\n(?:[^\[\n].*\n)+", "quantities")):
+        shorter = re.sub(pattern, "", text, flags=re.MULTILINE)
+        assert shorter != text
+        path.write_text(shorter, encoding="utf-8")
+        with raises(ActiveSteerError, key=key, file="validation.toml"):
+            read_measured(folder)
 
 
 def test_a_window_outside_the_imported_part_is_an_error(folder: Path) -> None:
