@@ -111,6 +111,12 @@ def json_text(value: Any) -> str:
     return json.dumps(finite(value), indent=2, allow_nan=False)
 
 
+def write_json(path: Path, value: Any, error: type[ActiveSteerError]) -> Path:
+    """Write a value as indented JSON into a folder that is created if it does not exist; see `write_text`."""
+    make_folder(path.parent, error)
+    return write_text(path, json_text(value) + "\n", error)
+
+
 def finite(value: Any) -> Any:
     """Return JSON values with None for every number that is not finite."""
     if isinstance(value, Mapping):

@@ -55,10 +55,11 @@ def _compare(options: argparse.Namespace) -> int:
         measured, simulated, options.standard, filtered=options.filter, noise=options.noise == "estimate"
     )  # fmt: skip
     if options.output is not None:
-        from activesteer.measured.comparison_page import write_page
+        from activesteer.measured.comparison_page import comparison_page
+        from activesteer.pages import write_page
 
         names = [file.stem for file in options.files]
-        write_page(found, names[:-1], names[-1], options.output)
+        write_page(comparison_page(found, names[:-1], names[-1]), options.output)
     if options.json:
         print_json(found.to_json())
         return 0 if found.inside else 1

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_json, add_output, add_workers
 from activesteer.commands.output import BAD, painted, print_json, print_notes, tell, tell_files
 from activesteer.commands.progress import ProgressBar
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
+from activesteer.files import write_json
+
+if TYPE_CHECKING:
+    from activesteer.validation.measured_file import MeasuredFile
 
 
 def add_to(commands: Any) -> None:
@@ -54,24 +58,25 @@ def _validate(options: argparse.Namespace) -> int:
             print(file)
         print(f"next: activesteer validate {options.new} -o {options.new}/page; then replace the lines marked with <-")
         return 0
-    from activesteer.validation.measured_circle import is_measured
-    from activesteer.validation.measured_file import measured_folder
+    from activesteer.validation.measured_file import measured_folder, read_measured
 
-    circle, folder = is_measured(options.name), measured_folder(options.name)
-    code = not circle and folder is None
-    belongs = {"reference": (code, "another code"), "study": (code, "another code"), "timestep": (code, "another code"),
-               "samples": (circle, "a measured circle")}  # fmt: skip
+    folder = measured_folder(options.name)
+    file = None if folder is None else read_measured(folder)
+    circle = file is not None and file.table.circle is not None
+    belongs = {"reference": (file is None, "another code"), "study": (file is None, "another code"),
+               "timestep": (file is None, "another code"), "samples": (circle, "a measured circle")}  # fmt: skip
     for name, (allowed, other) in belongs.items():
         if getattr(options, name) and not allowed:
             raise ParameterError(f"belongs to a comparison with {other}; {options.name} is none", key=f"--{name}")
-    if circle:
-        return _circle(options)
-    if folder is not None:
-        return _measured(options, folder)
+    return _code(options) if file is None else _measured(options, file)
+
+
+def _code(options: argparse.Namespace) -> int:
+    from activesteer.pages import write_page
     from activesteer.validation import to_json, validate
-    from activesteer.validation.programme import write_json, write_runs
-    from activesteer.validation.study import TITLES, as_text, responses
-    from activesteer.validation.validation_page import write_page
+    from activesteer.validation.programme import write_runs
+    from activesteer.validation.study import TITLES, responses
+    from activesteer.validation.validation_page import comparison_table, study_table, validation_page
 
     with ProgressBar("validate", quiet=options.json) as bar:
         result = validate(
@@ -91,52 +96,41 @@ def _validate(options: argparse.Namespace) -> int:
     files: list[Path] = []
     if options.output is not None:
         files = [
-            write_page(result, options.output / "validation.html", titled),
-            write_json(result, options.output / "validation.json"),
+            write_page(validation_page(result, titled), options.output / "validation.html"),
+            write_json(options.output / "validation.json", to_json(result.comparisons), ParameterError),
             *write_runs(result, options.output / "runs"),
         ]
     status = 1 if result.outside else 0
     if options.json:
         print_json(to_json(result.comparisons) | {key: [row._asdict() for row in rows] for key, rows in tables.items()})
         return status
-    for comparison in result.comparisons:
-        mark = {True: " ", False: "!", None: "~"}[comparison.inside]
-        run, quantity, ours, theirs, error, tolerance = comparison.words()
-        line = f"{mark} {run:13} {quantity:42} {ours:>15} {theirs:>15} {error:>14} {tolerance:>9}"
-        print(painted(line, BAD) if comparison.inside is False else line)
+    for line in comparison_table(result.comparisons).lines():
+        print(painted(line, BAD) if line.startswith("!") else line)
     kept = result.judged - len(result.outside)
     print(f"{kept} of {result.judged} comparisons within tolerance (! outside, ~ no tolerance)")
     if options.output is not None:
         print(f"page: {files[0]}\nruns: {len(result.runs)} CSV files in {options.output / 'runs'}")
     for title, rows in titled.items():
-        print(as_text(title, rows))
+        print("\n".join((title, *study_table(rows).lines())))
     return status
 
 
-def _circle(options: argparse.Namespace) -> int:
-    from activesteer.validation.circle_page import write_circle_page
-    from activesteer.validation.measured_circle import SAMPLES, validate_circle
-
-    with ProgressBar("validate", quiet=options.json) as bar:
-        result = validate_circle(
-            options.name, options.samples or SAMPLES, options.jobs, scheduler=options.scheduler, progress=bar
-        )  # fmt: skip
-    tell(options, result.as_table(), [result.text()])
-    if options.output is not None:
-        tell_files(options, [write_circle_page(result, options.output / "validation.html")], "page")
-    return 0 if result.inside else 1
-
-
-def _measured(options: argparse.Namespace, folder: Path) -> int:
-    from activesteer.validation.measured_file import read_measured
+def _measured(options: argparse.Namespace, file: MeasuredFile) -> int:
+    from activesteer.pages import write_page
+    from activesteer.validation.circle import SAMPLES, validate_circle
     from activesteer.validation.measured_folder import validate_measured
-    from activesteer.validation.measured_page import measured_text, write_measured_page
+    from activesteer.validation.measured_page import measured_page
 
-    file = read_measured(folder)
     with ProgressBar("validate", quiet=options.json) as bar:
-        result = validate_measured(file, options.jobs, scheduler=options.scheduler, progress=bar)
-    print_notes(result.notes)
-    tell(options, result.to_json(), [measured_text(result)])
+        if file.table.circle is None:
+            result = validate_measured(file, options.jobs, scheduler=options.scheduler, progress=bar)
+            print_notes(result.notes)
+        else:
+            result = validate_circle(
+                file, options.samples or SAMPLES, options.jobs, scheduler=options.scheduler, progress=bar
+            )
+    page = measured_page(result)
+    tell(options, result.to_json(), (*page.lines(), "inside" if result.inside else "outside"))
     if options.output is not None:
-        tell_files(options, [write_measured_page(result, options.output / "validation.html")], "page")
+        tell_files(options, [write_page(page, options.output / "validation.html")], "page")
     return 0 if result.inside else 1

@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Final
 
 from activesteer.conventions import RUN_COLOURS, Array
 from activesteer.display_units import quantity_of
-from activesteer.errors import ParameterError
-from activesteer.files import write_text
 from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
-from activesteer.pages import Page, Section, Table, failed, passed, render_page
+from activesteer.pages import Page, Section, Table, failed, passed
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
 
 _EDGE: Final = "#9bbbd4"
 
 
-def write_page(found: Comparison, measured: list[str], simulated: str, path: Path) -> Path:
-    """Write the page and return its path; an existing file is replaced.
+def comparison_page(found: Comparison, measured: list[str], simulated: str) -> Page:
+    """Return the page.
 
     Args:
         found: Result of the comparison.
         measured: Names of the measured runs.
         simulated: Name of the simulated run.
-        path: The HTML file.
 
     Raises:
-        ParameterError: matplotlib is not installed, or the file cannot be written.
+        ParameterError: matplotlib is not installed.
     """
     shifts = ", ".join("unknown" if math.isnan(shift_s) else f"{1e3 * shift_s:.1f} ms" for shift_s in found.shifts_s)
     lead = [
@@ -41,8 +37,7 @@ def write_page(found: Comparison, measured: list[str], simulated: str, path: Pat
     pictures = [as_svg(draw(picture(each, found.standard, len(measured)))) for each in found.quantities]
     heading = "Measured and simulated: " + (passed("inside") if found.inside else failed("outside"))
     sections = [Section(tables=[table]), Section(pictures=pictures), Section("Assumptions", points=assumptions(found))]
-    page = Page(f"activesteer compare: {simulated}", heading, lead, sections)
-    return write_text(path, render_page(page), ParameterError)
+    return Page(f"activesteer compare: {simulated}", heading, lead, sections)
 
 
 def picture(found: Compared, standard: str, runs: int, more: Sequence[Area] = ()) -> Picture:

@@ -28,24 +28,24 @@ def with_motion(time_s: Array, channels: Mapping[str, Array]) -> dict[str, Array
     Returns:
         The channels, with `speed_mps`, `sideslip_rad`, `yaw_rad`, `x_m` and `y_m` where they can be derived.
     """
+    from scipy.integrate import cumulative_trapezoid  # noqa: PLC0415 - slow to import
+
     found = dict(channels)
     if "speed_mps" not in found and "vx_mps" in found:
         found["speed_mps"] = np.hypot(found["vx_mps"], found.get("vy_mps", 0.0))
     if "sideslip_rad" not in found and {"vx_mps", "vy_mps"} <= set(found):
-        moving = np.abs(found["vx_mps"]) > _MOVING_MPS
-        found["sideslip_rad"] = np.where(moving, np.arctan2(found["vy_mps"], np.abs(found["vx_mps"])), 0.0)
+        found["sideslip_rad"] = _sideslip(found["vx_mps"], found["vy_mps"])
     if "yaw_rad" not in found and "yaw_rate_radps" in found:
-        found["yaw_rad"] = _integral(time_s, found["yaw_rate_radps"])
+        found["yaw_rad"] = cumulative_trapezoid(found["yaw_rate_radps"], time_s, initial=0.0)
     if not {"x_m", "y_m"} <= set(found) and {"speed_mps", "yaw_rad"} <= set(found):
         course = found["yaw_rad"] + found.get("sideslip_rad", 0.0)
-        found["x_m"] = _integral(time_s, found["speed_mps"] * np.cos(course))
-        found["y_m"] = _integral(time_s, found["speed_mps"] * np.sin(course))
+        found["x_m"] = cumulative_trapezoid(found["speed_mps"] * np.cos(course), time_s, initial=0.0)
+        found["y_m"] = cumulative_trapezoid(found["speed_mps"] * np.sin(course), time_s, initial=0.0)
     return found
 
 
-def _integral(time_s: Array, values: Array) -> Array:
-    """Integrate by trapezoids from zero."""
-    return np.append(0.0, np.cumsum(np.diff(time_s) * 0.5 * (values[1:] + values[:-1])))
+def _sideslip(vx: Array, vy: Array) -> Array:
+    return np.where(np.abs(vx) > _MOVING_MPS, np.arctan2(vy, np.abs(vx)), 0.0)
 
 
 def at_sensor(run: Recording) -> Recording:
@@ -65,7 +65,7 @@ def at_sensor(run: Recording) -> Recording:
     moved = {
         "vy_mps": vy,
         "speed_mps": np.hypot(vx, vy),
-        "sideslip_rad": np.where(np.abs(vx) > _MOVING_MPS, np.arctan2(vy, np.abs(vx)), 0.0),
+        "sideslip_rad": _sideslip(vx, vy),
         "ay_mps2": run["ay_mps2"] + ahead_m * np.gradient(rate, run.time_s),
         "ax_mps2": run["ax_mps2"] - ahead_m * rate**2,
     }
@@ -83,33 +83,13 @@ def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) ->
     """
     if not {"x_m", "y_m", "yaw_rad"} <= set(channels):
         return None
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import
+
     rows = np.arange(0, len(time_s), max(1, round(0.01 / float(time_s[1] - time_s[0]))))
-    half = 0.5 * channels["yaw_rad"][rows]
-    turn = np.column_stack([np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)])
-    cos, sin = np.cos(2.0 * half), np.sin(2.0 * half)
+    turns = Rotation.from_euler("z", channels["yaw_rad"][rows, None])
     centre = vehicle.data.site("cg").xpos
-    at = np.array([vehicle.data.body(name).xpos for name in vehicle.body_names]) - [centre[0], centre[1], 0.0]
-    how = np.array([vehicle.data.body(name).xquat for name in vehicle.body_names])
-    x_m, y_m = channels["x_m"][rows, None], channels["y_m"][rows, None]
-    positions = np.stack(
-        [
-            x_m + cos[:, None] * at[:, 0] - sin[:, None] * at[:, 1],
-            y_m + sin[:, None] * at[:, 0] + cos[:, None] * at[:, 1],
-            np.broadcast_to(at[:, 2], (len(rows), len(at))),
-        ],
-        axis=-1,
-    )
-    return Poses(time_s[rows], vehicle.body_names, positions, _product(turn[:, None], how[None]))
-
-
-def _product(one: Array, other: Array) -> Array:
-    """Return the product of quaternions w x y z."""
-    w, x, y, z = np.moveaxis(one, -1, 0)
-    W, X, Y, Z = np.moveaxis(other, -1, 0)
-    return np.stack(
-        [
-            w * W - x * X - y * Y - z * Z, w * X + x * W + y * Z - z * Y,
-            w * Y - x * Z + y * W + z * X, w * Z + x * Y - y * X + z * W,
-        ],
-        axis=-1,
-    )  # fmt: skip
+    bodies = [vehicle.data.body(name) for name in vehicle.body_names]
+    path = np.column_stack([channels["x_m"][rows], channels["y_m"][rows], np.zeros(len(rows))])
+    positions = [path + turns.apply(body.xpos - [centre[0], centre[1], 0.0]) for body in bodies]
+    turned = [(turns * Rotation.from_quat(body.xquat, scalar_first=True)).as_quat(scalar_first=True) for body in bodies]
+    return Poses(time_s[rows], vehicle.body_names, np.stack(positions, axis=1), np.stack(turned, axis=1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -10,6 +11,8 @@ from markupsafe import Markup
 
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from activesteer.display_units import parameter_title, typeset
+from activesteer.errors import ParameterError
+from activesteer.files import make_folder, write_text
 from activesteer.pages.model import Page, Section, Table, Text, failed, passed
 from activesteer.version import __version__
 
@@ -17,6 +20,20 @@ from activesteer.version import __version__
 def render_page(page: Page) -> str:
     """Return a page as HTML."""
     return render("document.html", page=page)
+
+
+def write_page(page: Page, path: Path) -> Path:
+    """Write a page as HTML and return its path; an existing file is replaced.
+
+    Args:
+        page: The page.
+        path: The file; its folder is created if it does not exist.
+
+    Raises:
+        ParameterError: the file cannot be written.
+    """
+    make_folder(path.parent, ParameterError)
+    return write_text(path, render_page(page), ParameterError)
 
 
 def render(template: str, **content: Any) -> str:
@@ -57,4 +74,4 @@ def _asset(name: str) -> Markup:
     return Markup(loader.get_source(_environment(), name)[0])
 
 
-__all__ = ["Page", "Section", "Table", "Text", "failed", "passed", "render", "render_page"]
+__all__ = ["Page", "Section", "Table", "Text", "failed", "passed", "render", "render_page", "write_page"]

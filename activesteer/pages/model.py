@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from markupsafe import Markup
@@ -29,6 +30,15 @@ class Table(NamedTuple):
     outside: frozenset[int] = frozenset()
     quiet: frozenset[int] = frozenset()
     kind: str = "findings"
+
+    def lines(self) -> Iterator[str]:
+        """Yield the table as aligned text; `!` marks rows that break a limit, `~` rows that nothing is asked of."""
+        rows = [[_plain(cell) for cell in row] for row in (self.columns, *self.rows)]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for number, row in enumerate(rows, start=-1):
+            mark = "!" if number in self.outside else "~" if number in self.quiet else " "
+            cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+            yield f"{mark} {'  '.join(cells)}".rstrip()
 
 
 class Section(NamedTuple):
@@ -65,6 +75,20 @@ class Page(NamedTuple):
     heading: Text
     lead: Sequence[Text]
     sections: Sequence[Section]
+
+    def lines(self) -> Iterator[str]:
+        """Yield heading, paragraphs and tables as text."""
+        yield from map(_plain, (self.heading, *self.lead))
+        for section in self.sections:
+            if section.texts or section.tables:
+                yield from map(_plain, filter(None, (section.title, *section.texts)))
+            for table in section.tables:
+                yield from table.lines()
+
+
+def _plain(text: Text) -> str:
+    """Return a text without markup, ticks and crosses."""
+    return re.sub("[\N{CHECK MARK}\N{BALLOT X}] ", "", text.striptags() if isinstance(text, Markup) else text)
 
 
 def passed(words: str, *, chip: bool = False) -> Markup:

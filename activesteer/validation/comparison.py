@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from activesteer.files import finite
@@ -45,17 +45,7 @@ class Comparison:
 
     def row(self) -> dict[str, Any]:
         """Return the JSON values."""
-        return {
-            "run": self.run,
-            "quantity": self.quantity,
-            "unit": self.unit,
-            "ours": self.ours,
-            "reference": self.reference,
-            "error": self.error,
-            "tolerance": self.tolerance,
-            "kind": self.kind,
-            "inside": self.inside,
-        }
+        return {**asdict(self), "inside": self.inside}
 
     def words(self) -> tuple[str, str, str, str, str, str]:
         """Return run, quantity, ours, reference, error and tolerance as printed."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
+from activesteer.conventions import Array
 from activesteer.display_units import quantity_of
 from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.validation.kinematics import Curves
@@ -30,6 +30,14 @@ _CROSS: Final = (("rack", "ay"), ("ay", "r"), ("ay", "roll"), ("ay", "beta"))
 _AXIS_NAMES: Final = _SHOWN | {"rack": ("rack [mm] (- steers left)", 1e3)}
 
 
+def _reference(x: Array, y: Array) -> Curve:
+    return Curve(x, y, "reference", _THEIRS, width=2.6)
+
+
+def _ours(x: Array, y: Array) -> Curve:
+    return Curve(x, y, "ours", _OURS, _DASHES)
+
+
 def run_picture(run: str, ours: Table, reference: Table | None) -> Picture:
     """Return a run over time: yaw rate, lateral acceleration, roll, sideslip; with the reference's corridor, if any."""
     panels = []
@@ -40,8 +48,8 @@ def run_picture(run: str, ours: Table, reference: Table | None) -> Picture:
         if (trace := compared.get(quantity.column)) is not None:
             low, high = trace.corridor()
             areas.append(Area(trace.time_s, factor * low, factor * high, "20 ms, 2 %", _CORRIDOR))
-            curves.append(Curve(trace.time_s, factor * trace.reference, "reference", _THEIRS, width=2.6))
-        curves.append(Curve(ours["t"], factor * ours[quantity.column], "ours", _OURS, _DASHES))
+            curves.append(_reference(trace.time_s, factor * trace.reference))
+        curves.append(_ours(ours["t"], factor * ours[quantity.column]))
         panels.append(Panel("time [s]", label, curves, areas=areas))
     return Picture(run, panels, height_in=5.2, shared_legend=True)
 
@@ -51,11 +59,8 @@ def uneven_picture(run: str, ours: Table, reference: Table) -> Picture:
     panels = []
     for column, label, factor in _UNEVEN:
         start = 1e3 * (ours[column][0] - reference[column][0]) if column == "z" else 0.0
-        curves = [
-            Curve(reference["t"], factor * reference[column], "reference", _THEIRS, width=2.6),
-            Curve(ours["t"], factor * ours[column] - start, "ours", _OURS, _DASHES),
-        ]
-        panels.append(Panel("time [s]", label, curves))
+        reference_y, our_y = factor * reference[column], factor * ours[column] - start
+        panels.append(Panel("time [s]", label, [_reference(reference["t"], reference_y), _ours(ours["t"], our_y)]))
     return Picture(run, panels, height_in=7.5, shared_legend=True)
 
 
@@ -70,8 +75,8 @@ def cross_picture(run: str, ours: Table, reference: Table | None) -> Picture:
             around = np.linspace(0.0, math.tau, 17)
             du, dv = RMS_TOLERANCE * np.ptp(u) * np.cos(around), RMS_TOLERANCE * np.ptp(v) * np.sin(around)
             curves += [Curve(u + a, v + b, "", _CORRIDOR, width=2.0) for a, b in zip(du, dv, strict=True)]
-            curves.append(Curve(u, v, "reference", _THEIRS, width=2.6))
-        curves.append(Curve(x_factor * ours[x], y_factor * ours[y], "ours", _OURS, _DASHES))
+            curves.append(_reference(u, v))
+        curves.append(_ours(x_factor * ours[x], y_factor * ours[y]))
         panels.append(Panel(x_label, y_label, curves))
     return Picture(f"{run}: cross-plots", panels, height_in=5.2, shared_legend=True)
 
@@ -81,10 +86,7 @@ def sweep_picture(curves: list[Curves]) -> Picture:
     above = [
         Panel(
             "", "",
-            [
-                Curve(curve.x, curve.reference, "reference", _THEIRS, width=2.6),
-                Curve(curve.x, curve.ours, "ours", _OURS, _DASHES),
-            ],
+            [_reference(curve.x, curve.reference), _ours(curve.x, curve.ours)],
             f"{curve.title}: {curve.label}",
         )
         for curve in curves
@@ -100,8 +102,3 @@ def sweep_picture(curves: list[Curves]) -> Picture:
     return Picture(
         title, above + below, columns=len(curves), width_in=2.6 * len(curves), height_in=4.6, shared_legend=True
     )
-
-
-PerRun = Callable[[str, Table, Table | None], Picture]
-RUN_PICTURES: Final[tuple[PerRun, ...]] = (run_picture, cross_picture)
-"""The pictures of every run."""

@@ -1,24 +1,30 @@
-"""`validation.toml`: measured runs of a car, and what is predicted, fitted and compared.
+"""`validation.toml`: measured runs of a car, or its measured angle on a circle, and what is predicted and compared.
 
 The file stands in the folder of the measured files. Windows are times of these files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from activesteer.config import Range, Source, build, field_in_unit, read_toml
-from activesteer.errors import ActiveSteerError, ParameterError, nearest_names
+from activesteer.conventions import Array
+from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
 from activesteer.files import is_file, is_folder, shown_path, user_path
 from activesteer.measured.comparison import TOLERANCES, Tolerance
-from activesteer.resources import models_dir
-from activesteer.scenario import load_car, resolve
+from activesteer.resources import find_vehicle, models_dir
+from activesteer.scenario import load_car, resolve, value_of
 from activesteer.studies.engine.factors import Factor, read_factor
+from activesteer.validation.axle_changes import Case, ChangeTable
 
 NAME: Final = "validation.toml"
+STEERING: Final = "steering_wheel_rad"
+_OF_RUNS: Final = ("runs", "predict", "factors", "filter", "noise_allowance")
+_OF_CIRCLE: Final = ("effects", "steps", "decisions")
+"""Keys that only measured runs, or only a measured circle, can have."""
 Window = tuple[float, ...]
 """Start and end in the time of the file [s]."""
 
@@ -67,10 +73,40 @@ class PredictTable:
 class IntervalTable:
     """A value with an unknown true value."""
 
-    ends: tuple[float, ...]
-    """Its ends."""
     source: str
-    """Where they come from."""
+    """Where its ends come from."""
+    ends: tuple[float, ...] = ()
+    """Its ends, of a key."""
+    low: tuple[ChangeTable, ...] = ()
+    """Changes to one end, of any name; only with a circle."""
+    high: tuple[ChangeTable, ...] = ()
+    """Changes to the other end."""
+
+
+@dataclass(frozen=True)
+class CircleTable:
+    """A measured circle."""
+
+    radius_m: Annotated[float, Range(1.0)]
+    """Radius of the path of the centre of gravity [m]."""
+    ay_mps2: Annotated[float, Range(0.5)]
+    """Measured lateral acceleration [m/s2]."""
+    steering_wheel_rad: tuple[float, ...]
+    """Size of the measured steering wheel angle, one value for each lap."""
+    spread: dict[str, Annotated[float, Range(1e-12)]]
+    """`radius_m`, `ay_mps2` or a key of the car -> standard deviation from lap to lap."""
+
+
+@dataclass(frozen=True)
+class StepTable:
+    """A step from the car without effects to the car of the file."""
+
+    name: str
+    """Its name."""
+    origin: Literal["geometry", "measured", "assumed"]
+    """Where its effects come from. The main prediction ends before the last assumed steps."""
+    adds: tuple[str, ...] = ()
+    """Effects that it adds."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +115,11 @@ class MeasuredTable:
 
     vehicle: str
     """Name or file of the car."""
-    runs: tuple[RunTable, ...]
+    runs: tuple[RunTable, ...] = ()
     """The measured runs."""
-    quantities: dict[str, QuantityTable]
+    circle: CircleTable | None = None
+    """The measured circle, in place of runs."""
+    quantities: dict[str, QuantityTable] = field(default_factory=dict)
     """Channel, in any unit -> how it is compared."""
     title: str = ""
     """Title of the page."""
@@ -97,6 +135,12 @@ class MeasuredTable:
     """Factors of the fit, with ranges as in a study."""
     intervals: dict[str, IntervalTable] = field(default_factory=dict)
     """Key -> ends of its unknown value, for the band around the prediction."""
+    effects: dict[str, tuple[ChangeTable, ...]] = field(default_factory=dict)
+    """With a circle: effect -> changes that remove it."""
+    steps: tuple[StepTable, ...] = ()
+    """With a circle: steps from the car without effects to the car of the file."""
+    decisions: dict[str, tuple[ChangeTable, ...]] = field(default_factory=dict)
+    """With a circle: open decision -> changes that reverse it."""
     assumptions: tuple[str, ...] = ()
     """What was assumed, one sentence each."""
 
@@ -114,6 +158,8 @@ class MeasuredFile:
         noise: Channel -> standard deviation, SI.
         predict_channels: Channels that determine the free factors of the prediction.
         source: For error messages.
+        curves: Axle -> its curves in the vehicle file; empty if its axles have links.
+        nominal: Key of the car that varies from lap to lap -> its value in the file.
     """
 
     table: MeasuredTable
@@ -124,6 +170,52 @@ class MeasuredFile:
     noise: dict[str, float]
     predict_channels: tuple[str, ...]
     source: Source
+    curves: dict[str, Any] = field(default_factory=dict)
+    nominal: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def case(self) -> Case:
+        """The car of the file on the measured circle."""
+        circle = self.table.circle
+        assert circle is not None
+        values = {"radius_m": circle.radius_m, "ay_mps2": circle.ay_mps2, "zero_deg": 0.0, "body_roll": 0.0}
+        return Case(self.vehicle, values, self.table.overrides)
+
+    def changed(self, case: Case, changes: Sequence[ChangeTable]) -> Case:
+        """Return a case with changes.
+
+        Raises:
+            ParameterError: a change does not fit the car.
+        """
+        for change in changes:
+            case = self.without(case, change.without).changed_by(change, self.curves)
+        return case
+
+    def without(self, case: Case, effects: Sequence[str]) -> Case:
+        """Return a case without effects.
+
+        Raises:
+            ParameterError: there is no such effect, or it is no effect of the car.
+        """
+        for name in effects:
+            if name not in self.table.effects:
+                raise ParameterError(
+                    f"there is no effect {shown(name)}; {nearest_names(name, self.table.effects)}", value=name
+                )
+            case = self.changed(case, self.table.effects[name])
+        return case
+
+    def drawn(self, case: Case, draw: Array) -> Case:
+        """Return a case of another lap from standard normal numbers, one for each key of `circle.spread`."""
+        circle = self.table.circle
+        assert circle is not None
+        for (key, spread), number in zip(circle.spread.items(), draw.tolist(), strict=True):
+            if key in case.circle:
+                case = case._replace(circle=case.circle | {key: case.circle[key] + spread * number})
+            else:
+                nominal = case.overrides.get(key, self.nominal[key])
+                case = case._replace(overrides=case.overrides | {key: nominal + spread * number})
+        return case
 
 
 def read_measured(folder: Path) -> MeasuredFile:
@@ -132,33 +224,91 @@ def read_measured(folder: Path) -> MeasuredFile:
     Raises:
         ParameterError: the file cannot be read, or a key or value is wrong; the error names file, key and line.
     """
-    path = folder / NAME
-    given, source = read_toml(path)
+    given, source = read_toml(folder / NAME)
     table = build(MeasuredTable, given, source)
-    if not table.runs:
-        raise source.fail(("runs",), "at least one measured run [[runs]] is needed")
-    for number, run in enumerate(table.runs):
-        _check_run(run, folder, source, ("runs", str(number)), [other.name for other in table.runs[:number]])
-    if not any(run.check_s for run in table.runs):
-        raise source.fail(("runs",), "a verdict needs a run with check_s = [start, end]")
+    foreign, home = (_OF_CIRCLE, "[circle]") if table.circle is None else (_OF_RUNS, "[[runs]]")
+    if wrong := [key for key in foreign if key in given]:
+        raise source.fail((wrong[0],), f"belongs to {home}, and not here")
     own = folder / table.vehicle
     vehicle = str(own) if table.vehicle.endswith(".toml") or "/" in table.vehicle else table.vehicle
     try:
         names = [channel.name for channel in load_car(vehicle).on().channels.channels]
     except ActiveSteerError as reason:
         raise source.fail(("vehicle",), reason.problem, table.vehicle, reason.allowed) from reason
-    tolerances, noise = _quantities(table, source, names)
-    channels = tuple(_channel(key, noise, source, ("predict", "channels")) for key in table.predict.channels)
-    factors = _factors(table, vehicle, source)
-    if factors and not noise:
-        raise source.fail(("quantities",), "a fit needs a channel with noise = its standard deviation")
-    for key, interval in table.intervals.items():
-        if len(interval.ends) != 2 or interval.ends[0] >= interval.ends[1]:
-            raise source.fail(("intervals", key), "ends = [low, high] is needed", interval.ends)
-        _check_key(vehicle, key, interval.ends[0], source, ("intervals", key))
     for key, value in table.overrides.items():
         _check_key(vehicle, key, value, source, ("overrides", key))
-    return MeasuredFile(table, folder, vehicle, factors, tolerances, noise, channels or tuple(noise), source)
+    file = MeasuredFile(table, folder, vehicle, (), *_quantities(table, source, names), (), source)
+    return _with_runs(file) if table.circle is None else _with_circle(file, table.circle)
+
+
+def _with_runs(file: MeasuredFile) -> MeasuredFile:
+    """Check runs, factors and intervals."""
+    table, source = file.table, file.source
+    if not table.runs:
+        raise source.fail(("runs",), "at least one measured run [[runs]], or a [circle], is needed")
+    for number, run in enumerate(table.runs):
+        _check_run(run, file.folder, source, ("runs", str(number)), [other.name for other in table.runs[:number]])
+    if not any(run.check_s for run in table.runs):
+        raise source.fail(("runs",), "a verdict needs a run with check_s = [start, end]")
+    channels = tuple(_channel(key, file.noise, source, ("predict", "channels")) for key in table.predict.channels)
+    factors = _factors(table, file.vehicle, source)
+    if factors and not file.noise:
+        raise source.fail(("quantities",), "a fit needs a channel with noise = its standard deviation")
+    for key, interval in table.intervals.items():
+        _check_ends(interval, source, key)
+        _check_key(file.vehicle, key, interval.ends[0], source, ("intervals", key))
+    return replace(file, factors=factors, predict_channels=channels or tuple(file.noise))
+
+
+def _with_circle(file: MeasuredFile, circle: CircleTable) -> MeasuredFile:
+    """Check circle, effects, steps, decisions and intervals; an interval of a key becomes changes."""
+    table, source = file.table, file.source
+    if set(file.tolerances) != {STEERING}:
+        raise source.fail(("quantities",), "a circle compares steering_wheel_deg alone", list(table.quantities))
+    if len(set(circle.steering_wheel_rad)) < 2 or not circle.spread:
+        raise source.fail(
+            ("circle",), "two different angles, and a spread of at least one value, are needed for distributions"
+        )
+    curves = read_toml(find_vehicle(file.vehicle))[0].get("curves", {})
+    file = replace(file, curves=curves)
+    nominal = {}
+    for key in set(circle.spread) - set(file.case.circle):
+        nominal[key] = value = _value(file.vehicle, key, source, ("circle", "spread", key))
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise source.fail(("circle", "spread", key), "is no number that could vary", key)
+    intervals = {}
+    for key, interval in table.intervals.items():
+        if interval.low or interval.high:
+            intervals[key] = interval
+            continue
+        _check_ends(interval, source, key)
+        own = file.case.circle.get(key)
+        low, high = (
+            (ChangeTable(set={key: end}),) if own is None else (ChangeTable(add={key: end - own}),)
+            for end in interval.ends
+        )
+        intervals[key] = replace(interval, low=low, high=high)
+    file = replace(file, nominal=nominal, table=replace(table, intervals=intervals))
+    lists = {("effects", name): changes for name, changes in table.effects.items()}
+    lists |= {("decisions", name): changes for name, changes in table.decisions.items()}
+    lists |= {("intervals", name): (*each.low, *each.high) for name, each in intervals.items()}
+    lists |= {("steps", str(number)): (ChangeTable(without=each.adds),) for number, each in enumerate(table.steps)}
+    for where, changes in lists.items():
+        try:
+            file.changed(file.case, changes)
+        except ActiveSteerError as reason:
+            raise source.fail(where, reason.problem, reason.value, reason.allowed) from reason
+        except RecursionError:
+            raise source.fail(where, "contains itself") from None
+        for change in changes:
+            for key, value in change.set.items():
+                _check_key(file.vehicle, key, value, source, where)
+    return file
+
+
+def _check_ends(interval: IntervalTable, source: Source, key: str) -> None:
+    if len(interval.ends) != 2 or interval.ends[0] >= interval.ends[1] or interval.low or interval.high:
+        raise source.fail(("intervals", key), "ends = [low, high] is needed", interval.ends)
 
 
 def _factors(table: MeasuredTable, vehicle: str, source: Source) -> tuple[Factor, ...]:
@@ -206,9 +356,10 @@ def _quantities(
     """Return tolerances and noise by channel, SI."""
     tolerances: dict[str, Tolerance] = {}
     noise: dict[str, float] = {}
-    if not table.quantities:
+    quantities = table.quantities or ({} if table.circle is None else {STEERING: QuantityTable()})
+    if not quantities:
         raise source.fail(("quantities",), "at least one channel is needed")
-    for key, given in table.quantities.items():
+    for key, given in quantities.items():
         where = ("quantities", key)
         name = _channel(key, names, source, where)
         factor = field_in_unit(key, names)[1]
@@ -232,11 +383,19 @@ def _check_key(
     vehicle: str, key: str, value: Any, source: Source, where: tuple[str, ...], *, relative: bool = False
 ) -> None:
     """Refuse a key that neither the car nor a repeated measurement has."""
+    _value(vehicle, key, source, where, {} if relative else {key: value}, value)
+
+
+def _value(
+    vehicle: str, key: str, source: Source, where: tuple[str, ...], overrides: Mapping[str, Any] | None = None,
+    given: Any = None,
+) -> Any:  # fmt: skip
+    """Return the value of a key of the car or of a repeated measurement."""
     inputs: Mapping[str, Any] = {"kind": "open_loop", "name": "inputs", "duration_s": 1.0, "speed_mps": 20.0}
     try:
-        resolve(inputs, vehicle, {} if relative else {key: value})
+        return value_of(resolve(inputs, vehicle, overrides or {}), key)
     except ActiveSteerError as reason:
-        raise source.fail(where, reason.problem, value, reason.allowed) from reason
+        raise source.fail(where, reason.problem, given, reason.allowed) from reason
 
 
 def measured_folder(name: str) -> Path | None:

@@ -1,67 +1,51 @@
-"""A validation against measured runs as printed lines, and as one HTML page."""
+"""A validation against measured runs or a measured circle as a page, which is printed or written as HTML."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import Final
 
-from activesteer.display_units import quantity_of
-from activesteer.errors import ParameterError
-from activesteer.files import make_folder, write_text
+import numpy as np
+from markupsafe import Markup
+
+from activesteer.conventions import RUN_COLOURS
+from activesteer.display_units import quantity_of, typeset
 from activesteer.measured.comparison import words
 from activesteer.measured.comparison_page import picture
 from activesteer.measured.fit_page import correlation_table, parameter_table
 from activesteer.measured.fit_result import Fit, rests_on
-from activesteer.pages import Page, Section, Table, failed, passed, render_page
-from activesteer.plotting import Area, Picture, as_svg, draw
+from activesteer.pages import Page, Section, Table, Text, failed, passed
+from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.validation.circle import CircleValidation
+from activesteer.validation.measured_file import STEERING
 from activesteer.validation.measured_folder import Band, MeasuredValidation, Part
 
 _HEAD: Final = ["run", "window", "quantity", "rms of the residual", "tolerance", "share inside", ""]
 _BAND_COLOUR: Final = "#b3a369"
+_ORIGINS: Final = {"geometry": "#8a9097", "measured": RUN_COLOURS[2], "assumed": RUN_COLOURS[1]}
+"""Origin of a step -> colour."""
 
 
-def measured_text(result: MeasuredValidation) -> str:
-    """Return the text that the command prints."""
-    lines = [result.file.table.title or result.file.table.vehicle]
-    for stage, found in _stages(result):
-        lines.append(f"{stage}: {_free(found)}")
-        for one in result.parts:
-            if one.stage == stage:
-                run, part, label, residual, tolerance, share, verdict = _row(one)
-                lines.append(f"  {run} {part:5} {label:22} rms {residual:>12}  {tolerance:>34}  {share:>7} {verdict}")
-        if found is not None:
-            lines += [f"  {one.key:40} {one.words}" for one in found.parameters]
-            lines += [f"  correlation {value:+.2f}  {one}, {other}" for one, other, value in found.pairs(0.5)]
-            lines += [f"  ! {note}" for note in found.notes]
-    for band in result.bands:
-        lines.append("band of the intervals: " + ", ".join(_band_row(band)[1:]))
-    lines += [f"  {head:42} {effect}" for head, effect in _end_rows(result)]
-    lines.append("inside" if result.inside else "outside")
-    return "\n".join(lines)
-
-
-def write_measured_page(result: MeasuredValidation, path: Path) -> Path:
-    """Write the page and return its path; an existing file is replaced.
-
-    Args:
-        result: The result.
-        path: The HTML file.
+def measured_page(result: MeasuredValidation | CircleValidation) -> Page:
+    """Return the page of a result.
 
     Raises:
-        ParameterError: matplotlib is not installed, or the file cannot be written.
+        ParameterError: matplotlib is not installed.
     """
-    make_folder(path.parent, ParameterError)
-    return write_text(path, render_page(_page(result)), ParameterError)
-
-
-def _page(result: MeasuredValidation) -> Page:
     table = result.file.table
+    lead, sections = _circle(result) if isinstance(result, CircleValidation) else _runs(result)
+    sections.append(Section("Assumptions", points=result.assumptions))
+    return Page(f"activesteer validate: {table.vehicle}", table.title or table.vehicle, lead, sections)
+
+
+def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
     kept = sum(one.compared.inside for one in result.judged)
     verdict = (passed if result.inside else failed)(f"{kept} of {len(result.judged)}")
     stage = "prediction" if result.fitted is None else "fitted car"
-    lead = [verdict + f" quantities of the {stage} keep their tolerance in the check windows, which no fit has seen."]
-    sections = []
+    lead: list[Text] = [
+        verdict + f" quantities of the {stage} keep their tolerance in the check windows, which no fit has seen."
+    ]
+    sections: list[Section] = []
     for name, found in _stages(result):
         shown = [one for one in result.parts if one.stage == name]
         outside = frozenset(number for number, one in enumerate(shown) if not one.compared.inside)
@@ -71,8 +55,8 @@ def _page(result: MeasuredValidation) -> Page:
             if len(found.parameters) > 1:
                 tables.append(correlation_table(found))
         pictures = [as_svg(draw(_picture(result, one))) for one in shown if one.part == "check"]
-        points = [] if found is None else [*found.notes, *rests_on(found)]
-        sections.append(Section(name.capitalize(), [_free(found)], pictures, tables, points))
+        notes, points = ([], []) if found is None else ([f"! {note}" for note in found.notes], rests_on(found))
+        sections.append(Section(name.capitalize(), [_free(found), *notes], pictures, tables, points))
     if result.bands:
         text = (
             "The band contains the prediction with each value at either end of its interval. Before that, the free "
@@ -83,11 +67,9 @@ def _page(result: MeasuredValidation) -> Page:
         )
         ends = Table("", ["interval", "rms change of the prediction"], _end_rows(result))
         sections.append(Section("Band of the intervals", [text], tables=[bands, ends]))
-    sections.append(Section("Assumptions", points=result.assumptions))
     if result.notes:
         sections.append(Section("Notes of the import", points=result.notes))
-    title = table.title or table.vehicle
-    return Page(f"activesteer validate: {table.vehicle}", title, lead, sections)
+    return lead, sections
 
 
 def _stages(result: MeasuredValidation) -> Iterator[tuple[str, Fit | None]]:
@@ -130,3 +112,81 @@ def _picture(result: MeasuredValidation, one: Part) -> Picture:
     factor = quantity_of(one.compared.channel).factor
     area = Area(one.compared.x, factor * band.low, factor * band.high, "band of the intervals", _BAND_COLOUR, 0.25)
     return picture(one.compared, "iso19365", 1, [area])
+
+
+def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
+    ours, measured = result.samples_deg, result.measured_deg
+    lead: list[Text] = [
+        Markup("The mean difference of <b>{} deg</b> is {} the tolerance of {} deg ({}).").format(
+            typeset(f"{result.difference_deg:+.1f}"), passed("inside") if result.inside else failed("outside"),
+            f"{result.tolerance_deg:.1f}", result.file.tolerances[STEERING].source,
+        ),
+        f"Area metric {result.area_metric_deg:.1f} deg, overlap of the distributions {100.0 * result.overlap:.0f} %.",
+    ]  # fmt: skip
+    rows = [
+        ("measured", f"{measured.mean():.1f} +- {measured.std(ddof=1):.1f}", f"{len(measured)} values"),
+        ("predicted", f"{ours.mean():.1f} +- {ours.std(ddof=1):.1f}", f"{len(ours)} samples, nominal "
+         f"{result.nominal_deg:.1f}"),
+        ("predicted, with assumed effects", f"{result.assumed_deg:.1f}", "nominal"),
+    ]  # fmt: skip
+    sections = [Section("", (), [as_svg(draw(_distributions(result)))], [_table(["steering wheel", "deg", ""], rows)])]
+    if result.ends:
+        text = (
+            f"From {result.low_deg:.1f} to {result.high_deg:.1f} deg, {result.high_deg - result.low_deg:.1f} deg wide: "
+            f"{result.measured_inside} of {len(measured)} measured angles lie inside. Values with one unknown true "
+            "value are intervals; the others vary from lap to lap. The table gives the second prediction with the ends "
+            "of each interval alone."
+        )
+        ends = [(name, f"{low:.1f}", f"{high:.1f}", source) for name, source, low, high in result.ends]
+        head = ["interval", "low end, deg", "high end, deg", "source"]
+        sections.append(Section("Probability box", [text], tables=[_table(head, ends)]))
+    if result.steps:
+        steps = [(name, origin, f"{angle:.1f}") for name, origin, angle in result.steps]
+        sections.append(
+            Section(
+                "From geometry to the second prediction", (), [as_svg(draw(_waterfall(result)))],
+                [_table(["with", "origin", "deg"], steps)],
+            )
+        )  # fmt: skip
+    for title, head, angles in (
+        ("Decrease of the second prediction without one effect", "effect",
+         {name: f"{result.assumed_deg - angle:+.1f}" for name, angle in result.effects.items()}),
+        ("Second prediction with one open decision reversed", "decision",
+         {name: f"{angle:.1f}" for name, angle in result.decisions.items()}),
+    ):  # fmt: skip
+        if angles:
+            sections.append(Section(title, tables=[_table([head, "deg"], list(angles.items()))]))
+    return lead, sections
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[Text]]) -> Table:
+    return Table("", columns, rows, kind="comparisons")
+
+
+def _waterfall(result: CircleValidation) -> Picture:
+    """Draw the angle of each step as a bar from the angle of the step before."""
+    measured = float(result.measured_deg.mean())
+    areas, before = [], min(measured, result.steps[0][2])
+    labels = {origin: origin for _, origin, _ in result.steps}
+    for place, (_, origin, angle) in enumerate(result.steps):
+        low, high = sorted((before, angle))
+        areas.append(Area([place + 0.1, place + 0.9], low, high, labels.pop(origin, ""), _ORIGINS[origin]))
+        before = angle
+    line = Curve([0.0, float(len(result.steps))], [measured, measured], "measured mean", "#777777")
+    panel = Panel("step of the table", "steering wheel angle [deg]", [line], areas=areas)
+    return Picture("", [panel], width_in=7.0, height_in=3.2)
+
+
+def _distributions(result: CircleValidation) -> Picture:
+    middle = float(result.measured_deg.mean())
+    tolerance = [middle - result.tolerance_deg, middle + result.tolerance_deg]
+    shown = [(result.measured_deg, "measured", "#777777"), (result.samples_deg, "predicted", RUN_COLOURS[2])]
+    if result.ends:
+        shown += [(result.lower_deg, "probability box", RUN_COLOURS[1]), (result.upper_deg, "", RUN_COLOURS[1])]
+    curves = []
+    for values, label, colour in shown:
+        fraction = np.repeat(np.arange(len(values) + 1) / len(values), 2)[1:-1]
+        curves.append(Curve(np.repeat(np.sort(values), 2), fraction, label, colour))
+    area = Area(tolerance, 0.0, 1.0, "tolerance", "#777777", 0.15)
+    panel = Panel("steering wheel angle [deg]", "cumulative fraction", curves, areas=[area])
+    return Picture("", [panel], width_in=7.0, height_in=3.2)

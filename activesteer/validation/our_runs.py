@@ -143,15 +143,21 @@ def _compare(run: str, trace: Trace) -> list[Comparison]:
             relative(run, f"{quantity.word}_{word}", quantity.unit, sign * ours[1], sign * theirs[1], PEAK_TOLERANCE)
         )
         rows.append(absolute(run, f"{quantity.word}_{word}_time", "s", ours[0], theirs[0], TIME_TOLERANCE_S))
-    rms = math.sqrt(float(np.trapezoid((trace.ours - trace.reference) ** 2, t)) / float(t[-1] - t[0])) / trace.span
-    worst = int(np.abs(trace.ours - trace.reference).argmax())
-    rows.append(
-        Comparison(
-            run, f"{quantity.word}_rms_of_peak_to_peak", quantity.unit, float(trace.ours[worst]),
-            float(trace.reference[worst]), rms, RMS_TOLERANCE, "relative",
-        )
-    )  # fmt: skip
-    return rows
+    return [*rows, compare_rms(run, quantity.word, quantity.unit, t, trace.ours, trace.reference)]
+
+
+def compare_rms(
+    run: str, word: str, unit: str, time_s: Array, ours: Array, reference: Array, limit: float | None = None
+) -> Comparison:
+    """Compare the rms of the difference with `RMS_TOLERANCE` of peak to peak, or with an absolute limit."""
+    error = ours - reference
+    rms = math.sqrt(float(np.trapezoid(error**2, time_s)) / float(time_s[-1] - time_s[0]))
+    worst = int(np.abs(error).argmax())
+    at = float(ours[worst]), float(reference[worst])
+    if limit is not None:
+        return Comparison(run, f"{word}_rms", unit, *at, rms, limit)
+    span = float(np.ptp(reference))
+    return Comparison(run, f"{word}_rms_of_peak_to_peak", unit, *at, rms / span, RMS_TOLERANCE, "relative")
 
 
 def _peak(t: Array, values: Array) -> tuple[float, float] | None:

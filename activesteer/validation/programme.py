@@ -11,12 +11,12 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
-from activesteer.files import json_text, make_folder, replacing, shown_path, write_text
+from activesteer.files import make_folder, replacing, shown_path
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.validation.comparison import Comparison, to_json
+from activesteer.validation.comparison import Comparison
 from activesteer.validation.kinematics import Curves, compare_kinematics
 from activesteer.validation.our_runs import compare_run
 from activesteer.validation.reference import ReferenceData, Table, read_table
@@ -147,24 +147,6 @@ def _start_speed_mps(data: ReferenceData, run: UnevenRun, timestep_s: float) -> 
     short = run.maneuver(wanted) | {"duration_s": 0.01}
     settled = reference_columns(simulate(short, vehicle=data.vehicle, timestep_s=timestep_s), data.point_from_cg_m)
     return wanted**2 / float(settled["vx"][0])
-
-
-def write_json(result: Validation, path: Path) -> Path:
-    """Write the comparisons as JSON; see `comparison.to_json`.
-
-    Args:
-        result: Result of the comparison.
-        path: The file.
-
-    Returns:
-        The path.
-
-    Raises:
-        ParameterError: the file cannot be written.
-    """
-    make_folder(path.parent, ParameterError)
-    text = json_text(to_json(result.comparisons))
-    return write_text(path, text + "\n", ParameterError)
 
 
 def write_runs(result: Validation, folder: Path) -> list[Path]:

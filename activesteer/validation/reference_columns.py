@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.recording import Recording
@@ -34,7 +35,7 @@ def reference_columns(recording: Recording, point_from_cg_m: tuple[float, float,
     r = recording
     t = r.time_s
     yaw, pitch, roll = r["yaw_rad"], r["pitch_rad"], r["roll_rad"]
-    to_heading = _tilt(roll, pitch)
+    to_heading = Rotation.from_euler("YX", np.column_stack([pitch, roll])).as_matrix()  # from chassis axes
     arm = to_heading @ np.asarray(point_from_cg_m)
     sin_roll, cos_roll = np.sin(roll), np.cos(roll)
     p, q = r["roll_rate_radps"], r["pitch_rate_radps"]
@@ -63,20 +64,6 @@ def reference_columns(recording: Recording, point_from_cg_m: tuple[float, float,
         for name, channel in _WHEEL.items():
             columns[f"{name}_{corner.upper()}"] = r[f"{corner}_{channel}"]
     return columns
-
-
-def _tilt(roll: Array, pitch: Array) -> Array:
-    """Return the rotation from chassis axes to the heading frame, shape (n, 3, 3)."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    zero = np.zeros_like(roll)
-    return np.stack(
-        [
-            np.stack([cp, sp * sr, sp * cr], axis=-1),
-            np.stack([zero, cr, -sr], axis=-1),
-            np.stack([-sp, cp * sr, cp * cr], axis=-1),
-        ],
-        axis=-2,
-    )
 
 
 def _accelerations(t: Array, yaw: Array, east: Array, north: Array) -> dict[str, Array]:

@@ -107,22 +107,3 @@ def _response(data: ReferenceData, name: str, overrides: Mapping[str, Any], step
         float(slip.min()),
         float(turn * columns["roll"][end].mean()),
     )
-
-
-def as_text(title: str, rows: list[Response]) -> str:
-    """Return a table of responses and their differences from the first response."""
-    lines = [title, f"  {'':34} {'yaw rate':>18} {'peak':>18} {'peak at':>16} {'sideslip':>18} {'peak':>18}"]
-    for row in rows:
-        change = row.relative_to(rows[0])
-        cells = [
-            f"{value:9.5f} ({100 * change[key]:+6.2f} %)"
-            for key, value in (
-                ("steady_yaw_rate_radps", row.steady_yaw_rate_radps),
-                ("peak_yaw_rate_radps", row.peak_yaw_rate_radps),
-                ("steady_sideslip_rad", row.steady_sideslip_rad),
-                ("peak_sideslip_rad", row.peak_sideslip_rad),
-            )
-        ]
-        when = f"{row.peak_time_s:.3f} s ({1e3 * change['peak_time_s']:+.0f} ms)"
-        lines.append(f"  {row.name:34} {cells[0]:>18} {cells[1]:>18} {when:>16} {cells[2]:>18} {cells[3]:>18}")
-    return "\n".join(lines)

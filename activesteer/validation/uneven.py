@@ -18,7 +18,7 @@ from activesteer.conventions import Array
 from activesteer.errors import ParameterError, shown
 from activesteer.files import read_text, shown_path
 from activesteer.validation.comparison import Comparison
-from activesteer.validation.our_runs import RMS_TOLERANCE
+from activesteer.validation.our_runs import compare_rms
 from activesteer.validation.reference import Table
 
 ROADS: Final = "roads.json"
@@ -94,17 +94,11 @@ class UnevenRun(NamedTuple):
         # The cars drift apart by centimetres, so on a bank their heights differ: ours is taken where the other car is.
         there = self._bank_m(theirs["x"], theirs["y"] + _ASIDE_M)
         own["z"] = own["z"] - own["z"][0] + theirs["z"][0] + there - self._bank_m(own["x"], own["y"])
-        return [self._row(time, own[column], theirs[column], limit) for column, limit in _LIMITS.items()]
-
-    def _row(self, time: Array, ours: Array, theirs: Array, limit: _Limit) -> Comparison:
-        span, error = float(np.ptp(theirs)), ours - theirs
-        rms = math.sqrt(float(np.trapezoid(error**2, time) / (time[-1] - time[0])))
-        worst = int(np.abs(error).argmax())
-        at = float(ours[worst]), float(theirs[worst])
-        if span < limit.least_range:
-            return Comparison(self.name, f"{limit.word}_rms", limit.unit, *at, rms, limit.limit)
-        name = f"{limit.word}_rms_of_peak_to_peak"
-        return Comparison(self.name, name, limit.unit, *at, rms / span, RMS_TOLERANCE, "relative")
+        return [
+            compare_rms(self.name, limit.word, limit.unit, time, own[column], theirs[column],
+                        limit.limit if float(np.ptp(theirs[column])) < limit.least_range else None)
+            for column, limit in _LIMITS.items()
+        ]  # fmt: skip
 
     def _bank_m(self, x: Array, y: Array) -> Array:
         bank = _table(self.road.get("bank", {}), self.name, "bank")

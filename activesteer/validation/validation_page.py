@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Final
 
-from activesteer.errors import ParameterError
-from activesteer.files import make_folder, write_text
-from activesteer.pages import Page, Section, Table, Text, failed, passed, render_page
+from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import as_svg, draw
 from activesteer.validation.comparison import Comparison
-from activesteer.validation.figures import RUN_PICTURES, sweep_picture, uneven_picture
+from activesteer.validation.figures import cross_picture, run_picture, sweep_picture, uneven_picture
 from activesteer.validation.programme import Validation
 from activesteer.validation.study import Response
 
@@ -25,24 +22,16 @@ _STUDY_COLUMNS: Final = {
 }
 
 
-def write_page(result: Validation, path: Path, studies: Mapping[str, list[Response]] | None = None) -> Path:
-    """Write the page and return its path; an existing file is replaced.
+def validation_page(result: Validation, studies: Mapping[str, list[Response]] | None = None) -> Page:
+    """Return the page.
 
     Args:
         result: Result of the comparison.
-        path: The HTML file.
         studies: Further tables by their titles; each compares its rows with its first row.
 
     Raises:
-        ParameterError: matplotlib is not installed, or the file cannot be written.
+        ParameterError: matplotlib is not installed.
     """
-    text = page(result, studies or {})
-    make_folder(path.parent, ParameterError)
-    return write_text(path, text, ParameterError)
-
-
-def page(result: Validation, studies: Mapping[str, list[Response]]) -> str:
-    """Return the page as HTML; see `write_page`."""
     reference, within = result.reference, result.judged - len(result.outside)
     count = (failed if result.outside else passed)(str(within))
     lead = [
@@ -50,13 +39,13 @@ def page(result: Validation, studies: Mapping[str, list[Response]]) -> str:
         "reported without a tolerance. Corridors: 20 ms in time, 2 % of peak to peak in amplitude, in the manner of "
         "ISO 19364 and ISO 19365.",
     ]
-    sections = [Section("Outside", tables=[_comparisons(result.outside)])] if result.outside else []
+    sections = [Section("Outside", tables=[comparison_table(result.outside)])] if result.outside else []
     if reference.notes:
         sections.append(Section("Differences, and which code is right", points=reference.notes))
-    sections += [Section(title, tables=[_study(rows)]) for title, rows in studies.items()]
+    sections += [Section(title, tables=[study_table(rows)]) for title, rows in (studies or {}).items()]
     sections += _runs(result)
     title = f"activesteer validate: {reference.name}"
-    return render_page(Page(title, f"{reference.vehicle} against {reference.code}", lead, sections))
+    return Page(title, f"{reference.vehicle} against {reference.code}", lead, sections)
 
 
 def _runs(result: Validation) -> list[Section]:
@@ -70,22 +59,23 @@ def _runs(result: Validation) -> list[Section]:
     for run, rows in by_run.items():
         if run not in result.runs:
             pictures = [as_svg(draw(sweep_picture(sweeps[run])))] if run in sweeps else []
-            sections.append(Section(run, pictures=pictures, tables=[_comparisons(rows)]))
+            sections.append(Section(run, pictures=pictures, tables=[comparison_table(rows)]))
     for run, ours in result.runs.items():
         reference = result.references.get(run)
         if reference is not None and "ay" not in reference:
             pictures = [as_svg(draw(uneven_picture(run, ours, reference)))]
         else:
-            pictures = [as_svg(draw(picture(run, ours, reference))) for picture in RUN_PICTURES]
+            pictures = [as_svg(draw(picture(run, ours, reference))) for picture in (run_picture, cross_picture)]
         texts = (
             ["The reference of this run is not known here; the page shows our run alone."] if reference is None else []
         )
-        tables = [_comparisons(by_run[run])] if run in by_run else []
+        tables = [comparison_table(by_run[run])] if run in by_run else []
         sections.append(Section(run, texts, pictures, tables))
     return sections
 
 
-def _comparisons(rows: Sequence[Comparison]) -> Table:
+def comparison_table(rows: Sequence[Comparison]) -> Table:
+    """Return comparisons with their verdicts."""
     verdicts: dict[bool | None, Text] = {None: "", True: passed("inside"), False: failed("outside")}
     return Table(
         "",
@@ -97,7 +87,7 @@ def _comparisons(rows: Sequence[Comparison]) -> Table:
     )
 
 
-def _study(rows: Sequence[Response]) -> Table:
+def study_table(rows: Sequence[Response]) -> Table:
     """Return the values of each row, and their differences from the first row."""
     cells = []
     for row in rows:

@@ -8,51 +8,134 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from activesteer.config import read_toml
-from activesteer.errors import ParameterError
+from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.resources import find_vehicle, models_dir
-from activesteer.validation.circle_box import Box, Case, intervals, measured_only
-from activesteer.validation.circle_variations import DECISIONS, EFFECTS
-from activesteer.validation.measured_circle import CircleResult, is_measured, steering_wheel_deg, validate_circle
+from activesteer.validation.axle_changes import Case
+from activesteer.validation.circle import CircleValidation, steering_wheel_deg, validate_circle
+from activesteer.validation.measured_file import MeasuredFile, read_measured
+from activesteer.validation.measured_page import measured_page
 from tests.raising import raises
 
+FOLDER = models_dir() / "reference" / "tesla_model_s"
+KC_OFF = [
+    f"{effect}, {axle}"
+    for effect in ("toe over side force", "roll steer", "static toe", "camber over side force")
+    for axle in ("rear", "front")
+    if (effect, axle) != ("static toe", "front")
+]
+"""Effects that the two-track model of the source does not have; its camber over travel is in the car's curves."""
 
-def result(ours: np.ndarray, measured: np.ndarray) -> CircleResult:
-    return CircleResult("car", measured, float(ours.mean()), ours, 0.0)
+
+@pytest.fixture(scope="module")
+def file() -> MeasuredFile:
+    return read_measured(FOLDER)
 
 
-def test_the_area_between_shifted_distributions_is_the_shift(rng: np.random.Generator) -> None:
+def result(file: MeasuredFile, ours: np.ndarray, measured: np.ndarray) -> CircleValidation:
+    lower, upper = np.linspace(80.0, 90.0, 101), np.linspace(110.0, 120.0, 101)
+    ends = (("ratio", "source", 80.0, 120.0),)
+    return CircleValidation(file, measured, float(ours.mean()), 0.0, {}, {}, (), ends, ours, lower, upper)
+
+
+def test_the_area_between_shifted_distributions_is_the_shift(file: MeasuredFile, rng: np.random.Generator) -> None:
     values = rng.normal(94.0, 1.3, 200)
-    assert result(values + 5.0, values).area_metric_deg == pytest.approx(5.0, abs=1e-9)
-    assert result(values, values).area_metric_deg == pytest.approx(0.0, abs=1e-9)
+    assert result(file, values + 5.0, values).area_metric_deg == pytest.approx(5.0, abs=1e-9)
+    assert result(file, values, values).area_metric_deg == pytest.approx(0.0, abs=1e-9)
 
 
-def test_distributions_apart_do_not_overlap_and_alike_ones_do(rng: np.random.Generator) -> None:
+def test_distributions_apart_do_not_overlap_and_alike_ones_do(file: MeasuredFile, rng: np.random.Generator) -> None:
     values = rng.normal(94.0, 1.3, 200)
-    assert result(values + 30.0, values).overlap < 1e-3
-    assert result(values, values).overlap == pytest.approx(1.0, abs=0.01)
+    assert result(file, values + 30.0, values).overlap < 1e-3
+    assert result(file, values, values).overlap == pytest.approx(1.0, abs=0.01)
 
 
-def test_the_tolerance_is_that_of_iso_19364() -> None:
+def test_the_tolerance_is_that_of_iso_19364(file: MeasuredFile) -> None:
     measured = np.array([99.0, 101.0])
-    assert result(measured + 7.9, measured).inside
-    assert not result(measured + 8.1, measured).inside
+    assert result(file, measured + 7.9, measured).inside
+    assert not result(file, measured + 8.1, measured).inside
 
 
-def test_too_few_samples_are_an_error() -> None:
-    assert is_measured("tesla_model_s")
-    assert not is_measured("sedan")
+def test_too_few_samples_are_an_error(file: MeasuredFile) -> None:
     with raises(ParameterError, key="samples"):
-        validate_circle("tesla_model_s", 5)
+        validate_circle(file, 5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("radius_m = 30.0", "radius_m = -30.0", "circle.radius_m"),
+        (
+            "93.7879010565951, 93.3886776207234, 97.4933780151733, 91.0079809633492,",
+            '"a",',
+            "circle.steering_wheel_deg",
+        ),
+        ('spread = { "factors.mass"', 'spread = { "factors.mas"', "circle.spread.factors.mas"),
+        ('axle = "front", hold = "toe_deg"', 'axle = "left", hold = "toe_deg"', "effects.roll steer, front.0.axle"),
+        ('axle = "front", hold = "toe_deg"', 'axle = "front", hold = "toes_deg"', "effects.roll steer, front"),
+        ('axle = "front", hold = "toe_deg"', 'hold = "stiffness"', "effects.roll steer, front"),
+        ('compliance = "no_camber"', 'compliance = "no_cambers"', "effects.camber over side force, front.0.compliance"),
+        ('[{ without = [\n  "roll steer, front"', '[{ without = [\n  "roll steers"', "effects.all six effects on toe"),
+        (
+            '[{ without = [\n  "roll steer, front"',
+            '[{ without = [\n  "all six effects on toe"',
+            "effects.all six effects on toe",
+        ),
+        ('"powertrain.front_fraction"', '"powertrain.front"', "effects.drive on the front wheels (assumed)"),
+        ('adds = ["roll steer, front"', 'adds = ["roll steers"', "steps.3"),
+        ('origin = "geometry"', 'origin = "guess"', "steps.0.origin"),
+        ("{ radius_m = 0.83 }", "{ radius = 0.83 }", "intervals.point that follows 30 m"),
+        ("low = [{ add = { body_roll = 1.0 } }]", "ends = [1.0]", "intervals.tilt of the accelerometer"),
+        ("[decisions]", '[[runs]]\nname = "a"\nfiles = ["a.csv"]\n\n[decisions]', "runs"),
+        ("[decisions]", "[quantities]\nay_mps2 = {}\n\n[decisions]", "quantities"),
+        ('vehicle = "tesla_model_s"', 'vehicle = "compact"', "effects.roll steer, front"),
+    ],
+)
+def test_a_wrong_key_or_value_is_one_error_with_file_and_key(tmp_path: Path, old: str, new: str, key: str) -> None:
+    text = (FOLDER / "validation.toml").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "validation.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with raises(ActiveSteerError, key=key, file="validation.toml") as caught:
+        read_measured(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_two_laps_alike_or_no_spread_make_no_distribution(tmp_path: Path) -> None:
+    for laps, spread in (("94.0, 94.0", "ay_mps2 = 0.1"), ("94.0, 95.0", "")):
+        circle = f"radius_m = 30.0\nay_mps2 = 5.0\nsteering_wheel_deg = [{laps}]\nspread = {{ {spread} }}\n"
+        (tmp_path / "validation.toml").write_text(f'vehicle = "compact"\n[circle]\n{circle}', encoding="utf-8")
+        with raises(ActiveSteerError, key="circle"):
+            read_measured(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_circle_of_any_car_needs_no_effects_and_its_intervals_may_be_keys(tmp_path: Path) -> None:
+    text = (
+        'vehicle = "compact"\n[circle]\nradius_m = 40.0\nay_mps2 = 3.0\nsteering_wheel_deg = [80.0, 81.0]\n'
+        'spread = { ay_mps2 = 0.1 }\n[intervals]\nradius_m = { ends = [39.0, 41.0], source = "tape" }\n'
+        '"factors.front_cornering_stiffness" = { ends = [0.9, 1.1], source = "guess" }\n'
+    )
+    (tmp_path / "validation.toml").write_text(text, encoding="utf-8")
+    found = validate_circle(read_measured(tmp_path), 10, 1)
+    by_hand = 2.57 / 40.0 * 16.0  # wheelbase and ratio of some such car, within a half
+    assert found.nominal_deg == found.assumed_deg == pytest.approx(math.degrees(by_hand), rel=0.5)
+    # A smaller radius and softer front tyres both need more angle: the lower ends of these keys are the upper angles.
+    for (_, _, low, high), larger in zip(found.ends, ("39.0", "0.9"), strict=True):
+        assert low < found.nominal_deg < high, larger
+    assert found.low_deg < min(end[2] for end in found.ends)
+    assert found.high_deg > max(end[3] for end in found.ends)
+    lines = "\n".join(measured_page(found).lines())
+    assert "factors.front_cornering_stiffness" in lines
 
 
 def source() -> dict[str, Any]:
-    text = (models_dir() / "reference" / "tesla_model_s" / "vehicle.json").read_text(encoding="utf-8")
+    text = (FOLDER / "vehicle.json").read_text(encoding="utf-8")
     return json.loads(text)
 
 
@@ -78,71 +161,97 @@ def test_the_wheel_inertia_of_the_source_is_that_of_both_wheels_of_an_axle() -> 
     assert given["Iwf"] == pytest.approx(0.5 * both_kg * given["r_stat0"] ** 2, rel=1e-12)
 
 
-def toe_deg(table: dict[str, Any], axle: str, side_N: float, aligning_Nm: float) -> float:
+def toe_deg(case: Case, axle: str, side_N: float, aligning_Nm: float) -> float:
     """Return the rotation of the left wheel to the left under forces at the road."""
+    table, _ = read_toml(find_vehicle("tesla_model_s"))
     matrix = np.zeros((5, 5))
-    matrix[np.triu_indices(5)] = table["curves"][axle]["stiffness"]
+    matrix[np.triu_indices(5)] = case.overrides.get(f"curves.{axle}.stiffness", table["curves"][axle]["stiffness"])
     moved = np.linalg.solve(matrix + np.triu(matrix, 1).T, [0.0, side_N, 0.335 * side_N, 0.0, aligning_Nm])
     return float(np.degrees(moved[4]))
 
 
-def test_switching_an_effect_off_changes_no_other_effect() -> None:
-    table, _ = read_toml(find_vehicle("tesla_model_s"))
+def test_switching_an_effect_off_changes_no_other_effect(file: MeasuredFile) -> None:
+    case = file.case
     for axle, sign in (("front", 1.0), ("rear", -1.0)):
-        side, aligning = toe_deg(table, axle, -1e3, 0.0), toe_deg(table, axle, 0.0, 100.0)
+        side, aligning = toe_deg(case, axle, -1e3, 0.0), toe_deg(case, axle, 0.0, 100.0)
         assert side * sign > 0.03, "towards the middle of the car: front toe-out, rear toe-in"
         assert aligning > 0.4
-        no_side = EFFECTS[f"toe over side force, {axle}"](table)
+        no_side = file.without(case, [f"toe over side force, {axle}"])
         assert toe_deg(no_side, axle, -1e3, 0.0) == pytest.approx(0.0, abs=1e-4)
         assert toe_deg(no_side, axle, 0.0, 100.0) == pytest.approx(aligning, rel=1e-4)
-        no_moment = EFFECTS[f"toe over aligning moment, {axle} (assumed)"](table)
+        no_moment = file.without(case, [f"toe over aligning moment, {axle} (assumed)"])
         assert toe_deg(no_moment, axle, -1e3, 0.0) == pytest.approx(side, rel=1e-3)
         assert toe_deg(no_moment, axle, 0.0, 100.0) < 0.5 * aligning
-        no_camber = EFFECTS[f"camber over side force, {axle}"](table)
+        no_camber = file.without(case, [f"camber over side force, {axle}"])
         assert toe_deg(no_camber, axle, -1e3, 0.0) == pytest.approx(side, rel=1e-2)
-        turned = DECISIONS["elkin_y_toe of both axles reversed (used: understeering)"](table)
+        turned = file.changed(case, file.table.decisions["elkin_y_toe of both axles reversed (used: understeering)"])
         assert toe_deg(turned, axle, -1e3, 0.0) == pytest.approx(-side, rel=1e-3)
 
 
+def at(case: Case, **circle: float) -> Case:
+    return case._replace(circle=case.circle | circle)
+
+
+def measured_only(file: MeasuredFile) -> Case:
+    return file.without(file.case, [name for step in file.table.steps[:-3:-1] for name in step.adds])
+
+
 @pytest.mark.slow
-def test_without_changes_of_toe_the_angle_is_that_of_geometry_and_tyres() -> None:
+def test_without_changes_of_toe_the_angle_is_that_of_geometry_and_tyres(file: MeasuredFile) -> None:
     """Tyres add some degrees to the Ackermann angle of 87: the front carries more load and more roll moment."""
-    table, _ = read_toml(find_vehicle("tesla_model_s"))
-    changed = EFFECTS["all six effects on toe"]({**table, "name": "tesla_model_s"})
-    angle = steering_wheel_deg(Case(changed, 30.0, 5.65))
-    assert 88.0 < angle < 98.0
+    assert 88.0 < steering_wheel_deg(file.without(file.case, ["all six effects on toe"])) < 98.0
 
 
 @pytest.mark.slow
-def test_without_lateral_acceleration_the_angle_is_that_of_ackermann() -> None:
+def test_without_lateral_acceleration_the_angle_is_that_of_ackermann(file: MeasuredFile) -> None:
     """A line through two low accelerations must reach 5.64 deg at the wheels (30 m) times the ratio of 15.5."""
-    table, _ = read_toml(find_vehicle("tesla_model_s"))
-    low, high = (steering_wheel_deg(Case({**table, "name": "tesla_model_s"}, 30.0, ay)) for ay in (0.6, 1.2))
+    low, high = (steering_wheel_deg(at(file.case, ay_mps2=ay)) for ay in (0.6, 1.2))
     assert low < high
     assert 2.0 * low - high == pytest.approx(15.48 * math.degrees(math.atan(2.96 / 30.0)), rel=0.02)
 
 
-def test_the_box_lies_between_the_ends_of_the_intervals_and_counts_what_is_inside() -> None:
-    box = Box((), np.linspace(80.0, 90.0, 101), np.linspace(110.0, 120.0, 101))
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("mass_kg", "ay_mps2", "theirs_deg"),
+    [(2374.0, 5.65, 30.43), (2347.0, 3.01, 28.41), (2863.0, 4.69, 30.45), (2076.0, 6.99, 31.46), (2977.0, 6.87, 32.36)],
+)
+def test_with_the_settings_of_the_source_the_angle_is_that_of_its_own_model(
+    file: MeasuredFile, mass_kg: float, ay_mps2: float, theirs_deg: float
+) -> None:
+    """Medians of its figure `Framework - TotalUC-ZSMValidation-Concluded.pdf`: 100 m, no toe and no compliance.
+
+    Each median is of four samples with 5 % of tyre force and 0.1 m/s2, which vary by up to 2 %, and the method by which
+    the source's driver reaches the circle is not published. The differences of all its sets below 7 m/s2 are -6.8 to
+    +5.7 % (docs/validation.md), the worst two among these: 7.5 % notices a changed car, it is no target.
+    """
+    case = at(file.without(measured_only(file), KC_OFF), radius_m=100.0, ay_mps2=ay_mps2)
+    case = case._replace(overrides=case.overrides | {"factors.mass": mass_kg / 2374.0})
+    assert steering_wheel_deg(case) == pytest.approx(theirs_deg, rel=0.075)
+
+
+def test_the_box_lies_between_the_ends_of_the_intervals_and_counts_what_is_inside(file: MeasuredFile) -> None:
+    box = result(file, np.array([94.0, 95.0]), np.array([80.0, 81.0, 100.0, 119.0, 120.0]))
     assert box.low_deg == pytest.approx(80.25)
     assert box.high_deg == pytest.approx(119.75)
-    assert box.inside(np.array([80.0, 81.0, 100.0, 119.0, 120.0])) == 3
-    assert box.as_table(np.array([94.0]))["measured_deg"] == 94.0
-
-
-def test_a_tilted_accelerometer_shows_more_than_the_horizontal_acceleration() -> None:
-    """By hand: a cos(phi) + g sin(phi) = 5.65 with phi = 0.0458 rad * a / 5.65 gives 5.24 m/s2."""
-    tilt = next(interval for interval in intervals(0.0458) if "tilt" in interval.name)
-    assert tilt.low(Case({}, 30.0, 5.65)).ay_mps2 == pytest.approx(5.238, abs=2e-3)
+    assert box.measured_inside == 3
+    assert box.to_json()["box"]["measured_deg"] == 100.0
 
 
 @pytest.mark.slow
-def test_without_the_assumed_compliances_the_angle_is_smaller_and_a_quicker_ratio_makes_it_smaller_still() -> None:
-    table, _ = read_toml(find_vehicle("tesla_model_s"))
-    case = Case({**table, "name": "tesla_model_s"}, 30.0, 5.65)
-    main = measured_only(case)
-    quick = next(interval for interval in intervals(0.05) if interval.name == "steering ratio").low(main)
-    angles = [steering_wheel_deg(each) for each in (quick, main, case)]
+def test_a_tilted_accelerometer_shows_more_than_the_horizontal_acceleration(file: MeasuredFile) -> None:
+    """By hand: a cos(phi) + g sin(phi) = 5.65 with phi = 0.0458 rad * a / 5.65 gives 5.24 m/s2."""
+    (change,) = file.table.intervals["tilt of the accelerometer"].low
+    tilted = steering_wheel_deg(file.changed(file.case, [change]), 0.0458 / 5.65)
+    assert tilted == pytest.approx(steering_wheel_deg(at(file.case, ay_mps2=5.238)), abs=0.01)
+
+
+@pytest.mark.slow
+def test_without_the_assumed_compliances_the_angle_is_smaller_and_a_quicker_ratio_makes_it_smaller_still(
+    file: MeasuredFile,
+) -> None:
+    main = measured_only(file)
+    quick = file.changed(main, file.table.intervals["steering ratio"].low)
+    angles = [steering_wheel_deg(each) for each in (quick, main, file.case)]
     assert angles[2] - angles[1] == pytest.approx(8.2, abs=0.3)  # 10.4 - 5.3 + 3.1 deg
     # The wheels need the same angle, so the steering wheel turns less in proportion to the ratio.
     assert angles[0] == pytest.approx(angles[1] * 14.27 / 15.48, rel=0.01)

@@ -13,11 +13,12 @@ import activesteer
 from activesteer.errors import ActiveSteerError
 from activesteer.measured.importing import import_file
 from activesteer.measured.motion import at_sensor
+from activesteer.pages import render_page
 from activesteer.recording import Recording
 from activesteer.resources import models_dir
 from activesteer.validation.measured_file import measured_folder, read_measured
 from activesteer.validation.measured_folder import validate_measured
-from activesteer.validation.measured_page import write_measured_page
+from activesteer.validation.measured_page import measured_page
 from activesteer.validation.template import write_template
 from tests.raising import raises
 
@@ -150,7 +151,7 @@ def test_the_example_finds_the_parameters_of_its_car_and_predicts_the_second_lan
     truth = {"steering.factor": 1.25, "factors.front_cornering_stiffness": 0.9}
     for one in result.fitted.parameters:
         assert abs(one.value - truth[one.key]) < 1.5 * one.half_width  # one noise, 95 % intervals
-    page = write_measured_page(result, tmp_path / "page.html").read_text(encoding="utf-8")
+    page = render_page(measured_page(result))
     assert page.count("<svg") == 4
     assert "The road is level and dry." in page
     assert {row["part"] for row in result.to_json()["quantities"]} == {"fit", "check"}

@@ -11,13 +11,13 @@ import pytest
 from jinja2 import UndefinedError
 
 from activesteer.analysis.report import report_page
-from activesteer.pages import render
+from activesteer.pages import render, render_page
 from activesteer.validation.comparison import Comparison
 from activesteer.validation.kinematics import Curves
 from activesteer.validation.programme import Validation
 from activesteer.validation.reference import ReferenceData
 from activesteer.validation.study import Response
-from activesteer.validation.validation_page import page
+from activesteer.validation.validation_page import validation_page
 from tests.contrast import contrast
 from tests.unit.analysis.synthetic import step_steer
 from tests.unit.analysis.synthetic_files import recording_of
@@ -50,7 +50,7 @@ def test_names_of_controller_and_manoeuvre_in_a_report_stay_text():
 def test_names_in_a_validation_stay_text():
     pytest.importorskip("matplotlib")
     studies = {EVIL: [Response(EVIL, *([1.0] * 6))]}
-    evil = page(result(EVIL), studies)
+    evil = render_page(validation_page(result(EVIL), studies))
     assert scripts(evil) == 0
     assert "<img" not in evil
     assert evil.count("<svg") == 1
@@ -59,7 +59,7 @@ def test_names_in_a_validation_stay_text():
 
 def test_both_pages_have_one_frame_and_one_stylesheet():
     pytest.importorskip("matplotlib")
-    texts = [report_page({"a": recording_of(step_steer())}), page(result("plain"), {})]
+    texts = [report_page({"a": recording_of(step_steer())}), render_page(validation_page(result("plain")))]
     frames = [re.search(r"<meta http-equiv.*?>", text, re.DOTALL) for text in texts]
     styles = [re.search(r":root \{.*?</style>", text, re.DOTALL) for text in texts]
     assert frames[0]
@@ -75,7 +75,7 @@ def test_every_text_can_be_read_on_every_page():
     pytest.importorskip("matplotlib")
     modes = [
         dict(re.findall(r"--(\w+): (#\w{6})", each))
-        for each in re.split(r"@media", page(result("plain"), {}), maxsplit=1)
+        for each in re.split(r"@media", render_page(validation_page(result("plain"))), maxsplit=1)
     ]
     inks = ("ink", "quiet", "link", "passed", "failed", "known")
     pairs = [(ink, paper) for ink in inks for paper in ("paper", "shade", "differs")] + [("ink", "outside")]
