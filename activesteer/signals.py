@@ -362,9 +362,15 @@ class ActuatorCommand(NamedTuple):
 
 
 def steering(
-    rear_rad: float, front_rad: float, desired_radps: float, prediction_rad: float, correction_rad: float, limited: bool
+    rear_rad: float,
+    front_rad: float,
+    desired_radps: float,
+    prediction_rad: float,
+    correction_rad: float,
+    limited: bool,
+    estimate: Estimate | None = None,
 ) -> ActuatorCommand:
-    """Return the `ActuatorCommand` of a controller that only steers, from the first six fields."""
+    """Return the `ActuatorCommand` of a controller that only steers, from the first six fields and its estimate."""
     return new_message(
         ActuatorCommand,
         (
@@ -376,7 +382,7 @@ def steering(
             limited,
             NO_BRAKES,
             0.0,
-            None,
+            estimate,
             0.0,
             NO_TORQUES,
         ),

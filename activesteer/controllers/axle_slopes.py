@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -10,6 +11,8 @@ import numpy as np
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation import KnownTyre
+from activesteer.native_blocks import NativeBlock, Table, table
+from activesteer.shared_laws import shared
 from activesteer.signals import Estimate
 
 LEAST: Final = 0.05
@@ -40,7 +43,7 @@ class Axle(NamedTuple):
     secant: float
 
 
-class AxleSlopes:
+class AxleSlopes(NativeBlock):
     """Side force curves of both axles.
 
     F is the curve of a tyre under its static load. On a road of friction mu the curve is mu F(alpha / mu), with the
@@ -49,6 +52,9 @@ class AxleSlopes:
     Attributes:
         loads_N: Static load of one wheel of each axle [N].
     """
+
+    _front_excess_rad: Table
+    _rear_excess_rad: Table
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Read the curves."""
@@ -68,10 +74,10 @@ class AxleSlopes:
             self._car.mass_kg * car.load_height_m * fraction / track_m
             for fraction, track_m in zip(fractions, (car.front_track_m, car.rear_track_m), strict=True)
         )
-        self._excesses = [
-            _excesses(tyre, load_N, shift_kg)
+        self._front_excess_rad, self._rear_excess_rad = (
+            array("d", _excesses(tyre, load_N, shift_kg))
             for tyre, load_N, shift_kg in zip(known.tyres, self.loads_N, shifts_kg, strict=True)
-        ]
+        )
 
     def at(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
         """Return the slopes of front and rear axle [-].
@@ -106,10 +112,7 @@ class AxleSlopes:
         Returns:
             Slip angles of front and rear axle, positive to the side of the turn [rad].
         """
-        place = abs(ay_mps2) / friction / _AY_STEP_MPS2
-        size = math.copysign(friction, ay_mps2)
-        front, rear = self._excesses
-        return size * _between(front, place), size * _between(rear, place)
+        return excess(self, ay_mps2, friction)
 
     def _axle(self, axle: int, slip_angle_rad: float, friction: float) -> Axle:
         curve, place = self._curves[axle], abs(slip_angle_rad) / friction / self._step_rad
@@ -147,7 +150,16 @@ def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
     return (np.interp(wanted, ay_mps2[:rising], angles_rad[:rising]) - straight).tolist()
 
 
-def _between(values: list[float], place: float) -> float:
+@shared
+def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, float]:
+    """Law of `AxleSlopes.excess_rad`."""
+    place = abs(ay_mps2) / friction / _AY_STEP_MPS2
+    size = math.copysign(friction, ay_mps2)
+    return size * _between(table(block._front_excess_rad), place), size * _between(table(block._rear_excess_rad), place)
+
+
+@shared
+def _between(values: Table, place: float) -> float:
     """Interpolate in a row at a fractional index; beyond its end the last value holds."""
     index = min(int(place), len(values) - 2)
     return values[index] + min(place - index, 1.0) * (values[index + 1] - values[index])

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from activesteer.controllers.parameters import ControllerSetup
+from activesteer.estimation.estimator import Estimator
+from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 from activesteer.signals import Estimate, new_message
-
-if TYPE_CHECKING:
-    from activesteer.estimation.estimator import Estimator
 
 _AVERAGED_S: Final = 0.2
 """Time constant of the mean of the squared innovations [s]: some twenty samples."""
@@ -32,8 +32,15 @@ class Confidence(NamedTuple):
     authority: float
 
 
-class ConfidenceMonitor:
+class ConfidenceMonitor(NativeBlock):
     """Monitor of an estimator's friction and innovations."""
+
+    _prior: float
+    _fraction: float
+    _fall: float
+    _rise: float
+    _mean: float
+    _authority: float
 
     def __init__(self, setup: ControllerSetup, estimator: Estimator) -> None:
         """Watch an estimator.
@@ -47,16 +54,29 @@ class ConfidenceMonitor:
         self._fall, self._rise = setup.timestep_s / _FALL_S, setup.timestep_s / _RISE_S
         self._mean, self._authority = 0.0, 1.0
 
+    @property
+    def innovation(self) -> float:
+        """Present innovation of the estimator."""
+        return self._estimator.innovation
+
     def step(self, now: Estimate) -> Confidence:
         """Return the confidence in the estimate of this call."""
-        self._mean += self._fraction * (self._estimator.innovation - self._mean)
-        if self._mean > _EXPLAINED or self._authority < 1.0:
-            wanted = min(max((_UNEXPLAINED - self._mean) / (_UNEXPLAINED - _EXPLAINED), 0.0), 1.0)
-            self._authority += min(max(wanted - self._authority, -self._fall), self._rise)
-        known = 1.0 - (now.friction_std / self._prior) ** 2
-        return new_message(Confidence, (known if known > 0.0 else 0.0, self._authority))
+        return new_message(Confidence, confidence(self, self.innovation, now.friction_std))
 
 
+@shared
+def confidence(block: ConfidenceMonitor, innovation: float, friction_std: float) -> tuple[float, float]:
+    """Law of `ConfidenceMonitor.step`; returns the fields of `Confidence`."""
+    block._mean += block._fraction * (innovation - block._mean)
+    if block._mean > _EXPLAINED or block._authority < 1.0:
+        wanted = min(max((_UNEXPLAINED - block._mean) / (_UNEXPLAINED - _EXPLAINED), 0.0), 1.0)
+        block._authority += min(max(wanted - block._authority, -block._fall), block._rise)
+    left = friction_std / block._prior
+    known = 1.0 - left * left
+    return known if known > 0.0 else 0.0, block._authority
+
+
+@shared
 def bounded(added_rad: float, driver_rad: float, against_rad: float, limit_rad: float) -> float:
     """Return a superposition angle within its limit, and within another one against the driver [rad].
 

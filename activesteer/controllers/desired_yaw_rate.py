@@ -48,9 +48,6 @@ class DesiredYawRate(NativeBlock):
         return desired_yaw_rate(self, front_steer_rad, speed_mps)
 
 
-shared(yaw_rate_gain)
-
-
 @shared
 def desired_yaw_rate(block: DesiredYawRate, front_steer_rad: float, speed_mps: float) -> float:
     """Law of `DesiredYawRate.step`."""

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from activesteer.controllers.file_gains import EscParameters
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.controllers.turn_reference import TurnReference
+from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class Esc:
 
     def __init__(
         self,
-        reference: TurnReference,
+        reference: BorneTurnReference,
         estimator: Estimator,
         parameters: EscParameters,
         yaw_inertia_kgm2: float,
@@ -60,7 +60,7 @@ class Esc:
     def from_vehicle(cls, setup: ControllerSetup) -> Esc:
         """Make the controller for a car."""
         p, estimator = setup.gains.esc, setup.estimator()
-        reference = TurnReference(setup.single_track, p.reference_length_m, p.friction_fraction, setup.timestep_s)
+        reference = BorneTurnReference(setup.single_track, p, setup.timestep_s)
         return cls(reference, estimator, p, setup.single_track.yaw_inertia_kgm2, brake_levers(setup))
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
@@ -68,7 +68,9 @@ class Esc:
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < p.least_speed_mps:
             return ActuatorCommand(estimate=now)
-        desired = self._reference.step(command.front_steer_demand_rad, now.speed_mps, now.friction)
+        desired = self._reference.borne(
+            command.front_steer_demand_rad, now.speed_mps, now.friction, measurement.ay_mps2
+        )
         error = beyond(desired - now.yaw_rate_radps, p.yaw_rate_band_radps)
         slide = beyond(now.sideslip_rad, p.sideslip_limit_rad)
         moment = self._yaw_inertia_kgm2 * (error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2)

@@ -91,6 +91,10 @@ class EscParameters:
     """Distance over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction
     """Fraction of the estimated friction that the desired yaw rate may use [-]."""
+    acceleration_time_s: _Lag
+    """T_a: time in which the lateral acceleration follows the desired yaw rate [s]."""
+    acceleration_shortfall_mps2: Annotated[float, Range(0.0, 20.0)]
+    """D: lateral acceleration that the turn may lack before the desired yaw rate falls [m/s2]."""
     torque_limit_Nm: Annotated[float, Range(0.0, 1e4)]
     """Largest brake torque at a wheel [Nm]."""
     least_speed_mps: Annotated[float, Range(1.0, 20.0)]

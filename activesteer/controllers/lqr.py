@@ -37,23 +37,26 @@ zero sideslip: M. Abe, Vehicle Handling Dynamics, 2009, chapter 8.
 
 from __future__ import annotations
 
-import itertools
 import math
+from array import array
 from functools import lru_cache
-from operator import mul
+from itertools import chain
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.controllers.axle_slopes import AxleSlopes
-from activesteer.controllers.confidence import ConfidenceMonitor, bounded
+from activesteer.controllers.axle_slopes import AxleSlopes, excess
+from activesteer.controllers.confidence import ConfidenceMonitor, bounded, confidence
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.esc import brake_levers
 from activesteer.controllers.file_gains import LqrParameters
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.controllers.turn_reference import TurnReference
+from activesteer.controllers.turn_reference import TurnReference, desired_ahead, desired_turn
 from activesteer.conventions import Array
-from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
+from activesteer.estimation.estimator import Estimator
+from activesteer.native_blocks import NativeBlock, Table, table
+from activesteer.shared_laws import shared
+from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement, PerWheel, steering
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 SPEED_STEP_MPS: Final = 5.0
@@ -66,6 +69,11 @@ BOTH: Final = (True, True)
 """Both actuators work: superposition, rear steering."""
 _STEADY: Final = 6
 """Number of values of the steady turn in a row of the schedule, before the rows of K."""
+_ROW: Final = _STEADY + 2 * len(STATES)
+"""Number of values in a row of the schedule."""
+_SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD = map(
+    Estimate._fields.index, ("speed_mps", "sideslip_rad", "yaw_rate_radps", "friction", "friction_std")
+)
 _FULL_MPS: Final = 8.0
 """Speed from which the controller acts fully; below it fades out until `MIN_SPEED_MPS` [m/s]."""
 
@@ -90,13 +98,35 @@ class Turn(NamedTuple):
     against_rad: float
 
 
-class Lqr:
+class Lqr(NativeBlock):
     """Rear steering and front superposition by one state feedback."""
 
     interval_s = 0.005
     reads = ("lqr", "servos", "estimator")
     gains = LqrParameters
-    derived = ("_schedules",)
+    derived = ("_schedule", "_superposition_works", "_rear_works")
+    _estimator: Estimator
+    _confidence: ConfidenceMonitor
+    _reference: TurnReference
+    _curves: AxleSlopes
+    _schedule: Table
+    _superposition_works: bool
+    _rear_works: bool
+    _interval_s: float
+    _lag_s: float
+    _relaxation_length_m: float
+    _friction_deviations: float
+    _against_driver_rad: float
+    _superposition_limit_rad: float
+    _rear_limit_rad: float
+    _torque_per_pressure_NmpPa: PerWheel
+    _moment_per_torque: PerWheel
+    _front_compensation_radpNm: float
+    _rear_compensation_radpNm: float
+    _front_rad: float
+    _rear_rad: float
+    _superposition_before_rad: float
+    _rear_before_rad: float
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Make the controller of one run."""
@@ -107,18 +137,19 @@ class Lqr:
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._curves = AxleSlopes(setup)
-        self._schedules: dict[tuple[bool, bool], list[list[tuple[float, float]]]] = {}
-        self._front_rad = self._rear_rad = 0.0
-        self._before = 0.0, 0.0
+        self._adapt(BOTH)
+        self._lag_s, self._rear_limit_rad = self._servos.lag_s, self._servos.rear_limit_rad
+        self._superposition_limit_rad = self._servos.superposition_limit_rad
+        self._relaxation_length_m, self._friction_deviations = p.relaxation_length_m, p.friction_deviations
+        self._against_driver_rad = p.against_driver_rad
+        self._front_rad = self._rear_rad = self._superposition_before_rad = self._rear_before_rad = 0.0
         known, (front, rear) = setup.estimation, brake_levers(setup)
         assert known is not None  # an estimator exists
         self._torque_per_pressure_NmpPa = known.brake_torque_per_pressure_NmpPa
         self._moment_per_torque = 1.0 / front, -1.0 / front, 1.0 / rear, -1.0 / rear
         wheelbase_m = self._car.wheelbase_m
-        self._compensation_radpNm = (
-            -1.0 / (wheelbase_m * self._car.front_stiffness_Nprad),
-            1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad),
-        )
+        self._front_compensation_radpNm = -1.0 / (wheelbase_m * self._car.front_stiffness_Nprad)
+        self._rear_compensation_radpNm = 1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad)
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> Lqr:
@@ -127,29 +158,21 @@ class Lqr:
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return both angles."""
-        servos, turn = self._servos, self.turn(command, measurement)
-        speed_mps = turn.estimate.speed_mps
-        if speed_mps < MIN_SPEED_MPS:
-            self.apply(0.0, 0.0)
-            return ActuatorCommand(estimate=turn.estimate)
-        fade = min((speed_mps - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
-        added_demand, rear_demand = (fade * angle for angle in turn.demand_rad)
-        driver = command.front_steer_demand_rad
-        added = bounded(added_demand, driver, turn.against_rad, servos.superposition_limit_rad)
-        rear = min(max(rear_demand, -servos.rear_limit_rad), servos.rear_limit_rad)
-        self.apply(added, rear)
-        saturated = (added, rear) != (added_demand, rear_demand)
-        steady = turn.steady_rad[1]
-        return ActuatorCommand(
-            rear, added, turn.desired_radps, steady, rear - steady, saturated, estimate=turn.estimate
-        )
+        now = self._estimator.step(measurement)
+        return steering(
+            *regulated(
+                self, now, self._confidence.innovation, command.front_steer_demand_rad, command.brake_pedal,
+                measurement.superposition_rad, measurement.rear_steer_rad, measurement.brake_pressure_Pa,
+            ),
+            now,
+        )  # fmt: skip
 
     def turn(
         self,
         command: DriverCommand,
         measurement: Measurement,
         works: tuple[bool, bool] = BOTH,
-        own_brakes_Nm: tuple[float, float, float, float] = NO_BRAKES,
+        own_brakes_Nm: PerWheel = NO_BRAKES,
     ) -> Turn:
         """Return the desired turn and the demands of the state feedback, all zero below walking speed.
 
@@ -159,85 +182,145 @@ class Lqr:
             works: Whether superposition and rear steering work.
             own_brakes_Nm: Brake torques demanded by the controller itself, order of `CORNERS` [Nm].
         """
-        p, now = self._parameters, self._estimator.step(measurement)
-        speed, driver = now.speed_mps, command.front_steer_demand_rad
-        confidence = self._confidence.step(now)
-        if speed < MIN_SPEED_MPS:
-            return Turn(now, 0.0, 0.0, (0.0, 0.0), (0.0, 0.0), 0.0)
-        desired = self._reference.step(driver, speed, now.friction + p.friction_deviations * now.friction_std)
-        added, turned = measurement.superposition_rad, measurement.rear_steer_rad
-        # The tyres follow the angles over their relaxation length.
-        fraction = -math.expm1(-self._interval_s * speed / p.relaxation_length_m)
-        self._front_rad += fraction * (driver + added - self._front_rad)
-        self._rear_rad += fraction * (turned - self._rear_rad)
-        row = self._gains(works, speed)
-        given = 0.0 if works[0] and works[1] else driver + added if works[1] else turned
-        front, rear, sideslip = self._steady(row, works, given, desired, now)
-        # The present demand takes effect a call and a lag later.
-        coming = self._reference.ahead(self._servos.lag_s + self._interval_s)
-        next_front, next_rear, _ = self._steady(row, works, given, coming, now)
-        brake_front, brake_rear = 0.0, 0.0
-        if command.brake_pedal > 0.0 and works[0] and works[1]:
-            moment_Nm = self._brakes_moment(measurement, own_brakes_Nm)
-            brake_front, brake_rear = (moment_Nm * angle for angle in self._compensation_radpNm)
-        front, rear = front + brake_front, rear + brake_rear
-        steady = front - driver, rear
-        held = next_front + brake_front - driver, next_rear + brake_rear
-        errors = (
-            now.yaw_rate_radps - desired,
-            now.sideslip_rad - sideslip,
-            self._front_rad - front,
-            self._rear_rad - rear,
-            added - steady[0],
-            turned - rear,
-            self._before[0] - held[0],
-            self._before[1] - held[1],
-        )
-        second = _STEADY + len(errors)
-        demand = (
-            confidence.authority * (held[0] - sum(map(mul, row[_STEADY:second], errors))),
-            confidence.authority * (held[1] - sum(map(mul, row[second:], errors))),
-        )
-        most = self._servos.superposition_limit_rad
-        against = p.against_driver_rad + confidence.friction * max(most - p.against_driver_rad, 0.0)
-        return Turn(now, desired, sideslip, steady, demand, against)
+        if works != (self._superposition_works, self._rear_works):
+            self._adapt(works)
+        now = self._estimator.step(measurement)
+        desired, sideslip, *angles, against = fed_back(
+            self, now, self._confidence.innovation, command.front_steer_demand_rad, command.brake_pedal,
+            measurement.superposition_rad, measurement.rear_steer_rad, measurement.brake_pressure_Pa, own_brakes_Nm,
+        )  # fmt: skip
+        return Turn(now, desired, sideslip, (angles[0], angles[1]), (angles[2], angles[3]), against)
 
-    def _steady(
-        self, row: list[float], works: tuple[bool, bool], given_rad: float, yaw_rate_radps: float, now: Estimate
-    ) -> tuple[float, float, float]:
-        """Return front angle, rear angle and sideslip of a steady turn, for a row of the schedule [rad]."""
-        front_r, front_g, rear_r, rear_g, sideslip_r, sideslip_g = row[:_STEADY]
-        ay_mps2 = now.speed_mps * yaw_rate_radps
-        front_more, rear_more = self._curves.excess_rad(ay_mps2, now.friction)
-        # An axle with a given angle gets its additional slip angle from the sideslip, and the other axle follows.
-        less = 0.0 if works[0] and works[1] else rear_more if works[0] else front_more
-        front = front_r * yaw_rate_radps + front_g * given_rad + front_more - less
-        rear = rear_r * yaw_rate_radps + rear_g * given_rad + rear_more - less
-        return front, rear, sideslip_r * yaw_rate_radps + sideslip_g * given_rad - less
-
-    def _brakes_moment(self, measurement: Measurement, own_Nm: tuple[float, float, float, float]) -> float:
-        """Return the yaw moment of the driver's brakes from their pressures [Nm]."""
-        moment_Nm = 0.0
-        for arm, per_pressure, pressure, own in zip(
-            self._moment_per_torque, self._torque_per_pressure_NmpPa, measurement.brake_pressure_Pa, own_Nm, strict=True
-        ):
-            moment_Nm += arm * max(per_pressure * pressure - own, 0.0)
-        return moment_Nm
+    def _adapt(self, works: tuple[bool, bool]) -> None:
+        """Take the gains for the actuators that work."""
+        rows = schedule(self._car, self._parameters, self._servos.lag_s, self._interval_s, works)
+        self._schedule = array("d", chain.from_iterable(rows))
+        self._superposition_works, self._rear_works = works
 
     def apply(self, superposition_rad: float, rear_rad: float) -> None:
         """Store the final demands of the actuators; for a failed actuator its position."""
-        self._before = superposition_rad, rear_rad
+        self._superposition_before_rad, self._rear_before_rad = superposition_rad, rear_rad
 
-    def _gains(self, works: tuple[bool, bool], speed_mps: float) -> list[float]:
-        """Interpolate the schedule at a speed."""
-        if (lines := self._schedules.get(works)) is None:
-            rows = schedule(self._car, self._parameters, self._servos.lag_s, self._interval_s, works)
-            lines = [[(a, b - a) for a, b in zip(*ends, strict=True)] for ends in itertools.pairwise(rows)]
-            self._schedules[works] = lines
-        place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(lines) - 1e-6)
-        index = int(place)
-        part = place - index
-        return [start + part * rise for start, rise in lines[index]]
+
+@shared
+def regulated(
+    block: Lqr,
+    now: Estimate,
+    innovation: float,
+    driver_rad: float,
+    brake_pedal: float,
+    superposition_rad: float,
+    rear_rad: float,
+    pressures_Pa: PerWheel,
+) -> tuple[float, float, float, float, float, bool]:
+    """Law of `Lqr.step`; returns the first fields of an `ActuatorCommand`."""
+    desired, _, _, steady, front_demand, rear_demand, against = fed_back(
+        block, now, innovation, driver_rad, brake_pedal, superposition_rad, rear_rad, pressures_Pa, NO_BRAKES
+    )
+    speed = now[_SPEED]
+    if speed < MIN_SPEED_MPS:
+        block._superposition_before_rad = block._rear_before_rad = 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0, False
+    fade = min((speed - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
+    front_demand, rear_demand = fade * front_demand, fade * rear_demand
+    added = bounded(front_demand, driver_rad, against, block._superposition_limit_rad)
+    rear = min(max(rear_demand, -block._rear_limit_rad), block._rear_limit_rad)
+    block._superposition_before_rad, block._rear_before_rad = added, rear
+    return rear, added, desired, steady, rear - steady, added != front_demand or rear != rear_demand
+
+
+@shared
+def fed_back(
+    block: Lqr,
+    now: Estimate,
+    innovation: float,
+    driver_rad: float,
+    brake_pedal: float,
+    superposition_rad: float,
+    rear_rad: float,
+    pressures_Pa: PerWheel,
+    own_brakes_Nm: PerWheel,
+) -> tuple[float, float, float, float, float, float, float]:
+    """Law of `Lqr.turn`; returns the fields of `Turn` behind the estimate, one after the other."""
+    speed, friction = now[_SPEED], now[_FRICTION]
+    certain, authority = confidence(block._confidence, innovation, now[_FRICTION_STD])
+    if speed < MIN_SPEED_MPS:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    assumed = friction + block._friction_deviations * now[_FRICTION_STD]
+    desired = desired_turn(block._reference, driver_rad, speed, assumed)
+    # The tyres follow the angles over their relaxation length.
+    fraction = -math.expm1(-block._interval_s * speed / block._relaxation_length_m)
+    block._front_rad += fraction * (driver_rad + superposition_rad - block._front_rad)
+    block._rear_rad += fraction * (rear_rad - block._rear_rad)
+    given, both = 0.0, block._superposition_works and block._rear_works
+    if not both:
+        given = driver_rad + superposition_rad if block._rear_works else rear_rad
+    rows, (start, part) = table(block._schedule), _place(speed)
+    turning = (
+        _gain(rows, start, part, 0), _gain(rows, start, part, 1), _gain(rows, start, part, 2),
+        _gain(rows, start, part, 3), _gain(rows, start, part, 4), _gain(rows, start, part, 5),
+    )  # fmt: skip
+    front, rear, sideslip = _steady(block, turning, speed, friction, given, desired)
+    # The present demand takes effect a call and a lag later.
+    coming = desired_ahead(block._reference, block._lag_s + block._interval_s)
+    next_front, next_rear, _ = _steady(block, turning, speed, friction, given, coming)
+    brake_front, brake_rear = 0.0, 0.0
+    if brake_pedal > 0.0 and both:
+        moment_Nm = 0.0
+        for wheel in range(4):
+            torque_Nm = block._torque_per_pressure_NmpPa[wheel] * pressures_Pa[wheel] - own_brakes_Nm[wheel]
+            moment_Nm += block._moment_per_torque[wheel] * max(torque_Nm, 0.0)
+        brake_front = moment_Nm * block._front_compensation_radpNm
+        brake_rear = moment_Nm * block._rear_compensation_radpNm
+    front, rear = front + brake_front, rear + brake_rear
+    steady, held_front, held_rear = front - driver_rad, next_front + brake_front - driver_rad, next_rear + brake_rear
+    errors = (
+        now[_YAW_RATE] - desired,
+        now[_SIDESLIP] - sideslip,
+        block._front_rad - front,
+        block._rear_rad - rear,
+        superposition_rad - steady,
+        rear_rad - rear,
+        block._superposition_before_rad - held_front,
+        block._rear_before_rad - held_rear,
+    )
+    front_feedback, rear_feedback = 0.0, 0.0
+    for place in range(len(errors)):
+        front_feedback += _gain(rows, start, part, _STEADY + place) * errors[place]
+        rear_feedback += _gain(rows, start, part, _STEADY + len(errors) + place) * errors[place]
+    against = block._against_driver_rad
+    against += certain * max(block._superposition_limit_rad - against, 0.0)
+    front_demand, rear_demand = authority * (held_front - front_feedback), authority * (held_rear - rear_feedback)
+    return desired, sideslip, steady, rear, front_demand, rear_demand, against
+
+
+@shared
+def _steady(
+    block: Lqr, gains: tuple[float, ...], speed_mps: float, friction: float, given_rad: float, yaw_rate_radps: float
+) -> tuple[float, float, float]:
+    """Return front angle, rear angle and sideslip of a steady turn, from their gains in the schedule [rad]."""
+    front_more, rear_more = excess(block._curves, speed_mps * yaw_rate_radps, friction)
+    # An axle with a given angle gets its additional slip angle from the sideslip, and the other axle follows.
+    less = 0.0
+    if not (block._superposition_works and block._rear_works):
+        less = rear_more if block._superposition_works else front_more
+    front = gains[0] * yaw_rate_radps + gains[1] * given_rad + front_more - less
+    rear = gains[2] * yaw_rate_radps + gains[3] * given_rad + rear_more - less
+    return front, rear, gains[4] * yaw_rate_radps + gains[5] * given_rad - less
+
+
+@shared
+def _place(speed_mps: float) -> tuple[int, float]:
+    """Return where the row of the schedule before a speed starts, and the part of the way to the next row."""
+    place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(SPEEDS_MPS) - 1 - 1e-6)
+    return _ROW * int(place), place - int(place)
+
+
+@shared
+def _gain(rows: Table, start: int, part: float, column: int) -> float:
+    """Interpolate a column of the schedule."""
+    low = rows[start + column]
+    return low + part * (rows[start + _ROW + column] - low)
 
 
 @lru_cache(maxsize=64)

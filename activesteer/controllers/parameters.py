@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from activesteer.config import Range
 from activesteer.controllers.file_gains import (
@@ -20,10 +20,8 @@ from activesteer.controllers.file_gains import (
 )
 from activesteer.errors import ControllerError
 from activesteer.estimation import EstimatorParameters, EstimatorSetup
+from activesteer.estimation.estimator import Estimator
 from activesteer.theory.single_track import SingleTrackParameters
-
-if TYPE_CHECKING:
-    from activesteer.estimation.estimator import Estimator
 
 _NotNegative = Annotated[float, Range(0.0)]
 _Limit = Annotated[float, Range(0.0, math.radians(10.0))]
@@ -194,6 +192,4 @@ class ControllerSetup:
                 "an estimator needs the table [two_track] in the vehicle file, as models/vehicles/compact.toml has it",
                 key="two_track",
             )
-        from activesteer.estimation.estimator import Estimator  # noqa: PLC0415 - compiled code, which lists of controllers do without
-
         return Estimator(self.estimation, self.gains.estimator, self.timestep_s)

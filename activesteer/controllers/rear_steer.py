@@ -12,8 +12,6 @@ from activesteer.shared_laws import shared
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack, rear_prediction
 
-shared(rear_prediction)
-
 
 class RearPrediction(NativeBlock):
     """The transfer function G(s) of eq. 5 in the time domain, with coefficients of the present speed.

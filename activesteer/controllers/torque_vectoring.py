@@ -1,6 +1,6 @@
 """Torque vectoring: a yaw moment from the difference of the drive torques of an axle's wheels.
 
-Desired yaw rate and estimator are those of `esc` and `lqr`. The moment removes the errors in given times:
+Desired yaw rate and estimator are those of `esc`. The moment removes the errors in given times:
 
     M_z = J_z (r* - r) / T_r + J_z / T_b^2 (sideslip beyond its limit)
 
@@ -17,18 +17,11 @@ at the limit, and the wheel load F_z of the measured lateral acceleration. Both 
 slip grows from 3 to 6 %, since the estimate of a sudden change of friction comes late. Last, q is reduced so far that
 the electric power stays within the limits of the battery. While the driver brakes, the controller rests.
 
-The desired yaw rate falls where the road does not bear the turn. A car turns at a_y / v while its sideslip angle is
-constant; what it turns faster is growing sideslip. If the measured |a_y| is short of v |r* behind a lag T_a| by more
-than D, the desired yaw rate falls by the rest over v, at most to zero. Without this rule, the controller turns a car
-whose front wheels have reached ice further in, and the car slides when its rear wheels reach the ice too: the estimated
-friction comes late, and it is one number for both axles.
-
 Unlike the brakes of `esc`, the moment costs no speed, so the controller acts at every error. Electric motors answer
 within some 15 ms, faster than hydraulics.
 
-Sources: L. De Novellis, A. Sorniotti, P. Gruber, Wheel torque distribution criteria for electric vehicles with
+Source: L. De Novellis, A. Sorniotti, P. Gruber, Wheel torque distribution criteria for electric vehicles with
 torque-vectoring differentials, IEEE Trans. Vehicular Technology 63 (2014); the law is that of `esc` without its band.
-R. Rajamani, Vehicle Dynamics and Control, 2012, section 8.3.3, on a_y = v (r + d beta/dt) and the desired yaw rate.
 """
 
 from __future__ import annotations
@@ -41,7 +34,7 @@ from activesteer.controllers.esc import beyond
 from activesteer.controllers.file_gains import TorqueVectoringParameters
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.split_axles import SplitTorques
-from activesteer.controllers.turn_reference import TurnReference
+from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.errors import ControllerError
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 
@@ -58,12 +51,11 @@ class TorqueVectoring:
 
     def __init__(
         self,
-        reference: TurnReference,
+        reference: BorneTurnReference,
         estimator: Estimator,
         parameters: TorqueVectoringParameters,
         yaw_inertia_kgm2: float,
         torques: SplitTorques,
-        interval_s: float,
     ) -> None:
         """Make the controller of one run.
 
@@ -73,12 +65,9 @@ class TorqueVectoring:
             parameters: Times and limits.
             yaw_inertia_kgm2: J_z [kg m2].
             torques: The electric axles.
-            interval_s: Time between two steps [s].
         """
         self._reference, self._estimator, self._parameters = reference, estimator, parameters
         self._yaw_inertia_kgm2, self._torques = yaw_inertia_kgm2, torques
-        self._fraction = -math.expm1(-interval_s / parameters.acceleration_time_s)
-        self._expected_radps = 0.0
 
     @classmethod
     def from_vehicle(cls, setup: ControllerSetup) -> TorqueVectoring:
@@ -95,17 +84,17 @@ class TorqueVectoring:
             )
         p, estimator = setup.gains.tv, setup.estimator()
         torques = SplitTorques(setup, p.friction_fraction, p.least_fraction)
-        reference = TurnReference(setup.single_track, p.reference_length_m, p.friction_fraction, setup.timestep_s)
-        inertia_kgm2 = setup.single_track.yaw_inertia_kgm2
-        return cls(reference, estimator, p, inertia_kgm2, torques, setup.timestep_s)
+        reference = BorneTurnReference(setup.single_track, p, setup.timestep_s)
+        return cls(reference, estimator, p, setup.single_track.yaw_inertia_kgm2, torques)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the wheel torques."""
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < MIN_SPEED_MPS:
             return ActuatorCommand(estimate=now)
-        desired = self._reference.step(command.front_steer_demand_rad, now.speed_mps, now.friction)
-        desired = self._borne(desired, measurement.ay_mps2, now.speed_mps)
+        desired = self._reference.borne(
+            command.front_steer_demand_rad, now.speed_mps, now.friction, measurement.ay_mps2
+        )
         slide = beyond(now.sideslip_rad, p.sideslip_limit_rad)
         error = desired - now.yaw_rate_radps
         moment = self._yaw_inertia_kgm2 * (error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2)
@@ -117,11 +106,3 @@ class TorqueVectoring:
             estimate=now,
             wheel_torque_demand_Nm=torques,
         )
-
-    def _borne(self, desired_radps: float, ay_mps2: float, speed_mps: float) -> float:
-        """Return the part of a desired yaw rate that the measured lateral acceleration shows the road to bear."""
-        self._expected_radps += self._fraction * (desired_radps - self._expected_radps)
-        side = math.copysign(1.0, self._expected_radps)
-        missing_mps2 = speed_mps * side * self._expected_radps - side * ay_mps2
-        fall_radps = beyond(max(missing_mps2, 0.0), self._parameters.acceleration_shortfall_mps2) / speed_mps
-        return side * max(side * desired_radps - fall_radps, min(side * desired_radps, 0.0))

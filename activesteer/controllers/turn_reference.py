@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import math
 
+from activesteer.controllers.file_gains import EscParameters, TorqueVectoringParameters
 from activesteer.conventions import GRAVITY_MPS2
-from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
+from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
+from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, yaw_rate_gain
 
 
-class TurnReference:
+class TurnReference(NativeBlock):
     """Desired yaw rate, eqs. 3 and 6 with the estimated friction, behind a first-order lag of the driver's angle.
 
     The lag is a distance, like the lag of the tyres: at twice the speed the car answers in half the time.
     """
+
+    _single_track: SingleTrack
+    _length_m: float
+    _interval_s: float
+    _most_mps2: float
+    _lagged_rad: float
+    _driver_rad: float
+    _speed_mps: float
+    _limit_radps: float
 
     def __init__(
         self, single_track: SingleTrackParameters, length_m: float, friction_fraction: float, interval_s: float
@@ -25,7 +37,7 @@ class TurnReference:
             friction_fraction: Fraction of the friction that may be used [-].
             interval_s: Time between two steps [s].
         """
-        self._gain = SingleTrack(single_track).yaw_rate_gain
+        self._single_track = SingleTrack(single_track)
         self._length_m, self._interval_s = length_m, interval_s
         self._most_mps2 = friction_fraction * GRAVITY_MPS2
         self._lagged_rad = self._driver_rad = self._speed_mps = self._limit_radps = 0.0
@@ -38,19 +50,83 @@ class TurnReference:
             speed_mps: Speed > 0 [m/s].
             friction: Friction of the road [-].
         """
-        self._driver_rad, self._speed_mps = front_steer_rad, speed_mps
-        self._limit_radps = self._most_mps2 * friction / speed_mps
-        self._lagged_rad = self._followed(self._interval_s)
-        return self._desired(self._lagged_rad)
+        return desired_turn(self, front_steer_rad, speed_mps, friction)
 
     def ahead(self, duration_s: float) -> float:
         """Return the desired yaw rate after a time, for a constant driver's angle and speed [rad/s]."""
-        return self._desired(self._followed(duration_s))
+        return desired_ahead(self, duration_s)
 
-    def _followed(self, duration_s: float) -> float:
-        fraction = -math.expm1(-duration_s * self._speed_mps / self._length_m)
-        return self._lagged_rad + fraction * (self._driver_rad - self._lagged_rad)
 
-    def _desired(self, angle_rad: float) -> float:
-        desired = self._gain(self._speed_mps) * angle_rad
-        return min(max(desired, -self._limit_radps), self._limit_radps)
+@shared
+def desired_turn(block: TurnReference, front_steer_rad: float, speed_mps: float, friction: float) -> float:
+    """Law of `TurnReference.step`."""
+    block._driver_rad, block._speed_mps = front_steer_rad, speed_mps
+    block._limit_radps = block._most_mps2 * friction / speed_mps
+    block._lagged_rad = _followed(block, block._interval_s)
+    return _desired(block, block._lagged_rad)
+
+
+@shared
+def desired_ahead(block: TurnReference, duration_s: float) -> float:
+    """Law of `TurnReference.ahead`."""
+    return _desired(block, _followed(block, duration_s))
+
+
+@shared
+def _followed(block: TurnReference, duration_s: float) -> float:
+    fraction = -math.expm1(-duration_s * block._speed_mps / block._length_m)
+    return block._lagged_rad + fraction * (block._driver_rad - block._lagged_rad)
+
+
+@shared
+def _desired(block: TurnReference, angle_rad: float) -> float:
+    desired = yaw_rate_gain(block._single_track, block._speed_mps) * angle_rad
+    return min(max(desired, -block._limit_radps), block._limit_radps)
+
+
+class BorneTurnReference(TurnReference):
+    """Desired yaw rate that falls where the measured lateral acceleration shows that the road does not bear the turn.
+
+    A car turns at a_y / v while its sideslip angle is constant; what it turns faster is growing sideslip. If the
+    measured |a_y| is short of v |r* behind a lag T_a| by more than D, the desired yaw rate r* falls by the rest over v,
+    at most to zero. Without this rule, a yaw moment turns a car whose front wheels have reached ice further in, and the
+    car slides when its rear wheels reach the ice too: the estimated friction comes late, and it is one number for both
+    axles.
+
+    Source: R. Rajamani, Vehicle Dynamics and Control, 2012, section 8.3.3, on a_y = v (r + d beta/dt) and the desired
+    yaw rate.
+    """
+
+    def __init__(
+        self,
+        single_track: SingleTrackParameters,
+        parameters: EscParameters | TorqueVectoringParameters,
+        interval_s: float,
+    ) -> None:
+        """Compute the constants.
+
+        Args:
+            single_track: The known car.
+            parameters: Those of the controller.
+            interval_s: Time between two steps [s].
+        """
+        super().__init__(single_track, parameters.reference_length_m, parameters.friction_fraction, interval_s)
+        self._fraction = -math.expm1(-interval_s / parameters.acceleration_time_s)
+        self._shortfall_mps2 = parameters.acceleration_shortfall_mps2
+        self._expected_radps = 0.0
+
+    def borne(self, front_steer_rad: float, speed_mps: float, friction: float, ay_mps2: float) -> float:
+        """Return the desired yaw rate [rad/s].
+
+        Args:
+            front_steer_rad: The driver's angle at the road wheel [rad].
+            speed_mps: Speed > 0 [m/s].
+            friction: Friction of the road [-].
+            ay_mps2: Measured lateral acceleration, left positive [m/s2].
+        """
+        desired_radps = self.step(front_steer_rad, speed_mps, friction)
+        self._expected_radps += self._fraction * (desired_radps - self._expected_radps)
+        side = math.copysign(1.0, self._expected_radps)
+        missing_mps2 = side * (speed_mps * self._expected_radps - ay_mps2) - self._shortfall_mps2
+        fall_radps = max(missing_mps2, 0.0) / speed_mps
+        return side * max(side * desired_radps - fall_radps, min(side * desired_radps, 0.0))

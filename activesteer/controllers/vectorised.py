@@ -10,12 +10,10 @@ from numba import from_dtype, types
 
 from activesteer.compilation import compiled_call
 from activesteer.controllers.find import find_controller
-from activesteer.controllers.front_superposition import FrontSuperposition, front_superposition
-from activesteer.controllers.no_control import NoControl, no_control
+from activesteer.controllers.law_interface import N_HELD, N_STEERING
+from activesteer.controllers.native_laws import LAWS, UNIT, decide, put
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.controllers.rear_steer import RearSteer, rear_steer
 from activesteer.conventions import Array
-from activesteer.native_blocks import record_type, values
 from activesteer.signals import (
     ActuatorCommand,
     DriverCommand,
@@ -26,17 +24,15 @@ from activesteer.signals import (
     numbers_of,
 )
 
-LAWS: Final[tuple[type[Any] | None, ...]] = (None, NoControl, RearSteer, FrontSuperposition)
-"""Controllers whose law compiled code can carry out, by their number; 0 is no such controller."""
-_RECORDS: Final = tuple(record_type(kind) for kind in (NoControl, RearSteer, FrontSuperposition))
+_UNIT: Final = np.dtype((np.record, UNIT))
 _ROW, _ROWS = types.Array(types.float64, 1, "A"), types.Array(types.float64, 2, "C")
 
 
 class Vectorised:
     """A controller of many cars, each with its own gains and memory.
 
-    The laws of `none`, `ars` and `afs` run in compiled code, and are those of the scalar controllers. Every other
-    controller is called car by car.
+    The laws of `none`, `ars`, `afs` and `lqr` run in compiled code, and are those of the scalar controllers. Every
+    other controller is called car by car.
 
     Attributes:
         n: Number of cars.
@@ -53,13 +49,11 @@ class Vectorised:
             ControllerError: there is no such controller, or it cannot be made.
         """
         self.n, plugin = len(setups), find_controller(controller)
-        blocks = [plugin.make(setup) for setup in setups]
-        self._law = LAWS.index(type(blocks[0])) if type(blocks[0]) in LAWS else 0
-        self._blocks = [] if self._law else blocks
-        self._records = [
-            np.array([values(block) for block in blocks] if number == self._law else [], record)
-            for number, record in enumerate(_RECORDS, 1)
-        ]
+        self._blocks = [plugin.make(setup) for setup in setups]
+        self._law = LAWS.index(type(self._blocks[0])) if type(self._blocks[0]) in LAWS else 0
+        self._units, self._held = np.zeros(self.n, _UNIT), np.zeros((self.n, N_HELD))
+        if self._law:
+            self._called = [put(self._units, car, self._law, block) for car, block in enumerate(self._blocks)]
 
     def step(self, command: DriverCommand, measurement: Measurement) -> Any:
         """Return the commands of all cars: an `ActuatorCommand` of arrays, without estimates.
@@ -68,12 +62,13 @@ class Vectorised:
             command: Commands of the drivers; each field has shape (n,).
             measurement: Measurements; each field has shape (n,), for the wheels (n, 4).
         """
-        rows = np.zeros((self.n, len(numbers_of(ActuatorCommand))))
+        rows, seen = np.zeros((self.n, len(numbers_of(ActuatorCommand)))), rows_of(measurement)
         if self._law:
-            inputs: list[Any] = [command.front_steer_demand_rad, measurement.speed_mps, measurement.yaw_rate_radps]
-            _carry_out(self._law, *self._records, *inputs, rows)
+            drivers: list[Any] = [command.front_steer_demand_rad, command.brake_pedal]
+            _carry_out(self._law, self._units, seen, *drivers, self._held)
+            rows[:, :N_STEERING] = self._held[:, :N_STEERING]
         else:
-            said, seen = rows_of(command), rows_of(measurement)
+            said = rows_of(command)
             for row, block, one, other in zip(rows, self._blocks, said.tolist(), seen.tolist(), strict=True):
                 row[:] = numbers_in(block.step(message_of(DriverCommand, one), message_of(Measurement, other)))
         return arrays_of(ActuatorCommand, rows)
@@ -84,19 +79,8 @@ def rows_of(message: tuple[Any, ...]) -> Array:
     return np.column_stack([part for part in message if part is not None])
 
 
-@compiled_call(
-    types.void, types.intp, *(types.Array(from_dtype(record), 1, "C") for record in _RECORDS), _ROW, _ROW, _ROW, _ROWS
-)
-def _carry_out(law, none, ars, afs, front_steer_rad, speed_mps, yaw_rate_radps, rows):
-    """Carry out a law of `LAWS` on its records, for each car."""
-    for car in range(len(rows)):
-        front, speed, yaw_rate = front_steer_rad[car], speed_mps[car], yaw_rate_radps[car]
-        if law == 1:
-            answer = no_control(none[car], front, speed, yaw_rate)
-        elif law == 2:
-            answer = rear_steer(ars[car], front, speed, yaw_rate)
-        else:
-            answer = front_superposition(afs[car], front, speed, yaw_rate)
-        row = rows[car]
-        row[0], row[1], row[2], row[3], row[4] = answer[:5]
-        row[5] = 1.0 if answer[5] else 0.0
+@compiled_call(types.void, types.intp, types.Array(from_dtype(_UNIT), 1, "C"), _ROWS, _ROW, _ROW, _ROWS)
+def _carry_out(law, units, measurements, front_rad, brake_pedal, held):
+    """Carry out a law of `LAWS` for each car."""
+    for car in range(len(units)):
+        decide(units[car], law, measurements[car].ctypes.data, front_rad[car], brake_pedal[car], held[car].ctypes.data)

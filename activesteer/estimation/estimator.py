@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import functools
 import struct
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from activesteer.estimation.advance import advance
+from activesteer.conventions import Array
 from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.records import MEMORY, SAID, known_of
-from activesteer.estimation.setup import EstimatorSetup
+from activesteer.estimation.setup import GRID, EstimatorSetup
+from activesteer.native_blocks import NativeBlock
 from activesteer.signals import Estimate, Measurement, new_message
 
 _pack_into = struct.Struct(f"{len(SAID)}d").pack_into
 
 
-class Estimator:
+@functools.cache
+def _advance() -> Any:
+    from activesteer.estimation.advance import advance  # noqa: PLC0415 - compiled code, which lists of controllers do without
+
+    return advance
+
+
+class Estimator(NativeBlock):
     """Estimator of speed, sideslip, yaw rate and friction from the sensors.
 
     Example:
@@ -31,6 +42,11 @@ class Estimator:
         >>> recording = activesteer.simulate("step_steer", Watching, overrides={"sensors.preset": "production"})
     """
 
+    _known: NDArray[Any]
+    _tyres: Array
+    _memory: NDArray[Any]
+    _line: Array
+
     def __init__(self, setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> None:
         """Make the estimator of one run.
 
@@ -40,7 +56,7 @@ class Estimator:
             timestep_s: Time between two steps [s].
         """
         self._known = known_of(setup, parameters, timestep_s)
-        self._tyres = np.array([tyre.force_N for tyre in setup.tyres])
+        self._tyres = np.array([tyre.force_N for tyre in setup.tyres]).reshape(2, *GRID)
         self._memory, self._said = np.zeros(1, MEMORY), np.zeros(len(SAID))
         self._row = self._said.data
         self._estimate = self._memory["estimate"][0]
@@ -56,7 +72,7 @@ class Estimator:
         """Process a measurement, and return the estimate."""
         _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement
         _pack_into(self._row, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
-        advance(self._known, self._tyres, self._memory, self._said, self._line)
+        _advance()(self._known, self._tyres, self._memory, self._said, self._line)
         return new_message(Estimate, self._estimate.tolist())
 
     def __getstate__(self) -> dict[str, object]:

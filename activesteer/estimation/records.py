@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,9 @@ from numpy.typing import NDArray
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.setup import EstimatorSetup
-from activesteer.sensors.sensor_kinds import Sensor
+
+if TYPE_CHECKING:
+    from activesteer.sensors.sensor_kinds import Sensor
 
 LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OFFSET, AY_OFFSET, FRICTION, \
     FRONT_STIFFNESS, REAR_STIFFNESS = range(11)  # fmt: skip
@@ -59,6 +62,31 @@ moment of all longitudinal forces, lateral acceleration that loads the wheels, l
 to v_y, roll; and for each wheel its longitudinal force, its load, and the speed of the car by this wheel.
 """
 
+KNOWN: Final = np.dtype(
+    (
+        np.record,
+        [
+            *((name, np.float64) for name in (
+                "mass_kg", "yaw_inertia_kgm2", "cg_to_front_m", "cg_to_rear_m", "front_compliance_radpN",
+                "rear_compliance_radpN", "front_load_N", "rear_load_N", "front_load_kg", "rear_load_kg",
+                "along_load_kg", "front_relaxation_m", "rear_relaxation_m", "angle_step_rad", "front_load_step_N",
+                "rear_load_step_N", "roll_gradient_radpmps2", "roll_speed_radps", "roll_damping", "roll_arm_m",
+                "pitch_gain", "drag_kgpm", "wheel_inertia_kgm2", "steering_ratio",
+                *(one.name for one in fields(EstimatorParameters)),
+                "ay_offset_std_mps2", "ay_offset_s", "rate_offset_std_radps", "rate_walk_rad2ps3",
+                "rate_variance_rad2ps2", "ay_variance_m2ps4", "ax_offset_std_mps2", "ax_offset_density_m2ps5",
+                "wheel_variance_m2ps2", "call_s", "longest_s", "age_s",
+            )),
+            *((name, np.intp) for name in ("wheel_age", "steering_age", "actuator_age")),
+            *((name, np.float64, (4,)) for name in (
+                "half_track_m", "to_axle_m", "left_m", "rolling_radius_m", "drive_fraction",
+                "torque_per_pressure_NmpPa", "slip_stiffness",
+            )),
+        ],
+    )
+)  # fmt: skip
+"""Knowledge of an estimator; see `known_of`."""
+
 _RATE_FLOOR_RADPS: Final = math.radians(0.02)
 _AY_FLOOR_MPS2: Final = 0.03
 """Smallest standard deviations of a measurement, even if a data sheet gives less."""
@@ -69,7 +97,7 @@ _SHORTEST_WAIT_S: Final = 0.005
 
 
 def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> NDArray[Any]:
-    """Return the knowledge of an estimator: a record, shape (1,), with a field for each value.
+    """Return the knowledge of an estimator: a record of `KNOWN`, shape (1,).
 
     Car: for each axle its compliance, wheel load, load transfer per lateral and longitudinal acceleration, relaxation
     length and steps of the tyre grid; roll of the body, and effect of its pitch on an accelerometer. Uncertainties: the
@@ -83,10 +111,7 @@ def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s:
         timestep_s: Time between two calls [s].
     """
     values = _car(setup) | _uncertainties(setup, parameters) | _times(setup, timestep_s) | _wheels(setup)
-    fields = [
-        (name, np.intp if isinstance(value, int) else np.float64, np.shape(value)) for name, value in values.items()
-    ]
-    known = np.zeros(1, np.dtype((np.record, fields)))
+    known = np.zeros(1, KNOWN)
     for name, value in values.items():
         known[name] = value
     return known

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from activesteer.theory.two_track import TwoTrackParameters
 if TYPE_CHECKING:
     from activesteer.sensors import Sensors
 
+GRID: Final = (10, 41)
+"""Number of loads and of slip angles at which the forces of a `KnownTyre` are tabulated."""
+
 
 @dataclass(frozen=True)
 class KnownTyre:
@@ -21,7 +24,7 @@ class KnownTyre:
     Attributes:
         slip_angle_step_rad: Step of the slip angles of the grid, from 0 [rad].
         load_step_N: Step of its loads, from 0 [N].
-        force_N: Lateral force for each load and slip angle, mean of both directions, without sign [N].
+        force_N: Lateral force for each load and slip angle of `GRID`, mean of both directions, without sign [N].
         relaxation_length_m: Relaxation length of the slip angle under the static load [m].
         slip_stiffness: Longitudinal force per slip and load, under the static load.
         rolling_radius_m: Effective rolling radius under the static load [m].

@@ -8,14 +8,13 @@ import numpy as np
 
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation import EstimatorSetup, KnownTyre
+from activesteer.estimation.setup import GRID
 from activesteer.scenario.car import Car
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 
-_SLIP_ANGLES: Final = 41
 _LARGEST_SLIP_ANGLE_RAD: Final = np.radians(20.0)
 """Largest slip angle of the grid; beyond it the force stays constant [rad]."""
-_LOADS: Final = 10
 _LARGEST_LOAD: Final = 3.0
 """Largest load of the grid over the static load; beyond it the force stays constant."""
 _SPEED_MPS: Final = 20.0
@@ -42,8 +41,7 @@ def estimator_setup(car: Car) -> EstimatorSetup | None:
 def _known(parameters: TyreParameters, load_N: float) -> KnownTyre:
     """Evaluate a tyre with this static load."""
     tyre = MagicFormula(parameters)
-    angles_rad = np.linspace(0.0, _LARGEST_SLIP_ANGLE_RAD, _SLIP_ANGLES)
-    loads_N = np.linspace(0.0, _LARGEST_LOAD * load_N, _LOADS)
+    loads_N, angles_rad = map(np.linspace, (0.0, 0.0), (_LARGEST_LOAD * load_N, _LARGEST_SLIP_ANGLE_RAD), GRID)
     left, right = (
         tyre.evaluate(loads_N[:, np.newaxis], 0.0, sign * angles_rad, vx_mps=_SPEED_MPS).fy_N for sign in (-1.0, 1.0)
     )

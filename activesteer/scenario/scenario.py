@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -174,20 +175,14 @@ def part_of(
         return "controllers", [*own]
     if first in _PARTS and rest:
         return first, rest
-    paths = {"maneuver": key_paths(kind), "vehicle": key_paths(VehicleConfig)}
-    # A key names a table, a value, or a value in an entry of a list, after the number of the entry.
-    dotted = key + "."
-    holders = [
-        part
-        for part in paths
-        if any(f"{path}.".startswith(dotted) or dotted.startswith(f"{path}.") for path in paths[part])
-    ]
+    holders = _holders(key, kind)
     if len(holders) == 1:
         return holders[0], [first, *rest]
     if holders:
         raise ParameterError(
             f"both manoeuvre and vehicle have this key; use maneuver.{key} or vehicle.{key}", key=key, overridden=True
         )
+    paths = {"maneuver": key_paths(kind), "vehicle": key_paths(VehicleConfig)}
     known = [f"{part}.{path}" for part in paths for path in paths[part]]
     known += [*paths["maneuver"], *paths["vehicle"]]
     known += [f"driver.{path}" for path in key_paths(DriverParameters)]
@@ -198,6 +193,17 @@ def part_of(
         help_ += f" A parameter of your own class {own[0]} needs this class as a controller"
     raise ParameterError(
         f"neither manoeuvre nor vehicle nor driver has such a key; {help_}", key=key, allowed=known, overridden=True
+    )
+
+
+@functools.lru_cache(1024)
+def _holders(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
+    """Return the parts in which a key names a table, a value, or an entry of a list by its number."""
+    dotted, of_part = key + ".", {"maneuver": key_paths(kind), "vehicle": key_paths(VehicleConfig)}
+    return tuple(
+        part
+        for part, paths in of_part.items()
+        if any(f"{path}.".startswith(dotted) or dotted.startswith(f"{path}.") for path in paths)
     )
 
 

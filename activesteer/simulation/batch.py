@@ -61,8 +61,8 @@ class Batch:
     All inputs and outputs are arrays whose first axis is the car. The trajectory of each car is equal to the last bit
     to that of a `Simulation` with the same inputs, for any number of cars and threads.
 
-    The package's driver with any manoeuvre, held commands, and the controllers `none`, `ars` and `afs` run in native
-    code. Every other driver or controller, and a car with a faulty sensor, is driven in Python, car by car.
+    The package's driver with any manoeuvre, held commands, and the controllers `none`, `ars`, `afs` and `lqr` run in
+    native code. Every other driver or controller, and a car with a faulty sensor, is driven in Python, car by car.
 
     Attributes:
         scenarios: Manoeuvre, car and driver of each car.
@@ -266,8 +266,8 @@ class Batch:
 
     def _drive(self, left: NDArray[np.intp], drivers: Array | None, controllers: Array | None) -> None:
         native, records, moving = self._native, self._native.cars, left > 0
-        records["driver_kind"] = GIVEN if drivers is not None else HUMAN
-        records["controller_kind"] = 0 if controllers is not None else self._laws
+        records["driver_kind"][moving] = GIVEN if drivers is not None else HUMAN
+        records["controller_kind"][moving] = 0 if controllers is not None else self._laws[moving]
         if drivers is not None:
             native.driver_commands[moving] = drivers[moving]
         if controllers is not None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.controllers.law_interface import N_HELD, N_STEERING
+from activesteer.controllers.native_laws import LAWS, fetch, put
 from activesteer.conventions import Array
 from activesteer.driver.human import HumanDriver
 from activesteer.errors import SimulationDiverged
@@ -16,6 +19,7 @@ from activesteer.road.path_search import PathSearch
 from activesteer.signals import (
     ActuatorCommand,
     DriverCommand,
+    Estimate,
     Measurement,
     Motion,
     Setpoint,
@@ -34,8 +38,6 @@ from activesteer.simulation.native_loop import (
     GIVEN,
     HUMAN,
     INSANE,
-    LAWS,
-    N_STEERING,
     PATH,
     SETPOINT,
     TORQUES,
@@ -142,7 +144,8 @@ class NativeCars:
             self.cars[name] = row.ctypes.data + row.strides[0] * np.arange(count)
         self.driver_commands, self.actuator_commands, self.measurements, self.motions = self.rows.values()
         self._tables: list[SetpointTable | None] = [None] * count
-        self._buses: list[Array] = [np.zeros(0)] * count
+        self._buses: list[Array] = [np.zeros((0, 0))] * count
+        self._blocks: list[NDArray[Any] | None] = [None] * count
         for index, loop in enumerate(loops):
             drive: Any = loop.driver_setup.drive  # the vehicle's own
             bound = {"drive_fractions": drive.fractions, "drive_numbers": drive.numbers, **loop.vehicle.bound()}
@@ -152,6 +155,8 @@ class NativeCars:
     def load(self, index: int) -> None:
         """Copy the state of a loop into its record; its native driver and controller act, other commands hold."""
         loop, cars = self._loops[index], self.cars
+        estimate = loop.vehicle.rows.estimate
+        cars["estimate"][index] = estimate.ctypes.data if estimate.size else 0
         cars["gear"][index] = loop.vehicle.gear
         cars["step"][index] = loop.step_count
         self.measurements[index], self.motions[index] = numbers_in(loop.measurement), loop.motion
@@ -170,12 +175,14 @@ class NativeCars:
             every, calls, ratio, held, on_bus = controller.memory()
             controller = controller.inner
         cars, delay = self.cars, max(len(on_bus) - 1, 0) if calls else len(on_bus)
-        bus = self._buses[index] = np.zeros((delay + 1, N_STEERING))
+        self._blocks[index] = block = put(cars, index, law, controller)
+        numbers = N_STEERING if block is None else N_HELD
+        bus = self._buses[index] = np.zeros((delay + 1, numbers))
         for back, command in enumerate(reversed(on_bus), 1):
-            bus[(calls - back) % (delay + 1)] = command[:N_STEERING]
+            bus[(calls - back) % (delay + 1)] = _numbers(command)[:numbers]
         unit = {
             "every": every, "calls": calls, "on_bus": delay, "bus": (bus.ctypes.data, bus.size),
-            "held": held[:N_STEERING], "steering_ratio": ratio, f"law_{law}": values(controller),
+            "numbers": numbers, "held": _numbers(held), "steering_ratio": ratio,
         }  # fmt: skip
         for name, value in unit.items():
             cars[name][index] = value
@@ -193,15 +200,18 @@ class NativeCars:
             take(loop.driver, cars["driver"][index].item())  # type: ignore[arg-type]
             if cars["driver_kind"][index] == HUMAN:
                 driver_command = driver_command._replace(wheel_torques=self._torques_of(index, step - 1))
-        loop.commands = driver_command, message_of(ActuatorCommand, self.actuator_commands[index].tolist())
+        command = message_of(ActuatorCommand, self.actuator_commands[index].tolist())
         if law := law_of(loop.controller):
-            controller, calls = loop.controller, int(cars["calls"][index])
+            controller, calls, bus = loop.controller, int(cars["calls"][index]), self._buses[index]
+            on_bus = [_command(bus[(calls - back) % len(bus)]) for back in range(len(bus), 0, -1)]
             if isinstance(controller, ControlUnit):
-                bus, length = self._buses[index], len(self._buses[index])
-                on_bus = [_steering(bus[(calls - back) % length]) for back in range(length, 0, -1)]
-                controller.put_memory(calls, _steering(cars["held"][index]), on_bus if calls else on_bus[1:])
+                held = _command(cars["held"][index][: bus.shape[1]])
+                controller.put_memory(calls, held, on_bus if calls else on_bus[1:])
                 controller = controller.inner
-            take(controller, cars[f"law_{law}"][index].item())  # type: ignore[arg-type]
+            fetch(cars, index, law, controller, self._blocks[index])
+            if cars["controller_kind"][index]:
+                command = command._replace(estimate=on_bus[0].estimate)
+        loop.commands = driver_command, command
 
     def follow(self, index: int, table: SetpointTable, first: int) -> None:
         """Give the driver of a car its setpoints.
@@ -269,5 +279,15 @@ class NativeCars:
         return WheelTorques(drive, brake)
 
 
-def _steering(row: Sequence[float]) -> ActuatorCommand:
-    return steering(*map(float, row[: N_STEERING - 1]), bool(row[N_STEERING - 1]))  # type: ignore[arg-type]
+def _numbers(command: ActuatorCommand) -> Array:
+    """Return the numbers of a command and of its estimate, shape (`N_HELD`,); nan without an estimate."""
+    estimate = command.estimate or [math.nan] * (N_HELD - N_STEERING)
+    return np.array([*command[:N_STEERING], *estimate])
+
+
+def _command(numbers: Array) -> ActuatorCommand:
+    """Return a command from its numbers; see `_numbers`."""
+    row = numbers.tolist()
+    estimate = Estimate(*row[N_STEERING:]) if len(row) > N_STEERING and not math.isnan(row[N_STEERING]) else None
+    rear, front, desired, prediction, correction, saturated = row[:N_STEERING]
+    return steering(rear, front, desired, prediction, correction, bool(saturated), estimate)

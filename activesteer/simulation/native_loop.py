@@ -12,31 +12,26 @@ import numpy as np
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, call_at, compiled_call, inlined
-from activesteer.controllers.front_superposition import front_superposition
-from activesteer.controllers.no_control import no_control
-from activesteer.controllers.rear_steer import rear_steer
-from activesteer.controllers.vectorised import LAWS
+from activesteer.controllers.law_interface import N_HELD, N_STEERING
+from activesteer.controllers.native_laws import UNIT, decide
 from activesteer.driver.constant_radius import circle_angle, correct_circle
 from activesteer.driver.human import HumanDriver
 from activesteer.driver.open_loop import turned
 from activesteer.driver.path_preview import SPEED_STEP_MPS, look, looks, moved
 from activesteer.native_blocks import ARRAY, record_type
+from activesteer.native_memory import array_of, f64_pointer, pointer_to, word_pointer
 from activesteer.native_messages import load_numbers, native_type, store_numbers
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_of, widths_of
 from activesteer.vehicle import native_step
-from activesteer.vehicle.native_memory import f64_pointer, pointer_to, word_pointer
 from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits, engine_speed
 
 ANGLE, CURVATURE, PATH = range(3)
 """Kinds of a setpoint: steering wheel angle, curvature, path."""
 GIVEN, HUMAN = range(2)
 """Kinds of drivers: the row of commands holds, or `HumanDriver` decides."""
-_NONE, _ARS, _AFS = 1, 2, 3
 DONE, NEEDS_PYTHON, INSANE = range(3)
 """Reasons why a car has stopped: all its steps are made; the next step needs Python, which knows the driver's gains at
 a new speed; a value is beyond all reason."""
-N_STEERING: Final = 6
-"""Numbers of an `ActuatorCommand` that a controller of `LAWS` decides."""
 
 SETPOINT: Final = np.dtype(
     (
@@ -65,10 +60,10 @@ CAR: Final = np.dtype(
             ("driver_kind", np.intp),
             ("driver", record_type(HumanDriver)),
             ("controller_kind", np.intp),
-            *((f"law_{index}", record_type(kind)) for index, kind in enumerate(LAWS) if kind is not None),
-            *((name, np.intp) for name in ("every", "calls", "on_bus")),
+            *UNIT,
+            *((name, np.intp) for name in ("every", "calls", "on_bus", "numbers", "estimate")),
             ("bus", ARRAY),
-            ("held", np.float64, (N_STEERING,)),
+            ("held", np.float64, (N_HELD,)),
             ("steering_ratio", np.float64),
             *((name, np.intp) for name in ("setpoints", "torques", "n_setpoints", "first")),
             ("spacing_m", np.float64),
@@ -104,15 +99,6 @@ _SPEED, _YAW_RATE, _STEERING_WHEEL, _WHEEL_SPEEDS = map(
 )
 _N_MEASURED, _N_MOTION, _N_DRIVER = len(_MEASURED), len(numbers_of(Motion)), len(_DRIVER_NUMBERS)
 _MOTION_SPEED: Final = Motion._fields.index("speed_mps")
-assert [number.name for number in numbers_of(ActuatorCommand)[:N_STEERING]] == [
-    "rear_steer_demand_rad", "superposition_demand_rad", "yaw_rate_desired_radps", "prediction_rad", "correction_rad",
-    "saturated",
-]  # fmt: skip
-
-
-@inlined
-def _array(memory):
-    return carray(f64_pointer(memory.address), (memory.size,))
 
 
 @inlined
@@ -123,7 +109,7 @@ def _drive(car, setpoint, measured, motion, command):
     if setpoint.kind == PATH:
         path = human._path
         if path._steps % path._preview_every_steps == 0:
-            decided, address = _array(path._decided_rad), 0
+            decided, address = array_of(path._decided_rad), 0
             if looks(motion[_MOTION_SPEED]):
                 rounded = int(np.rint(motion[_MOTION_SPEED] / SPEED_STEP_MPS))
                 if rounded < path._known.size:
@@ -134,7 +120,7 @@ def _drive(car, setpoint, measured, motion, command):
             look(
                 path, robot.steering_wheel_limit_rad, decided,
                 motion[0], motion[1], motion[2], motion[3], motion[4], motion[5],
-                car.spacing_m, _array(car.path_x_m), _array(car.path_y_m), car.headings_rad[0], car.headings_rad[1],
+                car.spacing_m, array_of(car.path_x_m), array_of(car.path_y_m), car.headings_rad[0], car.headings_rad[1],
                 gains,
             )  # fmt: skip
         path._steps += 1
@@ -160,27 +146,24 @@ def _drive(car, setpoint, measured, motion, command):
 
 
 @inlined
-def _control(car, measured, front_rad, command):
-    """Write the command of the controller that reaches the actuators."""
+def _control(car, measured, driver, command):
+    """Write the command of the controller that reaches the actuators, and its estimate."""
     held = car.held
     if car.calls % car.every == 0:
+        front_rad = driver[_FRONT]
         if car.steering_ratio != 0.0:
             front_rad = measured[_STEERING_WHEEL] / car.steering_ratio
-        speed, yaw_rate = measured[_SPEED], measured[_YAW_RATE]
-        if car.controller_kind == _ARS:
-            answer = rear_steer(car.law_2, front_rad, speed, yaw_rate)
-        elif car.controller_kind == _AFS:
-            answer = front_superposition(car.law_3, front_rad, speed, yaw_rate)
-        else:
-            answer = no_control(car.law_1, front_rad, speed, yaw_rate)
-        held[0], held[1], held[2], held[3], held[4] = answer[:5]
-        held[5] = 1.0 if answer[5] else 0.0
-    length, bus = car.on_bus + 1, _array(car.bus)
-    newest, oldest = car.calls % length * N_STEERING, (car.calls + 1) % length * N_STEERING
-    for index in range(N_STEERING):
+        decide(car, car.controller_kind, car.measurement, front_rad, driver[_PEDAL], held.ctypes.data)
+    length, bus = car.on_bus + 1, array_of(car.bus)
+    newest, oldest = car.calls % length * car.numbers, (car.calls + 1) % length * car.numbers
+    for index in range(car.numbers):
         bus[newest + index] = held[index]
     for index in range(N_STEERING):
         command[index] = bus[oldest + index]
+    if car.estimate != 0:
+        estimate = f64_pointer(car.estimate)
+        for index in range(N_STEERING, car.numbers):
+            estimate[index - N_STEERING] = bus[oldest + index]
     car.calls += 1
 
 
@@ -227,7 +210,7 @@ def drive_cars(cars, first, last, step_address):
                     break
                 torques_set = setpoints[row].torques_set != 0
             if car.controller_kind != 0:
-                _control(car, measured, driver[_FRONT], f64_pointer(car.actuator_command))
+                _control(car, measured, driver, f64_pointer(car.actuator_command))
             gear = float(CLUTCH_OPEN) if torques_set else driver[_GEAR]
             if gear != car.gear:
                 _engage(car, gear)

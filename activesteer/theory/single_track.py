@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from activesteer.config import Range
 from activesteer.errors import ParameterError
 from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
 
 if TYPE_CHECKING:
     import control
@@ -197,12 +198,14 @@ class SingleTrack(NativeBlock):
         return a, b
 
 
+@shared
 def yaw_rate_gain(model: SingleTrack, speed_mps: float) -> float:
     """Return `SingleTrack.yaw_rate_gain`, also in compiled code."""
     ratio = speed_mps / model.characteristic_speed_mps
     return speed_mps / model.wheelbase_m / (1.0 + ratio * ratio)
 
 
+@shared
 def rear_prediction(model: SingleTrack, speed_mps: _Speed) -> tuple[_Speed, _Speed, _Speed]:
     """Return `SingleTrack.rear_prediction`, also in compiled code."""
     # Called in every step of a run; everything that does not depend on speed is computed beforehand.

@@ -17,8 +17,8 @@ from typing import Final
 import numpy as np
 
 from activesteer.compilation import inlined
+from activesteer.native_memory import records_at
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.native_memory import records_at
 
 _wheels_at: Final = records_at(fb.CURVE_AXLE_WHEEL)
 _tables_at: Final = records_at(fb.CURVE_TABLE)

@@ -18,6 +18,7 @@ from numba import carray, types
 
 from activesteer.compilation import compiled_callback, inlined
 from activesteer.errors import ModelError
+from activesteer.native_memory import array_at, f64_pointer, records_at, word
 from activesteer.road.obstacle import OBSTACLE
 from activesteer.road.path_coordinates import along_path
 from activesteer.road.surface_kernels import SURFACE, left_grid
@@ -28,7 +29,6 @@ from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
 from activesteer.vehicle.native_actuators import brake_rate, drive_rate, dry_friction_rate, servo_rate
 from activesteer.vehicle.native_contact import CAM, contact_plane, plane_axes, spin_on_bend
 from activesteer.vehicle.native_curve_axle import add_curve_axle_forces
-from activesteer.vehicle.native_memory import array_at, f64_pointer, records_at, word
 from activesteer.vehicle.native_screws import screw_rate
 
 _MARKER: Final = fb.MARKER

@@ -15,8 +15,8 @@ from numba import from_dtype, types
 from numba.extending import intrinsic
 
 from activesteer.compilation import inlined
+from activesteer.native_memory import f64_pointer, pointer_to
 from activesteer.vehicle.implicit_plan import IMPLICIT_PLAN
-from activesteer.vehicle.native_memory import f64_pointer, pointer_to
 
 _N_BIAS: Final = int(mujoco.mjNBIAS)
 _N_GEAR: Final = 6

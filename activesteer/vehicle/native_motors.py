@@ -19,8 +19,8 @@ from typing import Final
 from numba import carray, from_dtype
 
 from activesteer.compilation import compiled, inlined
+from activesteer.native_memory import pointer_to
 from activesteer.vehicle.motor_records import BATTERY, BATTERY_STATE, MOTOR, MOTOR_STATE
-from activesteer.vehicle.native_memory import pointer_to
 
 _motor_pointer: Final = pointer_to(from_dtype(MOTOR))
 _motor_state_pointer: Final = pointer_to(from_dtype(MOTOR_STATE))

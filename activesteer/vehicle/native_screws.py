@@ -6,8 +6,8 @@ import math
 from typing import Final
 
 from activesteer.compilation import inlined
+from activesteer.native_memory import records_at
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.native_memory import records_at
 
 _CONTACT_S: Final = 3e-4
 """Time in which a screwed link settles in its play; at 0, the linearised car would lack this mode [s]."""

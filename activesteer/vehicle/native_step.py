@@ -15,6 +15,7 @@ from activesteer.brakes.control_unit import step_brakes
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
+from activesteer.native_memory import f64_pointer, pointer_to
 from activesteer.native_messages import native_type
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
@@ -30,7 +31,6 @@ from activesteer.vehicle.command_row import (
     write_commands,
 )
 from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
-from activesteer.vehicle.native_memory import f64_pointer, pointer_to
 from activesteer.vehicle.native_motors import step_motors
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.step_bindings import ENGINE, MOTOR, N_SOURCES, N_WARNINGS, STEP_BINDINGS, TAPE

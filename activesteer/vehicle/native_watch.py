@@ -7,7 +7,7 @@ from typing import Final
 from numba import carray, types
 
 from activesteer.compilation import compiled_call
-from activesteer.vehicle.native_memory import f64_pointer, pointer_to, word_pointer
+from activesteer.native_memory import f64_pointer, pointer_to, word_pointer
 
 UNCHANGED: Final = 0
 CHANGED: Final = 1

@@ -12,8 +12,8 @@ import numpy as np
 from numba import from_dtype, types
 
 from activesteer.compilation import compiled_call, inlined
+from activesteer.native_memory import f64_pointer
 from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, RawRows
-from activesteer.vehicle.native_memory import f64_pointer
 
 _ROWS_AT_ONCE: Final = 8
 """Number of float64 in a cache line."""

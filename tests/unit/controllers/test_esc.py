@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.esc import Esc, brake_levers, wheel_torques
-from activesteer.controllers.turn_reference import TurnReference
+from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, Estimate
 from activesteer.theory.single_track import SingleTrack
@@ -68,7 +68,7 @@ def test_brake_turns_a_sliding_car_back_in_a_time_proportional_to_the_sideslip_t
             return Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, 0.9, *[0.0] * 5)
 
     inertia_kgm2 = known.single_track.yaw_inertia_kgm2
-    reference = TurnReference(known.single_track, p.reference_length_m, p.friction_fraction, known.timestep_s)
+    reference = BorneTurnReference(known.single_track, p, known.timestep_s)
     esc = Esc(reference, Sliding(), p, inertia_kgm2, brake_levers(known))  # pyright: ignore[reportArgumentType]
     torque_Nm = esc.step(steering(0.0), measured(0.0)).brake_torque_demand_Nm[0]
     moment_Nm = torque_Nm / car.rolling_radius_m[0] * 0.5 * car.two_track.front_track_m

@@ -12,7 +12,7 @@ from activesteer.controllers import load_controller
 from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.esc import wheel_torques
 from activesteer.controllers.integrated import Integrated
-from activesteer.controllers.lqr import BOTH, SPEEDS_MPS, Lqr, schedule, steady_turn
+from activesteer.controllers.lqr import SPEEDS_MPS, Lqr, _gain, _place, schedule, steady_turn
 from activesteer.controllers.mpc import GIVEN, STATES, envelope_problem, model
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
@@ -143,10 +143,13 @@ def test_brakes_of_a_car_that_spins_to_the_left_are_those_of_one_that_spins_to_t
 def test_gains_of_the_regulator_are_those_of_the_schedule_and_between_its_speeds_their_mean(known):
     regulator, p = Lqr(known), known.gains
     rows = schedule(known.single_track, p.lqr, p.servos.lag_s, INTERVAL_S)
-    assert regulator._gains(BOTH, SPEEDS_MPS[3]) == pytest.approx(rows[3])
-    mean = 0.5 * (np.array(rows[3]) + rows[4])
-    assert regulator._gains(BOTH, 0.5 * (SPEEDS_MPS[3] + SPEEDS_MPS[4])) == pytest.approx(mean)
-    assert regulator._gains(BOTH, 2.0 * SPEEDS_MPS[-1]) == pytest.approx(rows[-1], rel=1e-5)
+
+    def gains(speed_mps):
+        return [_gain(regulator._schedule, *_place(speed_mps), column) for column in range(len(rows[0]))]
+
+    assert gains(SPEEDS_MPS[3]) == pytest.approx(rows[3])
+    assert gains(0.5 * (SPEEDS_MPS[3] + SPEEDS_MPS[4])) == pytest.approx(0.5 * (np.array(rows[3]) + rows[4]))
+    assert gains(2.0 * SPEEDS_MPS[-1]) == pytest.approx(rows[-1], rel=1e-5)
 
 
 def test_axle_that_carries_all_of_the_load_transfer_feels_twice_the_height(known):

@@ -45,6 +45,60 @@ def test_each_car_equals_its_simulation_for_any_number_of_threads_and_chunks(man
         assert (one.loops[car].vehicle.save_state() == alone.loop.vehicle.save_state()).all()
 
 
+def driven_by_python(simulation: Simulation) -> Simulation:
+    """Replace the controller's method, so that compiled code does not carry out its law."""
+    unit = simulation.loop.controller
+    controller: Any = getattr(unit, "inner", unit)
+    controller.step = controller.step
+    return simulation
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "production"])
+def test_the_law_of_lqr_gives_the_same_bits_in_python_and_in_compiled_code(sensors: str) -> None:
+    both = {"sensors.preset": sensors, "controllers.bus_delay_s": 0.003 if sensors == "production" else 0.0}
+    cars = [{"road.mu": 0.7}, {"road.mu": 0.9, "factors.mass": 1.1}]
+    batch = Batch("brake_in_turn", 2, "lqr", overrides=[both | car for car in cars], threads=2)
+    batch.advance(1301)
+    for car, own in enumerate(cars):
+        known, alone = (Simulation("brake_in_turn", "lqr", overrides=both | own) for _ in range(2))
+        known.advance(1301)
+        driven_by_python(alone).advance(1301)
+        assert row(batch, car) == numbers(alone)
+        assert batch.loops[car].commands == alone.loop.commands
+        assert alone.loop.commands[1].estimate is not None
+        states = [loop.vehicle.save_state() for loop in (batch.loops[car], alone.loop)]
+        assert (states[0] == states[1]).all()
+        recordings = known.recording(), alone.recording()
+        assert "estimated_friction" in recordings[0].channels
+        for channel in recordings[0].channels:
+            assert np.array_equal(*(recording[channel.name] for recording in recordings), equal_nan=True)
+
+
+def test_a_car_whose_loop_stands_still_keeps_the_kind_of_its_last_command() -> None:
+    batch = Batch("step_steer", 2, "lqr", threads=1)
+    batch.advance(20, actuator_command=ActuatorCommand(0.01))
+    batch.advance(20, cars=[0])
+    batch.sync()
+    assert [loop.commands[1].estimate is None for loop in batch.loops] == [False, True]
+
+
+@pytest.mark.parametrize("controller", ["ars", "lqr"])
+def test_a_vectorised_controller_is_the_scalar_one(controller: str) -> None:
+    batch = Batch("sine_with_dwell", 2, overrides={"road.mu": np.array([0.5, 0.9])}, threads=1)
+    together, alone = batch.vectorised(controller, 0.01), [batch.vectorised(controller, 0.01) for _ in range(2)]
+    blocks = [each._blocks[0] for each in alone]
+    for _ in range(120):
+        batch.advance(10)
+        batch.sync()
+        found = together.step(batch.driver_command, batch.measurement)
+        for car, block in enumerate(blocks):
+            loop = batch.loops[car]
+            expected = block.step(loop.commands[0], loop.measurement)
+            assert numbers_in(expected._replace(estimate=None)) == [
+                part for field in found if field is not None for part in np.ravel(field[car])
+            ]
+
+
 def test_given_commands_replace_the_blocks() -> None:
     batch = Batch("step_steer", 2, "ars", overrides={"speed_kmh": 80.0}, threads=1)
     rear: Any = np.array([-0.02, 0.03])
@@ -73,9 +127,10 @@ def test_a_fault_acts_at_its_time_in_its_car() -> None:
         assert row(batch, car) == numbers(alone)
 
 
+@pytest.mark.parametrize("controller", ["ars", "lqr"])
 @pytest.mark.parametrize("twin", [copy.deepcopy, lambda batch: pickle.loads(pickle.dumps(batch))])
-def test_states_and_copies_continue_bit_identically(twin) -> None:
-    batch = Batch("double_lane_change", 2, "ars", overrides={"road.mu": np.array([0.5, 0.9])}, threads=1)
+def test_states_and_copies_continue_bit_identically(twin, controller: str) -> None:
+    batch = Batch("double_lane_change", 2, controller, overrides={"road.mu": np.array([0.5, 0.9])}, threads=1)
     batch.advance(1100)
     (state,), other = batch.save_state([1]), twin(batch)
     expected = batch.advance(400).yaw_rate_radps
@@ -93,7 +148,7 @@ def test_every_controller_and_driver_can_be_driven() -> None:
         def step(self, _command, measurement):
             return ActuatorCommand(rear_steer_demand_rad=0.05 * measurement.yaw_rate_radps)
 
-    for controller in (Damper(), "lqr"):
+    for controller in (Damper(), "esc"):
         batch, alone = Batch("step_steer", 2, controller), Simulation("step_steer", controller)
         batch.advance(120)
         alone.advance(120)

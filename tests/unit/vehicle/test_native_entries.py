@@ -147,7 +147,7 @@ def test_inputs_of_another_form_are_not_played_back() -> None:
 def test_rows_of_another_form_are_not_taken() -> None:
     channels, rows = rolling().channels, rolling().rows.empty(5)
     out, inputs = np.zeros((5, len(channels.channels)), order="F"), channels.inputs(5)
-    for array in rows:
+    for array in (*rows, inputs):  # none of them is cleared when it is made
         array[:] = 0.0
     for name in set(RawRows._fields) - {"measured", "electric"}:  # empty with ideal sensors, without motors
         own = getattr(rows, name)

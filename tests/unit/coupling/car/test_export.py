@@ -2,6 +2,7 @@
 
 import csv
 import ctypes
+import functools
 import importlib
 import shutil
 import subprocess
@@ -65,14 +66,15 @@ class Car:
         ):  # fmt: skip
             function = getattr(lib, f"as_{name}")
             function.restype, function.argtypes = result, arguments
+        self.find = functools.cache(lambda name: lib.as_find(name.encode()))
         self.car = lib.as_create()
         assert self.car, lib.as_message(None)
 
     def __getitem__(self, name):
-        return self.lib.as_get(self.car, self.lib.as_find(name.encode()))
+        return self.lib.as_get(self.car, self.find(name))
 
     def __setitem__(self, name, value):
-        assert self.lib.as_set(self.car, self.lib.as_find(name.encode()), value) == 0, self.message
+        assert self.lib.as_set(self.car, self.find(name), value) == 0, self.message
 
     def step(self, steps=1):
         assert self.lib.as_step(self.car, steps) == 0, self.message

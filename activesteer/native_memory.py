@@ -1,4 +1,4 @@
-"""Access to the engine's memory from compiled code: addresses become numba pointers and arrays."""
+"""Access to memory from compiled code: addresses become numba pointers and arrays."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import carray, from_dtype, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 
 from activesteer.compilation import inlined
+from activesteer.native_blocks import table
 
 
 def pointer_to(numba_type: types.Type) -> Any:
@@ -31,6 +32,20 @@ f64_pointer = pointer_to(types.float64)
 """Address (intp) -> pointer to float64."""
 word_pointer = pointer_to(types.intp)
 """Address (intp) -> pointer to a machine word."""
+
+
+@inlined
+def array_of(memory):
+    """Return the array of float64 of a record of `native_blocks.ARRAY`."""
+    return carray(f64_pointer(memory.address), (memory.size,))
+
+
+@overload(table)
+def _table(numbers):
+    """Let a law that Python and compiled code share read the numbers of a block."""
+    if isinstance(numbers, types.Record):
+        return lambda numbers: array_of(numbers)  # noqa: PLW0108 - numba asks for a function of Python
+    return None
 
 
 @inlined
