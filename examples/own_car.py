@@ -21,7 +21,7 @@ def stiffer_front(folder):
     """Build a car with stiffer front springs and anti-roll bar from the compact's table."""
     table = (models_dir() / "tables" / "compact.toml").read_text(encoding="utf-8")
     for compact, mine in (
-        ("spring_rate_Npm = 24200", "spring_rate_Npm = 30000"),
+        ("spring_rate_Npm = 24730", "spring_rate_Npm = 30000"),
         ("anti_roll_bar_Npm = 11750", "anti_roll_bar_Npm = 16000"),
     ):
         assert compact in table

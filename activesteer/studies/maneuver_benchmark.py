@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 from activesteer.analysis.claims import SCENARIOS, SYSTEMS
 from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
 from activesteer.errors import ActiveSteerError, RecordingError
-from activesteer.files import json_text, read_text, write_text
+from activesteer.files import read_text, write_json
 from activesteer.metric_table import Metric, recorded_metric
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
@@ -197,7 +197,7 @@ def read_baseline(path: Path = BASELINE) -> Baseline:
 
 def write_baseline(benchmark: Benchmark, path: Path = BASELINE) -> Path:
     """Write the key metrics of a benchmark as the new baseline."""
-    return write_text(path, json_text(benchmark.key_metrics()) + "\n", ActiveSteerError)
+    return write_json(path, benchmark.key_metrics(), ActiveSteerError)
 
 
 def search_told(benchmark: Benchmark, maneuver: str) -> str:

@@ -81,7 +81,8 @@ def _link(name: str, stiffness: float, hardening: float, damping: float, reason:
 
 _SPRINGS: Final = ("spring_inner", "spring_outer", "damper_inner", "damper_outer")
 _HANDLING, _COMFORT = "two hard handling bushings", "a hard and a soft comfort bushing, hardening"
-_TIE_ROD: Final = _link("tie_rod", 1e6, 0.0, 3000.0, "rod, ball joints, and the rubber mounts of rack and subframe")
+_ROD: Final = "rod, ball joints, and the rubber mounts of rack and subframe"
+_TIE_ROD: Final = _link("tie_rod", 1e6, 0.0, 3000.0, _ROD)
 _TOE_LINK: Final = _link("toe_link", 1.64e6, 0.0, 3000.0, "two bushings of 3.3 kN/mm")
 _TRAILING: Final = "two soft comfort bushings, hardening"
 
@@ -91,7 +92,7 @@ MCPHERSON: Final = AxleKind(
     (
         _link("lca_front", 8.5e6, 0.0, 3000.0, _HANDLING, "lca_outer"),
         _link("lca_rear", 1e6, 8e9, 2000.0, _COMFORT, "lca_outer"),
-        _TIE_ROD,
+        _link("tie_rod", 1.2e6, 0.0, 3000.0, _ROD),
     ),
     ("wheel_centre", "strut_top", "strut_bottom"),
     {"strut": ()},

@@ -19,6 +19,7 @@ from activesteer.vehicle_builder.kc_tables import KcTables
 from activesteer.vehicle_builder.levers import mount
 from activesteer.vehicle_builder.steering_geometry import rack_limit_m, rack_sign
 from activesteer.vehicle_builder.table import UNITS, AxleTable, CarTable, LinkTable
+from activesteer.vehicle_builder.top_mounts import top_mount
 
 DEFAULT_TYRE: Final = "compact_205_55R16.tir"
 BUSHINGS_NPM: Final = {"ball_joint": 1e8, "hard": 1e7, "medium": 1e6, "soft": 3e5}
@@ -214,7 +215,8 @@ def _axle(
         strut,
         carrier,
         mount(axle, "spring", spring_on, kind, points, table.spring_ratio or 1.0),
-        mount(axle, "damper", damper_on, kind, points, _damper_ratio(axle, table, measured, log)),
+        damper := mount(axle, "damper", damper_on, kind, points, _damper_ratio(axle, table, measured, log)),
+        top_mount(axle, table.top_mount, kind, points, damper, log),
         _anti_roll_bar(axle, table, measured, float(centre[1]), log),
         measured,
         frequency,

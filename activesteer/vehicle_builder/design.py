@@ -46,6 +46,24 @@ class Link:
     remark: str
 
 
+@dataclass(frozen=True)
+class TopMount:
+    """The top mount of a strut or damper.
+
+    Attributes:
+        directions: Unit vector of each slide of the left side, vehicle axes: `z` along the axis, upwards; a strut also
+            has `x` and `y` across it, forward and to the left.
+        stiffness_Npm: Stiffness of each slide [N/m].
+        damping_Nspm: Damping of each slide [N s/m].
+        rod: Piston and rod of a damper; None for a strut, which has a body of its own.
+    """
+
+    directions: dict[str, Array]
+    stiffness_Npm: dict[str, float]
+    damping_Nspm: dict[str, float]
+    rod: Solid | None
+
+
 @dataclass
 class Axle:
     """An axle, complete but for the trim."""
@@ -67,6 +85,8 @@ class Axle:
     carrier: Solid | None
     spring: Mount
     damper: Mount
+    top_mount: TopMount | None
+    """Elasticity of the top mount; None if it is rigid."""
     anti_roll_bar_Npm: float
     measured: MeasuredAxle | None
     """Measurements that an axle of curves has to match."""

@@ -29,9 +29,13 @@ _HINT: Final = f" ({NAMES_FILE} turns the sign of a channel)"
 _MUST_RISE: Final = (
     ("parallel_travel", "load", "the wheel load falls in bump: is travel positive in bump?"),
     ("steering", "-toe", "the left wheel turns to the right as the rack steers left: signs of rack and toe?"),
-    ("side_force", "centre_outwards", "the wheel moves against the side force: sign of force or of the way outwards?"),
-    ("side_force_opposed", "centre_outwards", "the wheel moves against the side force: sign of force or way outwards?"),
+    # The force does work at the contact point; a wheel that leans over may move its centre the other way.
     ("side_force", "contact_outwards", "the contact moves against the side force: sign of force or way outwards?"),
+    (
+        "side_force_opposed",
+        "contact_outwards",
+        "the contact moves against the side force: sign of force or way outwards?",
+    ),
     ("braking_force", "contact_forward", "the contact moves against the longitudinal force: sign of force or way?"),
     ("drive_force", "centre_forward", "the wheel moves against the longitudinal force: sign of force or way?"),
     ("aligning_moment", "-toe", "the wheel turns against the moment: sign of moment or toe?"),

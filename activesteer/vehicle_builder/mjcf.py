@@ -73,6 +73,7 @@ def _main(car: Car, trimmed: Trimmed) -> str:
         rack_limit=num(car.rack_limit_m),
         link_classes=tendons.link_classes(car),
         spring_classes=tendons.spring_classes(car, trimmed),
+        mount_classes=tendons.mount_classes(car, trimmed),
         damper_classes=tendons.damper_classes(car, trimmed),
         chassis_words=(
             "What is left of the whole car's mass and inertia when all other bodies are taken away."
@@ -86,11 +87,16 @@ def _main(car: Car, trimmed: Trimmed) -> str:
         cg=vec((trimmed.cg_m[0], 0.0, trimmed.cg_m[1]), 4),
         shell=_shell(car),
         link_tendons=tendons.link_tendons(car),
+        mount_tendons=tendons.mount_tendons(car),
         spring_tendons=tendons.part_tendons(car, "spring"),
         damper_tendons=tendons.part_tendons(car, "damper"),
         front_bar=sig(front.anti_roll_bar_Npm),
         rear_bar=sig(car.rear.anti_roll_bar_Npm),
         front_travel="jounce" if front.kind.strut else "z",
+        # On the strut tube: its force does not go through the top mount.
+        front_bar_on_mounts=(
+            '<joint joint="fl_mount_z" coef="1"/><joint joint="fr_mount_z" coef="-1"/>' if front.kind.strut else ""
+        ),
         front_bar_on_rack=tendons.rack_joint(front, -2.0),
         pinion=num(trimmed.pinion_radius_m, 7),
         column_stiffness=sig(car.column_stiffness_Npm),

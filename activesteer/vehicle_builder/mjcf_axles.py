@@ -64,6 +64,8 @@ def _chassis_sites(axle: Axle, side: float) -> list[str]:
         if link.name != _ON_RACK:
             lines.append(_site(f"{corner}_{link.name}_inner", axle.points[link.inner], side, "  "))
     for part, mount in _mounts(axle):
+        if part == "damper" and axle.top_mount and axle.top_mount.rod:
+            continue  # On its rod.
         upper = axle.points["strut_top"] if axle.kind.strut else axle.points[f"{part}_inner"]
         lines.append(_site(f"{corner}_{part}_inner", upper, side, "  "))
         if mount.lever != 1.0 and mount.start_m is not None:
@@ -85,12 +87,14 @@ def _corner(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str
         strut = axle.strut
         return [
             f'  <body name="{corner}_strut">',
+            *_mount_slides(axle, side),
             f'    <joint name="{corner}_topmount" class="top_mount" pos="{_at(axle.points["strut_top"], side)}"/>',
             *([_inertial(strut, side, "    ")] if strut else []),
             *inner,
             "  </body>",
         ]
     centre = _at(axle.wheel_centre_m, side)
+    rod = _damper_rod(axle, axle.top_mount.rod, side) if axle.top_mount and axle.top_mount.rod else []
     joints = [
         f'<joint name="{corner}_x" class="knuckle_slide" axis="1 0 0"/>',
         f'<joint name="{corner}_y" class="knuckle_slide" axis="0 1 0"/>',
@@ -103,7 +107,27 @@ def _corner(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str
         ]
     else:
         joints.append(f'<joint name="{corner}_rot" class="knuckle_ball" pos="{centre}"/>')
-    return _knuckle(axle, trimmed, side, "  ", joints, _carrier(car, axle, trimmed, side) if axle.carrier else None)
+    carrier = _carrier(car, axle, trimmed, side) if axle.carrier else None
+    return [*rod, *_knuckle(axle, trimmed, side, "  ", joints, carrier)]
+
+
+def _mount_slides(axle: Axle, side: float) -> list[str]:
+    directions = {} if axle.top_mount is None else axle.top_mount.directions
+    return [
+        f'    <joint name="{corner_name(axle, side)}_mount_{name}" class="top_mount_slide" axis="{_at(axis, side)}"/>'
+        for name, axis in directions.items()
+    ]
+
+
+def _damper_rod(axle: Axle, rod: Solid, side: float) -> list[str]:
+    corner = corner_name(axle, side)
+    return [
+        f'  <body name="{corner}_damper_rod">',
+        *_mount_slides(axle, side),
+        _inertial(rod, side, "    "),
+        _site(f"{corner}_damper_inner", axle.points["damper_inner"], side, "    "),
+        "  </body>",
+    ]
 
 
 def _jounce(axle: Axle, corner: str, side: float) -> list[str]:

@@ -150,6 +150,33 @@ def spring_classes(car: Car, trimmed: Trimmed) -> str:
     return "\n".join(lines) + "\n"
 
 
+def mount_classes(car: Car, trimmed: Trimmed) -> str:
+    """Return the default classes of the top mounts."""
+    lines = []
+    for axle in car.axles:
+        if (mount := axle.top_mount) is None:
+            continue
+        for name, stiffness in mount.stiffness_Npm.items():
+            lines.append(
+                f'      <default class="{axle.name}_mount_{name}"><tendon stiffness="{sig(stiffness)}" '
+                f'damping="{sig(mount.damping_Nspm[name])}" '
+                f'springlength="{num(trimmed.axle(axle.name).mount_m.get(name, 0.0))}"/></default>'
+            )
+    return "".join(f"{line}\n" for line in lines)
+
+
+def mount_tendons(car: Car) -> str:
+    """Return the top mounts of all corners."""
+    lines = []
+    for axle in car.axles:
+        for side in (1.0, -1.0):
+            for name in () if axle.top_mount is None else axle.top_mount.directions:
+                joint = f"{corner_name(axle, side)}_mount_{name}"
+                start = f'    <fixed name="{joint}" class="{axle.name}_mount_{name}">'
+                lines.append(f'{start}<joint joint="{joint}" coef="1"/></fixed>')
+    return "".join(f"{line}\n" for line in lines)
+
+
 def damper_classes(car: Car, trimmed: Trimmed) -> str:
     """Return the default classes of the dampers."""
     lines = []

@@ -47,6 +47,22 @@ class LinkTable:
 
 
 @dataclass(frozen=True)
+class TopMountTable:
+    """Keys of the top mount of a strut, or of a damper with its rod."""
+
+    radial_Npm: Positive | None = None
+    """Strut: stiffness across its axis, of bushing, bending rod and body in series [N/m]."""
+    axial_Npm: Positive | None = None
+    """Stiffness along the axis [N/m]."""
+    radial_damping_Nspm: NotNegative | None = None
+    """Strut: damping across its axis [N s/m]."""
+    axial_damping_Nspm: NotNegative | None = None
+    """Damping along the axis [N s/m]."""
+    rod_mass_kg: Positive | None = None
+    """Damper: mass of piston and rod [kg]."""
+
+
+@dataclass(frozen=True)
 class AxleTable:
     """Keys of an axle; points of its left side."""
 
@@ -120,6 +136,8 @@ class AxleTable:
     """Centre of gravity of the strut, in the table's units."""
     strut_inertia_kgm2: tuple[float, ...] | None = None
     """Inertia of the strut [kg m2]."""
+    top_mount: TopMountTable | None = None
+    """Elasticity of the top mount. Default: a strut's as the compact's, a damper's rigid."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ _PLAUSIBLE: Final = {
     "spring_rate_Npm": (5e3, 8e5, 1e3, "N/mm"),
     "wheel_rate_Npm": (5e3, 3e5, 1e3, "N/mm"),
     "stiffness_Npm": (2e4, 1e10, 1e3, "N/mm"),
+    "radial_Npm": (2e4, 1e10, 1e3, "N/mm"),
+    "axial_Npm": (2e4, 1e10, 1e3, "N/mm"),
     "damper_Nspm": (200.0, 5e4, 1e3, "N s/mm"),
     "cg_height_m": (0.2, 1.5, 1e-3, "mm"),
     "anti_roll_bar_Npm": (300.0, 3e5, 1e3, "N/mm"),

@@ -64,6 +64,13 @@ class _Stand:
     toe_rad: Array
     camber_rad: Array
 
+    def mount_m(self, corner: str) -> dict[str, float]:
+        """Return the displacement of a top mount in each of its directions [m]."""
+        model, start = self.vehicle.model, f"{corner}_mount_"
+        joints = [model.joint(index) for index in range(model.njnt) if model.joint(index).name.startswith(start)]
+        qpos = self.held.data.qpos
+        return {joint.name.removeprefix(start): float(qpos[int(joint.qposadr[0])]) for joint in joints}
+
 
 def trim(car: Car, write: Write, log: Log) -> Trimmed:
     """Find all values of `Trimmed`, and write the files with them.
@@ -233,13 +240,17 @@ def _let_stand(
             travel = float(stand.travel_m[index : index + 2].mean())
             toe = float(stand.toe_rad[index : index + 2].mean()) - axle.toe_rad
             camber = float(stand.camber_rad[index : index + 2].mean()) - axle.camber_rad
+            mounts = stand.mount_m(axle.corner)
             off = 0.0 if rate is None else rates[axle.name] / rate - 1.0
             if axle_trim.curves is not None:
                 # The curves are matched as a whole.
                 toe = camber = 0.0
+            done &= max(map(abs, mounts.values()), default=0.0) < _TRAVEL_M
             done &= abs(travel) < _TRAVEL_M and max(abs(toe), abs(camber)) < _ANGLE_RAD and abs(off) < _RATE_FRACTION
             stiffness = max(rates[axle.name], 0.3 * axle_trim.spring_rate_Npm * ratio**2)
             axle_trim.spring_force_N += travel * stiffness / ratio
+            for name, moved in mounts.items():
+                axle_trim.mount_m[name] = axle_trim.mount_m.get(name, 0.0) - moved
             axle_trim.wheel_x_rad += camber
             axle_trim.wheel_z_rad += toe
             # Only near the design position: beyond it stops and progressive links act too.

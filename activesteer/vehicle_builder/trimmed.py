@@ -21,6 +21,8 @@ class TrimmedAxle:
     """First Euler angle of the wheel: minus camber, less the contribution of the loaded links."""
     wheel_z_rad: float = 0.0
     """Third Euler angle of the wheel: minus toe-in, less the contribution of the loaded links."""
+    mount_m: dict[str, float] = field(default_factory=dict)
+    """Spring length of the top mount in each direction; the standing car's load closes it [m]."""
     bump_stop_m: float = 0.035
     """Compression of the damper to its bump stop."""
     rebound_stop_m: float = 0.065

@@ -13,7 +13,7 @@
     V(CORRECTION, "correction_rad", output, Real, 0.0, "rad", "angle before the limit") \
     V(SATURATED, "saturated", output, Boolean, 0.0, "", "whether the limit is active") \
     V(WHEELBASE, "wheelbase_m", parameter, Real, 2.6375, "m", "wheelbase") \
-    V(CHARACTERISTIC_SPEED, "characteristic_speed_mps", parameter, Real, 23.95277777777778, "m/s", "characteristic speed, eq. 4") \
+    V(CHARACTERISTIC_SPEED, "characteristic_speed_mps", parameter, Real, 23.894444444444446, "m/s", "characteristic speed, eq. 4") \
     V(MAX_AY, "max_lateral_acceleration_mps2", parameter, Real, 7.74, "m/s2", "limit of the desired yaw rate times the speed") \
     V(DELAY, "delay_s", parameter, Real, 0.07, "s", "time constant of the desired yaw rate") \
     V(DEADBAND_START, "deadband_start_radps", parameter, Real, 0.008726646259971648, "rad/s", "error below which there is no action") \

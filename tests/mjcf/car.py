@@ -23,17 +23,19 @@ LINKS = [f"{c}_{link}" for c in FRONT for link in FRONT_LINKS] + [f"{c}_{link}" 
 BODIES = (
     ["chassis"]
     + [f"{c}_{part}" for c in FRONT for part in ("strut", "knuckle", "wheel")]
-    + [f"{c}_{part}" for c in REAR for part in ("knuckle", "carrier", "wheel")]
+    + [f"{c}_{part}" for c in REAR for part in ("damper_rod", "knuckle", "carrier", "wheel")]
     + ["rack", "steering_wheel", "superposition"]
 )
 JOINTS = (
     ["root"]
-    + [f"{c}_{joint}" for c in FRONT for joint in ("topmount", "jounce", "spin")]
-    + [f"{c}_{joint}" for c in REAR for joint in ("x", "y", "z", "rot", "steer", "spin")]
+    + [f"{c}_{joint}" for c in FRONT for joint in ("mount_x", "mount_y", "mount_z", "topmount", "jounce", "spin")]
+    + [f"{c}_{joint}" for c in REAR for joint in ("mount_z", "x", "y", "z", "rot", "steer", "spin")]
     + ["rack", "steering_wheel", "superposition"]
 )
+MOUNTS = [f"{c}_mount_{axis}" for c in FRONT for axis in "xyz"] + [f"{c}_mount_z" for c in REAR]
 TENDONS = (
     LINKS
+    + MOUNTS
     + [f"{c}_{part}" for part in ("spring", "damper") for c in CORNERS]
     + ["front_anti_roll_bar", "rear_anti_roll_bar", "steering_column"]
 )

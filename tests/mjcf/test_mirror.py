@@ -44,7 +44,7 @@ def test_joints(model: mujoco.MjModel, name: str) -> None:
     np.testing.assert_array_equal(right.type, left.type)
     np.testing.assert_array_equal(right.pos, Y * left.pos)
     # Struts and kingpins lean to the middle and point up on both sides; all other axes are those of the vehicle.
-    leaning = name.endswith(("_jounce", "_steer"))
+    leaning = name.endswith(("_jounce", "_steer", "_mount_x", "_mount_y", "_mount_z"))
     np.testing.assert_array_equal(right.axis, Y * left.axis if leaning else left.axis)
     first, second = model.jnt_dofadr[left.id], model.jnt_dofadr[right.id]
     assert model.dof_damping[first] == model.dof_damping[second]

@@ -72,17 +72,27 @@ class StaticCorner:
         return np.concatenate([force, moment, [extra]])
 
     def _strut(self, centre: Array, turn: Array) -> tuple[Array, Array]:
-        """Return the force of the top mount on the knuckle: the spring force along the strut, any force across it."""
+        """Return the force of the top mount on strut and knuckle, and the point at which it acts.
+
+        Along the strut, spring and mount are in series; the strut extends by what balances them.
+        """
         top = self.data.xanchor[self.model.joint(f"{self.corner}_topmount").id]
         axis = turn @ self.data.xaxis[self.model.joint(f"{self.corner}_jounce").id]
         tendon = self.model.tendon(f"{self.corner}_spring").id
         offset = top - (centre + turn @ (top - self.centre))
-        along = float(axis @ offset)
-        length = float(self.data.ten_length[tendon]) + along
-        spring = float(self.model.tendon_stiffness[tendon]) * (
-            length - float(self.model.tendon_lengthspring[tendon, 0])
-        )
-        return spring * axis + 1e12 * (offset - along * axis), top
+        stiffness, static = np.zeros((3, 3)), np.zeros(3)
+        for name in "xyz":
+            direction = self.data.xaxis[self.model.joint(f"{self.corner}_mount_{name}").id]
+            mount = self.model.tendon(f"{self.corner}_mount_{name}").id
+            rate = float(self.model.tendon_stiffness[mount])
+            stiffness += rate * np.outer(direction, direction)
+            stretched = float(self.data.ten_length[mount] - self.model.tendon_lengthspring[mount, 0])
+            static -= rate * stretched * direction
+        rate = float(self.model.tendon_stiffness[tendon])
+        spring = rate * float(self.data.ten_length[tendon] - self.model.tendon_lengthspring[tendon, 0])
+        longer = (axis @ (static + stiffness @ offset) - spring) / (rate + axis @ stiffness @ axis)
+        moved = longer * axis - offset
+        return static - stiffness @ moved, top + moved
 
     def _column_Npm(self) -> float:
         """Return the stiffness of column and steering wheel servo in series, at the rack."""

@@ -13,9 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from activesteer.conventions import Array
-from activesteer.errors import ParameterError
-from activesteer.files import write_text
-from activesteer.pages import Page, Section, Table, failed, passed, render_page
+from activesteer.pages import Page, Section, Table, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, save_all
 from activesteer.plotting import draw as drawn
 from activesteer.rigs.kc.definitions import Axle
@@ -122,8 +120,7 @@ def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> 
     sections = [Section(heads[0], pictures=[first]), Section("Metrics", tables=[metrics])]
     sections += [Section(head, pictures=[other]) for head, other in zip(heads[1:], others, strict=True)]
     title = f"Kinematics and compliance: {result.vehicle}"
-    page = render_page(Page(f"activesteer kc: {result.vehicle}", title, lead, sections))
-    return write_text(folder / "kc.html", page, ParameterError)
+    return write_page(Page(f"activesteer kc: {result.vehicle}", title, lead, sections), folder / "kc.html")
 
 
 def rear_camber_figure(result: KcResult) -> Figure:

@@ -47,6 +47,8 @@ _LOCK_NPM: Final = 1e9
 _NO_MOMENT: Final = np.zeros(3)
 _SPRING_ENDINGS: Final = ("_spring", "_damper", "_anti_roll_bar")
 """Endings of the names of the tendons that carry the car."""
+MOUNT_ENDINGS: Final = ("_mount_x", "_mount_y", "_mount_z")
+"""Endings of the names of top mounts, across (x, y) and along (z) a strut or damper."""
 
 
 class WheelPose(NamedTuple):
@@ -140,6 +142,7 @@ class HeldCar:
                 lock = lock_dampers and name.endswith("_damper")
                 model.tendon_stiffness[tendon] = _LOCK_NPM if lock else 0.0
                 model.tendon_stiffnesspoly[tendon] = 0.0
+            if name.endswith(_SPRING_ENDINGS + MOUNT_ENDINGS):
                 model.tendon_lengthspring[tendon] = data.ten_length[tendon]
 
     def reset(self) -> None:

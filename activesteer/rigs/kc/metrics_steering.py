@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
+import mujoco
 import numpy as np
 
 from activesteer.conventions import GRAVITY_MPS2, Array
 from activesteer.rigs.kc.definitions import DEG, Axle, AxleName, Definition, Evaluate, slope
+from activesteer.rigs.kc.held_car import MOUNT_ENDINGS
 from activesteer.rigs.kc.metrics_travel import TRAVEL_METRICS, wheelbase_mm
 from activesteer.rigs.kc.modes import NAMES
 from activesteer.rigs.kc.sweep import INWARDS
@@ -17,6 +19,7 @@ from activesteer.vehicle.curve_axle_model import HOLDING_TENDON
 
 _ON_CENTRE_RAD: Final = math.radians(20.0)
 _TRAIL_M: Final = 0.03
+_NOT_LINKS: Final = ("_spring", "_damper", HOLDING_TENDON, *MOUNT_ENDINGS)
 _MODE_WORDS: Final = {
     "body_bounce": "the body going up and down",
     "body_pitch": "the body pitching",
@@ -132,9 +135,16 @@ def _bushes_Npmm(axle: Axle) -> Array:
     rates = []
     for index in range(model.ntendon):
         name = model.tendon(index).name
-        if name.startswith(f"{axle.name[0]}l_") and not name.endswith(("_spring", "_damper", HOLDING_TENDON)):
+        if name.startswith(f"{axle.name[0]}l_") and not name.endswith(_NOT_LINKS):
             rates.append(2e-3 * float(model.tendon_stiffness[index]))
     return np.array(rates or [np.nan])
+
+
+def _top_mount_Npmm(axle: Axle, direction: str) -> float:
+    """Stiffness of the left top mount; nan for a rigid one [N/mm]."""
+    model = axle.measured.vehicle.model
+    tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{axle.name[0]}l_mount_{direction}")
+    return 1e-3 * float(model.tendon_stiffness[tendon]) if tendon >= 0 else math.nan
 
 
 def _damper_asymmetry(axle: Axle) -> float:
@@ -244,6 +254,11 @@ DEFINITIONS: Final = (
         "Twice the axial stiffness of the softest link, unloaded: one of its two bushes, if both were alike."),
     Definition("stiffest_bush", "kN/mm", lambda axle: 1e-3 * float(_bushes_Npmm(axle).max()),
         "Twice the axial stiffness of the stiffest link, unloaded: one of its two bushes, if both were alike."),
+    Definition("top_mount_radial_stiffness", "N/mm", lambda axle: _top_mount_Npmm(axle, "y"),
+        "Stiffness of a strut's top mount across its axis: bushing, bent rod and strut tower; none if rigid.",
+        ("front",)),
+    Definition("top_mount_axial_stiffness", "N/mm", lambda axle: _top_mount_Npmm(axle, "z"),
+        "Stiffness of the top mount along the strut or damper; none if rigid."),
     *_modes(),
     Definition("body_roll_frequency_sliding", "Hz", lambda axle: axle.measured.modes.body_roll_sliding.frequency_Hz,
         "Natural frequency of body roll with tyres that slide sideways without resistance, as on air bearings.",

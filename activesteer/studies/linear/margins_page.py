@@ -11,9 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.errors import ParameterError
-from activesteer.files import make_folder, write_text
-from activesteer.pages import Page, Section, Table, render_page
+from activesteer.pages import Page, Section, Table, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
 from activesteer.studies.linear.margins import LoopMargins
 
@@ -47,8 +45,7 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
         sections.append(Section(f"{controller}, opened at {loop}", pictures=pictures, tables=[_table(loops)]))
     title = f"Stability margins: {vehicle}"
     lead = [_LEAD] if any(each.curves for each in found) else []
-    path = make_folder(folder, ParameterError) / "margins.html"
-    return write_text(path, render_page(Page(f"activesteer margins: {vehicle}", title, lead, sections)), ParameterError)
+    return write_page(Page(f"activesteer margins: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
 
 
 def disk(alpha: float) -> tuple[float, float]:

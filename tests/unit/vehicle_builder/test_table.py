@@ -85,7 +85,7 @@ def test_metres_where_millimetres_are_stated(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "hint"),
     [
-        ("spring_rate_Npm = 24200", "spring_rate_Npm = 24.2", "is it in N/mm? then write 24200"),
+        ("spring_rate_Npm = 24730", "spring_rate_Npm = 24.2", "is it in N/mm? then write 24200"),
         ("cg_height_m = 0.545", "cg_height_m = 545", "is it in mm? then write 0.545"),
         ("rack_limit_m = 0.064", "rack_limit_m = 0.0064", "is no value of a road car"),
     ],
@@ -98,7 +98,7 @@ def test_other_units_are_recognised(tmp_path: Path, old: str, new: str, hint: st
     ("old", "new", "told"),
     [
         (
-            "spring_rate_Npm = 24200",
+            "spring_rate_Npm = 24730",
             "spring_rate_Npm = 24200\nwheel_rate_Npm = 24000",
             "say the same; give one of them",
         ),
@@ -115,7 +115,7 @@ def test_contradictions_are_told(tmp_path: Path, old: str, new: str, told: str) 
 
 def test_unknown_keys_name_file_line_and_nearest(tmp_path: Path) -> None:
     with raises(ParameterError, file="compact.toml", key="front.spring_rte_Npm"):
-        read_table(changed(COMPACT, tmp_path, ("spring_rate_Npm = 24200", "spring_rte_Npm = 24200")))
+        read_table(changed(COMPACT, tmp_path, ("spring_rate_Npm = 24730", "spring_rte_Npm = 24200")))
     with raises(ParameterError, file="wishbone.csv", key="mass.totl_kg"):
         read_table(changed(WISHBONE, tmp_path, ("mass.total_kg", "mass.totl_kg")))
 
