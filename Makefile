@@ -19,7 +19,7 @@ demo: $(READY)  ## the paper's scenarios with three steering systems: scorecard,
 test: MARK := -m "not slow"
 test: $(READY_DEV) pictures  ## lint, types, module borders, every test that is not slow, and both benchmarks
 	$(MAKE) --no-print-directory -j2 lint pytest MARK='$(MARK)'
-	$(BIN)/activesteer bench --rounds 2
+	$(BIN)/activesteer bench --rounds 1
 	$(BIN)/activesteer bench --maneuvers
 
 test-all: $(READY_DEV) pictures  ## the same with the slow tests

@@ -41,15 +41,25 @@ LONG_FIRST: Final = (
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile once before the worker processes start, so that they do not all compile the same code.
+    """Prepare several processes: compile once before they start, and keep each on its own processor.
 
     A shell starts background jobs with Ctrl-C ignored, and their children inherit this; here it is restored.
     """
     if hasattr(config, "workerinput"):
+        # Another process of the tests uses each other processor: a study without `jobs` starts none of its own.
+        os.sched_getaffinity = lambda _pid: {0}
         return
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config.option, "numprocesses", None):
-        drive = "from activesteer import simulate; simulate('step_steer', 'ars', overrides={'duration_s': 1.5})"
+        # Threads of the BLAS would wait for processors longer than they calculate.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        # Without byte code, each program that a test starts would translate the package again.
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+        # The kernels of the car, of all blocks and of the estimator, which several files of tests need.
+        drive = (
+            "from activesteer import simulate\n"
+            "simulate('step_steer', 'lqr', overrides={'duration_s': 1.5, 'sensors.preset': 'production'})"
+        )
         subprocess.run([sys.executable, "-c", drive], cwd=ROOT, check=True)
 
 

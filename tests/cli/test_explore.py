@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing
 from http.client import HTTPConnection
-from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+
+from tests.cli.conftest import Call
 
 pytest.importorskip("uvicorn", reason="needs the extra `explore`")
 websockets = pytest.importorskip("websockets.sync.client", reason="needs the extra `explore`")
@@ -89,12 +89,11 @@ def test_wrong_messages_get_an_answer_and_the_page_goes_on(url: str) -> None:
 
 
 @pytest.mark.parametrize(("options", "said"), [(["--port", "70000"], "0 to 65535"), (["-o", "missing"], "no folder")])
-def test_wrong_options_are_refused_in_one_line(options: list[str], said: str, tmp_path: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    command = [*COMMAND, "--no-browser", *options]
-    done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=False
-    )
-    assert done.returncode == 1
-    assert said in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+def test_wrong_options_are_refused_in_one_line(
+    call: Call, monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
+) -> None:
+    monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: pytest.fail("the page is served"))
+    done = call("explore", "--no-browser", *options)
+    assert done.status == 1
+    assert said in done.err
+    assert len(done.err.splitlines()) == 1

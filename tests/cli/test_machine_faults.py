@@ -21,7 +21,7 @@ from activesteer import Recording
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
-MORE_LIMITS = (100, 5_000, 50_000, 200_000, 500_000, 800_000)
+MORE_LIMITS = (5_000, 50_000, 100_000, 200_000, 800_000)
 MORE_STEPS = range(700, 9_700, 1_000)
 SHORT = ("--set", "duration_s=2", "--set", "settle_s=0")
 STUDY = """
@@ -77,7 +77,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     "limit",
     [
         100,
-        100_000,
         500_000,
         *(pytest.param(limit, marks=pytest.mark.slow) for limit in MORE_LIMITS),
     ],
@@ -162,10 +161,13 @@ def unprivileged() -> tuple[str, ...]:
     ids=["no home, language C", "home that does not exist"],
 )
 def test_a_run_and_its_report_need_no_home_and_no_language(tmp_path: Path, environment: dict[str, str]) -> None:
-    run = program(tmp_path, "run", "step_steer", "-c", "ars", "-o", "run.mcap", environment=environment)
-    assert run.returncode == 0, run.stderr
-    report = program(tmp_path, "report", "run.mcap", "-o", "report.html", environment=environment)
-    assert report.returncode == 0, report.stderr
+    words = (("run", "step_steer", "-c", "ars", "-o", "run.mcap"), ("report", "run.mcap", "-o", "report.html"))
+    both = f"import sys; from activesteer.cli import main; sys.exit(any([main(words) for words in {words}]))"
+    done = subprocess.run(
+        [sys.executable, "-c", both], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
+        capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
     assert "m/s²" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
@@ -189,7 +191,7 @@ def test_two_first_compilations_at_once_both_drive(tmp_path: Path) -> None:
 LARGEST_LOSS_S = 0.7
 
 
-@pytest.mark.parametrize("step", [1_234, *(pytest.param(step, marks=pytest.mark.slow) for step in MORE_STEPS)])
+@pytest.mark.parametrize("step", [1_450, *(pytest.param(step, marks=pytest.mark.slow) for step in MORE_STEPS)])
 def test_a_killed_run_loses_at_most_seven_tenths_of_a_second(call, controller, tmp_path: Path, step: int) -> None:
     body = f"if self.steps > {step}:\n    import os\n    os.kill(os.getpid(), 9)\nreturn ActuatorCommand()"
     words = ("run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")
@@ -260,19 +262,19 @@ def test_three_thousand_runs_in_one_process_take_no_more_memory_than_a_thousand(
     assert after_3000_MB < after_1000_MB + 10.0
 
 
-HASH = """
+OVERRIDES = {"sensors.preset": "production"}
+HASH = f"""
 import hashlib, activesteer
-run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides={"sensors.preset": "production"})
+run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides={OVERRIDES})
 print(hashlib.sha256(run.values.tobytes() + run.poses.positions_m.tobytes()).hexdigest())
 """
 
 
 def test_a_run_is_the_same_to_the_last_bit_in_processes_threads_and_after_other_runs() -> None:
-    overrides = {"sensors.preset": "production"}
     found: list[str] = []
 
     def drive() -> None:
-        run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides=overrides)
+        run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides=OVERRIDES)
         found.append(hashlib.sha256(run.values.tobytes() + run.poses.positions_m.tobytes()).hexdigest())
 
     activesteer.simulate("straight_braking", "none", "sedan")
@@ -282,9 +284,10 @@ def test_a_run_is_the_same_to_the_last_bit_in_processes_threads_and_after_other_
         thread.start()
     for thread in threads:
         thread.join()
-    for seed in ("0", "1"):
-        environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": seed}
-        done = subprocess.run([sys.executable, "-c", HASH], capture_output=True, text=True, check=True, env=environment)
-        found.append(done.stdout.strip())
-    assert len(found) == 5
+    # Another hash seed than this process has, which is random unless it is given.
+    seed = "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0"
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": seed}
+    done = subprocess.run([sys.executable, "-c", HASH], capture_output=True, text=True, check=True, env=environment)
+    found.append(done.stdout.strip())
+    assert len(found) == 4
     assert len(set(found)) == 1

@@ -58,6 +58,9 @@ def _run(line: str) -> str:
             _check_extras(words)
         case program:
             assert program in ORDINARY, f"{line}: {program} is not run here"
+            if re.fullmatch(r"python examples/\w+\.py", line):
+                assert (ROOT / words[1]).is_file(), f"{line}: there is no such example"
+                return ""  # tests/examples runs it
             return _ordinary(line)
     return ""
 

@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,6 +31,21 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An empty folder with the examples of a checkout."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make pictures, but leave their files empty: the tests of each picture draw it. Pages need theirs."""
+    figure = pytest.importorskip("matplotlib.figure").Figure
+    drawn = figure.savefig
+
+    def save(self: Any, target: Any, **how: Any) -> None:
+        if isinstance(target, Path):
+            target.touch()
+        else:
+            drawn(self, target, **how)
+
+    monkeypatch.setattr(figure, "savefig", save)
 
 
 def with_slow_commands() -> list[Path]:
@@ -64,6 +80,7 @@ def _do(block: Block, namespace: dict[str, object], *, slow: bool) -> None:
                 act(command)
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("page", with_blocks(), ids=name)
 def test_page_does_what_it_says(page: Path) -> None:
     read(page, slow=False)

@@ -31,7 +31,6 @@ from tests.unit.analysis.synthetic import (
     along_path,
     offset_track,
     sine_with_dwell,
-    slalom,
     step_steer,
 )
 
@@ -54,26 +53,6 @@ def lane_changes(**words):
 
 def sines():
     return {"none": sine_with_dwell(), "ars": sine_with_dwell(rear_rad=0.02), "afs": sine_with_dwell()}
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    scenarios = {
-        "step_steer": {"none": step_steer(), "ars": step_steer(rear_rad=-0.01)},
-        "sine_with_dwell": sines(),
-        "double_lane_change": lane_changes(),
-        "slalom": {"none": slalom(1.6), "ars": slalom(1.4), "afs": slalom(1.5)},
-        "double_lane_change_low_mu": lane_changes(),
-    }
-    return draw_all(scenarios, tmp_path_factory.mktemp("figures") / "new")
-
-
-def test_every_figure_of_the_result_part_is_there_in_pixels_and_as_lines(files):
-    numbers = [int(path.name.split("_")[1]) for path in files]
-    assert numbers == sorted(3 * [7, 9, *range(11, 25)])
-    assert {path.suffix for path in files} == {".png", ".svg", ".pdf"}
-    assert all(path.stat().st_size > 5000 for path in files)
-    assert len({path.name for path in files}) == len(files) == 3 * (2 + sum(map(len, BY_SCENARIO.values())))
 
 
 def test_only_the_figures_that_there_are_runs_for_are_drawn(tmp_path):

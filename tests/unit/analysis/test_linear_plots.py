@@ -37,12 +37,16 @@ def test_bode_diagram_shows_gain_and_phase_of_every_output(figures, tmp_path):
 def test_root_locus_has_the_poles_of_every_speed(figures, tmp_path):
     speeds = [10.0, 20.0, 40.0]
     draw_root_locus([system(speed) for speed in speeds], speeds, tmp_path / "locus.png")
-    points = figures[0].get_axes()[0].collections[0]
-    offsets = np.asarray(points.get_offsets())
-    for speed in (20.0, 40.0):
-        pole = next(pole for pole in system(speed).poles() if pole.imag > 0)
-        assert np.hypot(offsets[:, 0] - pole.real, offsets[:, 1] - pole.imag).min() < 1e-9
-    assert set(np.round(np.asarray(points.get_array()), 6)) <= {36.0, 72.0, 144.0}
+    colormaps = pytest.importorskip("matplotlib").colormaps
+    dots = [line for line in figures[0].get_axes()[0].get_lines() if line.get_marker() == "o"]
+    for speed, line, shade in zip(speeds, dots, (0.0, 1.0 / 3.0, 1.0), strict=True):
+        assert line.get_color() == colormaps["viridis"](shade)
+        shown = np.asarray(line.get_xdata()) + 1j * np.asarray(line.get_ydata())
+        for pole in system(speed).poles():
+            if pole.imag > 0 and speed > 10.0:
+                assert np.abs(shown - pole).min() < 1e-9
+    low, high = figures[0].get_axes()[1].get_ylim()
+    assert (low, high) == pytest.approx((36.0, 144.0))
 
 
 def test_what_cannot_be_drawn_is_an_error(tmp_path):

@@ -200,8 +200,8 @@ def test_proportions_of_the_stored_population_stand_beside_the_claims_of_its_car
         run.metadata["vehicle"] = {**run.metadata["vehicle"], "name": "compact"}
     words = Page(report_page(runs, MADE)).words
     assert words.count("population: ") == 5
-    assert "population: depends, in 19 % (16 to 22 %), more often with sensors.preset = ideal" in words
-    assert "For 500 other cars, roads and drivers" in words
+    assert "population: depends, in 16 % (12 to 21 %), more often with sensors.preset = ideal" in words
+    assert "For 250 other cars, roads and drivers" in words
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator
 from typing import Any
@@ -44,7 +45,14 @@ def seen(maneuver: Maneuver) -> str:
     met += [road.bank_rad, *_surface(road)]
     met += [None if course is None else course.to_table()]
     met += [None if search is None else [search.lateral_acceleration_mps2, search.accept(1.0), search.probe]]
-    return json.dumps([to_table(one) for one in met], default=str)
+    return json.dumps([to_table(one) for one in met], default=_short)
+
+
+def _short(value: Any) -> str:
+    """Return a digest of the first seven digits of an array: a setpoint carries the whole path at each time."""
+    return (
+        hashlib.sha256(value.astype(np.float32).tobytes()).hexdigest() if isinstance(value, np.ndarray) else str(value)
+    )
 
 
 def _surface(road: Road) -> list[Any]:

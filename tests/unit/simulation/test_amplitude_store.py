@@ -41,20 +41,25 @@ def forget(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def searches(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of the manoeuvres searched since."""
+def searches(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the manoeuvres searched since; with a parameter, each search finds this angle without driving."""
     made: list[str] = []
+    known: float | None = getattr(request, "param", None)
 
     def counted(find: Any) -> Any:
         def search(scenario: Any, *rest: Any) -> float:
             made.append(scenario.maneuver.name)
-            return find(scenario, *rest)
+            return find(scenario, *rest) if known is None else known
 
         return search
 
     for name in ("_steady_turn", "_ramp_angle"):
         monkeypatch.setattr(amplitude_search, name, counted(getattr(amplitude_search, name)))
     return made
+
+
+undriven = pytest.mark.parametrize("searches", [ANGLE_RAD], ids=["not driven"], indirect=True)
+"""For tests of what is searched, not of what is found."""
 
 
 def angle(overrides: dict[str, Any] | None = None, vehicle: Any = "compact", timestep_s: float = 1e-3) -> str:
@@ -111,6 +116,7 @@ def test_angle_of_a_ramp_is_kept_too(searches, monkeypatch):
     assert len(searches) == 1
 
 
+@undriven
 @pytest.mark.parametrize(
     "change",
     [
@@ -144,6 +150,7 @@ def own_car(tmp_path: Path) -> Path:
     return place
 
 
+@undriven
 def test_files_count_by_their_content_wherever_they_are(searches, own_car, tmp_path):
     angle(vehicle=own_car / "compact.toml")
     shutil.move(own_car, tmp_path / "moved")
@@ -152,6 +159,7 @@ def test_files_count_by_their_content_wherever_they_are(searches, own_car, tmp_p
     assert len(searches) == 1
 
 
+@undriven
 @pytest.mark.parametrize("file", ["tyre", "model", "included"])
 def test_a_file_that_is_edited_counts(searches, own_car, file):
     vehicle = own_car / "compact.toml"
@@ -186,6 +194,7 @@ def edit(path: Path, old: str, new: str, line: bool = False) -> None:
     path.write_text("".join(lines))
 
 
+@undriven
 @pytest.mark.parametrize(
     "what", ["content_key", "processor", "__version__"], ids=["sources and versions", "processor", "version"]
 )
@@ -286,6 +295,7 @@ def test_what_else_stands_in_the_place_is_neither_read_nor_written(folder, tmp_p
     assert not (tmp_path / "nothing").exists()
 
 
+@undriven
 @pytest.mark.parametrize("place", ["file", "file/below", "no home", "relative"])
 def test_where_nothing_can_be_kept_it_is_searched_for(searches, monkeypatch, tmp_path, place):
     (tmp_path / "file").write_text("")

@@ -6,10 +6,10 @@ import datetime
 
 import pytest
 
-from activesteer.pages import Table
+from activesteer.pages import Table, render_page
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.examination import Examination
-from activesteer.standards.examination_page import _together, page
+from activesteer.standards.examination_page import _together, examination_page
 from activesteer.standards.standard import Findings, Standard
 
 EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'
@@ -25,7 +25,7 @@ def examination(word: str, **values: bool) -> Examination:
 
 def test_page_shows_all_and_fetches_nothing():
     pytest.importorskip("matplotlib")
-    text = page(examination("plain", **{"pass": False}))
+    text = render_page(examination_page(examination("plain", **{"pass": False})))
     assert text.count("<svg") == 2
     assert ">\N{BALLOT X} fail<" in text
     assert 'class="outside"' in text
@@ -34,7 +34,7 @@ def test_page_shows_all_and_fetches_nothing():
 
 def test_names_stay_text():
     pytest.importorskip("matplotlib")
-    text = page(examination(EVIL))
+    text = render_page(examination_page(examination(EVIL)))
     assert "<script" not in text
     assert "<img" not in text
     assert "{{ version }}" in text
@@ -42,7 +42,7 @@ def test_names_stay_text():
 
 def test_a_method_without_limits_never_says_pass():
     pytest.importorskip("matplotlib")
-    text = page(examination("plain"))
+    text = render_page(examination_page(examination("plain")))
     assert ">pass<" not in text
     assert ">fail<" not in text
     assert "no limits" in text

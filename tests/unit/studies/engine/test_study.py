@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from activesteer.errors import StudyError
 from activesteer.recording import Recording
 from activesteer.resources import find_vehicle, models_dir
 from activesteer.studies.engine.store import Store
+from activesteer.studies.engine.workers import Workers, workers_for
 from tests.raising import raises
 from tests.unit.studies.short import MANEUVER, RATIO, short_study, write_controller
 
@@ -48,10 +50,16 @@ def test_a_row_says_what_was_driven_and_what_came_of_it(serial):
     assert table.schema.field("yaw_rate_response_time_s").metadata[b"unit"] == b"s"
 
 
+@pytest.fixture(scope="module")
+def processes() -> Iterator[Workers]:
+    with workers_for(2) as workers:
+        yield workers
+
+
 @pytest.mark.parametrize("limits", [(None,), (3, 1, None)])
-def test_processes_and_interruptions_change_no_bit(serial, tmp_path, limits):
+def test_processes_and_interruptions_change_no_bit(serial, processes, tmp_path, limits):
     for limit in limits:
-        table = study(short_study(*MU, **BOTH), output=tmp_path, jobs=2, limit=limit)
+        table = study(short_study(*MU, **BOTH), output=tmp_path, workers=processes, limit=limit)
         if limit is not None:
             assert table.num_rows == sum(other for other in limits[: limits.index(limit) + 1] if other)
     assert (tmp_path / "results.parquet").read_bytes() == serial.read_bytes()
@@ -96,9 +104,9 @@ def test_a_killed_study_goes_on_with_what_is_missing(tmp_path):
     assert (tmp_path / "killed/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
 
 
-def test_a_worker_that_dies_is_replaced(tmp_path):
+def test_a_worker_that_dies_is_replaced(processes, tmp_path):
     path = write_controller(tmp_path, 0.9, str(tmp_path / "once"))
-    rows = study(short_study(*MU, key=RATIO, controllers=["none", f"{path}:Kills"]), jobs=2).to_pylist()
+    rows = study(short_study(*MU, key=RATIO, controllers=["none", f"{path}:Kills"]), workers=processes).to_pylist()
     assert (tmp_path / "once").exists()
     assert {row["status"] for row in rows} == {"ok"}
 

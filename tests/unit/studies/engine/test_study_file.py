@@ -27,9 +27,10 @@ STUDIES = [
 @pytest.mark.parametrize("path", STUDIES)
 def test_every_study_that_comes_along_can_be_begun(path: Path):
     study = read_study(path)
-    plan = Plan(study)
-    assert len(plan) > 0
-    assert Plan(read_study(tomllib.loads(study.to_toml()))).digest == plan.digest
+    assert len(Plan(study)) > 0
+    again = read_study(tomllib.loads(study.to_toml()))
+    assert again.to_table() == study.to_table()
+    assert again.samples() == study.samples()
 
 
 def test_paths_in_a_file_begin_at_its_folder(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
-from activesteer.studies.engine.workers import LocalProcesses, workers_for
+from activesteer.studies.engine.workers import LocalProcesses, ThisProcess, workers_for
 from tests.raising import raises
 
 
@@ -24,6 +24,16 @@ def test_a_worker_solves_equations_in_one_thread_unless_told_otherwise(monkeypat
     finally:
         workers.close(abandon=False)
     assert os.environ.get(name) == given, "this process is as it was"
+
+
+def test_without_a_number_there_is_a_process_for_each_processor(monkeypatch) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda _pid: {0, 1, 5}, raising=False)
+    with workers_for() as workers:
+        assert isinstance(workers, LocalProcesses)
+        assert workers.in_flight == 4  # one task waits
+    monkeypatch.setattr("os.sched_getaffinity", lambda _pid: {5}, raising=False)
+    with workers_for() as workers:
+        assert isinstance(workers, ThisProcess)
 
 
 @pytest.mark.parametrize("jobs", [0, 65, 99_999_999])

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -18,10 +19,16 @@ DAMPING_NSPM = 1500.0
 LOAD_N = 4000.0
 
 
+@functools.cache
+def _record() -> Any:
+    """Return the record of the compact's tyre, which takes longer to fill than the kernel to call."""
+    return tyre().record
+
+
 def _contact(**changes: Any) -> WheelForces:
     """Return an upright wheel of the compact, rolling along x."""
     inputs: dict[str, Any] = {
-        "p": tyre().record, "mu": 1.0, "pressure_Pa": 230e3, "low_speed_mps": LOW_SPEED_MPS,
+        "p": _record(), "mu": 1.0, "pressure_Pa": 230e3, "low_speed_mps": LOW_SPEED_MPS,
         "low_speed_damping_Nspm": DAMPING_NSPM, "timestep_s": STEP_S, "centre_height_m": 0.295,
         "axis_x": 0.0, "axis_y": 1.0, "axis_z": 0.0, "velocity_x_mps": 0.0, "velocity_y_mps": 0.0,
         "velocity_z_mps": 0.0, "spin_x_radps": 0.0, "spin_y_radps": 0.0, "spin_z_radps": 0.0,
@@ -119,7 +126,7 @@ def test_a_sliding_tyre_at_rest_pulls_with_its_friction(mu: float, velocity_mps:
 
 
 @pytest.mark.parametrize("mu", [0.4, 1.0])
-@pytest.mark.parametrize("angle_deg", range(-165, 181, 15))
+@pytest.mark.parametrize("angle_deg", range(-150, 181, 30))
 def test_a_tyre_dragged_from_rest_pulls_against_its_sliding(mu: float, angle_deg: float) -> None:
     direction = np.array([math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))])
     force = _moved(TyreRig(tyre(), mu=mu), np.tile(0.2 * direction, (2000, 1))).force_N[-1, :2]
