@@ -1,17 +1,21 @@
 """Train a rear-steering policy by augmented random search, and compare it with the package's controllers.
 
-    python examples/train_rear_steer.py train     about 8 minutes on two cores: policy.npz, learning_curve.png
-    python examples/train_rear_steer.py train --resume    the same again, from the policy that is stored
+    python examples/train_rear_steer.py train     some 3 minutes on two idle cores: policy.npz, learning_curve.png
     python examples/train_rear_steer.py evaluate  the table of docs/learning.md, for the evaluation and the final set
     activesteer run sine_with_dwell -c "examples/train_rear_steer.py:Policy?weights=policy.npz"
 
-Objective, declared before training: the geometric mean over the manoeuvres of the policy's mean cost over the mean cost
-of the same cars without control. A manoeuvre in which cars are lost therefore counts no more than another one. The
-search minimises the objective on the training cars; the best policy on the evaluation cars is stored; the final cars
-are used for neither.
+Objective, declared before training: the mean over manoeuvres and cars of
 
-Each direction of the search is one car of a batch (H. Mania, A. Guy, B. Recht, Simple random search of static linear
-policies is competitive for reinforcement learning, NeurIPS 2018). Only numpy is needed.
+    x + h max(x, 0),  x = ln(cost with the policy / cost of the same car without control)
+
+so that a manoeuvre in which cars are lost counts no more than another one, and harm costs more than a gain elsewhere
+brings: with h = ln 2 / ln 1.05, a car whose cost grows by 5 % outweighs one whose cost halves. The search minimises the
+objective on the training cars; the best policy on the evaluation cars is stored; the final cars are used for neither.
+The number of rounds and the seed determine the result, whatever the machine does besides.
+
+Each direction of the search is some cars of a batch (H. Mania, A. Guy, B. Recht, Simple random search of static linear
+policies is competitive for reinforcement learning, NeurIPS 2018); steps and noise fall with the rounds. Only numpy is
+needed.
 """
 
 from __future__ import annotations
@@ -33,13 +37,22 @@ INTERVAL, INTERVAL_S = 10, 0.01
 LIMIT_RAD = math.radians(3.0)
 LOST_COST = 60.0
 """Cost of each second after a car has been lost."""
-DIRECTIONS, BEST, STEP, NOISE, CARS = 8, 4, 0.1, 0.1, 2
+DIRECTIONS, BEST, STEP, NOISE, CARS = 8, 4, 0.1, 0.1, 3
+HALVING = 10
+"""Rounds after which steps and noise are half as large as at the start; after twice as many, a third."""
+HARM = 1.05
+"""Cost over that of the same car without control from which the car is harmed."""
+N_FEATURES = 8
 TRAINING, EVALUATION, FINAL = 1, 1001, 2001
 """Seeds of the cars: the last set is used neither for training nor for selection."""
 
 
 def features(front_rad: Any, measurement: Any, memory: Any) -> Any:
     """Return what the policy sees, in units in which each number is about one; arrays or numbers.
+
+    All of them are errors of the car. A part of the driver's angle, of the yaw rate or of the lateral acceleration
+    would fit the cars of the training, and harm others: 0.15 deg of rear angle per 2.9 deg of the driver changes the
+    cost of the lane change by -27 to 27 %, from car to car.
 
     Args:
         front_rad: The driver's angle at the road wheels [rad].
@@ -54,14 +67,20 @@ def features(front_rad: Any, measurement: Any, memory: Any) -> Any:
     slide = measurement.ay_mps2 / speed - measurement.yaw_rate_radps  # rate of the sideslip angle
     memory.sideslip_rad = 0.98 * memory.sideslip_rad + INTERVAL_S * slide
     fast = speed / 25.0
+    # An ordinary manoeuvre stays within the bands, a sliding car does not.
+    wrong, sliding = _beyond(error, 0.1), _beyond(memory.sideslip_rad, 0.035)
     return np.stack(
         [
-            memory.front_rad / 0.05, memory.front_rad / 0.05 * fast, measurement.yaw_rate_radps / 0.3, error / 0.2,
-            np.clip(error / 0.2, -1.0, 1.0) * np.abs(error / 0.2), slide / 0.2, memory.sideslip_rad / 0.1,
-            measurement.ay_mps2 / 8.0,
+            error / 0.2, error / 0.2 * fast, np.clip(error / 0.2, -1.0, 1.0) * np.abs(error / 0.2), slide / 0.2,
+            memory.sideslip_rad / 0.1, memory.sideslip_rad / 0.1 * fast, wrong / 0.2, sliding / 0.1,
         ],
         axis=-1,
     )  # fmt: skip
+
+
+def _beyond(value: Any, band: float) -> Any:
+    """Return the part of a value outside a band about zero."""
+    return value - np.clip(value, -band, band)
 
 
 def angle(weights: Any, seen: Any) -> Any:
@@ -139,59 +158,76 @@ def cars_of(maneuver: str, count: int, seed: int) -> list[dict[str, Any]]:
     return drawn
 
 
-def train(minutes: float, seed: int, path: str, *, resume: bool) -> None:
+def objective(found: list[Any], plain: list[Any]) -> Any:
+    """Return the objective of each policy.
+
+    Args:
+        found: For each manoeuvre the costs, shape (policies, cars).
+        plain: For each manoeuvre the costs of the cars without control, shape (cars,).
+    """
+    worse = math.log(2.0) / math.log(HARM)
+    changes = [np.log(costs / bare) for costs, bare in zip(found, plain, strict=True)]
+    return np.mean([(change + worse * np.maximum(change, 0.0)).mean(axis=-1) for change in changes], axis=0)
+
+
+def train(rounds: int, seed: int, path: str) -> None:
     """Train, store the policy that is best on the evaluation cars, and the learning curve."""
-    rng, start = np.random.default_rng(seed), time.perf_counter()
+    rng, start = np.random.default_rng(seed), (time.perf_counter(), time.process_time())
     fleets = [Cars(name, cars_of(name, CARS, TRAINING) * (2 * DIRECTIONS)) for name in MANEUVERS]
     check = [Cars(name, cars_of(name, 8, EVALUATION)) for name in MANEUVERS]
-    plain = [fleet.drive()["cost"].mean() for fleet in check]
-    weights, curve, round_ = np.zeros(8), [], 0
-    if resume:
-        with np.load(path) as file:
-            weights, curve, round_ = file["weights"], file["curve"].tolist(), int(file["rounds"])
-        start -= curve[-1][0]
-        minutes += curve[-1][0] / 60.0
-    best, best_cost = weights, min((cost for _, cost in curve), default=math.inf)
-    while (passed := time.perf_counter() - start) < 60.0 * minutes:
+    trained_bare = [fleet.drive()["cost"][:CARS] for fleet in fleets]
+    bare = [fleet.drive()["cost"] for fleet in check]
+    weights, curve, best, best_cost = np.zeros(N_FEATURES), [], np.zeros(N_FEATURES), math.inf
+    for round_ in range(rounds + 1):
         if round_ % 5 == 0:
-            costs = [fleet.drive(np.tile(weights, (len(fleet.batch), 1)))["cost"].mean() for fleet in check]
-            ratios = np.divide(costs, plain)
-            cost = float(np.exp(np.log(ratios).mean()))
-            curve.append((passed, cost))
+            costs = [fleet.drive(np.tile(weights, (len(fleet.batch), 1)))["cost"] for fleet in check]
+            cost = float(objective(costs, bare))
+            curve.append((round_, cost))
             if cost < best_cost:
                 best, best_cost = weights.copy(), cost
-            told = ", ".join(f"{name} {ratio:.4f}" for name, ratio in zip(MANEUVERS, ratios, strict=True))
-            print(f"{passed:5.0f} s  round {round_:3d}  objective {cost:7.4f} ({told})", flush=True)
-        directions = rng.standard_normal((DIRECTIONS, len(weights)))
-        tried = np.repeat(np.concatenate([weights + NOISE * directions, weights - NOISE * directions]), CARS, axis=0)
-        means = [fleet.drive(tried)["cost"].reshape(2, DIRECTIONS, CARS).mean(axis=2) for fleet in fleets]
-        plus, minus = np.log(means).mean(axis=0)
+            np.savez(path, weights=best, curve=np.array(curve))
+            told = ", ".join(
+                f"{name} {np.mean(one):.3f}, {int((one > HARM * other).sum())} harmed"
+                for name, one, other in zip(MANEUVERS, costs, bare, strict=True)
+            )
+            wall, processor = time.perf_counter() - start[0], time.process_time() - start[1]
+            print(
+                f"{wall:4.0f} s ({processor:4.0f} s of processors) round {round_:3d}: {cost:7.3f} ({told})", flush=True
+            )
+        if round_ == rounds:
+            break
+        smaller = 1.0 / (1.0 + round_ / HALVING)
+        directions = rng.standard_normal((DIRECTIONS, N_FEATURES))
+        change = smaller * NOISE * directions
+        tried = np.repeat(np.concatenate([weights + change, weights - change]), CARS, axis=0)
+        costs = [fleet.drive(tried)["cost"].reshape(2, DIRECTIONS, CARS) for fleet in fleets]
+        plus, minus = objective(costs, trained_bare)
         chosen = np.argsort(np.minimum(plus, minus))[:BEST]
         spread = np.std(np.concatenate([plus[chosen], minus[chosen]])) + 1e-9
-        weights = weights - STEP / (BEST * spread) * ((plus - minus)[chosen] @ directions[chosen])
-        round_ += 1
-    np.savez(path, weights=best, curve=np.array(curve), rounds=round_)
-    print(f"{path}: objective {best_cost:.4f} after {passed:.0f} s, weights {np.round(best, 3).tolist()}")
+        weights = weights - smaller * STEP / (BEST * spread) * ((plus - minus)[chosen] @ directions[chosen])
+    print(f"{path}: objective {best_cost:.3f}, weights {np.round(best, 3).tolist()}")
 
 
 def evaluate(path: str, count: int) -> None:
     """Print the table: controllers and policy on cars that were not trained with."""
     with np.load(path) as file:
-        weights = file["weights"]
-    print("| set | manoeuvre | controller | mean cost | worst cost | mean sideslip peak | lost | harm |")
-    print("|---|---|---|---|---|---|---|---|")
+        weights = np.tile(file["weights"], (count, 1))
+    print("| set | manoeuvre | controller | mean cost | worst cost | mean sideslip peak | lost | harm | largest harm |")
+    print("|---|---|---|---|---|---|---|---|---|")
     for label, seed in (("evaluation", EVALUATION), ("final", FINAL)):
         for name in MANEUVERS:
-            overrides, plain = cars_of(name, count, seed), None
-            for controller in ("none", "ars", "lqr", "learned"):
-                fleet = Cars(name, overrides, "none" if controller == "learned" else controller)
-                found = fleet.drive(np.tile(weights, (count, 1)) if controller == "learned" else None)
-                cost = found["cost"]
-                plain = cost if plain is None else plain
+            overrides = cars_of(name, count, seed)
+            plain = Cars(name, overrides)
+            bare = plain.drive()
+            results = {"none": bare, **{one: Cars(name, overrides, one).drive() for one in ("ars", "lqr")}}
+            for controller, found in (results | {"learned": plain.drive(weights)}).items():
+                cost, more = found["cost"], found["cost"] - bare["cost"]
+                worst = int(np.argmax(cost / bare["cost"]))
+                harm = f"{more[worst]:.3f} ({100.0 * more[worst] / bare['cost'][worst]:.0f} %)"
                 print(
-                    f"| {label} | {name} | {controller} | {cost.mean():.2f} | {cost.max():.2f} | "
+                    f"| {label} | {name} | {controller} | {cost.mean():.3f} | {cost.max():.3f} | "
                     f"{math.degrees(found['peak_rad'].mean()):.1f} deg | {int(found['lost'].sum())} of {count} | "
-                    f"{int((cost > 1.05 * plain).sum())} of {count} |",
+                    f"{int((cost > HARM * bare['cost']).sum())} of {count} | {harm if more[worst] > 0.0 else 'none'} |",
                     flush=True,
                 )
 
@@ -201,16 +237,11 @@ def picture(path: str, output: str) -> None:
     from matplotlib.figure import Figure  # noqa: PLC0415 - only for the picture
 
     with np.load(path) as file:
-        seconds, cost = file["curve"].T
+        rounds, objectives = file["curve"].T
     figure = Figure(figsize=(6.4, 3.6), layout="constrained")
     axes = figure.add_subplot()
-    axes.plot(seconds / 60.0, cost)
-    axes.set(
-        xlabel="training time [min]",
-        ylabel="mean cost over that without control",
-        title="Learned rear steering",
-        yscale="log",
-    )
+    axes.plot(rounds, objectives)
+    axes.set(xlabel="round", ylabel="objective on the evaluation set", title="Learned rear steering")
     axes.grid(visible=True, alpha=0.3)
     figure.savefig(output, dpi=130)
 
@@ -218,14 +249,13 @@ def picture(path: str, output: str) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=["train", "evaluate"])
-    parser.add_argument("--minutes", type=float, default=8.0)
-    parser.add_argument("--resume", action="store_true")
+    parser.add_argument("--rounds", type=int, default=25)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--cars", type=int, default=32)
     parser.add_argument("--weights", default="policy.npz")
     options = parser.parse_args()
     if options.what == "train":
-        train(options.minutes, options.seed, options.weights, resume=options.resume)
+        train(options.rounds, options.seed, options.weights)
         picture(options.weights, "learning_curve.png")
     else:
         evaluate(options.weights, options.cars)

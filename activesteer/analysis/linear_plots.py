@@ -16,11 +16,10 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, Array, run_looks
 from activesteer.display_units import quantity_of
 from activesteer.errors import ParameterError
-from activesteer.plotting import Curve, Panel, Picture, draw, new_figure, save
+from activesteer.plotting import Curve, Panel, Picture, draw, save
 
 if TYPE_CHECKING:
     import control
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 BODE_RANGE_Hz: Final = (0.1, 10.0)
@@ -30,6 +29,7 @@ LOCUS_LIMIT_Hz: Final = 4.5
 DAMPING_RAYS: Final = (0.2, 0.4, 0.6, 0.8)
 """Damping ratios drawn as rays into a root locus."""
 
+_GREY: Final = "#cccccc"
 _GAIN_UNITS: Final = {
     "yaw_rate_radps": "1/s", "ay_mps2": "m/s² per rad", "roll_rad": "rad/rad", "sideslip_rad": "rad/rad",
 }  # fmt: skip
@@ -157,26 +157,22 @@ def draw_root_locus(
             f"{len(systems)} linear cars and {len(speeds_mps)} speeds given; as many of each are needed",
             value=(len(systems), len(speeds_mps)),
         )
-    figure = new_figure(width_in=7.5, height_in=5.5)
-    axis: Axes = figure.subplots()
-    limit = 2.0 * math.pi * LOCUS_LIMIT_Hz
-    angle = np.linspace(math.pi / 2.0, math.pi, 60)
+    limit, angle = 2.0 * math.pi * LOCUS_LIMIT_Hz, np.linspace(math.pi / 2.0, math.pi, 60)
+    curves, notes = [], []
     for frequency_Hz in range(1, math.ceil(LOCUS_LIMIT_Hz)):
         radius = 2.0 * math.pi * frequency_Hz
-        axis.plot(radius * np.cos(angle), radius * np.sin(angle), color="#dddddd", linewidth=0.7)
-        axis.annotate(f"{frequency_Hz} Hz", (0.0, radius), (4, 0), textcoords="offset points", color="#777777")
+        curves.append(Curve(radius * np.cos(angle), radius * np.sin(angle), "", _GREY, "-", 0.7))
+        notes.append((0.0, radius, f"{frequency_Hz} Hz"))
     for damping in DAMPING_RAYS:
         x, y = -limit * damping, limit * math.sqrt(1.0 - damping**2)
-        axis.plot([0.0, x], [0.0, y], color="#dddddd", linewidth=0.7)
-        axis.annotate(f"{damping:g}", (x, y), color="#777777")
-    poles = [np.array(system.poles(), dtype=np.complex128) for system in systems]
-    shown = [values[(values.imag >= -1e-9) & (np.abs(values) <= limit)] for values in poles]
-    points: NDArray[np.complex128] = np.concatenate(shown)
-    speeds_kmh = np.repeat(3.6 * np.asarray(speeds_mps, dtype=np.float64), [len(values) for values in shown])
-    dots = axis.scatter(points.real, points.imag, c=speeds_kmh, cmap="viridis", s=18, zorder=3)
-    figure.colorbar(dots, ax=axis, label="speed [km/h]")
-    axis.set_xlabel("real part [1/s]")
-    axis.set_ylabel("imaginary part [1/s]")
-    axis.set_ylim(bottom=-1.0)
-    axis.spines[["top", "right"]].set_visible(False)
-    return save(figure, Path(path))
+        curves.append(Curve([0.0, x], [0.0, y], "", _GREY, "-", 0.7))
+        notes.append((x, y, f"{damping:g}"))
+    slowest, fastest = 3.6 * min(speeds_mps), 3.6 * max(speeds_mps)
+    for system, speed_mps in zip(systems, speeds_mps, strict=True):
+        poles = np.array(system.poles(), dtype=np.complex128)
+        poles = poles[(poles.imag >= -1e-9) & (np.abs(poles) <= limit)]
+        shade = (3.6 * speed_mps - slowest) / max(fastest - slowest, 1e-9)
+        curves.append(Curve(poles.real, poles.imag, dashes="", marker="o", size=3.5, shade=shade))
+    panel = Panel("real part [1/s]", "imaginary part [1/s]", curves, notes=notes, y_range=(-1.0, 1.05 * limit))
+    scale = ("speed [km/h]", slowest, fastest)
+    return save(draw(Picture("", [panel], width_in=7.5, height_in=5.5, scale=scale)), Path(path))

@@ -16,6 +16,8 @@ from activesteer.commands.arguments import (
 )
 from activesteer.commands.output import coloured, print_entry, print_json
 from activesteer.commands.progress import ProgressBar
+from activesteer.errors import ParameterError
+from activesteer.files import write_json
 
 
 def add_to(commands: Any) -> None:
@@ -38,8 +40,9 @@ def add_to(commands: Any) -> None:
 
 
 def _test(options: argparse.Namespace) -> int:
-    from activesteer.standards.examination import examine, write_json
-    from activesteer.standards.examination_page import write_page
+    from activesteer.pages import write_page
+    from activesteer.standards.examination import examine
+    from activesteer.standards.examination_page import examination_page
 
     if options.output is not None:
         options.how_to_resume = "; the same command resumes it"
@@ -61,8 +64,8 @@ def _test(options: argparse.Namespace) -> int:
     if options.output is not None:
         name = result.standard.name
         files = [
-            write_page(result, options.output / f"{name}.html"),
-            write_json(result, options.output / f"{name}.json"),
+            write_page(examination_page(result), options.output / f"{name}.html"),
+            write_json(options.output / f"{name}.json", result.to_json(), ParameterError),
         ]
     status = 1 if result.failed else 0
     if options.json:

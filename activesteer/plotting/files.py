@@ -51,7 +51,7 @@ def as_svg(figure: Figure) -> Markup:
 
 
 def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:
-    """Write a figure and return its path.
+    """Write a figure and return its path. The first file fixes the layout, which other formats keep.
 
     Raises:
         ActiveSteerError: the file cannot be written; of class `error`.
@@ -61,4 +61,5 @@ def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterEr
             figure.savefig(part, dpi=DOTS_PER_INCH)
         except ValueError as reason:  # an ending that is no format of matplotlib's
             raise error(f"cannot write {shown_path(path)}: {reason}", value=path) from reason
+    figure.set_layout_engine("none")
     return path

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from activesteer.errors import ParameterError
-from activesteer.files import file_word, json_text, make_folder, write_text
+from activesteer.files import file_word
 from activesteer.scenario import FileOrTable, check_gains, check_parts, read_by, resolve
 from activesteer.standards.catalogue import standard_of
 from activesteer.standards.proving_ground import ProvingGround
@@ -101,9 +100,3 @@ def examine(
                 found[label] = Findings.without_result(reason)
     today = datetime.datetime.now(tz=datetime.UTC).date()
     return Examination(standard, label_of(vehicle), label_of(driver), given, found, versions(), today)
-
-
-def write_json(result: Examination, path: Path) -> Path:
-    """Write the result as JSON and return its path; an existing file is replaced."""
-    make_folder(path.parent, ParameterError)
-    return write_text(path, json_text(result.to_json()) + "\n", ParameterError)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Final
 
 from markupsafe import Markup
@@ -11,9 +10,7 @@ from markupsafe import Markup
 from activesteer.conventions import run_looks
 from activesteer.display_units import parameter_title, typeset
 from activesteer.drawing.colours import bytes_of
-from activesteer.errors import ParameterError
-from activesteer.files import make_folder, write_text
-from activesteer.pages import Page, Section, Table, Text, failed, passed, render_page
+from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Panel, Picture, as_svg, draw
 from activesteer.standards.examination import Examination
 from activesteer.standards.standard import Findings
@@ -24,15 +21,8 @@ _PALE: Final = 0.55
 """Share of white in the colour of the wide curve."""
 
 
-def write_page(result: Examination, path: Path) -> Path:
-    """Write the page and return its path; an existing file is replaced."""
-    text = page(result)
-    make_folder(path.parent, ParameterError)
-    return write_text(path, text, ParameterError)
-
-
-def page(result: Examination) -> str:
-    """Return the page as HTML; see `write_page`."""
+def examination_page(result: Examination) -> Page:
+    """Return the page."""
     standard = result.standard
     car = Markup("Vehicle <b>{}</b>, driver {}").format(result.vehicle, result.driver)
     for key, value in result.overrides.items():
@@ -54,7 +44,7 @@ def page(result: Examination) -> str:
         Section("Implemented", points=standard.implemented, level=3),
         Section("Not implemented", points=standard.left_out, level=3),
     ]
-    return render_page(Page(f"{standard.name}: {result.vehicle}", standard.title, lead, sections))
+    return Page(f"{standard.name}: {result.vehicle}", standard.title, lead, sections)
 
 
 def _together(findings: Mapping[str, Findings]) -> list[Picture]:
