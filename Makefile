@@ -17,12 +17,14 @@ demo: $(READY)  ## the paper's scenarios with three steering systems: scorecard,
 	$(BIN)/activesteer reproduce --setting paper --setting human --figures -o demo
 
 test: MARK := -m "not slow"
-test: $(READY_DEV) pictures  ## lint, types, module borders, every test that is not slow, and both benchmarks
+test:  ## lint, types, module borders, every test that is not slow, and both benchmarks
+	$(MAKE) --no-print-directory -j2 $(READY_DEV) pictures
 	$(MAKE) --no-print-directory -j2 lint pytest MARK='$(MARK)'
 	$(BIN)/activesteer bench --rounds 1
 	$(BIN)/activesteer bench --maneuvers
 
-test-all: $(READY_DEV) pictures  ## the same with the slow tests
+test-all:  ## the same with the slow tests
+	$(MAKE) --no-print-directory -j2 $(READY_DEV) pictures
 	$(MAKE) --no-print-directory -j2 lint pytest
 
 # A test process for each processor, up to four: each takes about a gigabyte, and more shorten little.
@@ -30,7 +32,7 @@ pytest: $(READY_DEV)
 	$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadgroup --no-loadscope-reorder $(MARK)
 
 # Drivers and browser for tests of pictures, where root and apt-get can install them; else those tests are skipped.
-pictures:
+pictures: | $(BIN)/python  # which may need apt-get too
 	@tools/install_for_pictures.sh
 
 lint: $(READY_DEV)  ## ruff, pyright, import-linter
@@ -71,9 +73,9 @@ $(BIN)/python:
 	tools/make_environment.sh $(VENV) $(PYTHON)
 
 $(READY): pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[plot]'
+	tools/install.sh $(VENV) plot
 	@touch $@
 
 $(READY_DEV): pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	tools/install.sh $(VENV) dev
 	@touch $(READY) $@
