@@ -18,6 +18,8 @@ PAGE: Final = Path(__file__).parents[1] / "docs" / "claims.md"
 BEGIN: Final = "<!-- the table is written by tools/make_claims_table.py -->\n"
 END: Final = "<!-- end of the table -->\n"
 VEHICLE: Final = "compact"
+SENSORS: Final = "sensors.preset"
+PRESETS: Final = ("ideal", "production")
 
 
 def table() -> str:
@@ -28,8 +30,9 @@ def table() -> str:
     for kind in Kind:
         lines += [f"**{kind.value.capitalize()}**", ""]
         lines += [
-            "| | statement | paper's setting | human driver | population | depends most on |",
-            "|---|---|---|---|---|---|",
+            "| | statement | paper's setting | human driver | population, % | ideal, production sensors, % | "
+            "depends most on |",
+            "|---|---|---|---|---|---|---|",
         ]
         for statement in STATEMENTS.values():
             if statement.kind is kind:
@@ -51,7 +54,7 @@ def summary() -> list[str]:
     ]
     for scenario in [*dict.fromkeys(SCENARIO_OF.values()), ""]:
         own = [claim for claim, name in SCENARIO_OF.items() if scenario in ("", name)]
-        shares = [_mean(population, own, f"sensors.preset = {preset}") for preset in ("ideal", "production")]
+        shares = [_mean(population, own, f"{SENSORS} = {preset}") for preset in PRESETS]
         counts = (sum(claim not in listed for claim in own) for listed in (fails, known))
         cells = (scenario.replace("_", " ") or "all", len(own), *counts, *shares)
         lines.append("| " + " | ".join(map(str, cells)) + " |")
@@ -64,12 +67,13 @@ def _mean(population: Population | None, claims: Sequence[str], at: str) -> str:
     return f"{percent(sum(found) / len(found))} %" if found else ""
 
 
-def _proportion(population: Population | None, number: str) -> tuple[str, str]:
+def _proportion(population: Population | None, number: str) -> tuple[str, str, str]:
     found = None if population is None else population.of(number)
     if found is None:
-        return "", ""
+        return "", "", ""
     interval = f"{percent(found.low)} to {percent(found.high)}"
-    return f"{found.verdict.value}: {percent(found.share)} ({interval})", found.words
+    sensors = ", ".join(percent(found.at[f"{SENSORS} = {preset}"]) for preset in PRESETS)
+    return f"{found.verdict.value}: {percent(found.share)} ({interval})", sensors, found.words
 
 
 def page(text: str) -> str:
