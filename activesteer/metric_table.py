@@ -227,7 +227,7 @@ METRICS: Final = {
         *_declare("J", "brake_energy"),
         *_declare("J", "steering_energy", unit=DisplayUnit("J", 1.0)),
         *_pure("yaw_rate_overshoot", better=_LOWER, unit=_PERCENT),
-        *_pure("wheel_load_coefficient_max", "wheel_lift_share", better=_SMALLER, unit=_PERCENT),
+        *_pure("wheel_load_coefficient_max", "wheel_lift_share", "extended_road_share", better=_SMALLER, unit=_PERCENT),
         *_declare("m", "suspension_travel_max", better=_SMALLER),
         *_pure("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
         *_pure(

@@ -17,9 +17,12 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS, Array
+from activesteer.road.road import road_of
 
 SEAT_ASIDE_M: Final = 0.35
 _BUTTERWORTH: Final = math.sqrt(0.5)
+_EVERY: Final = 10
+"""Rows from one look at the place of a wheel to the next: 0.2 m at 20 m/s."""
 _MARKER: Final = "fl_road_z_m"
 """A channel of uneven roads only."""
 
@@ -37,7 +40,14 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         - `wheel_load_coefficient_max`: standard deviation over mean of the load, of the wheel with the largest.
         - `suspension_travel_max_m`: largest difference of travel of a wheel.
         - `wheel_lift_share`: largest fraction of the time in which a wheel carries no load.
+        - `extended_road_share`: largest fraction of the time in which a wheel is beyond the known surface, where
+          `road.outside = "extend"` continues its edge.
     """
+    road = road_of(recording.metadata)
+    extended = [
+        road.extended_share(*(np.asarray(recording[f"{corner}_contact_{axis}_m"])[::_EVERY] for axis in "xy"))
+        for corner in CORNERS
+    ]
     loads = np.stack([np.asarray(recording[f"{corner}_tyre_fz_N"], np.float64) for corner in CORNERS])
     travels = np.stack([np.asarray(recording[f"{corner}_travel_m"], np.float64) for corner in CORNERS])
     return {
@@ -45,6 +55,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         "wheel_load_coefficient_max": float((loads.std(axis=1) / loads.mean(axis=1)).max()),
         "suspension_travel_max_m": float(np.ptp(travels, axis=1).max()),
         "wheel_lift_share": float((loads <= 0.0).mean(axis=1).max()),
+        "extended_road_share": max(extended),
     }
 
 

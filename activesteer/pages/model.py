@@ -88,7 +88,9 @@ class Page(NamedTuple):
 
 def _plain(text: Text) -> str:
     """Return a text without markup, ticks and crosses."""
-    return re.sub("[\N{CHECK MARK}\N{BALLOT X}] ", "", text.striptags() if isinstance(text, Markup) else text)
+    if isinstance(text, Markup):
+        text = Markup(str(text).replace("<br>", ", ")).striptags()
+    return re.sub("[\N{CHECK MARK}\N{BALLOT X}] ", "", text)
 
 
 def passed(words: str, *, chip: bool = False) -> Markup:

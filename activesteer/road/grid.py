@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.conventions import Array
 
@@ -35,6 +36,12 @@ class Grid(NamedTuple):
     def d(self) -> Array:
         """Distances of the columns [m]."""
         return self.d_m + self.step_d_m * np.arange(self.z_m.shape[1])
+
+    def knows(self, s_m: Array, d_m: Array) -> NDArray[np.bool_]:
+        """Return for each place whether it lies within the grid."""
+        along, across = (s_m - self.s_m) / self.step_s_m, (d_m - self.d_m) / self.step_d_m
+        rows, columns = self.z_m.shape
+        return (along >= 0.0) & (along <= rows - 1) & (across >= 0.0) & (across <= columns - 1)
 
 
 def summed(fine: Grid, other: Grid) -> Grid:

@@ -264,6 +264,18 @@ class Road:
         """Return world x and y of places along and to the left of the middle of the road [m]."""
         return s_m, d_m
 
+    def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
+        """Return the distances along and to the left of the middle of the road of places of the world [m]."""
+        return x_m, y_m
+
+    def extended_share(self, x_m: Array, y_m: Array) -> float:
+        """Return the fraction of places of the world [m] beyond the known surface, where its edge is extended."""
+        grid = self.grid()
+        if grid is None:
+            return 0.0
+        s, d = self.located(x_m, y_m)
+        return float(np.mean(~grid.knows(s, d) & (s >= self.start_m)))
+
     def areas(self) -> tuple[Area, ...]:
         """Return the areas whose friction is not `mu`; where areas overlap, the later one counts."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
@@ -312,6 +324,17 @@ class LaidRoad(Road):
         beyond = np.maximum(s_m - path.length_m, 0.0) + np.minimum(s_m, 0.0)
         cos, sin = np.cos(heading), np.sin(heading)
         return x + beyond * cos - d_m * sin, y + beyond * sin + d_m * cos
+
+    def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
+        """Return the places along and beside the nearest point of the path; see the base class."""
+        from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
+
+        path = self.path
+        assert path is not None
+        _, near = KDTree(np.column_stack([path.x_m, path.y_m])).query(np.column_stack([x_m, y_m]))
+        dx, dy, heading = x_m - path.x_m[near], y_m - path.y_m[near], path.heading_rad[near]
+        cos, sin = np.cos(heading), np.sin(heading)
+        return path.s_m[near] + dx * cos + dy * sin, dy * cos - dx * sin
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
         """Return quadrangles along the path; the rectangle does not matter. See the base class."""

@@ -185,4 +185,8 @@ def test_leaving_the_known_surface_ends_the_run_if_that_is_an_error() -> None:
     roughness = {"class": "A", "length_m": 30.0}
     with pytest.raises(SimulationDiverged, match=r"f. wheel leaves the known surface of the road at x = 29\.9"):
         drive({"roughness": roughness, "outside": "error"}, 60.0, 4.0)
-    assert drive({"roughness": roughness}, 60.0, 4.0)["fl_road_z_m"][-1] == pytest.approx(0.0, abs=0.05)
+    run = drive({"roughness": roughness}, 60.0, 4.0)
+    assert run["fl_road_z_m"][-1] == pytest.approx(0.0, abs=0.05)
+    beyond = max(float(np.mean(run[f"{corner}_contact_x_m"] > 30.0)) for corner in ("fl", "fr"))
+    assert 0.4 < beyond < 0.8
+    assert run.metrics["extended_road_share"] == pytest.approx(beyond, abs=0.005)

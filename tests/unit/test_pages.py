@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from jinja2 import UndefinedError
+from markupsafe import Markup
 
 from activesteer.analysis.report import report_page
 from activesteer.pages import render, render_page
+from activesteer.pages.model import Table
 from activesteer.validation.comparison import Comparison
 from activesteer.validation.kinematics import Curves
 from activesteer.validation.programme import Validation
@@ -93,3 +95,8 @@ def test_json_in_a_page_comes_back_and_opens_nothing():
 def test_what_a_template_needs_must_be_given():
     with pytest.raises(UndefinedError):
         render("document.html")
+
+
+def test_lines_of_a_cell_are_apart_in_the_terminal():
+    cell = Markup('{}<br><code class="key">{}</code>').format("anti-roll bar <1>", "factors.anti_roll_bar")
+    assert list(Table("", ["parameter"], [[cell]]).lines())[1] == "  anti-roll bar <1>, factors.anti_roll_bar"

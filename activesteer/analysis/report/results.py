@@ -83,6 +83,7 @@ KEY_FIGURES: Final = (
     KeyFigure("Energy from the battery", ("battery_energy_J",)),
     KeyFigure("Largest wheel load variation", ("wheel_load_coefficient_max",)),
     KeyFigure("Share of time with a wheel lifted", ("wheel_lift_share",)),
+    KeyFigure("Share of time beyond the known surface", ("extended_road_share",)),
     KeyFigure("Largest suspension travel", ("suspension_travel_max_m",)),
 )
 """Key figures in the order of their columns; a manoeuvre has some of them."""

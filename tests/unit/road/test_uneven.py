@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ManeuverError
+from activesteer.road import path as lines
 from activesteer.road.crg import CrgRoad, packed, read_crg, referenced, unpacked
 from activesteer.road.obstacle import Obstacle
 from activesteer.road.profile import ProfileTable
-from activesteer.road.road import BankingTable, Road
+from activesteer.road.road import BankingTable, LaidRoad, Road
 from activesteer.road.roughness import CLASSES, STEP_M, Roughness
 from activesteer.road.surface import Surface, surface_of
 from activesteer.scenario import resolve
@@ -225,3 +226,14 @@ def test_the_examples_of_asam_are_read() -> None:
     assert (line.x_m[-1], line.y_m[-1]) == pytest.approx(end, abs=2e-3)
     with pytest.raises(ManeuverError, match="not found beside it"):
         resolve(table(missing.name))
+
+
+def test_the_share_beyond_the_known_surface_follows_the_path() -> None:
+    turn = np.linspace(0.0, math.pi, 200)
+    path = lines.Path.through(40.0 * np.sin(turn), 40.0 * (1.0 - np.cos(turn)))
+    road = LaidRoad(along="path", roughness=Roughness(class_="A", length_m=60.0, width_m=6.0), start_m=3.0, path=path)
+    along, across = np.array([0.0, 20.0, 58.0, 62.0, 20.0]), np.array([0.0, 1.5, -1.5, 0.0, 5.0])
+    places = road.placed(along, across)
+    assert np.allclose(road.located(*places), (along, across), atol=0.02)
+    # The last two are behind the end and beside the surface; the first one is where every road is even.
+    assert road.extended_share(*places) == pytest.approx(0.4)
