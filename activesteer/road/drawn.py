@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
@@ -44,12 +45,20 @@ class DrawnSurface(NamedTuple):
         return {name: np.round(values, 4).tolist() for name, values in self._asdict().items()}
 
     def mesh(self, road: Road) -> tuple[Array, NDArray[np.int64]]:
-        """Return corners in world axes [m], shape (n, 3), and triangles, shape (m, 3), anticlockwise from above."""
+        """Return corners in world axes [m], shape (n, 3), and triangles, shape (m, 3), anticlockwise from above.
+
+        Each quadrangle is divided along the diagonal that is nearer to level, so that a skew edge is no saw.
+        """
         s, d = np.meshgrid(self.s_m, self.d_m, indexing="ij")
         x, y = road.placed(s.ravel(), d.ravel())
         corner = np.arange(s.size).reshape(s.shape)
         near_right, near_left, far_right, far_left = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
-        faces = [(near_right, far_right, far_left), (near_right, far_left, near_left)]
+        rise = np.abs(self.z_m[1:, 1:] - self.z_m[:-1, :-1]) - np.abs(self.z_m[1:, :-1] - self.z_m[:-1, 1:])
+        falls = rise > 0.0
+        faces = [
+            (near_right, far_right, np.where(falls, near_left, far_left)),
+            (np.where(falls, far_right, near_right), far_left, near_left),
+        ]
         triangles = np.concatenate([np.stack(face, axis=-1).reshape(-1, 3) for face in faces])
         return np.column_stack([x, y, self.z_m.ravel()]), triangles
 
@@ -62,7 +71,12 @@ def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
         length_m: Distance that the car drives [m].
     """
     count = min(_MAX_ALONG, max(2, round(length_m / _STEP_M)))
-    along, across = [np.linspace(0.0, length_m, count)], [np.arange(-_WIDTH_M, _WIDTH_M + 0.1, _ACROSS_M)]
+    # A skew edge passes a corner of each quadrangle where the steps have the ratio of its slope.
+    skew = [abs(math.tan(obstacle.angle_rad)) for obstacle in road.obstacle if obstacle.angle_rad != 0.0]
+    finest = 0.5 * _MAX_PLACES / count
+    step = max(min([_ACROSS_M, *(_STEP_M / slope for slope in skew)]), 2.0 * _WIDTH_M / finest)
+    places = round(2.0 * _WIDTH_M / step)
+    along, across = [np.linspace(0.0, length_m, count)], [np.linspace(-_WIDTH_M, _WIDTH_M, places + 1)]
     for obstacle in road.obstacle:
         ends = [0.0, *np.linspace(0.0, 1.0, 9) * (obstacle.length_m or 0.0)]
         edge = obstacle.edge_m

@@ -13,6 +13,7 @@ import pytest
 from activesteer.errors import ManeuverError
 from activesteer.road import path as lines
 from activesteer.road.crg import CrgRoad, packed, read_crg, referenced, unpacked
+from activesteer.road.drawn import DrawnSurface, places_to_draw
 from activesteer.road.obstacle import Obstacle
 from activesteer.road.profile import ProfileTable
 from activesteer.road.road import BankingTable, LaidRoad, Road
@@ -237,3 +238,20 @@ def test_the_share_beyond_the_known_surface_follows_the_path() -> None:
     assert np.allclose(road.located(*places), (along, across), atol=0.02)
     # The last two are behind the end and beside the surface; the first one is where every road is even.
     assert road.extended_share(*places) == pytest.approx(0.4)
+
+
+def test_a_skew_kerb_is_drawn_without_teeth() -> None:
+    kerb = Obstacle(kind="kerb", start_m=8.0, height_m=0.06, edge_m=0.02, angle_rad=math.radians(-70.0))
+    road = Road(obstacle=(kerb,))
+    along, across = places_to_draw(road, 30.0)
+    s, d = np.meshgrid(along, across, indexing="ij")
+    heights = surface(obstacle=(kerb,)).at(s.ravel(), d.ravel())[:, 0].reshape(s.shape)
+    corners, triangles = DrawnSurface(along, across, heights).mesh(road)
+    distances = []
+    for one, other in ((0, 1), (1, 2), (2, 0)):
+        a, b = corners[triangles[:, one]], corners[triangles[:, other]]
+        crosses = (a[:, 2] - 0.03) * (b[:, 2] - 0.03) < 0.0
+        part = ((0.03 - a[:, 2]) / np.where(crosses, b[:, 2] - a[:, 2], 1.0))[crosses, None]
+        x, y, _ = (a[crosses] + part * (b - a)[crosses]).T
+        distances.append((x - 8.0) * math.cos(kerb.angle_rad) + y * math.sin(kerb.angle_rad))
+    assert np.ptp(np.concatenate(distances)) < 0.1
