@@ -18,6 +18,7 @@ import pytest
 
 import activesteer
 from activesteer import Recording
+from activesteer.simulation.recorder import BLOCK_INTERVAL_S
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
@@ -188,13 +189,16 @@ def test_two_first_compilations_at_once_both_drive(tmp_path: Path) -> None:
 
 # -- killed ------------------------------------------------------------------------------------------------------------
 
-LARGEST_LOSS_S = 0.7
+LARGEST_LOSS_S = 2.0 * BLOCK_INTERVAL_S
+JUST_BEFORE_A_BLOCK = 1_198
+"""One block is almost full and the one before it may still be in the writer's hands, so that most is lost."""
 
 
-@pytest.mark.parametrize("step", [1_450, *(pytest.param(step, marks=pytest.mark.slow) for step in MORE_STEPS)])
-def test_a_killed_run_loses_at_most_seven_tenths_of_a_second(call, controller, tmp_path: Path, step: int) -> None:
+@pytest.mark.parametrize("step", [JUST_BEFORE_A_BLOCK, *(pytest.param(step, marks=pytest.mark.slow) for step in MORE_STEPS)])
+def test_a_killed_run_loses_less_than_two_blocks(call, controller, tmp_path: Path, step: int) -> None:
     body = f"if self.steps > {step}:\n    import os\n    os.kill(os.getpid(), 9)\nreturn ActuatorCommand()"
     words = ("run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")
+    assert LARGEST_LOSS_S < 0.7
     assert program(tmp_path, *words).returncode == -9
     left = Recording.open(tmp_path / "run.mcap")
     assert left.time_s[-1] >= 0.001 * step - LARGEST_LOSS_S
