@@ -42,13 +42,17 @@ class SteeringTable:
     """Time by which the column comes later, for a recorded signal with a clock of its own [s]."""
 
     def __post_init__(self) -> None:
-        """Check that times come with one of the two columns."""
+        """Check that times come with one of the two columns, and that factor and delay act on it."""
         if self.steering_wheel_rad is not None and self.rack_m is not None:
             raise ManeuverError("steering_wheel_rad and rack_m both steer the front wheels; leave one out")
         if self.steering_wheel_rad is None and self.rack_m is None:
             if self.time_s != (0.0,):
                 raise ManeuverError("given without angles; add steering_wheel_deg or rack_m", key="time_s")
             object.__setattr__(self, "steering_wheel_rad", (0.0,) * len(self.time_s))
+        if self.factor != 1.0 and not any(self.values):
+            raise ManeuverError("has no effect on a steering wheel that stays at zero; leave it out", key="factor")
+        if self.delay_s != 0.0 and len(set(self.values)) == 1:
+            raise ManeuverError("has no effect on a steering wheel that stands still; leave it out", key="delay_s")
 
     @property
     def values(self) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ import pytest
 from activesteer.config import key_paths, to_table
 from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.maneuver import Maneuver
+from activesteer.maneuver.phases import Phases, PhaseSequence
 from activesteer.resources import list_maneuvers
 from activesteer.road.road import Road
 from activesteer.scenario import resolve
@@ -21,7 +22,7 @@ LABELS = ("kind", "name", "title", "steering_csv", "drive_csv", "path.csv", "roa
 """Keys that name things."""
 WITHOUT_EFFECT = {
     ("hill_hold", "drive"), ("parking", "drive"), ("slalom", "vehicle_width_m"), ("split_mu_braking", "road.along"),
-    ("mu_jump", "road.along"),
+    ("rough_braking", "road.along"),
 }  # fmt: skip
 """The drive is off while the brake is pressed; a slalom's cones must be passed, but do not depend on the width; a
 straight path is the world's x axis."""
@@ -29,7 +30,7 @@ NUMBERS = (0.0, 0.05, 0.3, 0.7, 1.0, 1.7, 3.1, 5.0, 12.0, 33.0, 61.0)
 
 
 def seen(maneuver: Maneuver) -> str:
-    """All inputs of driver and wheels: setpoints over time, friction along the way, path, lanes, cones."""
+    """All inputs of driver and wheels: setpoints over time, friction and its places, path, lanes, cones."""
     times = np.linspace(0.0, maneuver.duration_s, 300)
     search = maneuver.search
     if search is not None:
@@ -41,11 +42,24 @@ def seen(maneuver: Maneuver) -> str:
             inside = [area.mu for area in road.areas() if _inside(area, x, y)]
             frictions.append(inside[-1] if inside else road.mu)
     met: list[Any] = [[maneuver.setpoint(time) for time in times], maneuver.settling_setpoint(), maneuver.settle_s]
+    if isinstance(maneuver, Phases):
+        sequence = PhaseSequence(maneuver)
+        met += [[sequence.setpoint(time, _waves(time)) for time in times]]
     met += [maneuver.duration_s, maneuver.speed_mps, frictions, road.grade]
     met += [road.bank_rad, *_surface(road)]
     met += [None if course is None else course.to_table()]
+    met += [getattr(maneuver, "sensor_ahead_m", None)]  # what `fit` and `compare` use
+    if road.is_uneven or road.areas():
+        along = np.linspace(0.0, 100.0, 20)
+        met += [np.round(np.stack(road.laid(course).placed(along, 0.1 * along)), 6)]
     met += [None if search is None else [search.lateral_acceleration_mps2, search.accept(1.0), search.probe]]
     return json.dumps([to_table(one) for one in met], default=_short)
+
+
+def _waves(time_s: float) -> tuple[float, ...]:
+    """Return a motion that passes every condition of a phase again and again, in the order of `Seen`."""
+    up = np.sin(3.0 * time_s)
+    return (0.5 * up, 0.2 * up, 5.0 * up, 10.0 + 10.0 * up, 20.0 * time_s, 3.0 * up)
 
 
 def _short(value: Any) -> str:
@@ -143,3 +157,12 @@ def test_file_with_a_key_without_effect_is_answered_with_its_line(tmp_path):
     with pytest.raises(ManeuverError) as told:
         resolve(file)
     assert (told.value.line, told.value.key) == (5, "steer.lateral_acceleration_g")
+
+
+@pytest.mark.parametrize(
+    ("key", "of"),
+    [("steering.factor", "standstill"), ("steering.delay_s", "straight_line"), ("steering.factor", "cleat")],
+)
+def test_scale_and_delay_of_a_wheel_that_stands_still_are_refused(key, of):
+    with pytest.raises(ManeuverError, match="has no effect on a steering wheel"):
+        resolve(of, overrides={key: 1.7})
