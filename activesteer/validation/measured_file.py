@@ -391,7 +391,8 @@ def _value(
     given: Any = None,
 ) -> Any:  # fmt: skip
     """Return the value of a key of the car or of a repeated measurement."""
-    inputs: Mapping[str, Any] = {"kind": "open_loop", "name": "inputs", "duration_s": 1.0, "speed_mps": 20.0}
+    steering = {"time_s": [0.0, 1.0], "steering_wheel_rad": [0.0, 0.1]}
+    inputs = {"kind": "open_loop", "name": "inputs", "duration_s": 1.0, "speed_mps": 20.0, "steering": steering}
     try:
         return value_of(resolve(inputs, vehicle, overrides or {}), key)
     except ActiveSteerError as reason:
