@@ -160,12 +160,12 @@ def is_folder(path: str | os.PathLike[str]) -> bool:
 
 
 def why_no_file(path: str | os.PathLike[str]) -> str:
-    """Return why a path is no file, for an error message."""
+    """Return why a path is not a file, for an error message."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
         return "is a link to nothing" if os.path.islink(path) else "does not exist"
-    return "is a folder" if stat.S_ISDIR(mode) else "is no regular file"
+    return "is a folder" if stat.S_ISDIR(mode) else "is not a regular file"
 
 
 def read_bytes(path: str | os.PathLike[str], error: type[ActiveSteerError], max_bytes: int = MAX_TEXT_BYTES) -> bytes:

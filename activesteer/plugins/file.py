@@ -66,7 +66,7 @@ def from_file(text: str, kind: Kind) -> FromFile:
         raise fail(f"{shown(form['name'])} cannot be the name of a class; give your own as {kind.example}")
     path = user_path(form["path"], kind.error)
     if not is_file(path):
-        raise fail(f"there is no file {shown_path(path)}: it {why_no_file(path)}")
+        raise fail(f"{shown_path(path)} {why_no_file(path)}")
     name = f"{_USER_MODULE}{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -183,6 +183,8 @@ class Watched:
             raise
         except BaseException as reason:
             what = f"{type(self.inner).__name__}.step raised {in_one_line(reason, files)}"
+            if isinstance(reason, TypeError) and reason.__traceback__ and reason.__traceback__.tb_next is None:
+                what = f"{reason}; it is called as step({kind.inputs})"
             raise kind.fail(name, what) from reason
         return kind.checked(command, name, setup)
 

@@ -102,7 +102,9 @@ def read_mcap(path: Path) -> Contents:
     try:
         size = os.fstat(descriptor).st_size
         if os.pread(descriptor, len(MCAP0_MAGIC), 0) != MCAP0_MAGIC:
-            raise RecordingError(f"{shown_path(path)} is not an MCAP file", value=path)
+            raise RecordingError(
+                f"{shown_path(path)} is not an MCAP file; `activesteer import` converts measured data", value=path
+            )
         if size > MAX_FILE_BYTES:
             raise RecordingError(
                 f"{shown_path(path)} has {size} bytes, at most {MAX_FILE_BYTES} are allowed",

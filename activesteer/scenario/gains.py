@@ -54,10 +54,10 @@ def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> Non
             raise ParameterError(problem, key=key, value=overrides[key], overridden=True)
         driving = " and ".join(find_controller(given).label for given in controllers)
         allowed = [f"controllers.{name}" for name in sorted(frozenset[str]().union(*map(keys_read, controllers)))]
-        verb = "reads" if len(controllers) == 1 else "read"
-        here = f"{driving} {verb} {', '.join(allowed)}" if controllers else "no controller drives here"
+        words = "controller {} reads" if len(controllers) == 1 else "controllers {} read"
+        here = f"{words.format(driving)} {', '.join(allowed)}" if controllers else "no controller drives here"
         given = ", ".join(f"controllers.{name}" for name in sorted(names))
         raise ParameterError(
-            f"has no effect: {here}; {given} is for {', '.join(readers)}",
+            f"has no effect: {here}; {given} is read by {', '.join(readers)}",
             key=key, value=overrides[key], allowed=allowed, overridden=True,
         )  # fmt: skip

@@ -62,7 +62,7 @@ class Archive:
                 self.names = archive.namelist()
                 self.description = archive.read(DESCRIPTION)
         except (*_DAMAGED, KeyError, ValueError) as reason:
-            raise self._fail(f"{shown_path(path)} is no FMU: {reason}") from reason
+            raise self._fail(f"{shown_path(path)} is not an FMU: {reason}") from reason
         # An FMU needs no document type; one could expand without limit or read files of this machine.
         if b"\0" in self.description[:4] or b"<!DOCTYPE" in self.description or b"<!ENTITY" in self.description:
             raise self._fail(f"its {DESCRIPTION} is not plain UTF-8 without a document type")
@@ -80,7 +80,7 @@ class Archive:
             if outside or kind not in (0, stat.S_IFREG, stat.S_IFDIR):
                 raise self._fail(f"holds {member.filename!r}, which is outside of the FMU or no plain file")
         if DESCRIPTION not in archive.namelist():
-            raise self._fail(f"{shown_path(self.path)} is no FMU: it has no {DESCRIPTION}")
+            raise self._fail(f"{shown_path(self.path)} is not an FMU: it has no {DESCRIPTION}")
         if archive.getinfo(DESCRIPTION).file_size > _MAX_DESCRIPTION_BYTES:
             raise self._fail(f"its {DESCRIPTION} is longer than {_MAX_DESCRIPTION_BYTES} bytes")
 

@@ -185,7 +185,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
     text, _, rest = os.fspath(given).partition("?")
     path = user_path(text, kind.error)
     if not is_file(path):
-        raise kind.fail(text, f"there is no file {shown_path(path)}: it {why_no_file(path)}")
+        raise kind.fail(text, f"{shown_path(path)} {why_no_file(path)}")
     fmu = Fmu(path, kind)
     written = parse_parameters(rest, functools.partial(kind.fail, path.name))
     label = "-".join([path.stem, *(f"{key}={value}" for key, value in written.items() if key != ISOLATE)])

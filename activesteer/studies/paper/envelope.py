@@ -78,7 +78,7 @@ def line_of(scenario: Scenario) -> Line:
     name, kind = scenario.maneuver.name, scenario.maneuver.kind
     if kind not in LINES:
         raise ParameterError(
-            f"{name} is a {kind}; entry speeds are those of {' and '.join(LINES)}",
+            f"{name} is of the kind {kind}, which has no entry speed to search for; allowed are {' and '.join(LINES)}",
             key="maneuver",
             value=kind,
             allowed=tuple(LINES),
