@@ -219,7 +219,9 @@ def _by_name(files: _Files, table: Mapping[str, Channel], notes: list[str]) -> d
     if not sources:
         some = ", ".join(shown(name) for name in sorted(names)[:8])
         raise RecordingError(
-            "; ".join((f"no column has a known name and unit (there are {some})", *notes, "describe them in a map: --map")),
+            "; ".join(
+                (f"no column has a known name and unit (there are {some})", *notes, "describe them in a map: --map")
+            ),
             file=", ".join(path.name for path in files),
         )
     return sources

@@ -142,7 +142,10 @@ def test_setting_of_a_controller_needs_one_that_reads_it(call, tmp_path):
     words = ("run", "straight_line", *SHORT, "--set", "controllers.ars.limit_deg=2", "-o", "out", "-c", "none")
     told = call(*words)
     assert told.status == 1
-    assert "override controllers.ars.limit_deg: has no effect: controller none reads controllers.desired_yaw_rate;" in told.err
+    assert (
+        "override controllers.ars.limit_deg: has no effect: controller none reads controllers.desired_yaw_rate;"
+        in told.err
+    )
     assert not list((tmp_path / "out").glob("*"))
     assert call(*words, "-c", "ars").status == 0
 
