@@ -4,12 +4,12 @@
     python tools/renew_population.py --comparison [--controllers C,C...] [-o DIR] [--samples N] [--jobs N]
     python tools/renew_population.py --judge S2=S1 W2=W2 W3=W3
 
-500 samples take half an hour on two idle processors. The tool resumes an interrupted run and accepts a folder that
-`activesteer reproduce --population N -o DIR` has finished. Call tools/make_claims_table.py afterwards. The second line
-does the same for the comparison of controllers, whose table stands in docs/chassis_control.md; call
-`tools/make_doc_pictures.py comparison_population` after it. The third line judges the stored population again after a
-criterion has changed: it drives only the samples in which the claim behind the equals sign held, because the claim
-before it can hold only there.
+The stored population has 250 samples, which take a quarter of an hour on two idle processors. The tool resumes an
+interrupted run and accepts a folder that `activesteer reproduce --population N -o DIR` has finished. Call
+tools/make_claims_table.py afterwards. The second line does the same for the comparison of controllers, whose table
+stands in docs/chassis_control.md; call `tools/make_doc_pictures.py comparison_population` after it. The third line
+judges the stored population again after a criterion has changed: it drives only the samples in which the claim behind
+the equals sign held, because the claim before it can hold only there.
 """
 
 from __future__ import annotations

@@ -185,7 +185,8 @@ def _imported_from(folder: Path, source: bytes) -> list[Path]:
         if isinstance(node, ast.ImportFrom):
             names |= {node.module} if node.module else {alias.name for alias in node.names}
     files = []
-    for name in sorted({name.partition(".")[0] for name in names}):
+    # A user's file may lie in our checkout, beside the package, which is loaded once.
+    for name in sorted({name.partition(".")[0] for name in names} - {__name__.partition(".")[0]}):
         if is_file(folder / f"{name}.py"):
             files.append(folder / f"{name}.py")
         elif is_file(folder / name / "__init__.py"):

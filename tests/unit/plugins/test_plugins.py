@@ -277,6 +277,19 @@ def test_a_module_beside_the_file_can_be_imported(write, tmp_path, how):
     assert str(tmp_path) not in sys.path
 
 
+def test_a_file_beside_our_own_package_uses_the_package_that_runs(write, tmp_path):
+    """As in the root of a checkout: a second copy of the package would have other classes of commands."""
+    (tmp_path / "activesteer").mkdir()
+    (tmp_path / "activesteer" / "__init__.py").write_text("ActuatorCommand = dict\n")
+    given = write(
+        "from activesteer import ActuatorCommand\nclass Mine:\n    def step(self, command, measurement):\n"
+        "        return ActuatorCommand(rear_steer_demand_rad=0.002)\n"
+    )
+    run = simulate("step_steer", f"{given}:Mine", overrides=SHORT)
+    assert (run["rear_steer_demand_rad"] == 0.002).all()
+    assert not any(name.startswith("activesteer/") for name in run.attachments)
+
+
 def test_a_module_that_the_program_imported_itself_stays_as_it_is(write, tmp_path, monkeypatch):
     (tmp_path / "apart.py").write_text("GAIN = 2.0\n")
     monkeypatch.syspath_prepend(tmp_path)
