@@ -17,7 +17,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "compare",
         help="compare measured runs with a simulated one",
-        description="Finds the time shift, and prints the share of the measurement inside the tolerance corridor of "
+        description="Find the time shift, and print the share of the measurement inside the tolerance corridor of "
         "the simulation. The exit status is 1 if a quantity is outside.",
     )
     parser.add_argument(

@@ -36,8 +36,8 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "driver",
         help="damping and phase margin of driver and car",
-        description="Prints crossover frequency, phase margin and damping of the loop of driver, controller and "
-        "linearised car, with a fully active corrector. Also prints the damping after a small step of the path, for "
+        description="Print crossover frequency, phase margin and damping of the loop of driver, controller and "
+        "linearised car, with a fully active corrector. Also print the damping after a small step of the path, for "
         "the same loop and for a run, and the largest distance between the two.",
     )
     parser.add_argument(

@@ -18,7 +18,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "explore",
         help="change a run by sliders, or drive the car by hand, in a local page",
-        description="Opens a page in the browser that only this computer can reach; Ctrl-C ends it.",
+        description="Open a page in the browser that only this computer can reach; Ctrl-C ends it.",
     )
     parser.add_argument("--port", type=int, default=0, metavar="N", help="port on 127.0.0.1 (default: a free one)")
     parser.add_argument("--no-browser", action="store_true", help="print the address and open no browser")

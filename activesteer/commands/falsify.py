@@ -24,7 +24,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "falsify",
         help="search for the worst case of a requirement",
-        description="Searches the ranges of the factors for the worst case of a requirement, for each controller in "
+        description="Search the ranges of the factors for the worst case of a requirement, for each controller in "
         "each manoeuvre. The exit status is 1 if the requirement is violated.",
     )
     parser.add_argument("requirement", metavar="REQUIREMENT", help="a study file with a table [falsify], or its name")

@@ -20,7 +20,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "fit",
         help="fit parameters of a car to recordings, with intervals",
-        description="Drives the inputs of recordings again, and finds by least squares the values of the factors of a "
+        description="Drive the inputs of recordings again, and find by least squares the values of the factors of a "
         "study for which the car matches the recordings best.",
     )
     parser.add_argument(

@@ -16,7 +16,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "import",
         help="convert measured data to a recording",
-        description="Reads CSV, MAT, Parquet or MDF files of one run. Columns become channels in SI units with the "
+        description="Read CSV, MAT, Parquet or MDF files of one run. Columns become channels in SI units with the "
         "signs of ISO 8855 on a uniform time. Without a map, columns are recognised by the names that exporters write.",
     )
     parser.add_argument(

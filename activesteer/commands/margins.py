@@ -38,7 +38,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "margins",
         help="gain, phase, delay and disk margins of a controller",
-        description="Prints margins of the loop of controller, control unit, actuators, linearised car and sensors, "
+        description="Print margins of the loop of controller, control unit, actuators, linearised car and sensors, "
         "opened at the rear actuator and at the superposition. Use --set sensors.preset=production for real sensors.",
     )
     add_car(parser)

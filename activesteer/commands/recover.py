@@ -15,7 +15,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "recover",
         help="repair the recording of a killed run",
-        description="Writes the readable part of a damaged or cut recording to a new file that ends properly, so that "
+        description="Write the readable part of a damaged or cut recording to a new file that ends properly, so that "
         "all tools can open it. The new file stays marked as incomplete.",
     )
     add_recording(parser)

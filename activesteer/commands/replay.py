@@ -17,7 +17,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "replay",
         help="show recordings in 3D, with signals and metrics",
-        description="Opens recordings in the rerun viewer, several in one window.",
+        description="Open recordings in the rerun viewer, several in one window.",
     )
     add_recording(parser, several=True)
     parser.add_argument(

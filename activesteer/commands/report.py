@@ -13,7 +13,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "report",
         help="compare recordings on one HTML page",
-        description="Writes a page that needs no network: scorecard, plots, track, metrics, parameters, versions.",
+        description="Write a page that needs no network: scorecard, plots, track, metrics, parameters, versions.",
     )
     add_recording(parser, several=True)
     add_output(parser, "FILE.html", "the page; replaces an existing one", "report.html")

@@ -20,7 +20,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "video",
         help="make a film of a recording",
-        description="Draws a recording without a window, and writes an MP4 or a GIF.",
+        description="Draw a recording without a window, and write an MP4 or a GIF.",
     )
     add_recording(parser)
     add_output(parser, "OUT.mp4|gif", "the film (default: FILE.mp4 beside the recording)")

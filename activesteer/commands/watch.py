@@ -24,7 +24,7 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser(
         "watch",
         help="show a manoeuvre while it is driven",
-        description="Opens the viewer of MuJoCo and drives the manoeuvre in real time; nothing is recorded.",
+        description="Open the viewer of MuJoCo and drive the manoeuvre in real time; nothing is recorded.",
     )
     add_scenario(parser)
     add_controller(parser, several=False)

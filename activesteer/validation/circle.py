@@ -65,7 +65,7 @@ class CircleValidation:
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What was assumed, by the file."""
+        """Assumptions that the file states."""
         return self.file.table.assumptions
 
     @property

@@ -103,7 +103,7 @@ def _front_roll_stiffness_fraction(axle: Axle) -> float:
 
 
 def _roll_understeer(axle: Axle) -> float:
-    """In a left turn the body rolls to the right: positive if the front wheels then steer right, or the rear left."""
+    """Roll understeer: positive if the front wheels steer out of the turn, or the rear wheels into it."""
     steer = _per_roll(axle, axle.sweep("opposite_travel").steer_rad[:, axle.wheels].mean(axis=1))
     return -steer if axle.name == "front" else steer
 

@@ -94,11 +94,11 @@ def differences(settings: Settings) -> str:
     except ActiveSteerError as error:
         return str(error)
     wrong = [
-        f"{key} ({here.get(key)}, there {value})" if key.startswith(_VERSION) else key
+        f"{key} (now {here.get(key)}, then {value})" if key.startswith(_VERSION) else key
         for key, value in settings.expected.items()
         if here.get(key) != value
     ]
-    return f"not as where the study was begun: {', '.join(wrong)}" if wrong else ""
+    return f"changed since the study began: {', '.join(wrong)}" if wrong else ""
 
 
 def prepare(workers: Workers, settings: Settings) -> None:
