@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.analysis.claims import PAPER, SCENARIO_OF, STATEMENTS, Kind, not_reproduced, read_setting
-from activesteer.analysis.claims.population import Population, stored_population
+from activesteer.analysis.claims.population import Population, read_population, stored_population
 from activesteer.theory.proportions import percent
+from tools.make_setting import AROUND
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "claims.md"
 BEGIN: Final = "<!-- the table is written by tools/make_claims_table.py -->\n"
@@ -20,6 +21,8 @@ END: Final = "<!-- end of the table -->\n"
 VEHICLE: Final = "compact"
 SENSORS: Final = "sensors.preset"
 PRESETS: Final = ("ideal", "production")
+HOLDS: Final = "\N{CHECK MARK} holds"
+FAILS: Final = "\N{BALLOT X} fails"
 
 
 def table() -> str:
@@ -37,11 +40,33 @@ def table() -> str:
         for statement in STATEMENTS.values():
             if statement.kind is kind:
                 nominal = "\N{NOT EQUAL TO} not reproduced" if statement.id in known else "\N{CHECK MARK} reproduced"
-                paper = "\N{BALLOT X} fails" if statement.id in fails else "\N{CHECK MARK} holds"
+                paper = FAILS if statement.id in fails else HOLDS
                 cells = (statement.id, statement.text, paper, nominal, *_proportion(population, statement.id))
                 lines.append("| " + " | ".join(cells) + " |")
         lines.append("")
-    return "\n".join(lines)
+    return "\n".join([*lines, *around_setting()])
+
+
+def around_setting() -> list[str]:
+    """Return the shares of the statements in the populations around the paper's setting, as lines of Markdown."""
+    fails, found = read_setting(PAPER).fails, [read_population(name) for name in AROUND]
+    if any(one is None for one in found):
+        return []
+    lines = [
+        "**Around the paper's setting**: shares in %, with ideal sensors and with production sensors",
+        "",
+        "| | paper's setting | car, road and speed vary | driver, cones, gains, band and reference vary too |",
+        "|---|---|---|---|",
+    ]
+    for claim in STATEMENTS:
+        shares = [_of_presets(one, [claim]) for one in found]
+        lines.append("| " + " | ".join((claim, FAILS if claim in fails else HOLDS, *shares)) + " |")
+    counts = f"{len(STATEMENTS) - len(fails)} of {len(STATEMENTS)}"
+    return [*lines, f"| all | {counts} | {' | '.join(_of_presets(one, list(STATEMENTS)) for one in found)} |", ""]
+
+
+def _of_presets(population: Population | None, claims: Sequence[str]) -> str:
+    return ", ".join(_mean(population, claims, f"{SENSORS} = {preset}") for preset in PRESETS)
 
 
 def summary() -> list[str]:

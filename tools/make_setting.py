@@ -1,10 +1,17 @@
 """Write the paper's setting from a match: every number with its range and its reason.
 
     python tools/make_setting.py DIR [--number N]
+    python tools/make_setting.py --studies
 
 DIR is the folder of `activesteer match match_paper -o DIR`; by default the best setting is taken. The tool rounds its
 numbers to four digits, drives the 15 runs with 1 ms, and writes `activesteer/analysis/claims/paper_setting.toml`. It
 keeps the reasons in the file for the statements that fail, and marks those that it does not find there.
+
+Both forms write the studies of populations around the setting, `studies/around_paper_setting.toml` and
+`studies/around_paper_setting_wide.toml`. Their ranges are as wide, relative to the setting, as those of
+`studies/population.toml` relative to the nominal values: in the first for car, road, speed and sensors, in the second
+for the driver, the cones and the gains too, and for what the setting alone changes: the tolerance band (half to
+double) and the characteristic speed of the reference (5 %, the error of an identification).
 """
 
 from __future__ import annotations
@@ -22,10 +29,17 @@ from activesteer.resources import find_study
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.matching import Match, read_match
-from activesteer.studies.engine.study_file import StudyFile
+from activesteer.studies.engine.prior import Prior
+from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.paper.reproduction import reproduce
 
 STUDY: Final = "match_paper"
+AROUND: Final = {"around_paper_setting": False, "around_paper_setting_wide": True}
+"""Study around the setting -> whether driver, band and reference vary too."""
+_CAR: Final = ("factors.", "load.", "road.", "speed_", "sensors.")
+_BAND: Final = "controllers.ars.corrector.deadband_start_degps"
+_WIDE: Final = {_BAND: {"log_uniform": [0.5, 2.0]}, "single_track.characteristic_speed_kmh": {"uniform": [0.95, 1.05]}}
+"""Ranges of the second study that the population with the human driver does not have, relative to the setting."""
 FILE: Final = Path(setting_file.__file__).parent / "paper_setting.toml"
 _HEAD: Final = """# The paper's setting: numbers for all that the paper leaves open, with which most statements hold.
 # Selected by the verdicts of the claims, among the settings of `activesteer match match_paper`: the most plausible of
@@ -33,6 +47,13 @@ _HEAD: Final = """# The paper's setting: numbers for all that the paper leaves o
 # ranges were committed before the search, which started from settings chosen by hand (docs/claims.md). Written by
 # tools/make_setting.py.
 """
+
+
+_AROUND_HEAD: Final = (
+    "# Written by tools/make_setting.py from paper_setting.toml and population.toml, which have the reasons.\n"
+)
+_OTHER_UNIT: Final = {"driver.steering_rate_per_metre_degps": "driver.steering_rate_per_metre_radps"}
+"""Key of the setting -> the same key in the unit of the population."""
 
 
 def reasons(study: str = STUDY) -> dict[str, str]:
@@ -132,15 +153,73 @@ def write(found: Match, number: int | None, jobs: int | None) -> Setting:
     return made
 
 
+def around(name: str) -> StudyFile:
+    """Return a study of a population around the setting."""
+    wide, population = AROUND[name], read_study("population")
+    spans = {factor.key: span(population, factor) for factor in population.factors}
+    spans = {key: one for key, one in spans.items() if one and (wide or key.startswith(_CAR))} | (_WIDE if wide else {})
+    factors: dict[str, Any] = {}
+    for number in read_setting(PAPER).numbers:
+        where = {"maneuvers": list(number.maneuvers)} if number.maneuvers else {}
+        relative = spans.pop(_OTHER_UNIT.get(number.key, number.key), None)
+        value = number.value
+        if number.key.partition("deadband_")[1] and number.key != _BAND and isinstance(value, float):
+            # The band keeps its shape, and is the same for both systems.
+            start = float(next(one.value for one in read_setting(PAPER).numbers if one.key == _BAND))
+            factors[number.key] = {"grid": [rounded(value / start)], "nominal": "times", "of": _BAND, **where}
+        elif relative is None or not isinstance(value, float):
+            factors[number.key] = {"grid": [value], **where}
+        else:
+            kind = next(iter(relative))
+            shift = relative.get("nominal") == "plus"
+            factors[number.key] = {
+                kind: [rounded(value + end if shift else value * end) for end in relative[kind]],
+                **where,
+            }
+    # What the setting leaves as it is. Lines in the middle of the lanes have no margin.
+    spans.pop("lane.margin_m", None)
+    table = {key: value for key, value in population.to_table().items() if key != "curves"} | {
+        "title": f"Around the paper's setting: car, road, speed{', driver, band, reference' * wide} and sensors vary",
+        "factors": factors | spans,
+        "design": {"kind": "sobol", "samples": 64},
+        "vehicles": [setting_file.VEHICLE],
+    }
+    return read_study(table)
+
+
+def span(study: StudyFile, factor: Factor) -> dict[str, Any]:
+    """Return the range of a factor relative to its nominal value, as the table of a factor; choices as they are."""
+    given = factor.to_table()
+    if factor.values or factor.nominal or factor.key == "lane.margin_m":
+        return given
+    nominal = Prior(study).nominal[factor.key]
+    if nominal == 0.0:
+        return {factor.kind: [factor.low, factor.high], "nominal": "plus"}
+    return {factor.kind: [factor.low / nominal, factor.high / nominal], "nominal": "times"}
+
+
+def write_around() -> None:
+    """Write the studies of the populations around the setting."""
+    for name in AROUND:
+        path = find_study("population").parent / f"{name}.toml"
+        path.write_text(f"{_AROUND_HEAD}{around(name).to_toml()}", encoding="utf-8")
+        print(path)
+
+
 def main() -> None:
     """Run the tool."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, metavar="DIR")
+    parser.add_argument("folder", type=Path, nargs="?", metavar="DIR")
+    parser.add_argument("--studies", action="store_true", help="write only the studies around the setting")
     parser.add_argument("--number", type=int, metavar="N", help="number of the setting in the match")
     parser.add_argument("--jobs", type=int, metavar="N")
     options = parser.parse_args()
-    found = write(read_match(STUDY, options.folder), options.number, options.jobs)
-    print(f"{FILE}: {len(found.numbers)} numbers; fails: {' '.join(found.fails) or '-'}")
+    if not options.studies:
+        if options.folder is None:
+            parser.error("DIR is needed: the folder of a match")
+        found = write(read_match(STUDY, options.folder), options.number, options.jobs)
+        print(f"{FILE}: {len(found.numbers)} numbers; fails: {' '.join(found.fails) or '-'}")
+    write_around()
 
 
 if __name__ == "__main__":

@@ -2,14 +2,16 @@
 
     python tools/renew_population.py [-o DIR] [--samples N] [--jobs N]
     python tools/renew_population.py --comparison [--controllers C,C...] [-o DIR] [--samples N] [--jobs N]
+    python tools/renew_population.py --around [-o DIR] [--samples N] [--jobs N]
     python tools/renew_population.py --judge S2=S1 W2=W2 W3=W3
 
 The stored population has 250 samples, which take a quarter of an hour on two idle processors. The tool resumes an
 interrupted run and accepts a folder that `activesteer reproduce --population N -o DIR` has finished. Call
 tools/make_claims_table.py afterwards. The second line does the same for the comparison of controllers, whose table
 stands in docs/chassis_control.md; call `tools/make_doc_pictures.py comparison_population` after it. The third line
-judges the stored population again after a criterion has changed: it drives only the samples in which the claim behind
-the equals sign held, because the claim before it can hold only there.
+drives the two populations around the paper's setting, whose shares stand in docs/claims.md. The fourth line judges the
+stored population again after a criterion has changed: it drives only the samples in which the claim behind the equals
+sign held, because the claim before it can hold only there.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ import pyarrow.parquet as pq
 
 from activesteer.analysis.bands import FILE as BANDS
 from activesteer.analysis.bands import TRACK, Band
-from activesteer.analysis.claims import SCENARIO_OF, STATEMENTS, SYSTEMS, Claim, Kind
+from activesteer.analysis.claims import PAPER, SCENARIO_OF, STATEMENTS, SYSTEMS, Claim, Kind, read_setting
 from activesteer.analysis.claims.population import SUMMARY, Change, Population, read_population
 from activesteer.commands.progress import RunCounter
 from activesteer.conventions import CURVE_STEP_S, Array
@@ -40,10 +42,13 @@ from activesteer.resources import find_study, studies_dir
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.run_task import CLAIM, CURVE, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
+from activesteer.studies.engine.study import study
+from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.studies.paper.comparison_population import comparison_text
 from activesteer.studies.paper.population import STUDY, population, population_study, summarise
 from activesteer.theory.proportions import percent
+from tools.make_setting import AROUND
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
 PAGE: Final = DOCS / "population.md"
@@ -249,6 +254,25 @@ def stored_runs() -> pa.Table:
     return table
 
 
+def renew_around(folder: Path, samples: int | None, jobs: int | None) -> None:
+    """Drive the populations around the paper's setting, and store their results with the package.
+
+    Args:
+        folder: Folder of the studies.
+        samples: Number of samples; None for that of the study files.
+        jobs: Number of processes.
+    """
+    fails = read_setting(PAPER).fails
+    nominal = [Claim(statement, statement.id not in fails, {}) for statement in STATEMENTS.values()]
+    for name in AROUND:
+        planned = read_study(name)
+        if samples is not None:
+            planned = replace(planned, design=replace(planned.design, samples=samples))
+        with RunCounter(name, quiet=False) as counter:
+            table = study(planned, output=folder / name, jobs=jobs, progress=counter)
+        print(store_summary(summarise(table, planned, nominal), name))
+
+
 def _in_short(table: pa.Table) -> pa.Table:
     factors = population_study().keys
     columns = {}
@@ -403,7 +427,11 @@ def main() -> None:
     parser.add_argument("--samples", type=int, metavar="N", help="default: that of studies/population.toml")
     parser.add_argument("--jobs", type=int, metavar="N")
     parser.add_argument("--judge", nargs="+", metavar="CLAIM=CLAIM", help="judge the stored population again")
+    parser.add_argument("--around", action="store_true", help="drive the populations around the paper's setting")
     options = parser.parse_args()
+    if options.around:
+        renew_around(options.output or Path("build", "around"), options.samples, options.jobs)
+        return
     if options.judge:
         found = judge_again(dict(pair.split("=") for pair in options.judge), options.jobs)
         PAGE.write_text(page(found), encoding="utf-8")

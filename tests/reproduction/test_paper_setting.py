@@ -9,7 +9,9 @@ import pytest
 from activesteer import simulate
 from activesteer.analysis.claims import PAPER, SCENARIO_OF, SCENARIOS, SYSTEMS, Fake, read_setting
 from activesteer.recording import Recording
+from activesteer.studies.engine.study_file import read_study
 from tests.reproduction.test_fakes import passed, turned_round
+from tools.make_setting import AROUND, around
 
 
 def driven(scenario: str, controllers: dict[str, Any]) -> dict[str, Recording]:
@@ -25,6 +27,17 @@ def check(scenario: str) -> None:
 
 def test_the_step_steer_gives_the_listed_verdicts() -> None:
     check("step_steer")
+
+
+@pytest.mark.parametrize("name", AROUND)
+def test_the_studies_around_the_setting_are_as_the_tool_writes_them(name: str) -> None:
+    found = read_study(name)
+    assert found.to_toml() == around(name).to_toml()
+    numbers = read_setting(PAPER).numbers
+    values = {number.key: number.value for number in numbers if isinstance(number.value, float)}
+    varied = [factor for factor in found.factors if factor.low < factor.high and factor.key in values]
+    assert all(factor.low < values[factor.key] < factor.high for factor in varied if not factor.nominal)
+    assert len(varied) == (17 if AROUND[name] else 5)
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ Carlo without likelihoods, PNAS 100 (2003), 15324.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -26,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.errors import StudyError, not_installed
+from activesteer.files import make_folder
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.factor_values import label_of
 from activesteer.studies.engine.match_file import Statements
@@ -35,6 +37,7 @@ from activesteer.studies.engine.prior import Prior
 from activesteer.studies.engine.run_identity import digest
 from activesteer.studies.engine.run_settings import prepare
 from activesteer.studies.engine.run_task import Row, drive
+from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.task_queue import TaskQueue
 from activesteer.studies.engine.workers import workers_for
@@ -175,9 +178,10 @@ def match(
     by default that of the file. See `study` for the other arguments.
     """
     study = read_study(study_file, "match")
-    search = _Search(study, Path(output), progress)
-    total = search.statements.table.evaluations if evaluations is None else evaluations
-    with workers_for(jobs, scheduler=scheduler) as workers:
+    with contextlib.ExitStack() as stack:
+        search = _Search(study, Path(output), progress, stack)
+        workers = stack.enter_context(workers_for(jobs, scheduler=scheduler))
+        total = search.statements.table.evaluations if evaluations is None else evaluations
         prepare(workers, search.plan.settings)
         search.queue = TaskQueue(workers)
         if neighbours is not None:
@@ -186,22 +190,27 @@ def match(
             search.sample(total, least)
         else:
             search.run(total)
-    return search.result
+        return search.result
 
 
 def read_match(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Match:
     """Return the match in a folder as far as it is."""
-    return _Search(read_study(study_file, "match"), Path(folder), None, reads=True).result
+    return _Search(read_study(study_file, "match"), Path(folder), None, None).result
 
 
 class _Search:
     """A search, its store and its workers."""
 
-    def __init__(self, study: StudyFile, folder: Path, progress: Progress | None, *, reads: bool = False) -> None:
+    def __init__(
+        self, study: StudyFile, folder: Path, progress: Progress | None, stack: contextlib.ExitStack | None
+    ) -> None:
+        """Check the study and open the folder, which is locked until the stack ends; without a stack, only read it."""
         self.study, self.progress = study, progress
         self.statements = Statements(study)
         self.plan, self.prior = Plan(study), Prior(study)
-        self.store = MatchStore(folder, f"# {self.plan.digest}\n{study.to_toml()}", reads=reads)
+        if stack is not None:
+            stack.enter_context(locked(make_folder(folder, StudyError) / LOCK))
+        self.store = MatchStore(folder, f"# {self.plan.digest}\n{study.to_toml()}", reads=stack is None)
         self.names = [label_of(item) for item in study.maneuvers]
         self.all = [claim for name in self.names for claim in self.statements.of[name]]
         self.queue: Any = None

@@ -34,6 +34,8 @@ except ImportError:  # not available on Windows
     fcntl = None
 
 RESULTS: Final = "results.parquet"
+LOCK: Final = ".lock"
+"""File that the process at work locks."""
 _ROW_GROUP: Final = 65536
 _WITHOUT_EFFECT: Final = "without_effect.json"
 _KEY_CHARACTERS: Final = 200
@@ -76,7 +78,7 @@ class Store:
     def opened(self, study_toml: str, identity: str, total: int) -> Iterator[Store]:
         """Make the folder, or resume the study in it."""
         make_folder(self._parts, StudyError)
-        with _locked(self.folder / ".lock"):
+        with locked(self.folder / LOCK):
             about = {"digest": identity, "runs": total, "versions": versions(), "platform": platform.platform()}
             path = self.folder / "environment.json"
             if path.exists():
@@ -139,7 +141,7 @@ class Store:
                     if entry["values"]:
                         found[entry["values"]] = found.get(entry["values"], 0) + entry["counts"]
         maximum = dict(sorted(errors.items(), key=lambda item: -item[1])[:10])
-        running = _is_locked(self.folder / ".lock")
+        running = _is_locked(self.folder / LOCK)
         return Progress(about["runs"], sum(counts.values()), counts, maximum, running, self.without_effect())
 
     def note_without_effect(self, factors: Sequence[str]) -> None:
@@ -218,8 +220,12 @@ def _refusing(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Lock the folder; on a file system without locks, do nothing."""
+def locked(path: Path) -> Iterator[None]:
+    """Lock the folder of this file while it is in use; on a file system without locks, do nothing.
+
+    Raises:
+        StudyError: another process works in the folder.
+    """
     with writing(path, StudyError):
         file = path.open("w")
     with file:

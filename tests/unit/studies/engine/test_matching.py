@@ -13,6 +13,7 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.studies.engine.match_store import FILE
 from activesteer.studies.engine.matching import match, read_match
 from activesteer.studies.engine.prior import Plausibility, Prior
+from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import read_study
 from tests.raising import raises
 from tests.unit.studies.short import MANEUVER
@@ -48,6 +49,12 @@ def test_a_match_is_resumed_from_all_whole_lines_and_another_is_refused(tmp_path
     assert match(TABLE, tmp_path, jobs=1, evaluations=8).evaluations >= 8
     with raises(StudyError, value=tmp_path):
         match({**TABLE, "seed": 9}, tmp_path, jobs=1)
+
+
+def test_two_searches_do_not_work_in_one_folder(tmp_path):
+    with locked(tmp_path / LOCK), raises(StudyError, cause=BlockingIOError, value=tmp_path):
+        match(TABLE, tmp_path, jobs=1)
+    assert not (tmp_path / FILE).exists()
 
 
 def test_settings_are_drawn_in_which_enough_statements_hold(tmp_path):
