@@ -70,8 +70,10 @@ class MatchStore:
         make_folder(folder, StudyError)
         path = folder / _STUDY
         given = path.read_text(encoding="utf-8", errors="replace") if path.exists() else study_toml
-        if given != study_toml and not (reads and given.partition("\n")[2] == study_toml.partition("\n")[2]):
-            raise StudyError(f"{folder} holds another search; use a new folder", value=folder)
+        same = given.partition("\n")[2] == study_toml.partition("\n")[2]
+        if given != study_toml and not (reads and same):
+            what = "this search by another version of activesteer or of its files" if same else "another search"
+            raise StudyError(f"{folder} holds {what}; use a new folder", value=folder)
         if not reads:
             write_text(path, study_toml, StudyError)
         self._path = folder / FILE
