@@ -23,6 +23,8 @@ SENSORS: Final = "sensors.preset"
 PRESETS: Final = ("ideal", "production")
 HOLDS: Final = "\N{CHECK MARK} holds"
 FAILS: Final = "\N{BALLOT X} fails"
+REPRODUCED: Final = "\N{CHECK MARK} reproduced"
+NOT_REPRODUCED: Final = "\N{NOT EQUAL TO} not reproduced"
 
 
 def table() -> str:
@@ -39,7 +41,7 @@ def table() -> str:
         ]
         for statement in STATEMENTS.values():
             if statement.kind is kind:
-                nominal = "\N{NOT EQUAL TO} not reproduced" if statement.id in known else "\N{CHECK MARK} reproduced"
+                nominal = NOT_REPRODUCED if statement.id in known else REPRODUCED
                 paper = FAILS if statement.id in fails else HOLDS
                 cells = (statement.id, statement.text, paper, nominal, *_proportion(population, statement.id))
                 lines.append("| " + " | ".join(cells) + " |")

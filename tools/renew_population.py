@@ -48,6 +48,7 @@ from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.studies.paper.comparison_population import comparison_text
 from activesteer.studies.paper.population import STUDY, population, population_study, summarise
 from activesteer.theory.proportions import percent
+from tools.make_claims_table import NOT_REPRODUCED, REPRODUCED
 from tools.make_setting import AROUND
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
@@ -163,7 +164,7 @@ def _row(head: str, cells: Iterable[str]) -> str:
 def _claims(found: Population) -> list[str]:
     return [
         f"| {claim.id} | {STATEMENTS[claim.id].text} | {'yes' if STATEMENTS[claim.id].kind is Kind.DRIVER else ''} | "
-        f"{'passes' if claim.passed else 'fails'} | {percent(claim.share)} % | {percent(claim.low)} to "
+        f"{REPRODUCED if claim.passed else NOT_REPRODUCED} | {percent(claim.share)} % | {percent(claim.low)} to "
         f"{percent(claim.high)} % | **{claim.verdict.value}** | "
         f"{f'{percent(claim.at[PRODUCTION])} %' if PRODUCTION in claim.at else ''} | "
         f"{f'{claim.words}, {percent(claim.explained)} %' if claim.words else ''} |"
