@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -42,7 +43,7 @@ def stock_messages(path: Path) -> dict[str, int]:
                     last[topics[record.channel_id]] = record.log_time
                 elif hasattr(record, "topic"):
                     topics[record.id] = record.topic  # type: ignore[union-attr]
-        except McapError:  # the end, which is missing
+        except (McapError, struct.error):  # the end, which is missing or cut inside a record
             pass
     return last
 
