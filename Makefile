@@ -8,7 +8,7 @@ READY := $(VENV)/.ready-demo
 READY_DEV := $(VENV)/.ready-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all pytest pictures lint mutants format docs site fmus wheel clean clean-kernels clean-amplitudes
+.PHONY: help demo test test-all pytest baseline pictures lint mutants format docs site fmus wheel clean clean-kernels clean-amplitudes
 
 help:  ## what there is
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
@@ -17,15 +17,13 @@ demo: $(READY)  ## the paper's scenarios with three steering systems: scorecard,
 	$(BIN)/activesteer reproduce --setting paper --setting human --figures -o demo
 
 test: MARK := -m "not slow"
-test:  ## lint, types, module borders, every test that is not slow, and both benchmarks
+test:  ## lint, types, module borders, every test that is not slow, and the key metrics against their baseline
 	$(MAKE) --no-print-directory -j2 $(READY_DEV) pictures
-	$(MAKE) --no-print-directory -j2 lint pytest MARK='$(MARK)'
-	$(BIN)/activesteer bench --rounds 1
-	$(BIN)/activesteer bench --maneuvers
+	$(MAKE) --no-print-directory -j2 baseline pytest MARK='$(MARK)'
 
 test-all:  ## the same with the slow tests
 	$(MAKE) --no-print-directory -j2 $(READY_DEV) pictures
-	$(MAKE) --no-print-directory -j2 lint pytest
+	$(MAKE) --no-print-directory -j2 baseline pytest
 
 # A test process for each processor, up to four: each takes about a gigabyte, and more shorten little.
 pytest: $(READY_DEV)
@@ -34,6 +32,10 @@ pytest: $(READY_DEV)
 # Drivers and browser for tests of pictures, where root and apt-get can install them; else those tests are skipped.
 pictures: | $(BIN)/python  # which may need apt-get too
 	@tools/install_for_pictures.sh
+
+# After lint, when the tests have compiled the kernels.
+baseline: lint
+	$(BIN)/activesteer bench --maneuvers
 
 lint: $(READY_DEV)  ## ruff, pyright, import-linter
 	$(BIN)/ruff check .

@@ -16,6 +16,7 @@ import functools
 import hashlib
 import inspect
 import logging
+import os
 import re
 from collections.abc import Callable, Iterator
 from importlib import import_module, metadata
@@ -23,7 +24,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from llvmlite.binding import get_host_cpu_name
-from numba import njit, types
+from numba import config, njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
 from numba.extending import intrinsic, register_jitable
@@ -236,8 +237,10 @@ def _sources_key(source: Path) -> str:
 
 
 def processor() -> str:
-    """Return the compiler's name of this processor; another processor may change last digits."""
-    return get_host_cpu_name()
+    """Return what decides the last digits of results: the processor, as the compiler, numpy and the BLAS see it."""
+    compiler = [config.CPU_NAME or get_host_cpu_name(), config.CPU_FEATURES]
+    libraries = [os.environ.get(name, "") for name in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")]
+    return repr(compiler + libraries)
 
 
 @functools.cache

@@ -38,6 +38,13 @@ LONG_FIRST: Final = (
     "tests/cli/",
     "tests/examples/",
 )
+NEEDED: Final = {
+    "mesa-vulkan-drivers": "no Vulkan driver",
+    "libosmesa6": "OSMesa",
+    "chromium": "needs a browser",
+    "gcc": "needs a C compiler",
+}
+"""Debian package -> words in the reason of a test that is skipped without it."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -74,6 +81,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(
         key=lambda item: next((place for start, place in order.items() if item.location[0].startswith(start)), 99)
     )
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """End with the number of skipped tests and the packages that they miss."""
+    skipped = [report for report in terminalreporter.stats.get("skipped", []) if report.when != "collect"]
+    if skipped:
+        reasons = " ".join(str(report.longrepr) for report in skipped)
+        missing = [package for package, reason in NEEDED.items() if reason in reasons]
+        needed = f"missing: {', '.join(missing)}" if missing else "see the reasons above"
+        terminalreporter.write_line(f"{len(skipped)} tests were skipped; {needed}", yellow=True)
 
 
 @pytest.fixture

@@ -91,6 +91,7 @@ def test_reader_of_the_mcap_library_finds_what_a_killed_run_left(left):
     assert all(last_ns[topic] >= (KILLED_S - 1.0) * 1e9 for topic in (*STATES, "/tf"))
 
 
+@pytest.mark.slow
 def test_rerun_opens_what_a_killed_run_left(left, tmp_path):
     spec = importlib.util.find_spec("rerun_cli")
     binary = Path(spec.origin).with_name("rerun") if spec and spec.origin else None

@@ -38,6 +38,7 @@ def test_kc_json_has_what_is_promised(capsys):
         assert {"name", "axle", "value", "unit", "band", "inside", "source"} <= set(metric)
 
 
+@pytest.mark.slow
 def test_kc_draws_into_a_folder(tmp_path, capsys, monkeypatch):
     # The page draws every picture; of the same as files, two are enough.
     save = drawing.save

@@ -119,6 +119,7 @@ def test_a_study_resumes_after_a_full_disk_with_the_same_results(
     assert pq.read_table(tmp_path / "s" / "results.parquet").equals(undisturbed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [100, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_a_full_disk_leaves_no_half_report(tmp_path: Path, recording: Path, limit: int) -> None:
     done = program(tmp_path, "report", str(recording), "-o", "report.html", limit=limit)
@@ -156,6 +157,7 @@ def unprivileged() -> tuple[str, ...]:
     return words
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "environment",
     [{"HOME": "", "LANG": "C", "LC_ALL": "C"}, {"HOME": "/nonexistent", "XDG_CACHE_HOME": "/nonexistent"}],

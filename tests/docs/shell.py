@@ -31,7 +31,7 @@ def run(command: Command) -> None:
 def check(command: Command) -> None:
     """Check with the program's own parser a command line that is not run."""
     for part in command.words.split("&&"):
-        words = shlex.split(part)
+        words = shlex.split(part.partition(" > ")[0])
         if words[0] == "activesteer":
             with contextlib.redirect_stderr(io.StringIO()) as told:
                 try:

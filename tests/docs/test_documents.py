@@ -15,6 +15,8 @@ from tests.docs.blocks import Block, blocks
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
+QUICK = {"README.md", "docs/index.md", "docs/commands.md", "docs/stepping.md"}
+"""Pages whose commands and code the quick tests run; the slow tests run all."""
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 
 
@@ -81,9 +83,26 @@ def _do(block: Block, namespace: dict[str, object], *, slow: bool) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize("page", with_blocks(), ids=name)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=[] if name(page) in QUICK else pytest.mark.slow) for page in with_blocks()],
+    ids=name,
+)
 def test_page_does_what_it_says(page: Path) -> None:
     read(page, slow=False)
+
+
+@pytest.mark.parametrize("page", [page for page in with_blocks() if name(page) not in QUICK], ids=name)
+def test_page_can_be_read_by_the_program(page: Path) -> None:
+    """The commands exist with their options, and the code compiles; the slow tests run them."""
+    for block in blocks(page):
+        if block.language == "toml":
+            tomllib.loads(block.text)
+        elif block.language == "python":
+            compile(block.text, f"{name(page)}, line {block.line}", "exec")
+        elif block.language in {"sh", "console"}:
+            for command in block.commands():
+                shell.check(command)
 
 
 @pytest.mark.slow

@@ -50,10 +50,12 @@ def printed(notebook: Any) -> list[str]:
     return ["".join(output.text for output in cell.outputs if output.output_type == "stream") for cell in cells]
 
 
+@pytest.mark.slow
 def test_every_notebook_is_tested() -> None:
     assert sorted((ROOT / "examples").glob("*.ipynb")) == [FIRST_RUNS, LQR_DESIGN]
 
 
+@pytest.mark.slow
 def test_first_runs_are_kept_without_outputs() -> None:
     """Stored outputs would be outdated by the next change of the car."""
     nbformat = pytest.importorskip("nbformat")
@@ -65,6 +67,7 @@ def test_first_runs_are_kept_without_outputs() -> None:
             assert cell.execution_count is None
 
 
+@pytest.mark.slow
 def test_first_runs_run(kernel_home: Path) -> None:
     shown = outputs(run(FIRST_RUNS, kernel_home))
     assert sum("image/png" in data for data in shown) == 1
@@ -79,6 +82,7 @@ def test_first_runs_run(kernel_home: Path) -> None:
     shutil.rmtree(kernel_home)
 
 
+@pytest.mark.slow
 def test_lqr_design_shows_what_it_gives_and_keeps_the_car(kernel_home: Path) -> None:
     nbformat = pytest.importorskip("nbformat")
     stored = nbformat.read(LQR_DESIGN, as_version=4)

@@ -46,6 +46,7 @@ def opened(browser: Browser, url: str, **options: object) -> tuple[Page, list[st
     return page, problems
 
 
+@pytest.mark.slow
 def test_a_slider_changes_the_curve_and_the_command_repeats_it(browser: Browser, served: tuple[str, Path]) -> None:
     address = served[0] + "#maneuver=step_steer&controllers=none,ars"
     page, problems = opened(browser, address, viewport={"width": 700, "height": 500})

@@ -72,6 +72,7 @@ def test_chase_camera_shows_car_road_cones_and_sky(picture):
     assert pixels[-1].std() > 1.0  # the surface has a pattern
 
 
+@pytest.mark.slow
 def test_top_camera_shows_the_car_in_the_middle(picture):
     pixels = picture(2.0, camera="top")
     where = np.argwhere(blue(*np.moveaxis(pixels, 2, 0)))
@@ -81,6 +82,7 @@ def test_top_camera_shows_the_car_in_the_middle(picture):
     assert 1.5 < long / wide < 3.2  # seen from above, nose to the right
 
 
+@pytest.mark.slow
 def test_body_has_the_colour_of_the_system_and_a_ghost_in_its_place_is_not_drawn(drives, picture):
     assert share(picture(2.0), blue) > 0.02 > share(picture(2.0, "ars"), blue)
     run = drives["ars"]
@@ -92,6 +94,7 @@ def test_body_has_the_colour_of_the_system_and_a_ghost_in_its_place_is_not_drawn
     assert np.abs(shown[0] - shown[1])[:70].max() < 4
 
 
+@pytest.mark.slow
 def test_cutaway_shows_springs_that_the_body_hides(picture):
     def springs(pixels):
         return share(pixels, lambda r, g, b: (r > b + 50) & (g > b + 20) & (g < r))
@@ -101,6 +104,7 @@ def test_cutaway_shows_springs_that_the_body_hides(picture):
     assert springs(cut[60:]) > springs(whole[60:])
 
 
+@pytest.mark.slow
 def test_from_above_the_wheels_are_seen_through_the_body(drives):
     with Film({"none": drives["none"]}, Settings(size=(640, 480), camera="top")) as film:
         pixels = film.picture(0.2).astype(int)
@@ -109,6 +113,7 @@ def test_from_above_the_wheels_are_seen_through_the_body(drives):
     assert bonnet.mean() - wheel.mean() > 20.0
 
 
+@pytest.mark.slow
 def test_wheel_camera_shows_tyre_and_spring(picture):
     for corner in ("fl", "rr"):
         pixels = picture(2.0, camera="wheel", corner=corner)
@@ -123,6 +128,7 @@ def test_motion_is_seen(picture):
     assert np.abs(before[road] - after[road]).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_other_car_is_a_ghost_where_it_is(drives, folder):
     run = drives["afs"]
     left = run.poses._replace(positions_m=run.poses.positions_m + np.array([0.0, 3.0, 0.0]))
@@ -151,6 +157,7 @@ def steered(run: Recording, rear_deg: float) -> Recording:
     return Recording(run.channels, run.time_s, values, poses=run.poses, scene=run.scene, metadata=run.metadata)
 
 
+@pytest.mark.slow
 def test_rear_steering_of_2_deg_is_seen_beside_the_car_and_so_is_its_side(drives, folder):
     shown = []
     for angle_deg in (1.7, -1.7):
@@ -169,6 +176,7 @@ def test_rear_steering_of_2_deg_is_seen_beside_the_car_and_so_is_its_side(drives
     assert set(np.unique(np.sign(only_left[:, 0] - 240))) == {-1, 1}  # a wedge on each side of the car
 
 
+@pytest.mark.slow
 def test_arrows_of_tyre_forces_are_seen_on_the_slippery_road(picture):
     def magenta(r, g, b):
         return (r > 150) & (g < 80) & (b > 60) & (b < r)
@@ -176,6 +184,7 @@ def test_arrows_of_tyre_forces_are_seen_on_the_slippery_road(picture):
     assert share(picture(3.4, "ars", camera="top"), magenta) > 0.001
 
 
+@pytest.mark.slow
 def test_side_by_side_every_car_has_a_picture_of_its_own(drives, folder):
     runs = {name: drives[name] for name in ("ars", "afs")}
     with Film(runs, Settings(size=(640, 240), layout="side-by-side")) as film:
@@ -186,6 +195,7 @@ def test_side_by_side_every_car_has_a_picture_of_its_own(drives, folder):
     assert share(right, blue) > 0.02 > share(left, blue)
 
 
+@pytest.mark.slow
 def test_shadow_is_dark_at_the_car_and_has_no_edge(drives, monkeypatch):
     monkeypatch.setattr("activesteer.video.cameras._WHEELS_SEEN", 1.0)  # a body to be seen through has little shadow
     with Film({"none": drives["none"]}, Settings(size=(640, 480), camera="top")) as film:
@@ -196,6 +206,7 @@ def test_shadow_is_dark_at_the_car_and_has_no_edge(drives, monkeypatch):
     assert np.abs(np.diff(grey)).max() < 12.0
 
 
+@pytest.mark.slow
 def test_film_of_a_recording_read_from_a_file_is_the_same(drives, tmp_path):
     path = tmp_path / "run.mcap"
     drives["ars"].save(path)
@@ -206,6 +217,7 @@ def test_film_of_a_recording_read_from_a_file_is_the_same(drives, tmp_path):
     assert np.abs(pictures[0] - pictures[1]).mean() < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["film.gif", "film.mp4"])
 def test_file_is_as_long_as_the_drive(drives, folder, name):
     if name.endswith(".mp4"):

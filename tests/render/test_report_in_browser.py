@@ -133,6 +133,7 @@ def test_plots_show_the_curves_of_all_runs(open_page):
     assert "stretched" in track.inner_text()
 
 
+@pytest.mark.slow
 def test_first_screen_says_what_came_out(open_page):
     page = open_page(**DESK)
     # Inner text is what is shown; the first paragraphs say what was run.
@@ -148,6 +149,7 @@ def test_first_screen_says_what_came_out(open_page):
     assert (red.inner_text()[0], green.inner_text()[0]) == ("\N{BALLOT X}", "\N{CHECK MARK}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("device", [DESK, DARK], ids=["light", "dark"])
 def test_every_text_can_be_read(open_page, device):
     page = open_page(**device)
@@ -159,6 +161,7 @@ def test_every_text_can_be_read(open_page, device):
         assert contrast(ink, paper) >= 4.5, text
 
 
+@pytest.mark.slow
 def test_dark_pictures_are_dark_and_as_complete_as_light_ones(open_page):
     page = open_page(**DARK)
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(22, 24, 27)"
@@ -168,6 +171,7 @@ def test_dark_pictures_are_dark_and_as_complete_as_light_ones(open_page):
     assert pixels(track, "#35301f") > 5000
 
 
+@pytest.mark.slow
 def test_a_curve_below_others_is_seen_through_their_gaps(open_page):
     page = open_page(**DESK)
     # Steered by the same table: three curves on one line.
@@ -175,6 +179,7 @@ def test_a_curve_below_others_is_seen_through_their_gaps(open_page):
     assert all(pixels(steering, colour, 130) > 150 for colour in RUN_COLOURS[:3])
 
 
+@pytest.mark.slow
 def test_pointing_at_a_run_makes_the_others_pale(open_page):
     page = open_page(**DESK)
     yaw_rate = plot(page, "Yaw rate")
@@ -203,6 +208,7 @@ def test_nothing_lies_over_anything_else(open_page):
                 assert below or beside, (box, other)
 
 
+@pytest.mark.slow
 def test_cursor_is_in_all_plots_at_once_and_tells_the_values(open_page):
     page = open_page(**DESK)
     hover(page, plot(page, "Yaw rate"), 6.0 / DURATION_S)
@@ -217,6 +223,7 @@ def test_cursor_is_in_all_plots_at_once_and_tells_the_values(open_page):
     assert told(plot(page, "Yaw rate", 2)) == []  # other runs, other time
 
 
+@pytest.mark.slow
 def test_nothing_moves_when_values_are_told(open_page):
     for device in (DESK, PHONE):
         page = open_page(**device)
@@ -229,6 +236,7 @@ def test_nothing_moves_when_values_are_told(open_page):
         assert figure.bounding_box() == before
 
 
+@pytest.mark.slow
 def test_place_of_the_cars_at_the_cursor_is_on_the_track_and_back(open_page):
     page = open_page(**DESK)
     track, yaw_rate = plot(page, "Track of the front axle centre", 2), plot(page, "Yaw rate", 2)
@@ -240,6 +248,7 @@ def test_place_of_the_cars_at_the_cursor_is_on_the_track_and_back(open_page):
     assert float(told(yaw_rate)[0]) == pytest.approx(4.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_slider_and_play_button_move_the_cars_and_the_cursor(open_page):
     page = open_page(**DESK)
     yaw_rate, track = plot(page, "Yaw rate", 2), plot(page, "Track of the front axle centre", 2)
@@ -262,6 +271,7 @@ def test_slider_and_play_button_move_the_cars_and_the_cursor(open_page):
     assert float(told(yaw_rate)[0]) == after
 
 
+@pytest.mark.slow
 def test_contents_stay_in_view_and_mark_the_manoeuvre_that_is_read(open_page):
     page = open_page(**DESK)
     page.locator("#group-2 .plots figure").last.scroll_into_view_if_needed()
@@ -274,6 +284,7 @@ def test_contents_stay_in_view_and_mark_the_manoeuvre_that_is_read(open_page):
     assert bar["y"] >= box["y"] + box["height"] - 1.0
 
 
+@pytest.mark.slow
 def test_zoom_holds_for_all_plots_of_a_group_and_can_be_undone(open_page):
     page = open_page(**DESK)
     yaw_rate, other = plot(page, "Yaw rate"), plot(page, "Lateral acceleration")
@@ -288,6 +299,7 @@ def test_zoom_holds_for_all_plots_of_a_group_and_can_be_undone(open_page):
     assert float(told(other)[0]) == pytest.approx(0.5 * DURATION_S, abs=0.03)
 
 
+@pytest.mark.slow
 def test_runs_can_be_hidden(open_page):
     page = open_page(**DESK)
     yaw_rate = plot(page, "Yaw rate")
@@ -311,6 +323,7 @@ def test_phone_shows_everything_within_its_width(open_page):
         assert 300.0 < box["width"] <= 390.0 - box["x"]
 
 
+@pytest.mark.slow
 def test_no_number_of_the_first_screen_is_without_a_name_on_a_phone(open_page):
     page = open_page(**PHONE)
     names = page.locator(".headline:not(:empty), .results td.number").evaluate_all(
@@ -320,6 +333,7 @@ def test_no_number_of_the_first_screen_is_without_a_name_on_a_phone(open_page):
     assert all(re.match(r'attr|"\w', name) for name in names), names
 
 
+@pytest.mark.slow
 def test_fingers_read_values_and_zoom(open_page):
     page = open_page(**PHONE)
     yaw_rate, other = plot(page, "Yaw rate"), plot(page, "Sideslip angle")
@@ -351,6 +365,7 @@ def test_fingers_read_values_and_zoom(open_page):
     touch("touchEnd")
 
 
+@pytest.mark.slow
 def test_plots_follow_the_width_of_the_window(open_page):
     page = open_page(**DESK)
     figure = plot(page, "Yaw rate")
@@ -365,6 +380,7 @@ def test_plots_follow_the_width_of_the_window(open_page):
     assert pixels(figure, RUN_COLOURS[2]) > 100
 
 
+@pytest.mark.slow
 def test_printed_plots_fit_the_paper(open_page):
     page = open_page(**DESK)
     page.evaluate(TELL_WIDTHS)
@@ -378,6 +394,7 @@ def test_printed_plots_fit_the_paper(open_page):
     assert box["width"] > 400.0  # as before
 
 
+@pytest.mark.slow
 def test_names_of_printed_runs_end_before_their_results(open_page):
     page = open_page(viewport={"width": 600, "height": 850})  # paper less wide than A4
     page.emulate_media(media="print")

@@ -100,6 +100,7 @@ def view(pictures: Pictures, start: str) -> NDArray[np.int16]:
     return pictures[name].pixels
 
 
+@pytest.mark.slow
 def test_no_view_reports_anything(alone: dict[float, Pictures], together: Pictures) -> None:
     for pictures in (*alone.values(), together):
         assert {name: picture.reports for name, picture in pictures.items() if picture.reports} == {}
@@ -118,6 +119,7 @@ def test_the_car_is_seen_from_behind_on_its_road(alone: dict[float, Pictures]) -
     assert like(pixels, LANE, 30).mean() > 0.0005
 
 
+@pytest.mark.slow
 def test_the_camera_follows_the_car(alone: dict[float, Pictures]) -> None:
     """After 120 m the car is at the same place in the picture, and the road is not."""
     early, late = (alone[time_s][CARS[1]].pixels for time_s in (0.5, AT_S))
@@ -126,6 +128,7 @@ def test_the_camera_follows_the_car(alone: dict[float, Pictures]) -> None:
     assert (np.abs(early - late).max(axis=-1) > 20).mean() > 0.02
 
 
+@pytest.mark.slow
 def test_car_and_tyre_forces_are_seen_from_above_left_is_up(alone: dict[float, Pictures], drives: Drives) -> None:
     pixels = alone[AT_S]["From above"].pixels
     shell = _shell(pixels)
@@ -143,6 +146,7 @@ def test_car_and_tyre_forces_are_seen_from_above_left_is_up(alone: dict[float, P
     assert np.sign(rows.mean() - beside[:, 0].mean()) == np.sign(force)
 
 
+@pytest.mark.slow
 def test_the_whole_course_is_on_the_map(alone: dict[float, Pictures]) -> None:
     pixels = alone[AT_S]["Course [m]"].pixels
     for colour, minimum in ((CONE, 0.02), (LANE, 0.12), (ARS, 0.7)):
@@ -151,12 +155,14 @@ def test_the_whole_course_is_on_the_map(alone: dict[float, Pictures]) -> None:
     assert 0.02 < np.flatnonzero(track.any(axis=0)).min() / pixels.shape[1] < 0.2
 
 
+@pytest.mark.slow
 def test_the_car_moves_on_the_map(alone: dict[float, Pictures]) -> None:
     early, late = (alone[time_s]["Course [m]"].pixels for time_s in (0.5, AT_S))
     changed = np.flatnonzero((np.abs(early - late).max(axis=-1) > 60).any(axis=0))
     assert np.ptp(changed) > 0.2 * early.shape[1]
 
 
+@pytest.mark.slow
 def test_signals_are_plotted_over_the_whole_time(alone: dict[float, Pictures]) -> None:
     for name in PLOTS:
         pixels = alone[AT_S][name].pixels
@@ -165,6 +171,7 @@ def test_signals_are_plotted_over_the_whole_time(alone: dict[float, Pictures]) -
         assert np.ptp(np.nonzero(line)[0]) > 0.25 * pixels.shape[0], name
 
 
+@pytest.mark.slow
 def test_the_names_of_the_curves_stand_beside_the_plots_in_their_colours(alone: dict[float, Pictures]) -> None:
     names = alone[AT_S][ALONE].pixels
     for colour in (ARS, (179, 155, 0)):  # the run, and what is desired
@@ -172,6 +179,7 @@ def test_the_names_of_the_curves_stand_beside_the_plots_in_their_colours(alone: 
         assert like(alone[AT_S][PLOTS[0]].pixels, colour, 60).any(axis=0).mean() > 0.2, colour
 
 
+@pytest.mark.slow
 def test_the_summary_is_there(alone: dict[float, Pictures]) -> None:
     pixels = view(alone[AT_S], "Summary")
     text = pixels.min(axis=-1) > 180
@@ -179,6 +187,7 @@ def test_the_summary_is_there(alone: dict[float, Pictures]) -> None:
     assert text.any(axis=1).sum() > 40
 
 
+@pytest.mark.slow
 def test_each_car_is_compared_with_the_ghosts_of_the_others(together: Pictures) -> None:
     for own, others in zip(CARS, ((ARS, AFS), (NONE, AFS), (NONE, ARS)), strict=True):
         pixels = together[own].pixels
@@ -187,6 +196,7 @@ def test_each_car_is_compared_with_the_ghosts_of_the_others(together: Pictures) 
             assert like(pixels, colour, 45).mean() > 0.001, (own, colour)
 
 
+@pytest.mark.slow
 def test_the_plots_hold_all_runs_in_their_colours(together: Pictures) -> None:
     for start in ("Yaw rate", "Sideslip"):
         pixels = view(together, start)
@@ -194,6 +204,7 @@ def test_the_plots_hold_all_runs_in_their_colours(together: Pictures) -> None:
         assert min(seen) > 0.1, (start, seen)
 
 
+@pytest.mark.slow
 def test_plan_and_names_of_the_curves_show_every_run_in_its_colour_from_left_to_right(together: Pictures) -> None:
     for start in ("Wheels", "Curves"):
         middles = [np.argwhere(like(view(together, start), colour, 30))[:, 1].mean() for colour in (NONE, ARS, AFS)]
@@ -201,6 +212,7 @@ def test_plan_and_names_of_the_curves_show_every_run_in_its_colour_from_left_to_
         assert np.diff(middles).min() > 0.1 * view(together, start).shape[1], start
 
 
+@pytest.mark.slow
 def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drives, folder: Path) -> None:
     """These views are on pages behind the first one."""
     runs = runs_of({"ars": drives["ars"]})

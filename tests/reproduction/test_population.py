@@ -139,6 +139,7 @@ def checked_samples() -> list[int]:
     return [(2 * number + 1) * stored().samples // (2 * CHECKED) for number in range(CHECKED)]
 
 
+@pytest.mark.slow
 def test_a_sample_of_each_scenario_comes_out_again():
     # All samples in all scenarios are the next test's.
     check(list(zip(checked_samples(), SCENARIOS, strict=False)))

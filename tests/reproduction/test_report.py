@@ -34,6 +34,7 @@ def test_reproduce_writes_a_report_of_all_runs(
     assert "not judged" not in page
 
 
+@pytest.mark.slow
 def test_report_of_all_runs_is_small(folder: Path, tmp_path: Path) -> None:
     files = [str(path) for path in sorted(folder.glob("*.mcap"))]
     assert main(["report", *files, "-o", str(tmp_path / "report.html")]) == 0

@@ -46,8 +46,10 @@ def vehicle(tmp_path):
     return write
 
 
-@pytest.mark.parametrize("maneuver", list_maneuvers())
-@pytest.mark.parametrize("car", list_vehicles())
+@pytest.mark.parametrize(
+    ("maneuver", "car"),
+    [*((maneuver, "compact") for maneuver in list_maneuvers()), *(("step_steer", car) for car in list_vehicles())],
+)
 def test_everything_that_is_shipped_resolves(maneuver, car):
     scenario = resolve(maneuver, car)
     assert scenario.maneuver.name == maneuver

@@ -35,7 +35,7 @@ def _compare(model: mujoco.MjModel, ours: mujoco.MjData, rng: np.random.Generato
     return stepper.direct
 
 
-@pytest.mark.parametrize("batch", range(10))
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))])
 def test_random_models_step_as_in_the_engine(batch: int) -> None:
     """30 models each, see `RandomModel`; two steps, so that what the first leaves behind counts too."""
     direct = 0

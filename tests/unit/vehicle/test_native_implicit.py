@@ -115,24 +115,33 @@ def test_a_push_acts_as_in_the_engine() -> None:
     assert ours.data.qpos.tobytes() == engine.data.qpos.tobytes()
 
 
+def _rounding_radps2(vehicle: Vehicle) -> float:
+    """Return the largest change of an acceleration if each link's length of two runs is rounded in the worst way.
+
+    A length is the distance of two sites. Both ends and their distance are rounded to half the spacing of the numbers
+    at the largest coordinate, so the lengths of two runs differ by at most four half spacings each. Times the stiffness
+    this is a force, and (M + h D + h^2 K)^-1 gives the acceleration.
+    """
+    model, data = vehicle.model, vehicle.data
+    mass, lengths = np.zeros((model.nv, model.nv)), np.zeros((model.ntendon, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    mujoco.mju_sparse2dense(lengths, data.ten_J, model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind)
+    step_s, stiffness = model.opt.timestep, model.tendon_stiffness
+    link = step_s * model.tendon_damping + step_s**2 * stiffness
+    implicit = mass + np.diag(step_s * model.dof_damping) + lengths.T @ (link[:, np.newaxis] * lengths)
+    forces_N = 4.0 * stiffness * np.spacing(np.abs(data.site_xpos).max())
+    return float((np.abs(np.linalg.solve(implicit, lengths.T)) @ forces_N).max())
+
+
 @pytest.mark.parametrize("name", CARS)
-def test_at_standstill_the_last_digit_of_a_position_matters_as_much_as_the_solution(name: str) -> None:
-    """A difference of 1e-9 is rounding times stiff links, see `implicit_plan`; from the same state it is 1e-14."""
+def test_at_standstill_the_solutions_differ_by_the_rounding_of_stiff_links(name: str) -> None:
+    """From the same state the first step differs by less than 1e-12; see `implicit_plan` for the following ones."""
     ours, engine = _pair(name, speed_mps=0.0)
-    moved, _ = _pair(name, speed_mps=0.0)
-    moved.data.qpos[2] = np.nextafter(moved.data.qpos[2], 2.0)
-    largest = {"solution": 0.0, "digit": 0.0}
+    bound = _rounding_radps2(engine)
+    assert bound < 1e-7
     for step in range(150):
-        ours.step(DriverCommand(0.0, 200.0, 0.2), ActuatorCommand())
-        for vehicle in (engine, moved):
-            vehicle.data.ctrl[:] = ours.data.ctrl
-            mujoco.mj_step(vehicle.model, vehicle.data)
-        if step == 0:
-            assert differences(ours.data, engine.data)["qacc"] < 1e-14
-        for what, other in (("solution", ours), ("digit", moved)):
-            largest[what] = max(largest[what], differences(other.data, engine.data)["qacc"])
-    assert 0.0 < largest["solution"] < 10.0 * largest["digit"]
-    assert largest["digit"] < 1e-7
+        _drive(ours, engine, 1, steer_rad=0.0)
+        assert differences(ours.data, engine.data)["qacc"] < (1e-12 if step == 0 else bound)
 
 
 def test_what_changes_in_the_model_counts_at_once() -> None:

@@ -157,6 +157,7 @@ def test_a_state_is_exact_and_belongs_to_its_car(library):
     assert other.all() == Car(library).all()
 
 
+@pytest.mark.slow
 def test_cars_in_two_threads_are_independent_and_a_long_step_is_many_short_ones(library):
     cars = [Car(library) for _ in range(2)]
     for car, angle in zip(cars, (0.3, -0.6), strict=True):

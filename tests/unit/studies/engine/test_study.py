@@ -104,6 +104,7 @@ def test_a_killed_study_goes_on_with_what_is_missing(tmp_path):
     assert (tmp_path / "killed/results.parquet").read_bytes() == (tmp_path / "whole/results.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_is_replaced(processes, tmp_path):
     path = write_controller(tmp_path, 0.9, str(tmp_path / "once"))
     rows = study(short_study(*MU, key=RATIO, controllers=["none", f"{path}:Kills"]), workers=processes).to_pylist()
