@@ -83,8 +83,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     )
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> Iterator[None]:
     """End with the number of skipped tests and the packages that they miss."""
+    yield
     skipped = [report for report in terminalreporter.stats.get("skipped", []) if report.when != "collect"]
     if skipped:
         reasons = " ".join(str(report.longrepr) for report in skipped)

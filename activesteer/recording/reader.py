@@ -146,7 +146,7 @@ def _decode(descriptor: int, records: Records) -> Contents:
         [other for other in records.topics if other not in known],
     )
     check_names(list(records.attachments), "attachments", MAX_OTHER_RECORDS)
-    rows = _Rows(len(channels))
+    rows = _Rows(len(channels), len(records.chunks))
     scenes: list[bytes] = []
     events: list[bytes] = []
     for start, length in records.chunks:
@@ -181,8 +181,9 @@ def _content(descriptor: int, start: int, length: int) -> bytes:
 class _Rows:
     """Collector of chunks: their places, all times, and the blocks themselves if they are few."""
 
-    def __init__(self, channels: int) -> None:
+    def __init__(self, channels: int, chunks: int) -> None:
         self._width = max(channels, 1)
+        self._chunks = chunks
         self._places: list[Place] = []
         self._blocks: list[Block] | None = []
         self._times: list[NDArray[np.uint64]] = []
@@ -206,7 +207,8 @@ class _Rows:
         self._rows += len(block.row_ns)
         self._places.append(place._replace(rows=len(block.row_ns), poses=len(block.pose_ns)))
         self._times.append(block.row_ns.copy())
-        if self._rows * self._width > MAX_LOADED_VALUES:
+        # The chunks of a run have equally many rows: a long recording is known by its first ones.
+        if self._rows * self._width * self._chunks > MAX_LOADED_VALUES * len(self._places):
             self._blocks = None
         elif self._blocks is not None:
             self._blocks.append(block)

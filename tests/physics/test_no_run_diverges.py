@@ -51,6 +51,8 @@ class Case(NamedTuple):
             for key in LEFT_TO_SEARCHES:
                 if table.get(steering, {}).pop(key, None) is not None:
                     table[steering]["steering_wheel_deg"] = 90.0
+        if any("steering_factor" in phase for phase in table.get("phases", ())):
+            table["reference_angle_deg"] = 30.0
         speed_mps = max(self.speed_kmh, 15.0) / 3.6
         if "speed" not in table:
             table["speed_kmh"] = 3.6 * speed_mps if table["kind"] in (*COURSES, "straight_braking") else self.speed_kmh
@@ -116,7 +118,7 @@ def test_no_run_of_a_sample_diverges(case: Case) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_no_run_of_a_larger_sample_diverges(seed: int) -> None:
     for case in drawn(seed, 50):
         case.drive()
