@@ -77,11 +77,11 @@ def all_commands() -> Commands:
 
     commands = Commands(f"activesteer {__version__}")
     for title, modules in {
-        "drive": "listing run watch explore",
-        "recordings": "info report compare replay video import_ recover",
+        "drive": "listing run explore",
+        "recordings": "info report compare replay video import_",
         "car": "vehicle tyre kc export",
-        "study": "study tune falsify match fit envelope fault_map identify linearise driver margins",
-        "verify": "reproduce test figures validate bench",
+        "study": "study tune falsify match fit envelope fault_map identify linearise",
+        "verify": "reproduce test validate bench",
     }.items():
         commands.begin_group(title)
         for module in modules.split():

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from array import array
-from typing import TYPE_CHECKING, Any, Final, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, get_type_hints
 
 import numpy as np
 
@@ -51,7 +51,9 @@ def record_type(kind: type[NativeBlock]) -> np.dtype[Any]:
         elif hint == PerWheel:
             fields.append((name, np.float64, (4,)))
         else:
-            fields.append((name, ARRAY if hint is array or get_origin(hint) is np.ndarray else record_type(hint)))
+            # An annotated array is another kind of object in each version of numpy, a block always a class.
+            is_block = isinstance(hint, type) and issubclass(hint, NativeBlock)
+            fields.append((name, record_type(hint) if is_block else ARRAY))
     return np.dtype((np.record, fields))
 
 

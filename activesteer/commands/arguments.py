@@ -17,6 +17,14 @@ if TYPE_CHECKING:
     from activesteer.scenario import Scenario
 
 _NAME_WIDTH: Final = 12
+SUCCESSORS: Final = {
+    "recover": "info FILE.mcap --recover OUT.mcap",
+    "figures": "reproduce --figures",
+    "watch": "run MANEUVER --watch",
+    "driver": "linearise --loop driver",
+    "margins": "linearise --loop controller",
+}
+"""Removed command -> what does its work now."""
 
 
 class Commands:
@@ -73,6 +81,8 @@ class Commands:
         """
         words = list(sys.argv[1:] if arguments is None else arguments)
         command = next((word for word in words if not word.startswith("-")), None)
+        if command in SUCCESSORS:
+            self._parser.error(f"there is no command {command!r} any more; use `activesteer {SUCCESSORS[command]}`")
         if command is not None and command not in self.names():
             self._parser.error(f"there is no command {command!r}; {nearest_names(command, self.names())}")
         options, unknown = self.parser().parse_known_args(words)
@@ -223,9 +233,9 @@ def numbers(text: str) -> list[float]:
         raise argparse.ArgumentTypeError(f"{text!r} is no list of numbers such as 60,100") from None
 
 
-def add_cutaway(parser: argparse.ArgumentParser) -> None:
-    """Add `--cutaway`."""
-    parser.add_argument("--cutaway", action="store_true", help="show the suspension through the body")
+def add_cutaway(parser: argparse.ArgumentParser, when: str = "") -> None:
+    """Add `--cutaway`; `when` says with which option it has an effect."""
+    parser.add_argument("--cutaway", action="store_true", help=f"{when}show the suspension through the body")
 
 
 def scenario_of(options: argparse.Namespace) -> Scenario:

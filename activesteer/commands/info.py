@@ -1,20 +1,29 @@
-"""`activesteer info FILE.mcap`: print the contents of a recording."""
+"""`activesteer info FILE.mcap`: print the contents of a recording; with `--recover`, repair it."""
 
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_json, add_recording
 from activesteer.commands.output import print_entry, print_json
-from activesteer.errors import shown
+from activesteer.errors import ParameterError, shown
 from activesteer.files import shown_path
+
+if TYPE_CHECKING:
+    from activesteer.recording import Recording
 
 
 def add_to(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("info", help="print the contents of a recording")
+    parser = commands.add_parser("info", help="print the contents of a recording, or repair it")
     add_recording(parser)
+    parser.add_argument(
+        "--recover", type=Path, metavar="OUT.mcap",
+        help="instead, write the readable part of a damaged or cut recording to a new file, which stays marked as "
+        "incomplete",
+    )  # fmt: skip
     add_json(parser)
     parser.set_defaults(action=_info)
 
@@ -26,6 +35,8 @@ def _info(options: argparse.Namespace) -> int:
     from activesteer.recording.events import events_of
 
     recording = Recording.open(options.file, recover=True)
+    if options.recover is not None:
+        return _recover(recording, options)
     metadata = recording.metadata
     time_s = recording.time_s
     if options.json:
@@ -63,6 +74,17 @@ def _info(options: argparse.Namespace) -> int:
         head = f"  {channel.name:{width}} {channel.unit or '-':6} "
         print_entry(head, channel.meaning, len(head))
     print_entry("attachments: ", ", ".join(recording.attachments))
+    return 0
+
+
+def _recover(recording: Recording, options: argparse.Namespace) -> int:
+    if options.json:
+        raise ParameterError("has no effect with --recover", key="--json")
+    if options.recover.exists() and options.recover.samefile(options.file):
+        raise ParameterError(f"--recover {options.recover} is the input file; choose another name")
+    recording.save(options.recover)
+    span = f"{len(recording)} steps up to {recording.time_s[-1]:.3f} s" if len(recording) else "no steps"
+    print(f"{options.recover}: {span}")
     return 0
 
 

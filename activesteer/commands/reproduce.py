@@ -80,7 +80,7 @@ def _settings(options: argparse.Namespace) -> int:
     report = _report(results.values(), options.output)
     figures: list[Path] = []
     if options.figures:
-        from activesteer.commands.figures import draw_all
+        from activesteer.commands.paper_figures import draw_all
 
         figures = draw_all(results[settings[0]].recordings(), options.output / "figures", options.vehicle)
     status = max(result.exit_status for result in results.values())

@@ -9,7 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.arguments import add_controller, add_json, add_output, add_scenario, scenario_of
+from activesteer.commands.arguments import (
+    add_controller,
+    add_cutaway,
+    add_json,
+    add_output,
+    add_scenario,
+    scenario_of,
+)
 from activesteer.commands.output import BAD, GOOD, painted, print_json
 from activesteer.commands.progress import ProgressBar
 from activesteer.errors import ActiveSteerError, ParameterError, shown
@@ -27,7 +34,8 @@ def add_to(commands: Any) -> None:
     run = commands.add_parser("run", help="drive a manoeuvre and record it")
     add_scenario(run)
     add_controller(run, several=True)
-    add_output(run, "FILE_OR_DIR", "a file *.mcap, or a folder for MANEUVER-CONTROLLER.mcap", "runs")
+    words = "a file *.mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)"
+    add_output(run, "FILE_OR_DIR", words)
     run.add_argument("--replace", action="store_true", help="replace recordings of other settings")
     run.add_argument("--all", action="store_true", help="print all metrics, not only the key metrics of the manoeuvre")
     run.add_argument(
@@ -49,6 +57,11 @@ def add_to(commands: Any) -> None:
         help="what follows: the run's own driver and controller, the last command, or the end (default: release)",
     )  # fmt: skip
     run.add_argument("--plot", action="store_true", help="also draw the runs: PNG and PDF")
+    run.add_argument(
+        "--watch", action="store_true",
+        help="instead, show one controller in a window of MuJoCo at the pace of --realtime, without a recording",
+    )  # fmt: skip
+    add_cutaway(run, "with --watch: ")
     add_json(run)
     run.set_defaults(action=_run)
 
@@ -75,6 +88,11 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.scenario import check_gains
     from activesteer.simulation.preparation import prepared
 
+    if options.watch:
+        return _watch(options)
+    if options.cutaway:
+        raise ParameterError("has an effect with --watch only", key="--cutaway")
+    options.output = options.output or Path("runs")
     options.driver = isolated(options.driver, options.isolate)
     controllers = [find_controller(isolated(name, options.isolate)) for name in options.controller or ["none"]]
     scenario, failures, alone = scenario_of(options), _Failures(), len(controllers) == 1
@@ -109,6 +127,29 @@ def _run(options: argparse.Namespace) -> int:
             if not options.json:
                 print(f"figure: {figure}")
     return 1 if failures else 0
+
+
+def _watch(options: argparse.Namespace) -> int:
+    from activesteer.scenario import check_gains
+    from activesteer.simulation.preparation import prepared
+
+    for key in ("output", "replace", "all", "isolate", "udp", "plot", "json"):
+        if getattr(options, key) not in (None, False):
+            raise ParameterError("has no effect with --watch: nothing is recorded", key=f"--{key}")
+    if len(options.controller or ["none"]) > 1:
+        raise ParameterError("give one controller with --watch", key="-c", value=" ".join(options.controller))
+    pace, controller = options.realtime or 1.0, (options.controller or ["none"])[0]
+    if not 0.01 <= pace <= 100.0:
+        raise ParameterError(f"--realtime: is {pace:g}, must be 0.01 to 100 with --watch")
+    # Check the manoeuvre first, with or without a display.
+    scenario = scenario_of(options)
+    check_gains(scenario.overrides, [controller])
+
+    from activesteer.commands.window import check_display, watch
+
+    check_display()
+    watch(prepared(scenario), controller, pace, cutaway=options.cutaway)
+    return 0
 
 
 def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Namespace) -> Any:
@@ -237,7 +278,7 @@ def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
     """Draw all runs in one figure, and for a step steer the car without control beside its linear models."""
     from activesteer.analysis.figures import figure_2, figure_for
-    from activesteer.commands.figures import models_beside
+    from activesteer.commands.paper_figures import models_beside
 
     name, kind = scenario.maneuver.name, scenario.maneuver.kind
     figures = [figure_for(kind)(recordings, folder / f"{name}{ending}") for ending in (".png", ".pdf")]

@@ -29,7 +29,7 @@ sideslip beta* solve 0 = A [r*, beta*] + B [f*, g*], and K is computed for the o
 
 The model is valid up to about 6 Hz, where body, suspensions and steering column move. R is chosen for a slower loop:
 its disk margin, opened at both demands, is to be at least 0.5 from 60 to 160 km/h. This holds for the estimator with
-ideal sensors, which it follows at once, and with production sensors (`activesteer margins -c lqr`).
+ideal sensors, which it follows at once, and with production sensors (`activesteer linearise --loop controller -c lqr`).
 
 Sources: B. D. O. Anderson and J. B. Moore, Optimal Control: Linear Quadratic Methods, 1989; both axles for yaw rate and
 zero sideslip: M. Abe, Vehicle Handling Dynamics, 2009, chapter 8.

@@ -106,7 +106,7 @@ def test_rerun_opens_what_a_killed_run_left(left, tmp_path):
 
 def test_recovered_file_of_a_killed_run_opens_in_readers_that_seek(call, left, tmp_path):
     whole = tmp_path / "whole.mcap"
-    done = call("recover", left, "-o", whole)
+    done = call("info", left, "--recover", whole)
     before, after = Recording.open(left), Recording.open(whole)
     assert done.status == 0
     assert done.out == f"{whole}: {len(before)} steps up to {before.time_s[-1]:.3f} s\n"
@@ -119,7 +119,7 @@ def test_recovered_file_of_a_killed_run_opens_in_readers_that_seek(call, left, t
         assert summary is not None
         assert summary.statistics is not None
         assert summary.statistics.message_end_time >= (len(before) - 1) * 1_000_000
-    refused = call("recover", left, "-o", left)
+    refused = call("info", left, "--recover", left)
     assert refused.status == 1
     assert "is the input file; choose another name" in refused.err
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from activesteer import Recording
-from activesteer.cli import main
+from activesteer.cli import all_commands, main
+from activesteer.commands.arguments import SUCCESSORS
 from activesteer.resources import find_vehicle
 
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.3")
@@ -83,13 +84,13 @@ def test_a_misplaced_or_misspelt_word_is_answered_with_the_right_one(capsys, wor
         (["study", "populaton"], ["'population'"]),
         (["study", "population"], ["-o DIR is needed"]),
         (["fit", "population"], ["population.toml: fit"]),
-        (["margins", "-c", "none", "--speed-kmh", "80"], ["-c", "no loop"]),
+        (["linearise", "--loop", "controller", "-c", "none", "--speed-kmh", "80"], ["-c", "no loop"]),
         (["reproduce", "-c", "none", "-c", "asr"], ["'asr'", "'ars'"]),
         (["validate", "sedan", "--samples", "5"], ["--samples", "sedan"]),
         (["validate", "tesla_model_s", "--timestep", "0.0005"], ["--timestep", "tesla_model_s"]),
         (["validate", "golf"], ["sedan", "tesla_model_s"]),
         (["report", "."], ["DIR/*.mcap"]),
-        (["figures", "-o", "out", "--recordings", "runs", "--jobs", "2"], ["--jobs", "--recordings"]),
+        (["run", "straight_line", "--watch", "--plot"], ["--plot", "--watch"]),
         (["bench", "--maneuvers", "--rounds", "2"], ["--rounds", "--maneuvers"]),
         (["test", "iso4138", "--jobs", "2", "--scheduler", "tcp://nowhere:1"], ["--jobs 2", "--scheduler"]),
         (["video", "run.mcap", "--corner", "rl"], ["--corner", "--camera wheel"]),
@@ -216,3 +217,11 @@ def test_interrupt_keeps_what_was_recorded(call, controller):
     recording = Recording.open("run.mcap")
     assert recording.metadata["complete"] is False
     assert len(recording) == 700
+
+
+def test_a_removed_command_names_its_successor(capsys):
+    for removed, successor in SUCCESSORS.items():
+        with pytest.raises(SystemExit, match="2"):
+            main([removed])
+        assert f"use `activesteer {successor}`" in capsys.readouterr().err
+        assert successor.split()[0] in all_commands().names()

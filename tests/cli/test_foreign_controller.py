@@ -77,7 +77,7 @@ def test_foreign_controller_goes_through_all_commands(call: Call) -> None:
     assert tuned["without_effect"] == ["controllers.YawBeta.limit_deg"]  # the angle stays below it
     assert set(tuned["front"][0]["values"]) >= {"controllers.YawBeta.k_beta", "controllers.YawBeta.k_yaw"}
 
-    (margins,) = call("margins", *given, "--speed-kmh", "100", "--json").json
+    (margins,) = call("linearise", "--loop", "controller", *given, "--speed-kmh", "100", "--json").json
     assert margins["disk_margin"] > 0.5
     verdict = call("test", "fmvss126", *given, "--jobs", "1", "--json")
     assert verdict.status == 0, json.dumps(verdict.json)[:300]

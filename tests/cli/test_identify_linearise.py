@@ -1,4 +1,4 @@
-"""`activesteer identify`, `activesteer linearise` and `activesteer driver`."""
+"""`activesteer identify`, `activesteer linearise` with its loops."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_linearise_takes_other_values_of_the_car(capsys):
         (["linearise", "--set", "speed_kmh=60"], "manoeuvre"),
         (["linearise", "--set", "driver.preview_s=1"], "driver"),
         (["identify", "--set", "duration_s=50"], "manoeuvre"),
-        (["driver", "-c", "none", "--set", "settle_s=1"], "manoeuvre"),
+        (["linearise", "--loop", "driver", "-c", "none", "--set", "settle_s=1"], "manoeuvre"),
         (["fault-map", "--jobs", "1", "--speeds-kmh", "60", "--set", "speed_kmh=50"], "manoeuvre"),
     ],
 )
@@ -73,10 +73,8 @@ def test_linearise_needs_a_speed(capsys):
 
 
 def test_driver_tells_how_stable_the_loop_is_and_draws(tmp_path, capsys):
-    assert (
-        main(["driver", "expert", "--speed-kmh", "100", "-c", "none", "-c", "afs_tuned", "--json", "-o", str(tmp_path)])
-        == 0
-    )
+    words = ("--driver", "expert", "--speed-kmh", "100", "-c", "none", "-c", "afs_tuned", "--json", "-o", str(tmp_path))
+    assert main(["linearise", "--loop", "driver", *words]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert [(row["speed_kmh"], row["controller"]) for row in rows] == [(100.0, "none"), (100.0, "afs_tuned")]
     for row in rows:
@@ -92,5 +90,5 @@ def test_driver_tells_how_stable_the_loop_is_and_draws(tmp_path, capsys):
 
 def test_driver_that_is_code_has_no_linear_form(tmp_path, capsys):
     (tmp_path / "mine.py").write_text("class Mine:\n    def step(self, setpoint, measurement, motion): ...\n")
-    assert main(["driver", f"{tmp_path}/mine.py:Mine"]) == 1
+    assert main(["linearise", "--loop", "driver", "--driver", f"{tmp_path}/mine.py:Mine"]) == 1
     assert "only a driver file has a linear form" in capsys.readouterr().err

@@ -57,16 +57,16 @@ def test_size_is_width_and_height():
 def test_watch_without_a_display_says_so_and_what_to_do(call, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    refused(call("watch", "step_steer"), "there is no display to open a window on", "`activesteer video`")
+    refused(call("run", "step_steer", "--watch"), "there is no display to open a window on", "`activesteer video`")
 
 
 @pytest.mark.parametrize(
     ("words", "texts"),
     [
         (["step_ster"], ["no manoeuvre is named 'step_ster'", "did you mean 'step_steer'"]),
-        (["step_steer", "--speed", "0"], ["--speed: is 0, must be 0.01 to 100"]),
+        (["step_steer", "--realtime", "1e-3"], ["--realtime: is 0.001, must be 0.01 to 100"]),
         (["step_steer", "--set", "road.mu"], ["KEY=VALUE is needed"]),
     ],
 )
 def test_watch_says_what_is_wrong_before_it_looks_for_a_display(call, words, texts):
-    refused(call("watch", *words), *texts)
+    refused(call("run", *words, "--watch"), *texts)

@@ -11,6 +11,7 @@ import pytest
 from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS, not_reproduced
 from activesteer.analysis.figures import BY_SCENARIO, OF_ANY_RUN
 from activesteer.cli import main
+from activesteer.commands.paper_figures import draw_all
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.studies.paper.reproduction import Reproduction, reproduce
@@ -64,9 +65,7 @@ def test_the_steering_wheel_angle_is_not_wrapped(runs: Runs) -> None:
             assert np.abs(np.diff(recording["steering_wheel_rad"])).max() < np.radians(3.0)
 
 
-def test_the_figures_are_drawn_from_the_files(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_figures_are_drawn_from_the_files(runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("activesteer.plotting.files.DOTS_PER_INCH", 100)
     figure = pytest.importorskip("matplotlib.figure").Figure
     savefig = figure.savefig
@@ -81,19 +80,13 @@ def test_the_figures_are_drawn_from_the_files(
             path.touch()
 
     monkeypatch.setattr(figure, "savefig", save)
-    assert main(["figures", "-o", str(tmp_path / "figures"), "--recordings", str(folder)]) == 0
-    names = {Path(line).name for line in capsys.readouterr().out.splitlines()}
+    names = {path.name for path in draw_all(runs, tmp_path / "figures", "compact")}
     for number in (1, 2, 7, 9, *range(11, 25)):
         assert {".png", ".svg", ".pdf"} == {
             Path(name).suffix for name in names if name.startswith(f"figure_{number:02}_")
         }
     assert len(names) == 3 * (2 + len(OF_ANY_RUN) + sum(map(len, BY_SCENARIO.values())))
     assert all((tmp_path / "figures" / name).stat().st_size > 5000 for name in names if drawn(name))
-
-
-def test_a_folder_without_runs_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["figures", "-o", str(tmp_path / "figures"), "--recordings", str(tmp_path)]) == 1
-    assert "activesteer reproduce -o" in capsys.readouterr().err
 
 
 def test_the_number_of_processes_is_checked(tmp_path: Path) -> None:

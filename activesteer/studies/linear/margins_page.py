@@ -45,7 +45,7 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
         sections.append(Section(f"{controller}, opened at {loop}", pictures=pictures, tables=[_table(loops)]))
     title = f"Stability margins: {vehicle}"
     lead = [_LEAD] if any(each.curves for each in found) else []
-    return write_page(Page(f"activesteer margins: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
+    return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
 
 
 def disk(alpha: float) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from activesteer.analysis.claims import (
     scorecard,
 )
 from activesteer.analysis.claims.setting import VEHICLE
-from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
+from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.files import make_folder
 from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, Scenario, resolve
@@ -102,20 +102,6 @@ def reproduce(
     claims = [claim for name, runs in result.recordings().items() for claim in SCENARIOS[name](runs)]
     result.scorecard = scorecard(claims, next(iter(scenarios.values())).car.name, setting=setting)
     return result
-
-
-def recordings_in(folder: str | os.PathLike[str]) -> dict[str, dict[str, Recording]]:
-    """Return the recordings of `reproduce` in a folder: scenario -> system -> recording, for complete scenarios."""
-    found: dict[str, dict[str, Recording]] = {}
-    for name in SCENARIOS:
-        paths = {system: _path(Path(folder), name, system) for system in SYSTEMS}
-        if all(path.is_file() for path in paths.values()):
-            found[name] = {system: Recording.open(path) for system, path in paths.items()}
-    if not found:
-        raise RecordingError(
-            f"{folder} holds no runs of {', '.join(SCENARIOS)}; make them with `activesteer reproduce -o {folder}`"
-        )
-    return found
 
 
 def _path(folder: Path, scenario: str, system: str) -> Path:

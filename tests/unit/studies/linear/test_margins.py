@@ -199,7 +199,7 @@ def test_command_prints_the_margins_of_every_loop(capsys):
     found = {}
     for sensors in ("ideal", "production"):
         arguments = ["-c", "ars", "-c", "afs", "--speed-kmh", "100", "--set", f"sensors.preset={sensors}", "--json"]
-        assert main(["margins", *arguments]) == 0
+        assert main(["linearise", "--loop", "controller", *arguments]) == 0
         found[sensors] = json.loads(capsys.readouterr().out)
     keys = {
         "controller", "loop", "speed_kmh", "gain_margin_dB", "phase_margin_deg", "delay_margin_s", "disk_margin",
@@ -245,8 +245,8 @@ def test_a_loop_that_is_unstable_in_one_car_has_no_margins():
 
 
 def test_processes_are_for_the_cars_of_a_study(capsys):
-    assert main(["margins", "--jobs", "2"]) == 1
-    assert "--jobs: belongs to --study" in capsys.readouterr().err
+    assert main(["linearise", "--loop", "controller", "--jobs", "2"]) == 1
+    assert "--jobs: has an effect with --study only" in capsys.readouterr().err
 
 
 def test_what_a_study_varies_and_the_speed_are_given_in_one_place():

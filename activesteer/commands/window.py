@@ -1,8 +1,7 @@
-"""`activesteer watch MANEUVER`: show a manoeuvre in a window while it is driven."""
+"""The window in which `activesteer run --watch` shows a manoeuvre while it is driven."""
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
 import threading
@@ -12,42 +11,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from activesteer.commands.arguments import add_controller, add_cutaway, add_pace, add_scenario, scenario_of
-from activesteer.errors import ParameterError, PlaybackError
+from activesteer.errors import PlaybackError
 
 _ELSEWHERE: Final = "`activesteer video` makes a film of a recording without a window"
 _LONGEST_CLOSING_S: Final = 5.0
 
 
-def add_to(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser = commands.add_parser(
-        "watch",
-        help="show a manoeuvre while it is driven",
-        description="Open the viewer of MuJoCo and drive the manoeuvre in real time; nothing is recorded.",
-    )
-    add_scenario(parser)
-    add_controller(parser, several=False)
-    add_pace(parser)
-    add_cutaway(parser)
-    parser.set_defaults(action=_watch)
-
-
-def _watch(options: argparse.Namespace) -> int:
-    from activesteer.scenario import check_gains
-    from activesteer.simulation.preparation import prepared
-
-    if not 0.01 <= options.speed <= 100.0:
-        raise ParameterError(f"--speed: is {options.speed:g}, must be 0.01 to 100")
-    # Check the manoeuvre first, with or without a display.
-    scenario = scenario_of(options)
-    check_gains(scenario.overrides, [options.controller])
-    check_display()
-    _show(prepared(scenario), options.controller, options.speed, cutaway=options.cutaway)
-    return 0
-
-
-def _show(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> None:
+def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> None:
+    """Drive a scenario again and again in a window until it is closed; nothing is recorded."""
     import mujoco.viewer
 
     from activesteer.simulation.closed_loop import ClosedLoop
