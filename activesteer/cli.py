@@ -81,7 +81,7 @@ def all_commands() -> Commands:
         "recordings": "info report compare replay video import_",
         "car": "vehicle tyre kc export",
         "study": "study tune falsify match fit envelope fault_map identify linearise",
-        "verify": "reproduce test validate bench",
+        "verify": "reproduce test bench",
     }.items():
         commands.begin_group(title)
         for module in modules.split():

@@ -238,7 +238,7 @@ def _sources_key(source: Path) -> str:
 
 def processor() -> str:
     """Return what decides the last digits of results: the processor, as the compiler, numpy and the BLAS see it."""
-    compiler = [config.CPU_NAME or get_host_cpu_name(), config.CPU_FEATURES]
+    compiler = [getattr(config, "CPU_NAME", None) or get_host_cpu_name(), getattr(config, "CPU_FEATURES", None)]
     libraries = [os.environ.get(name, "") for name in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")]
     return repr(compiler + libraries)
 

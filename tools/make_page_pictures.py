@@ -48,7 +48,7 @@ def write_pages(folder: Path) -> dict[str, Path]:
     activesteer(["report", *names.values(), "-o", str(report)])
     activesteer(["compare", names["none"], names["ars"], "-o", str(comparison)])
     activesteer(["test", "iso21994", "-o", str(folder)])
-    activesteer(["validate", "bmw_m8", "-o", str(folder)])
+    activesteer(["fit", "bmw_m8", "-o", str(folder)])
     return {
         "page_report": report, "page_comparison": comparison, "page_standard": folder / "iso21994.html",
         "measured_lane_change": folder / "validation.html",

@@ -9,7 +9,7 @@ import numpy as np
 from activesteer.conventions import Array
 
 TIME_TOLERANCE_S: Final = 0.02
-"""Tolerance in time, to either side [s]; agreed for `activesteer validate`."""
+"""Tolerance in time, to either side [s]; agreed for comparisons with another code."""
 
 
 def corridor(time_s: Array, values: Array, width: float | Array) -> tuple[Array, Array]:

@@ -23,6 +23,7 @@ SUCCESSORS: Final = {
     "watch": "run MANEUVER --watch",
     "driver": "linearise --loop driver",
     "margins": "linearise --loop controller",
+    "validate": "compare FOLDER` or `activesteer fit FOLDER",
 }
 """Removed command -> what does its work now."""
 

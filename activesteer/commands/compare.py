@@ -1,4 +1,4 @@
-"""`activesteer compare MEASURED.mcap... SIMULATED.mcap`: compare measured runs with a simulated one."""
+"""`activesteer compare MEASURED... SIMULATED`, or `compare FOLDER`: compare measured runs with simulated ones."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from activesteer.commands.arguments import add_json, add_output
+from activesteer.commands.arguments import add_json, add_output, add_workers
+from activesteer.commands.measured_folder import add_samples, judge
 from activesteer.commands.output import BAD, GOOD, painted, print_json
 from activesteer.errors import ParameterError
 
@@ -18,32 +19,59 @@ def add_to(commands: Any) -> None:
         "compare",
         help="compare measured runs with a simulated one",
         description="Find the time shift, and print the share of the measurement inside the tolerance corridor of "
-        "the simulation. The exit status is 1 if a quantity is outside.",
+        "the simulation. With a folder of measured runs, or of a measured circle, predict the measurement first. The "
+        "exit status is 1 if a quantity is outside.",
     )
     parser.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE.mcap",
-        help="recordings: measured ones, whose mean is compared, and the simulated one last",
+        "files", nargs="*", type=Path, metavar="FILE.mcap",
+        help="recordings: measured ones, whose mean is compared, and the simulated one last; or a folder with a "
+        "validation.toml, or bmw_m8 or tesla_model_s",
     )  # fmt: skip
     parser.add_argument(
-        "--standard", choices=("iso19364", "iso19365"), default="iso19365",
+        "--new", type=Path, metavar="FOLDER", help="make a folder with an example, to be replaced by your measured runs"
+    )
+    parser.add_argument(
+        "--standard", choices=("iso19364", "iso19365"),
         help="iso19364: cross plots over the lateral acceleration, for steady-state driving; iso19365: over time "
         "(default)",
     )  # fmt: skip
     parser.add_argument(
-        "--filter", choices=("iso15037", "fmvss126", "none"), default="iso15037",
+        "--filter", choices=("iso15037", "fmvss126", "none"),
         help="zero-phase Butterworth filter of both sides: iso15037 (8 poles, 10.1 Hz; default), fmvss126 (12 poles, "
         "6 Hz, steering wheel 10 Hz), or none",
     )  # fmt: skip
     parser.add_argument(
-        "--noise", choices=("estimate", "none"), default="estimate",
+        "--noise", choices=("estimate", "none"),
         help="widen the corridor by the noise of the measurement, estimated from it (default), or not",
     )  # fmt: skip
     add_output(parser, "FILE.html", "the page (default: no page)")
+    add_samples(parser)
+    add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_compare)
 
 
 def _compare(options: argparse.Namespace) -> int:
+    if options.new is not None:
+        from activesteer.measured.example_folder import write_template
+
+        if options.files:
+            raise ParameterError("makes a new folder and compares nothing", key="--new")
+        for file in write_template(options.new):
+            print(file)
+        print(f"next: activesteer fit {options.new} -o {options.new}/page; then replace the lines marked with <-")
+        return 0
+    of_recordings, of_folder = ("standard", "filter", "noise"), ("samples", "jobs", "scheduler")
+    is_folder = len(options.files) == 1 and options.files[0].suffix != ".mcap"
+    for name in of_recordings if is_folder else of_folder:
+        if getattr(options, name) is not None:
+            raise ParameterError(f"has no effect with {'a folder' if is_folder else 'recordings'}", key=f"--{name}")
+    if is_folder:
+        return judge(str(options.files[0]), options, page=options.output)
+    return _recordings(options)
+
+
+def _recordings(options: argparse.Namespace) -> int:
     from activesteer.measured.comparison import compare, words
     from activesteer.measured.noise import FILTERS
     from activesteer.recording import Recording
@@ -52,7 +80,8 @@ def _compare(options: argparse.Namespace) -> int:
         raise ParameterError("at least two recordings are needed: measured ones, and the simulated one last")
     *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
     found = compare(
-        measured, simulated, options.standard, filtered=options.filter, noise=options.noise == "estimate"
+        measured, simulated, options.standard or "iso19365", filtered=options.filter or "iso15037",
+        noise=options.noise != "none",
     )  # fmt: skip
     if options.output is not None:
         from activesteer.measured.comparison_page import comparison_page

@@ -1,4 +1,4 @@
-"""`activesteer fit STUDY.toml`: fit parameters of a car to recordings."""
+"""`activesteer fit STUDY.toml`, or `fit FOLDER`: fit parameters of a car to recordings."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from activesteer.commands.arguments import add_json, add_output, add_workers
+from activesteer.commands.measured_folder import judge
 from activesteer.commands.output import print_entry, print_json, print_notes
 from activesteer.commands.progress import ProgressBar
 
@@ -24,15 +25,22 @@ def add_to(commands: Any) -> None:
         "study for which the car matches the recordings best.",
     )
     parser.add_argument(
-        "study", metavar="STUDY", help="a study file (or its name) with recordings as manoeuvres and a table [fit]"
-    )
-    add_output(parser, "DIR", "folder for fit.json, fit.html and overrides.toml (default: no files)")
+        "study", metavar="STUDY",
+        help="a study file (or its name) with recordings as manoeuvres and a table [fit]; or a folder of measured runs "
+        "with a validation.toml, or bmw_m8: fitted in one window, judged in another",
+    )  # fmt: skip
+    add_output(parser, "DIR", "folder for fit.json, fit.html and overrides.toml, or for page.html (default: none)")
     add_workers(parser)
     add_json(parser)
     parser.set_defaults(action=_fit)
 
 
 def _fit(options: argparse.Namespace) -> int:
+    from activesteer.measured.folder_file import is_measured
+
+    if is_measured(options.study):
+        page = None if options.output is None else options.output / "page.html"
+        return judge(options.study, options, page=page, fitted=True)
     from activesteer.measured.fit_result import rests_on
     from activesteer.measured.fitting import fit
 

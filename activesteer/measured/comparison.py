@@ -334,5 +334,7 @@ def assumptions(found: Comparison) -> list[str]:
         )
     lines.append(f"A quantity is inside if {100.0 * SHARE_NEEDED:g} % of its samples are; this is an assumption.")
     if found.standard == "iso19365":
-        lines.append(f"The corridor reaches {1e3 * TIME_TOLERANCE_S:g} ms to either side, as in activesteer validate.")
+        lines.append(
+            f"The corridor reaches {1e3 * TIME_TOLERANCE_S:g} ms to either side, as between two simulation codes."
+        )
     return lines

@@ -92,7 +92,7 @@ _EXPORTERS: Final[tuple[tuple[str, dict[str, Known]], ...]] = (
         "Pitch": Known("pitch_rad", "deg"), "Yaw": Known("yaw_rad", "deg"), "Xcg_TM": Known("x_m", "m"),
         "Ycg_TM": Known("y_m", "m"),
     }),
-    # Runs of Project Chrono, as `activesteer validate` compares them: SI, and a rack that steers right.
+    # Runs of Project Chrono, as `tools/validate.py` compares them: SI, and a rack that steers right.
     ("delta_FL", {"rack": Known("rack_m", "m", -1.0), "vx": Known("vx_mps", "m/s"), "vy": Known("vy_mps", "m/s"),
         "r": Known("yaw_rate_radps", "rad/s"), "ax": Known("ax_mps2", "m/s2"), "ay": Known("ay_mps2", "m/s2"),
         "beta": Known("sideslip_rad", "rad"), "roll": Known("roll_rad", "rad"), "pitch": Known("pitch_rad", "rad"),

@@ -30,7 +30,6 @@ QUICK = [
 COMMANDS = (
     ("run", "slalom", "-c", "none", "-c", "ars"),
     ("reproduce", "--jobs", "2"),
-    ("validate", "-o", "runs"),
     ("vehicle", "check", "compact"),
     ("identify",),
     ("linearise", "-o", "runs"),

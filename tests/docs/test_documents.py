@@ -30,9 +30,10 @@ def with_blocks() -> list[Path]:
 
 @pytest.fixture(autouse=True)
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An empty folder with the examples of a checkout."""
+    """An empty folder with the examples and tools of a checkout."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    for name in ("examples", "tools"):
+        (tmp_path / name).symlink_to(ROOT / name)
 
 
 @pytest.fixture

@@ -16,11 +16,11 @@ import pytest
 
 from activesteer.config import read_toml
 from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.measured.circle import CircleValidation, steering_wheel_deg, validate_circle
+from activesteer.measured.circle_changes import Case
+from activesteer.measured.folder_file import MeasuredFile, read_measured
+from activesteer.measured.folder_page import measured_page
 from activesteer.resources import find_vehicle, models_dir
-from activesteer.validation.axle_changes import Case
-from activesteer.validation.circle import CircleValidation, steering_wheel_deg, validate_circle
-from activesteer.validation.measured_file import MeasuredFile, read_measured
-from activesteer.validation.measured_page import measured_page
 from tests.raising import raises
 
 FOLDER = models_dir() / "reference" / "tesla_model_s"

@@ -11,15 +11,15 @@ import pytest
 
 import activesteer
 from activesteer.errors import ActiveSteerError
+from activesteer.measured.example_folder import write_template
+from activesteer.measured.folder import validate_measured
+from activesteer.measured.folder_file import measured_folder, read_measured
+from activesteer.measured.folder_page import measured_page
 from activesteer.measured.importing import import_file
 from activesteer.measured.motion import at_sensor
 from activesteer.pages import render_page
 from activesteer.recording import Recording
 from activesteer.resources import models_dir
-from activesteer.validation.measured_file import measured_folder, read_measured
-from activesteer.validation.measured_folder import validate_measured
-from activesteer.validation.measured_page import measured_page
-from activesteer.validation.template import write_template
 from tests.raising import raises
 
 FOLDER = models_dir() / "reference" / "bmw_m8"
@@ -122,9 +122,10 @@ def test_a_window_outside_the_imported_part_is_an_error(folder: Path) -> None:
         validate_measured(read_measured(folder), 1)
 
 
-def test_a_folder_without_the_file_is_an_error_and_another_comparison_is_none(tmp_path: Path) -> None:
+def test_a_folder_without_the_file_is_an_error(tmp_path: Path) -> None:
     assert measured_folder("bmw_m8") == FOLDER
-    assert measured_folder("sedan") is None
+    with raises(ActiveSteerError, value="sedan"):
+        measured_folder("sedan")
     with raises(ActiveSteerError, value=str(tmp_path)):
         measured_folder(str(tmp_path))
     with raises(ActiveSteerError, value=str(tmp_path / "none")):

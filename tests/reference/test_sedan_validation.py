@@ -1,4 +1,4 @@
-"""The sedan against Project Chrono's sedan: the comparisons of `activesteer validate`, and their sensitivity."""
+"""The sedan against Project Chrono's sedan: the comparisons of `tools/validate.py`, and their sensitivity."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import pytest
 
 from activesteer import simulate
 from activesteer.errors import ParameterError
-from activesteer.validation import Validation, to_json, validate
-from activesteer.validation.our_runs import compare_run
-from activesteer.validation.reference import ReferenceData
-from activesteer.validation.reference_columns import reference_columns
 from tests.raising import raises
+from tests.reference.chrono.comparison import to_json
+from tests.reference.chrono.our_runs import compare_run
+from tests.reference.chrono.programme import Validation, validate
+from tests.reference.chrono.reference import ReferenceData
+from tests.reference.chrono.reference_columns import reference_columns
 
 RUNS = ("coast_80", "sine_0p5Hz", "step_0p2g_L", "step_0p4g_L")
 KEPT_BACK = {"step_0p1g_L", "step_0p4g_R", "step_0p6g_L", "sine_1p0Hz", "swd_0p7Hz", "sis_15s", "brake_0p4g"}

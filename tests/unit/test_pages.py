@@ -14,13 +14,13 @@ from markupsafe import Markup
 from activesteer.analysis.report import report_page
 from activesteer.pages import render, render_page
 from activesteer.pages.model import Table
-from activesteer.validation.comparison import Comparison
-from activesteer.validation.kinematics import Curves
-from activesteer.validation.programme import Validation
-from activesteer.validation.reference import ReferenceData
-from activesteer.validation.study import Response
-from activesteer.validation.validation_page import validation_page
 from tests.contrast import contrast
+from tests.reference.chrono.comparison import Comparison
+from tests.reference.chrono.kinematics import Curves
+from tests.reference.chrono.programme import Validation
+from tests.reference.chrono.reference import ReferenceData
+from tests.reference.chrono.study import Response
+from tests.reference.chrono.validation_page import validation_page
 from tests.unit.analysis.synthetic import step_steer
 from tests.unit.analysis.synthetic_files import recording_of
 

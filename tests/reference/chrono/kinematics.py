@@ -11,9 +11,9 @@ from scipy.interpolate import CubicSpline
 
 from activesteer.conventions import Array
 from activesteer.rigs.kc.held_car import Case, HeldCar
-from activesteer.validation.comparison import Comparison, absolute, relative
-from activesteer.validation.reference import ReferenceData, Table
 from activesteer.vehicle import Vehicle
+from tests.reference.chrono.comparison import Comparison, absolute, relative
+from tests.reference.chrono.reference import ReferenceData, Table
 
 _MAX_TRAVEL_MM: Final = 65.0
 _STEP_MM: Final = 5.0

@@ -10,9 +10,9 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.display_units import quantity_of
 from activesteer.plotting import Area, Curve, Panel, Picture
-from activesteer.validation.kinematics import Curves
-from activesteer.validation.our_runs import QUANTITIES, RMS_TOLERANCE, traces
-from activesteer.validation.reference import Table
+from tests.reference.chrono.kinematics import Curves
+from tests.reference.chrono.our_runs import QUANTITIES, RMS_TOLERANCE, traces
+from tests.reference.chrono.reference import Table
 
 _OURS, _THEIRS, _CORRIDOR = "#0072b2", "#d55e00", "#f3d9c4"
 _DASHES: Final = (0.0, (4.0, 2.0))

@@ -16,14 +16,14 @@ from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.validation.comparison import Comparison
-from activesteer.validation.kinematics import Curves, compare_kinematics
-from activesteer.validation.our_runs import compare_run
-from activesteer.validation.reference import ReferenceData, Table, read_table
-from activesteer.validation.reference_columns import reference_columns
-from activesteer.validation.static import compare_static
-from activesteer.validation.tyre_grid import compare_tyre
-from activesteer.validation.uneven import ROADS, UnevenRun, uneven_runs
+from tests.reference.chrono.comparison import Comparison
+from tests.reference.chrono.kinematics import Curves, compare_kinematics
+from tests.reference.chrono.our_runs import compare_run
+from tests.reference.chrono.reference import ReferenceData, Table, read_table
+from tests.reference.chrono.reference_columns import reference_columns
+from tests.reference.chrono.static import compare_static
+from tests.reference.chrono.tyre_grid import compare_tyre
+from tests.reference.chrono.uneven import ROADS, UnevenRun, uneven_runs
 
 _FRICTION: Final = 0.9
 """Friction of the road in all reference runs."""

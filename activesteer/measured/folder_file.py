@@ -14,11 +14,11 @@ from activesteer.config import Range, Source, build, field_in_unit, read_toml
 from activesteer.conventions import Array
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
 from activesteer.files import is_file, is_folder, shown_path, user_path
+from activesteer.measured.circle_changes import Case, ChangeTable
 from activesteer.measured.comparison import TOLERANCES, Tolerance
 from activesteer.resources import find_vehicle, models_dir
 from activesteer.scenario import load_car, resolve, value_of
 from activesteer.studies.engine.factors import Factor, read_factor
-from activesteer.validation.axle_changes import Case, ChangeTable
 
 NAME: Final = "validation.toml"
 STEERING: Final = "steering_wheel_rad"
@@ -399,23 +399,33 @@ def _value(
         raise source.fail(where, reason.problem, given, reason.allowed) from reason
 
 
-def measured_folder(name: str) -> Path | None:
-    """Return the folder of measured runs: that of a car of the package, or a path; None for another comparison.
+def measured_folder(name: str) -> Path:
+    """Return the folder of measured runs: the one of a car of the package, or a path.
 
     Raises:
         ParameterError: the folder has no `validation.toml`.
     """
     own = models_dir() / "reference" / name
-    if name in (path.name for path in own.parent.iterdir()):
-        return own if is_file(own / NAME) else None
+    of_package = [path.name for path in own.parent.iterdir() if is_file(path / NAME)]
+    if name in of_package:
+        return own
     folder = user_path(name, ParameterError)
     if not is_folder(folder):
-        if folder.name == name:
-            return None
-        raise ParameterError(f"there is no folder {shown_path(folder)}", value=name)
+        raise ParameterError(
+            f"there is no folder {shown_path(folder)}; {nearest_names(name, of_package)}",
+            value=name,
+            allowed=of_package,
+        )
     if not is_file(folder / NAME):
         raise ParameterError(
-            f"the folder {shown_path(folder)} has no {NAME}; activesteer validate --new FOLDER makes an example",
+            f"the folder {shown_path(folder)} has no {NAME}; activesteer compare --new FOLDER makes an example",
             value=name,
         )
     return folder
+
+
+def is_measured(name: str) -> bool:
+    """Return whether a name is that of a folder of measured runs."""
+    return any(
+        is_file(folder / NAME) for folder in (models_dir() / "reference" / name, user_path(name, ParameterError))
+    )

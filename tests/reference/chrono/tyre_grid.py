@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import Side, TyreParameters
-from activesteer.validation.comparison import Comparison
-from activesteer.validation.reference import ReferenceData, Table
+from tests.reference.chrono.comparison import Comparison
+from tests.reference.chrono.reference import ReferenceData, Table
 
 _TOLERANCE: Final = 0.005
 """Fraction of the peak."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from activesteer.conventions import CORNERS
 from activesteer.signals import ActuatorCommand, DriverCommand
-from activesteer.validation.comparison import Comparison, absolute, relative
-from activesteer.validation.reference import ReferenceData
 from activesteer.vehicle import Vehicle, engine_warnings_held
+from tests.reference.chrono.comparison import Comparison, absolute, relative
+from tests.reference.chrono.reference import ReferenceData
 
 _ROLLING_S: Final = 4.0
 _TOLERANCES: Final = {

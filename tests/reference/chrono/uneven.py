@@ -17,9 +17,9 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, shown
 from activesteer.files import read_text, shown_path
-from activesteer.validation.comparison import Comparison
-from activesteer.validation.our_runs import compare_rms
-from activesteer.validation.reference import Table
+from tests.reference.chrono.comparison import Comparison
+from tests.reference.chrono.our_runs import compare_rms
+from tests.reference.chrono.reference import Table
 
 ROADS: Final = "roads.json"
 _RACK_M: Final = 0.08

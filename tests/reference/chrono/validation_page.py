@@ -7,10 +7,10 @@ from typing import Final
 
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import as_svg, draw
-from activesteer.validation.comparison import Comparison
-from activesteer.validation.figures import cross_picture, run_picture, sweep_picture, uneven_picture
-from activesteer.validation.programme import Validation
-from activesteer.validation.study import Response
+from tests.reference.chrono.comparison import Comparison
+from tests.reference.chrono.figures import cross_picture, run_picture, sweep_picture, uneven_picture
+from tests.reference.chrono.programme import Validation
+from tests.reference.chrono.study import Response
 
 _STUDY_COLUMNS: Final = {
     "steady_yaw_rate_radps": "steady yaw rate [rad/s]",
@@ -44,7 +44,7 @@ def validation_page(result: Validation, studies: Mapping[str, list[Response]] | 
         sections.append(Section("Differences, and which code is right", points=reference.notes))
     sections += [Section(title, tables=[study_table(rows)]) for title, rows in (studies or {}).items()]
     sections += _runs(result)
-    title = f"activesteer validate: {reference.name}"
+    title = f"activesteer: {reference.name}"
     return Page(title, f"{reference.vehicle} against {reference.code}", lead, sections)
 
 

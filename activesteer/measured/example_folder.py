@@ -1,4 +1,4 @@
-"""An example folder for `activesteer validate`: simulated files in place of measured ones, to be replaced."""
+"""An example folder for `activesteer compare` and `fit`: simulated files in place of measured ones, to be replaced."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, shown_path, write_text
+from activesteer.measured.folder_file import NAME
 from activesteer.simulation.runner import simulate
-from activesteer.validation.measured_file import NAME
 
 _STEERING: Final = {
     "time_s": [0.5, 0.8, 1.3, 1.8, 2.2, 3.5, 3.8, 4.3, 4.8, 5.2],
@@ -36,7 +36,7 @@ speed_mps = { column = "v [km/h]", unit = "km/h" }
 yaw_rate_radps = { column = "Yaw rate [deg/s]", unit = "deg/s" }
 ay_mps2 = { column = "a_y [m/s2]", unit = "m/s2" }
 """
-_FILE: Final = """# Example of `activesteer validate --new`: replace run.csv, map.toml and each line marked with <-.
+_FILE: Final = """# Example of `activesteer compare --new`: replace run.csv, map.toml and each line marked with <-.
 # docs/measured.md explains the keys. As it is, run.csv is a simulated run: a compact with 10 % softer front tyres, and
 # a steering signal that is 20 % too small.
 title = "Example: compact, two lane changes at 80 km/h"   # <-
@@ -69,7 +69,7 @@ channels = ["yaw_rate_degps"]
 
 
 def write_template(folder: Path) -> list[Path]:
-    """Write a folder that `activesteer validate` can run, and return its files.
+    """Write a folder that `activesteer compare` and `fit` can run, and return its files.
 
     Args:
         folder: A new or empty folder.

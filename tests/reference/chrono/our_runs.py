@@ -13,8 +13,8 @@ import numpy as np
 
 from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
 from activesteer.conventions import Array
-from activesteer.validation.comparison import Comparison, absolute, relative
-from activesteer.validation.reference import Table
+from tests.reference.chrono.comparison import Comparison, absolute, relative
+from tests.reference.chrono.reference import Table
 
 STEADY_TOLERANCE: Final = 0.02
 PEAK_TOLERANCE: Final = 0.05

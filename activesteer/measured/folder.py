@@ -1,4 +1,4 @@
-"""Validation of a car against the measured runs of a folder: predicted, fitted, checked.
+"""A car against the measured runs of a folder: predicted, fitted, checked.
 
 The *prediction* uses the vehicle file; of the factors, only those in `predict.factors` are free. The *fit* frees all
 factors. Both see the fit windows alone and are judged in the check windows. The band around the prediction contains
@@ -23,11 +23,11 @@ from activesteer.errors import ParameterError, RecordingError, StudyError
 from activesteer.measured.comparison import Compared, assumptions, compare
 from activesteer.measured.fit_result import Fit
 from activesteer.measured.fitting import SPEED_HOLD, fit
+from activesteer.measured.folder_file import MeasuredFile, RunTable
 from activesteer.measured.importing import import_file
 from activesteer.recording import Recording
 from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.validation.measured_file import MeasuredFile, RunTable
 
 PARTS: Final = ("fit", "check")
 _LEAST_SAMPLES: Final = 10
@@ -153,6 +153,7 @@ def validate_measured(
     file: MeasuredFile,
     jobs: int | None = None,
     *,
+    fitted: bool = True,
     scheduler: str | None = None,
     progress: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> MeasuredValidation:
@@ -161,6 +162,7 @@ def validate_measured(
     Args:
         file: The checked file.
         jobs: Number of processes; by default the number of processors.
+        fitted: Whether to fit all factors as well; otherwise only the prediction is judged.
         scheduler: Address of a Dask scheduler.
         progress: Called with the finished fraction and the name of the step.
 
@@ -179,12 +181,12 @@ def validate_measured(
         known = {} if predicted is None else predicted.overrides
         stages = {"predicted": case.runs(known)}
         parts = case.parts("predicted", stages["predicted"])
-        fitted = None
-        if len(file.factors) > len(free):
+        found = None
+        if fitted and len(file.factors) > len(free):
             progress(0.3, "fit")
-            fitted = case.fit([factor.key for factor in file.factors], tuple(file.noise), known, jobs, scheduler)
-            assert fitted is not None
-            stages["fitted"] = case.runs(fitted.overrides)
+            found = case.fit([factor.key for factor in file.factors], tuple(file.noise), known, jobs, scheduler)
+            assert found is not None
+            stages["fitted"] = case.runs(found.overrides)
             parts += case.parts("fitted", stages["fitted"])
         calls = [(case, free, known, key, end) for key, each in file.table.intervals.items() for end in each.ends]
         beside = in_parallel(
@@ -196,7 +198,7 @@ def validate_measured(
     if ends:
         method.append("Effects of several intervals add up in the band; each is taken at its two ends only.")
     return MeasuredValidation(
-        file, predicted, fitted, tuple(parts), bands, ends, case.notes, (*file.table.assumptions, *method)
+        file, predicted, found, tuple(parts), bands, ends, case.notes, (*file.table.assumptions, *method)
     )
 
 

@@ -1,4 +1,4 @@
-"""A validation against measured runs or a measured circle as a page, which is printed or written as HTML."""
+"""A comparison with measured runs or a measured circle as a page, which is printed or written as HTML."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from markupsafe import Markup
 
 from activesteer.conventions import RUN_COLOURS
 from activesteer.display_units import quantity_of, typeset
+from activesteer.measured.circle import CircleValidation
 from activesteer.measured.comparison import words
 from activesteer.measured.comparison_page import picture
 from activesteer.measured.fit_page import correlation_table, parameter_table
 from activesteer.measured.fit_result import Fit, rests_on
+from activesteer.measured.folder import Band, MeasuredValidation, Part
+from activesteer.measured.folder_file import STEERING
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
-from activesteer.validation.circle import CircleValidation
-from activesteer.validation.measured_file import STEERING
-from activesteer.validation.measured_folder import Band, MeasuredValidation, Part
 
 _HEAD: Final = ["run", "window", "quantity", "rms of the residual", "tolerance", "share inside", ""]
 _BAND_COLOUR: Final = "#b3a369"
@@ -35,7 +35,7 @@ def measured_page(result: MeasuredValidation | CircleValidation) -> Page:
     table = result.file.table
     lead, sections = _circle(result) if isinstance(result, CircleValidation) else _runs(result)
     sections.append(Section("Assumptions", points=result.assumptions))
-    return Page(f"activesteer validate: {table.vehicle}", table.title or table.vehicle, lead, sections)
+    return Page(f"activesteer: {table.vehicle} and its measurement", table.title or table.vehicle, lead, sections)
 
 
 def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ParameterError
-from activesteer.validation.uneven import UnevenRun, uneven_runs
+from tests.reference.chrono.uneven import UnevenRun, uneven_runs
 
 TABLE = {"t": np.array([0.0, 1.0]), "vx": np.array([10.0, 10.0])}
 

@@ -19,10 +19,10 @@ from scipy.stats import gaussian_kde, wasserstein_distance
 
 from activesteer.conventions import GRAVITY_MPS2, Array
 from activesteer.errors import ParameterError
+from activesteer.measured.circle_changes import Case, ChangeTable
+from activesteer.measured.folder_file import STEERING, MeasuredFile
 from activesteer.simulation.simulation import Simulation
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.validation.axle_changes import Case, ChangeTable
-from activesteer.validation.measured_file import STEERING, MeasuredFile
 
 SAMPLES: Final = 200
 """Default number of samples of the values that vary from lap to lap."""

@@ -10,8 +10,8 @@ import numpy as np
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.validation.reference import ReferenceData
-from activesteer.validation.reference_columns import reference_columns
+from tests.reference.chrono.reference import ReferenceData
+from tests.reference.chrono.reference_columns import reference_columns
 
 _STEADY_S: Final = 0.5
 _STEPS_S: Final = (0.000125, 0.00025, 0.0005, 0.001)

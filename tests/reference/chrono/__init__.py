@@ -1,0 +1,1 @@
+"""Comparison of the sedan with the same car in Project Chrono; see `tools/validate.py`."""
