@@ -24,6 +24,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit status: 0, 1 after an explained error, 130 after Ctrl-C, 143 after SIGTERM.
     """
     # Before anything else is imported: a signal may come at any moment.
+    from io import TextIOWrapper
+
     from activesteer.commands.stopping import StopSignals
 
     stop = StopSignals()
@@ -31,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if arguments is None:
             stop.watch()
             for stream in (sys.stdout, sys.stderr):  # a terminal that has no such letter shows a question mark
-                if hasattr(stream, "reconfigure"):
+                if isinstance(stream, TextIOWrapper):
                     stream.reconfigure(errors="replace")
         status = _called(arguments, stop)
         if arguments is None and sys.stdout is not None:
