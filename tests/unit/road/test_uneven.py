@@ -84,6 +84,14 @@ def test_slopes_are_the_derivatives_of_the_height() -> None:
     assert road.at(np.array([0.0, 1.9]), np.zeros(2)) == pytest.approx(0.0)
 
 
+def test_an_edge_rises_before_the_middle_of_an_obstacle_and_falls_behind_it() -> None:
+    road = surface(obstacle=(Obstacle("cleat", 10.0, 2.0, 0.1, left_m=1.0, right_m=-1.0, edge_m=0.2),))
+    along = road.at(np.array([10.1, 11.0, 11.9]), np.zeros(3))
+    assert along == pytest.approx(np.array([[0.05, 0.5, 0.0], [0.1, 0.0, 0.0], [0.05, -0.5, 0.0]]))
+    across = road.at(np.full(3, 11.0), np.array([-0.9, 0.0, 0.9]))
+    assert across == pytest.approx(np.array([[0.05, 0.0, 0.5], [0.1, 0.0, 0.0], [0.05, 0.0, -0.5]]))
+
+
 HEAD = """$CT
 A road for tests
 $!*
