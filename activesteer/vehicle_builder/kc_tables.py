@@ -138,8 +138,10 @@ def _translation(folder: Path) -> tuple[dict[str, str], dict[str, float]]:
         return {}, {}
     raw, source = read_toml(file)
     for key, table in raw.items():
-        if key not in ("names", "signs") or not isinstance(table, dict):
+        if key not in ("names", "signs"):
             raise source.fail((key,), f"there is no such table; {nearest_names(key, ('names', 'signs'))}")
+        if not isinstance(table, dict):
+            raise source.fail((key,), f"{shown(table)} is no table")
     for name, channel in raw.get("names", {}).items():
         if not isinstance(channel, str):
             raise source.fail(("names", name), f"{shown(channel)} is no channel with its unit, as 'left_toe [deg]'")
@@ -201,7 +203,7 @@ def _raw_columns(file: Path) -> dict[str, Array]:
 def _numbers(head: str, values: Any, source: Source) -> Array:
     try:
         numbers = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as reason:
+    except (TypeError, ValueError, OverflowError) as reason:
         raise source.fail((head,), "holds something that is no number") from reason
     if numbers.ndim != 1 or not (np.abs(numbers) <= MAX_NUMBER).all():
         raise source.fail((head,), f"must be a list of finite numbers up to {MAX_NUMBER:g}")

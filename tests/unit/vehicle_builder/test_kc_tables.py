@@ -84,6 +84,11 @@ def test_a_column_without_unit_or_side_is_an_error(tmp_path: Path) -> None:
         ("rear_side_force.csv", "force [kN],left_toe [deg]\n-3000,0\n3000,0\n", {"key": "force [kN]"}),
         ("rear_side_force.csv", "force [N],left_toe [deg]\n-3000,1e30\n3000,0\n", {"key": "left_toe [deg]"}),
         ("rear_sideforce.csv", "", {"file": "rear_sideforce.csv"}),
+        (
+            "rear_side_force.toml",
+            f'"force [N]" = [-1.0, 1.0]\n"left_toe [deg]" = [0, {"9" * 400}]',
+            {"key": "left_toe [deg]"},
+        ),
         ("names.toml", "names = 3\n", {"key": "names"}),
         ("names.toml", "[names]\nZ_L = 3\n", {"key": "names.Z_L"}),
     ],
