@@ -24,12 +24,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit status: 0, 1 after an explained error, 130 after Ctrl-C, 143 after SIGTERM.
     """
     # Before anything else is imported: a signal may come at any moment.
+    from io import TextIOWrapper
+
     from activesteer.commands.stopping import StopSignals
 
     stop = StopSignals()
     try:
         if arguments is None:
             stop.watch()
+            for stream in (sys.stdout, sys.stderr):  # a terminal that has no such letter shows a question mark
+                if isinstance(stream, TextIOWrapper):
+                    stream.reconfigure(errors="replace")
         status = _called(arguments, stop)
         if arguments is None and sys.stdout is not None:
             sys.stdout.flush()
@@ -65,6 +70,11 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
         # An OSError that arrives here concerns the output or a temporary folder.
         lines = [f"activesteer: {error}", *getattr(error, "__notes__", [])]
         print("\n".join(lines), file=sys.stderr)
+        return 1
+    except SystemExit as end:  # not the parser's: code of the user wants to end the program
+        from activesteer.plugins import in_one_line
+
+        print(f"activesteer: code of your own ended the program: {in_one_line(end)}", file=sys.stderr)
         return 1
 
 

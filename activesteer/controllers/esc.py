@@ -75,8 +75,9 @@ class Esc:
         slide = beyond(now.sideslip_rad, p.sideslip_limit_rad)
         moment = self._yaw_inertia_kgm2 * (error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2)
         torques = wheel_torques(moment, now.yaw_rate_radps, self._levers, p.torque_limit_Nm)
-        limited = max(torques) >= p.torque_limit_Nm
-        change = -min(max(command.drive_torque_demand_Nm, 0.0), sum(torques))
+        braked = max(torques)  # of the only wheel that brakes
+        limited = braked >= p.torque_limit_Nm
+        change = -min(max(command.drive_torque_demand_Nm, 0.0), braked)
         return ActuatorCommand(
             yaw_rate_desired_radps=desired,
             saturated=limited,

@@ -16,8 +16,6 @@ from activesteer.recording.contents import MAX_ROWS
 
 MAX_BYTES: Final = 2**30
 """Largest size of a file that is read whole, decompressed [bytes]."""
-BROKEN: Final = (Exception,)
-"""Exceptions that the libraries of these formats raise for broken files: any."""
 
 
 class Column(NamedTuple):
@@ -44,13 +42,14 @@ def check_rows(count: int, path: Path) -> None:
 
 @contextmanager
 def understood(path: Path, what: str) -> Iterator[None]:
-    """Context that turns any exception of a file reader into a RecordingError of one line."""
+    """Context that turns any exception of a file reader, as libraries raise, into a RecordingError of one line."""
     try:
         yield
     except RecordingError:
         raise
-    except BROKEN as reason:
-        raise RecordingError(f"{shown_path(path)} is no readable {what}: {reason}", value=path) from reason
+    except Exception as reason:
+        problem = str(reason) or type(reason).__name__
+        raise RecordingError(f"{shown_path(path)} is no readable {what}: {problem}", value=path) from reason
 
 
 def numbers(values: Any, name: str, path: Path) -> Array:

@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import gc
-import struct
-import sys
-import zlib
-from collections.abc import Callable, Iterator, Mapping
+import json
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from activesteer.child_process import Child, ChildFault
 from activesteer.conventions import Array
-from activesteer.errors import RecordingError, nearest_names, not_installed, shown
+from activesteer.errors import RecordingError, nearest_names, shown
 from activesteer.files import is_file, shown_path, why_no_file
-from activesteer.measured.column import BROKEN, MAX_BYTES, Column, check_rows, numbers, understood
+from activesteer.measured import foreign_files
+from activesteer.measured.column import Column
 from activesteer.measured.csv_columns import csv_columns
+from activesteer.recording.contents import MAX_ROWS
 
-_MAT_HEADER: Final = 128
-"""Length of the header of a MATLAB file of version 5 [bytes]."""
-_MAT_COMPRESSED: Final = 15
-"""Type of a compressed element of a MATLAB file."""
-_PIECE_BYTES: Final = 2**20
+_LIMIT_S: Final = 120.0
+"""Time limit for opening a file and for reading a column; a column of `MAX_ROWS` rows takes some seconds [s]."""
+_MAX_MEMORY_BYTES: Final = 2**32
+"""Limit of the memory of a reader: a file of `MAX_BYTES`, and its numbers in several copies [bytes]."""
+_MAX_ANSWER_BYTES: Final = 16 * MAX_ROWS + 2**20
+"""Longest answer of a reader: values and times of a column [bytes]."""
 
 
 def read_columns(path: Path) -> list[Column]:
@@ -72,145 +74,36 @@ def find(columns: list[Column], name: str, path: Path) -> Column:
     raise RecordingError(f"there is no column {shown(name)}; {nearest}", file=path.name, value=name)
 
 
-def _in_memory(name: str, unit: str, values: Any, path: Path) -> Column:
-    def read() -> tuple[Array, None]:
-        return numbers(values, name, path), None
+def _in_child(path: Path) -> list[Column]:
+    """Return the columns of a file that a child process reads, which lives as long as the columns."""
+    child = Child(foreign_files.__file__, _MAX_MEMORY_BYTES, quiet=True)
 
-    return Column(name, unit, read)
+    def asked(request: Any, doing: str) -> tuple[dict[str, Any], bytes]:
+        try:
+            answer = child.ask(json.dumps(request).encode(), doing, _LIMIT_S, _MAX_ANSWER_BYTES)
+        except ChildFault as fault:
+            raise RecordingError(f"cannot read {shown_path(path)}: its reader {fault}", value=path) from fault
+        head, _, content = answer.partition(b"\n")
+        about = json.loads(head)
+        if "refused" in about:
+            problem, attributes = about["refused"]
+            raise RecordingError(problem, **attributes)
+        return about, content
 
-
-def _parquet(path: Path) -> list[Column]:
-    import pyarrow as pa  # noqa: PLC0415 - slow to import
-    from pyarrow import parquet  # noqa: PLC0415
-
-    with understood(path, "Parquet file"):
-        file = parquet.ParquetFile(path)
-        check_rows(file.metadata.num_rows, path)
-        fields = list(file.schema_arrow)
-
-    def lazy(name: str, kind: Any) -> Callable[[], tuple[Array, None]]:
-        kind = kind.value_type if pa.types.is_dictionary(kind) else kind
-
-        def read() -> tuple[Array, None]:
-            # A text or a list may be of any length, so that the number of rows would limit nothing.
-            if not (pa.types.is_primitive(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind)):
-                raise RecordingError(f"column {shown(name)} holds no numbers: its type is {kind}", file=path.name)
-            with understood(path, "Parquet file"):
-                column = file.read(columns=[name]).column(0).to_numpy()
-            return numbers(column, name, path), None
+    def lazy(index: int, name: str) -> Callable[[], tuple[Array, Array | None]]:
+        def read() -> tuple[Array, Array | None]:
+            about, content = asked(index, f"reading column {shown(name)}")
+            found = np.frombuffer(content, np.float64)
+            values, times = np.split(found, 2) if about["timed"] else (found, None)
+            return values.copy(), None if times is None else times.copy()
 
         return read
 
-    return [
-        Column(
-            field.name,
-            (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace"),
-            lazy(field.name, field.type),
-        )
-        for field in fields
-    ]
-
-
-def _mat(path: Path) -> list[Column]:
-    from scipy.io import loadmat, whosmat  # noqa: PLC0415 - slow to import
-
-    try:
-        with understood(path, "MATLAB file"):
-            _check_mat_size(path)
-            check_rows(max((max(shape, default=0) for _, shape, _ in whosmat(path)), default=0), path)
-            variables = loadmat(path, simplify_cells=True)
-    except RecordingError as error:
-        if isinstance(error.__cause__, NotImplementedError):
-            raise RecordingError(
-                f"{shown_path(path)} is a MATLAB file of version 7.3; save it with `save(..., '-v7')`", value=path
-            ) from None
-        raise
-    units = variables.get("units")
-    given = units if isinstance(units, Mapping) else {}
-    return [
-        _in_memory(name, str(given.get(name, "")), values, path)
-        for name, values in _flat(variables)
-        if not name.startswith(("__", "units.", "metrics.", "meanings."))
-    ]
-
-
-def _check_mat_size(path: Path) -> None:
-    """Refuse a MATLAB file that is too large when it is decompressed, without keeping what is decompressed.
-
-    Raises:
-        RecordingError: it has more than `MAX_BYTES`.
-    """
-    left = MAX_BYTES - path.stat().st_size
-    with path.open("rb") as file:
-        order = {b"IM": "<", b"MI": ">"}.get(file.read(_MAT_HEADER)[-2:])
-        while order and left > 0 and len(tag := file.read(8)) == 8:
-            kind, length = struct.unpack(f"{order}II", tag)
-            if kind != _MAT_COMPRESSED:
-                file.seek(length, 1)
-                continue
-            unpacker = zlib.decompressobj()
-            while length > 0 and left > 0 and (packed := file.read(min(length, _PIECE_BYTES))):
-                length -= len(packed)
-                while packed and left > 0:
-                    left -= len(unpacker.decompress(packed, _PIECE_BYTES))
-                    packed = unpacker.unconsumed_tail
-    if left <= 0:
-        raise RecordingError(
-            f"{shown_path(path)} has more than {MAX_BYTES} bytes when decompressed", value=path, allowed=MAX_BYTES
-        )
-
-
-def _flat(table: Mapping[str, Any], start: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield vectors of numbers in nested structs by dotted names."""
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{start}{name}.")
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.squeeze().ndim == 1:
-            yield f"{start}{name}", value.squeeze()
-
-
-def _mdf(path: Path) -> list[Column]:
-    try:
-        from asammdf import MDF  # noqa: PLC0415 - an extra, and slow to import
-    except ImportError as error:
-        raise not_installed(RecordingError, "an MDF file", "asammdf", "mdf") from error
-    file: Any = None
-    problem = ""
-    # asammdf leaves half an object of a broken file, which prints to the terminal when it is deleted.
-    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
-    try:
-        file = MDF(path)
-    except BROKEN as reason:
-        problem = str(reason) or type(reason).__name__
-    finally:
-        gc.collect()
-        sys.unraisablehook = hook
-    if problem:
-        raise RecordingError(f"{shown_path(path)} is no readable MDF file: {problem}", value=path)
-    with understood(path, "MDF file"):
-        check_rows(max((int(group.channel_group.cycles_nr) for group in file.groups), default=0), path)
-        places = [
-            (channel.name, group, index, str(channel.unit or ""))
-            for group, each in enumerate(file.groups)
-            for index, channel in enumerate(each.channels)
-            if index != file.masters_db.get(group)
-        ]
-
-    def lazy(name: str, group: int, index: int) -> Callable[[], tuple[Array, Array]]:
-        def read() -> tuple[Array, Array]:
-            with understood(path, "MDF file"):
-                signal = file.get(name, group=group, index=index)
-                times, samples = np.asarray(signal.timestamps, np.float64), signal.samples
-            return numbers(samples, name, path), times
-
-        return read
-
-    return [Column(name, unit, lazy(name, group, index)) for name, group, index, unit in places]
+    about, _ = asked(os.fspath(path), "opening the file")
+    return [Column(name, unit, lazy(index, name)) for index, (name, unit) in enumerate(about["columns"])]
 
 
 _READERS: Final[dict[str, Callable[[Path], list[Column]]]] = {
     **dict.fromkeys((".csv", ".txt", ".tsv", ".asc"), csv_columns),
-    ".mat": _mat,
-    ".parquet": _parquet,
-    **dict.fromkeys((".mf4", ".mdf", ".dat"), _mdf),
+    **dict.fromkeys(foreign_files.READERS, _in_child),
 }

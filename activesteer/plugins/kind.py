@@ -155,10 +155,21 @@ def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
     outside = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]
     last = (own or outside or frames)[-1:]
     places = [f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last]
-    words = f"{type(error).__name__}: {error}".removesuffix(": ")
+    words = _words(error)
     if isinstance(error, AttributeError) and error.name and type(error.obj).__module__.startswith(_OURS):
         words += f"; {_nearest_attributes(error.obj, error.name)}"
     return words + "".join(places)
+
+
+def _words(error: BaseException) -> str:
+    """Return class and text of an error; the text is made by foreign code, which may fail, too."""
+    name = type(error).__name__
+    try:
+        return f"{name}: {error}".removesuffix(": ")
+    except KeyboardInterrupt:
+        raise
+    except BaseException as reason:
+        return f"{name}, whose text raises {type(reason).__name__}"
 
 
 def _nearest_attributes(given: Any, name: str) -> str:

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, shown
+from activesteer.files import MAX_NUMBER
 from activesteer.road.grid import Grid
 from activesteer.road.path import Path
 
@@ -163,13 +164,26 @@ def _values(lines: list[str]) -> dict[str, float]:
     """Return the numbers of a block by their names in small letters."""
     values = {}
     for line in lines:
-        key, sign, text = line.partition("=")
-        try:
-            values[key.strip().lower()] = float(re.sub(r"\+e", "e+", text.strip()))
-        except ValueError as reason:
-            if sign:
-                raise ManeuverError(f"{key.strip()} is {shown(text.strip())}, a number is needed") from reason
+        key, sign, text = (part.strip() for part in line.partition("="))
+        if sign:
+            values[key.lower()] = _number(re.sub(r"\+e", "e+", text), key)
     return values
+
+
+def _number(text: str, key: str) -> float:
+    """Return the number in a text.
+
+    Raises:
+        ManeuverError: it is none, is not finite, or is above `MAX_NUMBER`.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= MAX_NUMBER:
+        needed = f"a number from {-MAX_NUMBER:g} to {MAX_NUMBER:g} is needed"
+        raise ManeuverError(f"{key} is {shown(text)}; {needed}", value=text, allowed=MAX_NUMBER)
+    return value
 
 
 def _road(head: dict[str, float], mods: dict[str, float], file: _Blocks) -> CrgRoad:
@@ -179,6 +193,8 @@ def _road(head: dict[str, float], mods: dict[str, float], file: _Blocks) -> CrgR
     if not 1e-3 <= step <= 1000.0:
         raise ManeuverError(f"REFERENCE_LINE_INCREMENT is {step:g} m, 0.001 to 1000 m are allowed")
     data = _data(file.data, form, len(columns))
+    if (np.abs(data) > MAX_NUMBER).any():
+        raise ManeuverError(f"has numbers above {MAX_NUMBER:g} in its data", allowed=MAX_NUMBER)
     if "reference_line_end_u" in head:
         span = (head["reference_line_end_u"] - head.get("reference_line_start_u", 0.0)) * scale["scale_length"]
         rows = round(span / step) + 1
@@ -310,10 +326,7 @@ def _check_size(rows: int, columns: int) -> None:
 def _places(head: dict[str, float], names: list[str]) -> Array:
     """Return the distances of the long sections to the left of the line [m]."""
     if all("v =" in name for name in names):
-        try:
-            return np.array([float(name.partition("v =")[2]) for name in names])
-        except ValueError as reason:
-            raise ManeuverError("a long section has no number for v") from reason
+        return np.array([_number(name.partition("v =")[2].strip(), "v of a long section") for name in names])
     count = len(names)
     right, left = head.get("long_section_v_right"), head.get("long_section_v_left")
     if right is not None and left is not None:

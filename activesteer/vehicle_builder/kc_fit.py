@@ -239,9 +239,8 @@ def _anti_roll_bar(tests: dict[str, Samples], travel: Array, parallel: Array | N
     """Return the anti-roll bar rate: half the stiffness difference of opposite and parallel travel."""
     if parallel is None or "opposite_travel" not in tests or (load := tests["opposite_travel"].moved("load")) is None:
         return None
-    x = tests["opposite_travel"].x
-    near, about = np.abs(x) <= 1.01 * _NEAR_M, np.abs(travel) <= 1.01 * _NEAR_M
-    opposite = float(np.polyfit(x[near], load[near], 1)[0])
+    about = np.abs(travel) <= 1.01 * _NEAR_M
+    opposite = _slope(tests["opposite_travel"], load)
     return max(0.0, 0.5 * (opposite - float(np.polyfit(travel[about], parallel[about], 1)[0])))
 
 
@@ -253,9 +252,8 @@ def _rack_lift(tests: dict[str, Samples]) -> float:
     load, lifted, sprung = steered.moved("load"), steered.moved("travel"), opposite.moved("load")
     if load is None or lifted is None or sprung is None:
         return 0.0
-    near, small = np.abs(opposite.x) <= 1.01 * _NEAR_M, np.abs(steered.x) <= 0.4 * np.abs(steered.x).max()
-    rate = float(np.polyfit(opposite.x[near], sprung[near], 1)[0])
-    rise, push = (float(np.polyfit(steered.x[small], value[small], 2)[1]) for value in (lifted, load))
+    rate, reach_m = _slope(opposite, sprung), 0.4 * float(np.abs(steered.x).max())
+    rise, push = (_slope(steered, value, reach_m, 2) for value in (lifted, load))
     return float(f"{rise - push / rate:.6g}")
 
 
@@ -263,5 +261,13 @@ def _damper_ratio(samples: Samples) -> float | None:
     length = samples.moved("damper")
     if length is None:
         return None
-    near = np.abs(samples.x) <= 1.01 * _NEAR_M
-    return abs(float(np.polyfit(samples.x[near], length[near], 1)[0]))
+    return abs(_slope(samples, length))
+
+
+def _slope(samples: Samples, values: Array, reach_m: float = 1.01 * _NEAR_M, degree: int = 1) -> float:
+    """Return the slope at 0 of a polynomial through the samples near 0."""
+    near = np.abs(samples.x) <= reach_m
+    if (count := len(np.unique(samples.x[near]))) <= degree:
+        problem = f"has {count} positions within {1e3 * reach_m:.3g} mm of the middle; at least {degree + 1} are needed"
+        raise ParameterError(problem, file=samples.file)
+    return float(np.polyfit(samples.x[near], values[near], degree)[degree - 1])

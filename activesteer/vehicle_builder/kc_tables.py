@@ -38,6 +38,8 @@ _GREATEST: Final = {
     "caster": 0.8, "load": 1e5,
 }  # fmt: skip
 """Values that no car reaches on a rig, SI units: a larger value means another unit of the column."""
+_LEAST_SPAN: Final = {"travel": 0.01, "rack": 0.005, "force": 10.0, "moment": 1.0}
+"""Smallest range of a variable that shows the behaviour of an axle, SI units."""
 _GREATEST_WAY_M: Final = 10.0
 """Such a value for all other channels, which may have any origin [m]."""
 
@@ -76,6 +78,9 @@ def smoothed(x: Array, y: Array, at: Array) -> Array:
     places = len(np.unique(np.round(x / np.ptp(x), 3)))
     intervals = int(np.clip(places // 2, 1, _MOST_INTERVALS))
     low, high = float(x.min()), float(x.max())
+    # Every interval needs a sample; where they are dense at one place alone, there are fewer intervals.
+    while intervals > 1 and not np.histogram(x, intervals)[0].all():
+        intervals -= 1
     knots = np.concatenate([[low] * 3, np.linspace(low, high, intervals + 1), [high] * 3])
     order = np.argsort(x, kind="stable")
     # Samples at one position count as their mean: the fit needs increasing positions.
@@ -138,8 +143,10 @@ def _translation(folder: Path) -> tuple[dict[str, str], dict[str, float]]:
         return {}, {}
     raw, source = read_toml(file)
     for key, table in raw.items():
-        if key not in ("names", "signs") or not isinstance(table, dict):
+        if key not in ("names", "signs"):
             raise source.fail((key,), f"there is no such table; {nearest_names(key, ('names', 'signs'))}")
+        if not isinstance(table, dict):
+            raise source.fail((key,), f"{shown(table)} is no table")
     for name, channel in raw.get("names", {}).items():
         if not isinstance(channel, str):
             raise source.fail(("names", name), f"{shown(channel)} is no channel with its unit, as 'left_toe [deg]'")
@@ -201,7 +208,7 @@ def _raw_columns(file: Path) -> dict[str, Array]:
 def _numbers(head: str, values: Any, source: Source) -> Array:
     try:
         numbers = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as reason:
+    except (TypeError, ValueError, OverflowError) as reason:
         raise source.fail((head,), "holds something that is no number") from reason
     if numbers.ndim != 1 or not (np.abs(numbers) <= MAX_NUMBER).all():
         raise source.fail((head,), f"must be a list of finite numbers up to {MAX_NUMBER:g}")
@@ -270,5 +277,15 @@ def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
     order = np.argsort(x, kind="stable")
     if not x[order[0]] < 0.0 < x[order[-1]]:
         raise ParameterError(f"{test.variable} does not go to both sides of 0", file=file.name)
+    if (places := len(np.unique(x))) < _LEAST_POINTS:
+        raise ParameterError(
+            f"has {places} different values; at least {_LEAST_POINTS} are needed", file=file.name, key=test.variable
+        )
+    if (span := float(np.ptp(x))) < (least := _LEAST_SPAN[test.variable]):
+        raise ParameterError(
+            f"covers {span:.3g} {CHANNELS[test.variable][0]}; at least {least:g} are needed: is its unit right?",
+            file=file.name,
+            key=test.variable,
+        )
     channels = {key: np.concatenate([part[key] for part in parts])[order] for key in sorted(common)}
     return Samples(x[order], channels, file.name)

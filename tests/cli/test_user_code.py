@@ -46,6 +46,25 @@ def test_a_run_that_user_code_ends_has_failed(call: Call, controller: Callable[.
     assert len(Recording.open(Path("run.mcap"))) == 100
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "raise type('Ends', (Exception,), {'__str__': exits})()",
+        "return type('Ends', (ActuatorCommand,), {'__len__': exits})()",
+        "return ActuatorCommand(type('Ends', (float,), {'__float__': exits, '__le__': exits, '__ge__': exits})())",
+        "return type('Ends', (), {'__repr__': exits})()",
+        "return type('Ends', (), {'__getattribute__': exits})()",
+    ],
+)
+def test_a_value_or_error_of_user_code_that_ends_the_program_fails_the_run(
+    call: Call, controller: Callable[..., str], text: str
+) -> None:
+    given = controller(f"import sys\ndef exits(*_):\n    sys.exit(0)\n{text}\n")
+    told = call("run", "step_steer", "-c", given, *SHORT, "-o", "run.mcap")
+    assert told.status == 1
+    assert "mine.py" in told.err
+
+
 def test_prints_of_user_code_do_not_disturb_json(call: Call, controller: Callable[..., str], tmp_path: Path) -> None:
     given = controller(PRINTS)
     words = "run", "step_steer", "-c", given, *SHORT, "--json"

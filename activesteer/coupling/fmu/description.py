@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.coupling.fmu.archive import BINARIES, DESCRIPTION, Archive
 from activesteer.coupling.fmu.units import Unit, declared_unit
-from activesteer.errors import not_installed
+from activesteer.errors import not_installed, shown
 from activesteer.plugins import Kind
 
 _FORMATS: Final = {
@@ -118,6 +118,10 @@ def describe_fmu(archive: Archive, kind: Kind) -> Description:
         causality: {name: read for name, (own, read) in found.items() if own == causality}
         for causality in ("input", "output", "parameter")
     }
+    for variable in (variable for variables in by_causality.values() for variable in variables.values()):
+        if variable.start is not None and not math.isfinite(variable.start):
+            problem = f"its variable {shown(variable.name)} starts at {variable.start}; a finite number is needed"
+            raise kind.fail(name, problem, variable.start)
     experiment = description.defaultExperiment
     usual_s = _positive(experiment.stepSize) if experiment else None
     fixed_s = _positive(simulation.fixedInternalStepSize)

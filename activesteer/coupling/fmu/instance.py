@@ -1,6 +1,6 @@
 """An instance of an FMU, called by function pointers, in this process or in one of its own.
 
-This file imports nothing of the package: run as a program, it is the process that an isolated instance lives in.
+This file imports no library, because every isolated instance waits for the start of its process.
 """
 
 from __future__ import annotations
@@ -9,15 +9,12 @@ import ctypes
 import functools
 import json
 import os
-import signal
-import socket
 import struct
-import subprocess
-import sys
 import weakref
-from collections.abc import Sequence
-from multiprocessing.connection import Connection
+from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple, Protocol
+
+from activesteer.child_process import Child, ChildFault
 
 _WARNING: Final = 1
 _FATAL: Final = 4
@@ -27,6 +24,9 @@ _P, _I, _D, _N, _B, _S = (
 )  # fmt: skip
 _MAX_STATE_BYTES: Final = 1 << 30
 _MAX_LOG: Final = 300
+_MAX_TEXT_BYTES: Final = 2**16
+"""Longest error text of an isolated FMU [bytes]."""
+_MAX_DIGITS: Final = 20
 START_LIMIT_S: Final = 30.0
 """Least time that an isolated FMU gets to load and initialise [s]."""
 
@@ -335,27 +335,23 @@ class IsolatedInstance:
             FmuFault: see `LocalInstance`; or the process ended or does not answer.
         """
         self._limit_s, self._step_s, self._steps = limit_s, spec.step_s, 0
-        ours, theirs = socket.socketpair()
-        with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-I", __file__, str(theirs.fileno()), str(os.getpid())],
-                pass_fds=(theirs.fileno(),), stdin=subprocess.DEVNULL,
-            )  # fmt: skip
-        self._pipe = Connection(ours.detach())
-        self._finalizer = weakref.finalize(self, _kill, self._process, self._pipe)
-        self._count = sum(group.size for group in spec.outputs)
-        self._ask(json.dumps(spec).encode(), "its initialisation", max(limit_s, START_LIMIT_S))
+        self._child = Child(__file__)
+        self._step_bytes = 8 * sum(group.size for group in spec.outputs)
+        self._unpack = struct.Struct(f"={self._step_bytes // 8}d").unpack
+        self._ask(json.dumps(spec).encode(), "its initialisation", limit_s=max(limit_s, START_LIMIT_S))
 
     def step(self, values: Sequence[float]) -> tuple[float, ...]:
         """See `Instance`."""
         doing = f"the step at {self._steps * self._step_s:g} s"
-        answer = self._ask(_STEP + struct.pack(f"={len(values)}d", *values), doing)
+        answer = self._ask(_STEP + struct.pack(f"={len(values)}d", *values), doing, self._step_bytes)
+        if len(answer) != self._step_bytes:
+            raise self._nonsense(doing, answer)
         self._steps += 1
-        return struct.unpack(f"={self._count}d", answer)
+        return self._unpack(answer)
 
     def save(self) -> int:
         """See `Instance`."""
-        return int(self._ask(_SAVE))
+        return self._number(_SAVE)
 
     def restore(self, state: int) -> None:
         """See `Instance`."""
@@ -363,43 +359,41 @@ class IsolatedInstance:
 
     def forget(self, state: int) -> None:
         """See `Instance`."""
-        if self._finalizer.alive:
+        if self._child.alive:
             self._ask(_FORGET + str(state).encode())
 
     def serialise(self, state: int) -> bytes:
         """See `Instance`."""
-        return self._ask(_SERIALISE + str(state).encode())
+        return self._ask(_SERIALISE + str(state).encode(), most_bytes=_MAX_STATE_BYTES)
 
     def deserialise(self, content: bytes) -> int:
         """See `Instance`."""
-        return int(self._ask(_DESERIALISE + content))
+        return self._number(_DESERIALISE + content)
 
     def close(self) -> None:
         """See `Instance`."""
-        self._finalizer()
+        self._child.close()
 
-    def _ask(self, request: bytes, doing: str = "a call", limit_s: float | None = None) -> bytes:
-        limit_s = limit_s or self._limit_s
+    def _number(self, request: bytes) -> int:
+        answer = self._ask(request)
+        if not (answer.isdigit() and len(answer) < _MAX_DIGITS):
+            raise self._nonsense("a call", answer)
+        return int(answer)
+
+    def _nonsense(self, doing: str, answer: bytes) -> FmuFault:
+        self.close()
+        return FmuFault(f"answers nonsense in {doing}: {answer[:_MAX_DIGITS]!r}")
+
+    def _ask(self, request: bytes, doing: str = "a call", most_bytes: int = 0, limit_s: float | None = None) -> bytes:
         try:
-            self._pipe.send_bytes(request)
-            if not self._pipe.poll(limit_s):
-                self.close()
-                raise FmuFault(f"hangs: {doing} took longer than {limit_s:g} s (isolate)")
-            answer = self._pipe.recv_bytes()
-        except (EOFError, OSError) as reason:
-            code = self._process.wait() if self._process.poll() is None else self._process.returncode
-            self.close()
-            end = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-            raise FmuFault(f"crashed in {doing}: its process ended with {end}") from reason
+            answer = self._child.ask(request, doing, limit_s or self._limit_s, most_bytes + _MAX_TEXT_BYTES)
+        except ChildFault as fault:
+            raise FmuFault(f"{fault} (isolate)") from fault
         if answer[:1] == _BAD:
             raise FmuFault(answer[1:].decode(errors="replace"))
+        if answer[:1] != _GOOD:
+            raise self._nonsense(doing, answer)
         return answer[1:]
-
-
-def _kill(process: subprocess.Popen[bytes], pipe: Connection) -> None:
-    process.kill()
-    process.wait()
-    pipe.close()
 
 
 def make_instance(spec: Spec, isolate_s: float | None) -> Instance:
@@ -422,38 +416,31 @@ def _spec(text: bytes) -> Spec:
     return spec._replace(inputs=inputs, outputs=outputs, parameters=parameters)
 
 
-def _serve(pipe: Connection) -> None:
-    """Answer the requests of an `IsolatedInstance` until its end."""
-    instance: Any = None
-    while True:
-        request = pipe.recv_bytes()
-        word, rest = request[:1], request[1:]
+def make_answerer() -> Callable[[bytes], bytes]:
+    """Return a function that answers the requests of an `IsolatedInstance`, in the process of `Child`."""
+    instances: list[LocalInstance] = []
+
+    def done(request: bytes) -> bytes:
+        if not instances:
+            instances.append(LocalInstance(_spec(request)))
+            return b""
+        (instance,), word, rest = instances, request[:1], request[1:]
+        if word == _STEP:
+            result = instance.step(struct.unpack(f"={len(rest) // 8}d", rest))
+            return struct.pack(f"={len(result)}d", *result)
+        if word == _SAVE:
+            return str(instance.save()).encode()
+        if word == _SERIALISE:
+            return instance.serialise(int(rest))
+        if word == _DESERIALISE:
+            return str(instance.deserialise(rest)).encode()
+        {_RESTORE: instance.restore, _FORGET: instance.forget}[word](int(rest))
+        return b""
+
+    def answer(request: bytes) -> bytes:
         try:
-            if instance is None:
-                instance, answer = LocalInstance(_spec(request)), b""
-            elif word == _STEP:
-                result = instance.step(struct.unpack(f"={len(rest) // 8}d", rest))
-                answer = struct.pack(f"={len(result)}d", *result)
-            elif word == _SAVE:
-                answer = str(instance.save()).encode()
-            elif word == _SERIALISE:
-                answer = instance.serialise(int(rest))
-            elif word == _DESERIALISE:
-                answer = str(instance.deserialise(rest)).encode()
-            else:
-                {_RESTORE: instance.restore, _FORGET: instance.forget}[word](int(rest))
-                answer = b""
+            return _GOOD + done(request)
         except FmuFault as fault:
-            pipe.send_bytes(_BAD + str(fault).encode())
-        else:
-            pipe.send_bytes(_GOOD + answer)
+            return _BAD + str(fault).encode()
 
-
-if __name__ == "__main__":
-    _PR_SET_PDEATHSIG = 1
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL))
-    if os.getppid() == int(sys.argv[2]):
-        try:
-            _serve(Connection(int(sys.argv[1])))
-        except (EOFError, OSError):
-            os._exit(0)
+    return answer

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -13,6 +12,7 @@ from scipy.special import ndtr, ndtri
 
 from activesteer.config import Source
 from activesteer.errors import nearest_names, shown
+from activesteer.files import MAX_NUMBER
 
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """Kinds of factors; a factor's table has exactly one of these keys."""
@@ -179,6 +179,9 @@ def _listed_values(key: str, kind: str, given: object, weights: object, source: 
     where = ("factors", key, kind)
     if not isinstance(given, Sequence) or isinstance(given, str) or not given:
         raise source.fail(where, f"{shown(given)} is no list of values")
+    for value in given:
+        if not is_plain(value):
+            raise source.fail(where, f"{shown(value)} is no number, text, true or false", value)
     if any(given.count(value) > 1 for value in given):
         raise source.fail(where, "a value stands in it twice")
     if weights is None:
@@ -193,9 +196,14 @@ def _listed_values(key: str, kind: str, given: object, weights: object, source: 
 
 def _pair(given: object, source: Source, where: Sequence[str]) -> tuple[float, float]:
     if not isinstance(given, Sequence) or len(given) != 2 or not all(map(_is_number, given)):
-        raise source.fail(where, f"{shown(given)} is not two finite numbers")
+        raise source.fail(where, f"{shown(given)} is not two finite numbers up to {MAX_NUMBER:g}")
     return float(given[0]), float(given[1])
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= MAX_NUMBER
+
+
+def is_plain(value: object) -> bool:
+    """Return whether a value can be varied: a number, a text or a truth value."""
+    return isinstance(value, (bool, str)) or _is_number(value)

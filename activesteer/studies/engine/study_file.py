@@ -17,7 +17,7 @@ from activesteer.files import user_path
 from activesteer.resources import DEFAULT_DRIVER, find_study
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.design import DesignTable, Samples, cases, choose_design, draw, read_cases
-from activesteer.studies.engine.factors import Factor, read_factor
+from activesteer.studies.engine.factors import Factor, is_plain, read_factor
 
 _KEYS: Final = (
     "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
@@ -247,6 +247,10 @@ def _cases(given: object, folder: Path, source: Source) -> Samples | None:
             raise source.fail(where, str(reason), given) from reason
     if not isinstance(given, Sequence) or not given or not all(isinstance(row, Mapping) and row for row in given):
         raise source.fail(where, "is neither a CSV file nor a list of tables with at least one key each")
+    for row in given:
+        for key, value in row.items():
+            if value is not None and not is_plain(value):
+                raise source.fail(where, f"{shown(value)} of {key} is no number, text, true or false", value)
     return cases(given)
 
 

@@ -74,6 +74,22 @@ def test_a_car_that_drifts_onto_the_better_side_is_no_measure_of_a_stop():
     assert change["stopping_elsewhere"] == pytest.approx(33.0)
 
 
+@pytest.mark.parametrize(
+    ("without_m", "controlled_m", "name"), [(1.8, 0.2, "stopping_elsewhere"), (0.2, 1.8, "stopping")]
+)
+def test_the_path_of_the_car_without_control_decides_whether_a_stop_counts(without_m, controlled_m, name):
+    stop = {"stopping_distance_m": 56.0, "lateral_deviation_max_m": without_m}
+    change = changes(stop, {"stopping_distance_m": 89.0, "lateral_deviation_max_m": controlled_m})
+    assert change[name] == pytest.approx(33.0)
+    assert len({"stopping", "stopping_elsewhere"} & change.keys()) == 1
+
+
+def test_the_worst_measure_is_the_severity():
+    change = {"lane": 0.1, "path": 0.2, "cones": 3.0, "heading_open_loop": 9.0, "stopping": -5.0}
+    assert severity(change) == pytest.approx(4.0)
+    assert track_harm_m(change) == pytest.approx(0.2)
+
+
 def test_a_longer_stop_is_harm_and_no_stop_is_a_lost_car():
     stop = {"stopping_distance_m": 40.0, "lateral_deviation_max_m": 0.2, "heading_end_rad": 0.0}
     assert harms(changes(stop, stop | {"stopping_distance_m": 40.4})) == []

@@ -99,6 +99,9 @@ def test_drive_is_taken_back_by_what_the_brake_takes_and_no_further(known):
     gas = DriverCommand(drive_torque_demand_Nm=100.0, front_steer_demand_rad=0.0)
     found = held(esc, gas, measured(0.4, SPEED_MPS), 5)
     assert found.drive_torque_change_Nm == -100.0 > -sum(found.brake_torque_demand_Nm)
+    full = DriverCommand(drive_torque_demand_Nm=1e5, front_steer_demand_rad=0.0)
+    found = held(esc, full, measured(0.4, SPEED_MPS), 5)
+    assert found.drive_torque_change_Nm == -sum(found.brake_torque_demand_Nm) < -500.0
     coasting = held(esc, steering(0.0), measured(0.4, SPEED_MPS), 5)
     assert coasting.drive_torque_change_Nm == 0.0
 

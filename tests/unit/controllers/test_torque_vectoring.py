@@ -8,7 +8,10 @@ import pytest
 
 from activesteer import simulate
 from activesteer.controllers import load_controller
+from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.split_axles import Range, SplitTorques
+from activesteer.controllers.torque_vectoring import TorqueVectoring
+from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ControllerError
 from activesteer.scenario import resolve
@@ -41,6 +44,27 @@ def test_more_torque_on_the_right_makes_a_moment_to_the_left_and_the_sum_stays(k
     # By hand: the force of each wheel at half of the rear track of 1.524 m.
     radius_m = known.estimation.rolling_radius_m[2]
     assert (rr - rl) / radius_m * 0.5 * 1.524 == pytest.approx(side * 500.0) == pytest.approx(reached)
+
+
+def test_the_moment_grows_with_the_speed_up_to_full_speed_and_no_further(known):
+    p, asked_Nm = known.gains.tv, {}
+
+    class Kept:
+        def for_moment(self, moment_Nm, _command, _measurement, now):
+            asked_Nm[now.speed_mps] = moment_Nm
+            return NO_TORQUES, 0.0
+
+    class Rolling:
+        def step(self, measurement):
+            return STRAIGHT._replace(speed_mps=measurement.speed_mps, yaw_rate_radps=0.1)
+
+    reference = BorneTurnReference(known.single_track, p, known.timestep_s)
+    vectoring = TorqueVectoring(reference, Rolling(), p, 2000.0, Kept())  # pyright: ignore[reportArgumentType]
+    half_mps = 0.5 * (MIN_SPEED_MPS + p.full_speed_mps)
+    for speed_mps in (half_mps, p.full_speed_mps, 3.0 * p.full_speed_mps):
+        vectoring.step(steering(0.0), measured(0.0, speed_mps))
+    full_Nm = -2000.0 * 0.1 / p.yaw_rate_time_s
+    assert list(asked_Nm.values()) == pytest.approx([0.5 * full_Nm, full_Nm, full_Nm])
 
 
 def test_without_an_error_there_is_no_torque_and_errors_have_the_sign_of_their_moment(known):

@@ -25,7 +25,7 @@ from activesteer.estimation.records import (
     known_of,
 )
 from activesteer.estimation.speed_filter import brush_slip
-from activesteer.estimation.two_track_model import follow
+from activesteer.estimation.two_track_model import follow, follow_roll
 from activesteer.estimation.wheels import read_wheels
 from activesteer.scenario import resolve
 from tests.unit.estimation.drives import estimates, rolling
@@ -58,6 +58,27 @@ def test_lateral_load_transfer_of_both_axles_balances_the_roll_moment(setup, kno
     assert front == pytest.approx(more.front_load_transfer_fraction)
     pitch_kgm = 2.0 * known.along_load_kg * (car.cg_to_front_m + car.cg_to_rear_m)
     assert pitch_kgm == pytest.approx(car.mass_kg * more.load_height_m)
+
+
+def test_the_body_rolls_as_a_damped_oscillator_whose_springs_and_dampers_load_the_wheels(known, memory):
+    speed, damping, ay_mps2 = known.roll_speed_radps, known.roll_damping, 4.0
+    assert damping < 1.0
+    free = speed * math.sqrt(1.0 - damping**2)
+    end_rad = known.roll_gradient_radpmps2 * ay_mps2
+    steps, dt = 400, 0.001
+    for step in range(1, steps + 1):
+        follow_roll(known, memory, ay_mps2, dt)
+        fading = math.exp(-damping * speed * step * dt)
+        phase = free * step * dt
+        expected = end_rad * (1.0 - fading * (math.cos(phase) + damping * speed / free * math.sin(phase)))
+        # The step is 0.001 s of an oscillation of about half a second.
+        assert memory.roll_rad == pytest.approx(expected, abs=0.03 * end_rad)
+        rate = end_rad * fading * speed**2 / free * math.sin(phase)
+        loading = (expected + 2.0 * damping / speed * rate) / known.roll_gradient_radpmps2
+        assert memory.loading_mps2 == pytest.approx(loading, abs=0.03 * ay_mps2)
+        assert memory.rolling_mps == pytest.approx(
+            known.roll_arm_m * rate, abs=0.03 * known.roll_arm_m * speed * end_rad
+        )
 
 
 def test_wheels_stand_at_their_corners(setup, known):

@@ -79,6 +79,13 @@ def test_of_several_runs_the_mean_counts_and_its_interval_is_that_of_student(rng
     assert np.mean(np.abs(found.residual) < found.confidence) == pytest.approx(0.95, abs=0.03)
 
 
+def test_the_interval_of_a_mean_is_two_sided():
+    runs = [run(yaw_rate_radps=0.3 * step(TIME_S) + offset) for offset in (-0.01, 0.01)]
+    found = plain(runs, run(yaw_rate_radps=0.3 * step(TIME_S)), aligned=False).quantities[0]
+    # 12.706: Student's table of one degree of freedom at 95 %, two-sided; the standard error of the mean is 0.01.
+    np.testing.assert_allclose(found.confidence, 12.706 * 0.01, rtol=1e-4)
+
+
 def test_cross_plots_know_no_time():
     ay = np.linspace(0.0, 8.0, len(TIME_S))
     slower = ay**3 / 64.0

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.compilation import compiled
 from activesteer.errors import ManeuverError
 from activesteer.road.course import Course
 from activesteer.road.path import Path
@@ -15,13 +14,9 @@ from activesteer.road.path_coordinates import PathGrid, along_path
 from activesteer.road.road import Road, RoadPatch
 
 
-@compiled
-def _native(x, y, x0, y0, cell, columns, rows, spacing, points, cells):
-    return along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells)[:2]
-
-
 def _along(x_m: float, y_m: float, grid: PathGrid) -> tuple[float, float]:
-    return _native(x_m, y_m, *grid)
+    # Called without a compiled function of this file, whose kept code would not follow a change of the kernel.
+    return along_path(x_m, y_m, *grid)[:2]
 
 
 def test_on_a_circle_the_distance_is_the_arc_and_the_offset_points_to_its_centre() -> None:
@@ -37,6 +32,17 @@ def test_on_a_circle_the_distance_is_the_arc_and_the_offset_points_to_its_centre
             along, beside = _along(*place, grid)
             assert along == pytest.approx(radius * angle, abs=2e-3 + fan)
             assert beside == pytest.approx(left, abs=2e-3)
+
+
+def test_direction_and_curvature_on_a_circle_are_those_of_the_circle() -> None:
+    radius = 60.0
+    turn = np.linspace(0.0, math.pi, 200)
+    grid = PathGrid.of(Path.through(radius * np.sin(turn), radius * (1.0 - np.cos(turn))))
+    for angle in turn[5:-5:20]:
+        for beyond in (0.0, 0.3 * turn[1]):
+            at = angle + beyond
+            found = along_path(radius * math.sin(at), radius * (1.0 - math.cos(at)), *grid)
+            assert found[2:] == pytest.approx((math.cos(at), math.sin(at), 1.0 / radius), abs=2e-4)
 
 
 def test_beyond_both_ends_and_off_the_grid_the_path_goes_on_straight() -> None:

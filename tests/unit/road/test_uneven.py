@@ -84,6 +84,14 @@ def test_slopes_are_the_derivatives_of_the_height() -> None:
     assert road.at(np.array([0.0, 1.9]), np.zeros(2)) == pytest.approx(0.0)
 
 
+def test_an_edge_rises_before_the_middle_of_an_obstacle_and_falls_behind_it() -> None:
+    road = surface(obstacle=(Obstacle("cleat", 10.0, 2.0, 0.1, left_m=1.0, right_m=-1.0, edge_m=0.2),))
+    along = road.at(np.array([10.1, 11.0, 11.9]), np.zeros(3))
+    assert along == pytest.approx(np.array([[0.05, 0.5, 0.0], [0.1, 0.0, 0.0], [0.05, -0.5, 0.0]]))
+    across = road.at(np.full(3, 11.0), np.array([-0.9, 0.0, 0.9]))
+    assert across == pytest.approx(np.array([[0.05, 0.0, 0.5], [0.1, 0.0, 0.0], [0.05, 0.0, -0.5]]))
+
+
 HEAD = """$CT
 A road for tests
 $!*
@@ -146,6 +154,17 @@ def test_scales_and_missing_heights_follow_the_file() -> None:
     assert scaled.grid.z_m[-1] == pytest.approx(2e-3 * (np.arange(24, 27) - 1.0), abs=1e-6)
 
 
+def test_the_slope_of_a_crg_file_belongs_to_the_step_before_its_point() -> None:
+    data = rows()
+    data[:, 1:] = 0.0
+    data[:, 1] = 0.1 * (np.arange(9) == 3)
+    head = HEAD.format(form="LDFI", more="", blocks="").replace("reference line banking", "reference line slope")
+    lines = ["".join(f"{number:20.7f}" for number in row) for row in np.nan_to_num(data)]
+    text = "\n".join(part for line in lines for part in (line[:80], line[80:]))
+    heights = read_crg("road.crg", lambda _: f"{head}{text}".encode()).grid.z_m
+    assert heights[:, 1] == pytest.approx(0.05 * (np.arange(9) >= 3))
+
+
 def test_bytes_lost_as_text_are_found() -> None:
     random = np.random.default_rng(2)
     data = np.cumsum(random.normal(0.0, 1e-3, (400, 5)), axis=0) + 0.3
@@ -163,6 +182,7 @@ def test_bytes_lost_as_text_are_found() -> None:
         (lambda d: d.__setitem__((4, slice(2, 5)), np.nan), "no height at all"),
         (lambda d: d.__setitem__((slice(1, 9), 0), 0.6 * np.arange(8)), "folds over itself"),
         (lambda d: d.__setitem__((4, 3), 5000.0), "above 1000 m"),
+        (lambda d: d.__setitem__((4, 3), np.inf), r"above 1e\+12"),
         (lambda d: d.__setitem__((3, 0), np.nan), "heading of the reference line"),
     ],
 )
@@ -177,7 +197,20 @@ def test_a_bad_grid_is_one_error(change: Any, problem: str) -> None:
     ("content", "problem"),
     [
         (b"", "no OpenCRG file"),
-        (b"$KD_DEFINITION\n$\n$ROAD_CRG\nREFERENCE_LINE_INCREMENT = x\n$\n", "a number is needed"),
+        (b"$KD_DEFINITION\n$\n$ROAD_CRG\nREFERENCE_LINE_INCREMENT = x\n$\n", "is needed"),
+        *(
+            (HEAD.format(form="LRFI", more=f"REFERENCE_LINE_END_U = {value}", blocks="").encode(), "is needed")
+            for value in ("inf", "-inf", "nan", "1e13")
+        ),
+        (
+            HEAD.format(form="LRFI", more="", blocks="")
+            .replace("section 1", "section at v = inf")
+            .replace("section 2", "section at v = 1")
+            .replace("section 3", "section at v = 2")
+            .encode()
+            + 2 * (5 * b"         0" + b"\n"),
+            "is needed",
+        ),
         (b"$ROAD_CRG\nA = 1\n$\n$KD_DEFINITION\n#:XYZ\n$\n$$$$\n", "known are LRFI"),
         (HEAD.format(form="LRFI", more="", blocks="").encode() + b" 0.0 junk \n" * 9, "is no number"),
     ],

@@ -115,6 +115,13 @@ def test_given_commands_replace_the_blocks() -> None:
         assert row(batch, car) == numbers(alone)
 
 
+def test_a_given_steering_wheel_turns_the_front_wheels_by_the_ratio_of_its_own_car() -> None:
+    ratios = np.array([12.0, 20.0])
+    batch = Batch("straight_line", 2, overrides={"vehicle.steering.ratio": ratios, "settle_s": 0.0}, threads=1)
+    batch.advance(1, DriverCommand(steering_wheel_demand_rad=0.24))
+    assert batch.driver_command.front_steer_demand_rad == pytest.approx(0.24 / ratios)
+
+
 def test_a_fault_acts_at_its_time_in_its_car() -> None:
     fault = {"part": "rear", "kind": "stuck", "start_s": 0.3, "end_s": 0.5}
     noisy = {"part": "yaw_rate_sensor", "kind": "offset", "size_degps": 5.0, "start_s": 0.2}

@@ -62,6 +62,11 @@ def test_the_middle_of_a_hysteresis_loop_is_found() -> None:
     np.testing.assert_allclose(smoothed(x, y, at), at**3, atol=1e-3)
 
 
+def test_samples_that_lie_close_together_at_one_place_are_smoothed() -> None:
+    x = np.concatenate([[-1.0, -0.5], np.linspace(0.99, 1.0, 9)])
+    np.testing.assert_allclose(smoothed(x, 2.0 * x, np.linspace(-1.0, 1.0, 5)), np.linspace(-2.0, 2.0, 5), atol=1e-9)
+
+
 def test_a_column_without_unit_or_side_is_an_error(tmp_path: Path) -> None:
     with raises(ParameterError, key="toe [deg]"):
         axle(tmp_path, **{"toe [deg]": TRAVEL_MM})
@@ -83,7 +88,18 @@ def test_a_column_without_unit_or_side_is_an_error(tmp_path: Path) -> None:
         ("rear_side_force.csv", "force [N],left_toe [deg]\n1,0\n2,off\n", {"key": "left_toe [deg]", "line": 3}),
         ("rear_side_force.csv", "force [kN],left_toe [deg]\n-3000,0\n3000,0\n", {"key": "force [kN]"}),
         ("rear_side_force.csv", "force [N],left_toe [deg]\n-3000,1e30\n3000,0\n", {"key": "left_toe [deg]"}),
+        ("rear_side_force.csv", "force [N],left_toe [deg]\n" + 3 * "-3000,0\n3000,0\n", {"key": "force"}),
+        (
+            "rear_side_force.csv",
+            "force [N],left_toe [deg]\n" + "".join(f"{f}e-9,0\n" for f in range(-3, 4)),
+            {"key": "force"},
+        ),
         ("rear_sideforce.csv", "", {"file": "rear_sideforce.csv"}),
+        (
+            "rear_side_force.toml",
+            f'"force [N]" = [-1.0, 1.0]\n"left_toe [deg]" = [0, {"9" * 400}]',
+            {"key": "left_toe [deg]"},
+        ),
         ("names.toml", "names = 3\n", {"key": "names"}),
         ("names.toml", "[names]\nZ_L = 3\n", {"key": "names.Z_L"}),
     ],

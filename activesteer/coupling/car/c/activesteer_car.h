@@ -2,7 +2,8 @@
    z up; left positive). The variables, with units and meanings, stand in variables.csv beside this file.
 
    Cars are independent of each other and may be driven in different threads, each by one thread at a time. Functions
-   that return an int return 0 for success; `as_message` then says why not. No function ends the process. */
+   that return an int return 0 for success; `as_message` then says why not. No function ends the process, not even for
+   NULL instead of a car, name or state. */
 #ifndef ACTIVESTEER_CAR_H
 #define ACTIVESTEER_CAR_H
 #include <stddef.h>
@@ -14,7 +15,7 @@ typedef struct as_car as_car;
 
 as_car *as_create(void);                                 /* A car at its start; NULL on failure. */
 void as_free(as_car *car);
-const char *as_message(const as_car *car);               /* The last failure; of `as_create` for NULL. */
+const char *as_message(const as_car *car);               /* The last failure; for NULL that of `as_create` in this thread. */
 
 int as_count(void);                                      /* Number of variables. */
 const char *as_name(int variable);                       /* Name of a variable, NULL if there is none. */

@@ -77,8 +77,7 @@ struct as_car {
     char message[256];
 };
 
-static const char *create_message = "";
-static _Thread_local char create_buffer[256];
+static _Thread_local char create_message[256];
 
 static int refuse(as_car *c, const char *format, ...) {
     va_list arguments;
@@ -313,13 +312,13 @@ static int start(as_car *c) {
 }
 
 as_car *as_create(void) {
-    create_message = create_buffer;
+    create_message[0] = 0;
     if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) {
-        snprintf(create_buffer, sizeof create_buffer, "the car needs a processor with AVX2 and FMA (x86-64-v3)");
+        snprintf(create_message, sizeof create_message, "the car needs a processor with AVX2 and FMA (x86-64-v3)");
         return NULL;
     }
     if (mj_version() != ENGINE_VERSION) {
-        snprintf(create_buffer, sizeof create_buffer, "the car needs MuJoCo %d, not %d", ENGINE_VERSION, mj_version());
+        snprintf(create_message, sizeof create_message, "the car needs MuJoCo %d, not %d", ENGINE_VERSION, mj_version());
         return NULL;
     }
     mju_user_error = fail;
@@ -331,7 +330,7 @@ as_car *as_create(void) {
     as_car *c = calloc(1, sizeof *c);
     if (c) c->memory = aligned_alloc(64, (as_memory_end - as_memory + 63) / 64 * 64);
     if (!c || !c->memory || start(c)) {
-        snprintf(create_buffer, sizeof create_buffer, "%s", c && c->message[0] ? c->message : "there is no memory");
+        snprintf(create_message, sizeof create_message, "%s", c && c->message[0] ? c->message : "there is no memory");
         as_free(c);
         return NULL;
     }
@@ -350,15 +349,16 @@ const char *as_message(const as_car *c) { return c ? c->message : create_message
 int as_count(void) { return N_VARIABLES; }
 const char *as_name(int variable) { return variable >= 0 && variable < N_VARIABLES ? VARIABLES[variable].name : NULL; }
 double as_timestep_s(void) { return TIMESTEP_S; }
-double as_get(const as_car *c, int variable) { return variable >= 0 && variable < N_VARIABLES ? *c->at[variable] : NAN; }
+double as_get(const as_car *c, int variable) { return c && variable >= 0 && variable < N_VARIABLES ? *c->at[variable] : NAN; }
 
 int as_find(const char *name) {
-    for (int i = 0; i < N_VARIABLES; i++)
+    for (int i = 0; name && i < N_VARIABLES; i++)
         if (!strcmp(name, VARIABLES[i].name)) return i;
     return -1;
 }
 
 int as_set(as_car *c, int variable, double value) {
+    if (!c) return 1;
     if (variable < 0 || variable >= N_VARIABLES) return refuse(c, "there is no variable %d; the last one is %d", variable, N_VARIABLES - 1);
     const Variable *v = VARIABLES + variable;
     if (v->causality == OUTPUT) return refuse(c, "%s is an output and cannot be set", v->name);
@@ -399,6 +399,7 @@ static int step(as_car *c) {
 }
 
 int as_step(as_car *c, int steps) {
+    if (!c) return 1;
     if (c->failed) return refuse(c, "the car has failed; reset it, or restore a state");
     if (steps < 0) return refuse(c, "%d steps; 0 or more are needed", steps);
     if (c->changed && as_settle(c)) return 1;
@@ -534,6 +535,7 @@ int as_settle(as_car *c) {
 }
 
 int as_reset(as_car *c) {
+    if (!c) return 1;
     c->failed = 0;
     return start(c);
 }
@@ -541,14 +543,16 @@ int as_reset(as_car *c) {
 size_t as_state_size(const as_car *c) { (void)c; return 8 * (1 + state_numbers()); }
 
 int as_save(as_car *c, void *state, size_t size) {
-    if (size < as_state_size(c)) return refuse(c, "a state has %zu bytes, not %zu", as_state_size(c), size);
+    if (!c) return 1;
+    if (!state || size < as_state_size(c)) return refuse(c, "a state has %zu bytes, not %zu", as_state_size(c), size);
     memcpy(state, &FINGERPRINT, 8);
     exchange(c, (double *)state + 1, 1);
     return 0;
 }
 
 int as_restore(as_car *c, const void *state, size_t size) {
-    if (size != as_state_size(c) || memcmp(state, &FINGERPRINT, 8)) return refuse(c, "this is no state of this car");
+    if (!c) return 1;
+    if (!state || size != as_state_size(c) || memcmp(state, &FINGERPRINT, 8)) return refuse(c, "this is no state of this car");
     const double *values = (const double *)state + 1 + STATE_SIZE;
     for (int i = 0; i < N_VARIABLES; i++)
         if (VARIABLES[i].causality == PARAMETER && values[i] != c->values[i])

@@ -4,6 +4,7 @@ import csv
 import ctypes
 import functools
 import importlib
+import math
 import shutil
 import subprocess
 import threading
@@ -155,6 +156,19 @@ def test_a_state_is_exact_and_belongs_to_its_car(library):
     assert "no state of this car" in car.message
     other.lib.as_reset(other.car)
     assert other.all() == Car(library).all()
+
+
+def test_no_car_no_name_and_no_state_are_failures_and_no_end(library):
+    car = Car(library)
+    lib, size = car.lib, car.lib.as_state_size(car.car)
+    state = car.save()
+    assert [lib.as_set(None, 0, 0.0), lib.as_step(None, 1), lib.as_reset(None)] == [1, 1, 1]
+    assert [lib.as_save(None, state, size), lib.as_restore(None, state, size)] == [1, 1]
+    assert math.isnan(lib.as_get(None, 0))
+    assert lib.as_find(None) == -1
+    assert lib.as_message(None) == b""
+    assert [lib.as_save(car.car, None, size), lib.as_restore(car.car, None, size)] == [1, 1]
+    assert car.restore(state) == 0
 
 
 @pytest.mark.slow

@@ -203,6 +203,8 @@ def test_an_isolated_fmu_may_crash_or_hang(fmus, fault, said):
         ([("modelIdentifier='yaw_damper'", "modelIdentifier='../x'")], "", "is not the name of a library|invalid"),
         ([("^", "<!DOCTYPE a [<!ENTITY b 'c'>]>")], "", "without a document type"),
         ([("Real start", "Real nonsense='1' start")], "", "modelDescription.xml is invalid.*nonsense"),
+        ([("Real start='[^']*'", "Real start='INF'")], "", "starts at inf; a finite number is needed"),
+        ([("Real start='[^']*'", "Real start='-1e400'")], "", "starts at -inf; a finite number is needed"),
     ],
 )
 def test_a_wrong_fmu_is_refused(fmus, tmp_path, edits, left_out, said):

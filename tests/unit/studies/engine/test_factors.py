@@ -65,6 +65,8 @@ def test_a_factor_becomes_the_table_that_it_came_from():
         {"normal": [0, 1], "truncate": [2, 1]}, {"normal": [0, 1], "truncate": [100, 101]},
         {"uniform": [0, 1], "truncate": [0, 1]}, {"uniform": [0, 1], "grid": [1]}, {"choice": [1, 2], "weights": [1]},
         {"choice": [1, 2], "weights": [0, 0]}, {"choice": [1, 2], "weights": [1, -1]},
+        {"choice": [1, [2]]}, {"grid": [1, {"a": 1}]}, {"grid": [1, float("nan")]}, {"uniform": [0, 10**400]},
+        {"normal": [10**400, 1]},
     ],
 )  # fmt: skip
 def test_a_wrong_table_is_refused_with_its_key(table):

@@ -1,0 +1,184 @@
+"""Readers of files in other programs' formats by libraries with native code: MAT, Parquet, MDF.
+
+A damaged file may crash such a library. `columns.py` therefore runs this file in a child process.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError, not_installed, shown
+from activesteer.files import shown_path
+from activesteer.measured.column import MAX_BYTES, Column, check_rows, numbers, understood
+
+_MAT_HEADER: Final = 128
+"""Length of the header of a MATLAB file of version 5 [bytes]."""
+_MAT_COMPRESSED: Final = 15
+"""Type of a compressed element of a MATLAB file."""
+_PIECE_BYTES: Final = 2**20
+
+
+def make_answerer() -> Callable[[bytes], bytes]:
+    """Return a function that answers the requests of `columns.py`.
+
+    A request is JSON: the path of a file that is opened, or the number of a column that is read. An answer is a line of
+    JSON, then values and times of a column as 64-bit floating-point numbers.
+    """
+    opened: list[Column] = []
+
+    def answer(request: bytes) -> bytes:
+        wanted, content = json.loads(request), b""
+        try:
+            if isinstance(wanted, str):
+                path = Path(wanted)
+                opened[:] = READERS[path.suffix.lower()](path)
+                head: Any = {"columns": [(column.name, column.unit) for column in opened]}
+            else:
+                values, times = opened[wanted].read()
+                content = values.tobytes() + (b"" if times is None else times.tobytes())
+                head = {"timed": times is not None}
+        except RecordingError as error:
+            head = {"refused": (error.problem, {"file": error.file, "value": error.value, "allowed": error.allowed})}
+        return json.dumps(head, default=os.fspath).encode() + b"\n" + content
+
+    return answer
+
+
+def _in_memory(name: str, unit: str, values: Any, path: Path) -> Column:
+    def read() -> tuple[Array, None]:
+        return numbers(values, name, path), None
+
+    return Column(name, unit, read)
+
+
+def _parquet(path: Path) -> list[Column]:
+    import pyarrow as pa  # noqa: PLC0415 - slow to import
+    from pyarrow import parquet  # noqa: PLC0415
+
+    with understood(path, "Parquet file"):
+        file = parquet.ParquetFile(path)
+        check_rows(file.metadata.num_rows, path)
+        fields = list(file.schema_arrow)
+
+    def lazy(name: str, kind: Any) -> Callable[[], tuple[Array, None]]:
+        kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+
+        def read() -> tuple[Array, None]:
+            # A text or a list may be of any length, so that the number of rows would limit nothing.
+            if not (pa.types.is_primitive(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind)):
+                raise RecordingError(f"column {shown(name)} holds no numbers: its type is {kind}", file=path.name)
+            with understood(path, "Parquet file"):
+                column = file.read(columns=[name]).column(0).to_numpy()
+            return numbers(column, name, path), None
+
+        return read
+
+    return [
+        Column(
+            field.name,
+            (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace"),
+            lazy(field.name, field.type),
+        )
+        for field in fields
+    ]
+
+
+def _mat(path: Path) -> list[Column]:
+    from scipy.io import loadmat, whosmat  # noqa: PLC0415 - slow to import
+
+    try:
+        with understood(path, "MATLAB file"):
+            _check_mat_size(path)
+            check_rows(max((max(shape, default=0) for _, shape, _ in whosmat(path)), default=0), path)
+            variables = loadmat(path, simplify_cells=True)
+    except RecordingError as error:
+        if isinstance(error.__cause__, NotImplementedError):
+            raise RecordingError(
+                f"{shown_path(path)} is a MATLAB file of version 7.3; save it with `save(..., '-v7')`", value=path
+            ) from None
+        raise
+    units = variables.get("units")
+    given = units if isinstance(units, Mapping) else {}
+    return [
+        _in_memory(name, str(given.get(name, "")), values, path)
+        for name, values in _flat(variables)
+        if not name.startswith(("__", "units.", "metrics.", "meanings."))
+    ]
+
+
+def _check_mat_size(path: Path) -> None:
+    """Refuse a MATLAB file that is too large when it is decompressed, without keeping what is decompressed.
+
+    Raises:
+        RecordingError: it has more than `MAX_BYTES`.
+    """
+    left = MAX_BYTES - path.stat().st_size
+    with path.open("rb") as file:
+        order = {b"IM": "<", b"MI": ">"}.get(file.read(_MAT_HEADER)[-2:])
+        while order and left > 0 and len(tag := file.read(8)) == 8:
+            kind, length = struct.unpack(f"{order}II", tag)
+            if kind != _MAT_COMPRESSED:
+                file.seek(length, 1)
+                continue
+            unpacker = zlib.decompressobj()
+            while length > 0 and left > 0 and (packed := file.read(min(length, _PIECE_BYTES))):
+                length -= len(packed)
+                while packed and left > 0:
+                    left -= len(unpacker.decompress(packed, _PIECE_BYTES))
+                    packed = unpacker.unconsumed_tail
+    if left <= 0:
+        raise RecordingError(
+            f"{shown_path(path)} has more than {MAX_BYTES} bytes when decompressed", value=path, allowed=MAX_BYTES
+        )
+
+
+def _flat(table: Mapping[str, Any], start: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield vectors of numbers in nested structs by dotted names."""
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{start}{name}.")
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.squeeze().ndim == 1:
+            yield f"{start}{name}", value.squeeze()
+
+
+def _mdf(path: Path) -> list[Column]:
+    try:
+        from asammdf import MDF  # noqa: PLC0415 - an extra, and slow to import
+    except ImportError as error:
+        raise not_installed(RecordingError, "an MDF file", "asammdf", "mdf") from error
+    with understood(path, "MDF file"):
+        file = MDF(path)
+        check_rows(max((int(group.channel_group.cycles_nr) for group in file.groups), default=0), path)
+        places = [
+            (channel.name, group, index, str(channel.unit or ""))
+            for group, each in enumerate(file.groups)
+            for index, channel in enumerate(each.channels)
+            if index != file.masters_db.get(group)
+        ]
+
+    def lazy(name: str, group: int, index: int) -> Callable[[], tuple[Array, Array]]:
+        def read() -> tuple[Array, Array]:
+            with understood(path, "MDF file"):
+                signal = file.get(name, group=group, index=index)
+                times, samples = np.asarray(signal.timestamps, np.float64), signal.samples
+            return numbers(samples, name, path), times
+
+        return read
+
+    return [Column(name, unit, lazy(name, group, index)) for name, group, index, unit in places]
+
+
+READERS: Final[dict[str, Callable[[Path], list[Column]]]] = {
+    ".mat": _mat,
+    ".parquet": _parquet,
+    **dict.fromkeys((".mf4", ".mdf", ".dat"), _mdf),
+}
