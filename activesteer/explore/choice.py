@@ -2,43 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from activesteer.config import Source, build
 from activesteer.controllers import CONTROLLERS
 from activesteer.errors import ParameterError, nearest_names, shown
+from activesteer.explore.messages import Choice
+from activesteer.files import is_file
 from activesteer.resources import (
-    DEFAULT_DRIVER,
     list_controller_variants,
     list_drivers,
     list_maneuvers,
     list_vehicles,
 )
 
-MAX_CONTROLLERS: Final = 3
 _OWN_CODE: Final = re.compile(r"[\w.-]+\.py:\w+(\?[\w=.&+-]*)?")
-_SOURCE: Final = Source("the message of the page", error=ParameterError)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Choice:
-    """A run, or a drive by hand, as the page chose it."""
-
-    maneuver: str
-    """Manoeuvre, or course of a drive."""
-    vehicle: str = "compact"
-    """Car."""
-    driver: str = DEFAULT_DRIVER
-    """Driver; a drive by hand needs none."""
-    controllers: tuple[str, ...] = ("none",)
-    """Controllers, at most `MAX_CONTROLLERS`."""
-    dragging: bool = False
-    """Whether a slider is being moved: the amplitude of the steering wheel is then held."""
 
 
 class Folder:
@@ -57,25 +37,26 @@ class Folder:
             "controllers": list(dict.fromkeys([*CONTROLLERS, *list_controller_variants()])),
         }
 
-    def choice(self, message: Mapping[str, Any], courses: Mapping[str, Any] | None = None) -> Choice:
-        """Read a message of the page.
+    def check(self, choice: Choice, courses: Mapping[str, Any] | None = None) -> None:
+        """Check the names of a choice.
 
         Args:
-            message: The message, without its numbers.
+            choice: The choice.
             courses: Names that stand for the manoeuvre; those of the package by default.
+
+        Raises:
+            ParameterError: a name is not in the lists, and no file directly in the folder.
         """
-        chosen = build(Choice, message, _SOURCE)
         names = self.names()
-        if not 1 <= len(chosen.controllers) <= MAX_CONTROLLERS:
-            raise ParameterError(
-                f"has {len(chosen.controllers)} names; 1 to {MAX_CONTROLLERS} are allowed", key="controllers"
-            )
-        self._check("maneuver", chosen.maneuver, list(courses) if courses else names["maneuvers"], r".+\.toml")
-        self._check("vehicle", chosen.vehicle, names["vehicles"], r".+\.toml")
-        self._check("driver", chosen.driver, names["drivers"], r".+\.toml")
-        for controller in chosen.controllers:
-            self._check("controllers", controller, names["controllers"], _OWN_CODE.pattern)
-        return chosen
+        self._check("maneuver", choice.maneuver, list(courses) if courses else names["maneuvers"], r".+\.toml")
+        self._check("vehicle", choice.vehicle, names["vehicles"], r".+\.toml")
+        self._check("driver", choice.driver, names["drivers"], r".+\.toml")
+        for controller in choice.controllers:
+            self.check_controller(controller)
+
+    def check_controller(self, name: str) -> None:
+        """Check the name of a controller, as `check` does."""
+        self._check("controllers", name, self.names()["controllers"], _OWN_CODE.pattern)
 
     def _check(self, key: str, name: str, known: list[str], own: str) -> None:
         """Check that a name is known, or that of a file directly in the folder."""
@@ -87,7 +68,7 @@ class Folder:
                 f"is {shown(name)}; {nearest_names(name, known)}, or name a file in {self.path} without a folder",
                 key=key, value=name,
             )  # fmt: skip
-        if not (self.path / file).is_file():
+        if not is_file(self.path / file):
             raise ParameterError(f"is {shown(name)}, but {self.path} has no file {file}", key=key, value=name)
 
     def located(self, name: str) -> str:
@@ -95,25 +76,21 @@ class Folder:
         return str(self.path / name) if ".toml" in name or ".py:" in name else name
 
 
-def numbers(values: object, allowed: Mapping[str, tuple[float, float]]) -> dict[str, float]:
-    """Return the values of sliders.
+def check_numbers(values: Mapping[str, float], allowed: Mapping[str, tuple[float, float]]) -> None:
+    """Check the values of sliders.
 
     Args:
         values: Key -> number, from the page.
         allowed: Key -> least and greatest number.
+
+    Raises:
+        ParameterError: a key has no slider, or its number is out of range.
     """
-    if not isinstance(values, Mapping):
-        raise ParameterError(f"is {shown(values)}; a number for each changed key is needed", key="values")
-    found: dict[str, float] = {}
     for key, value in values.items():
         if key not in allowed:
-            raise ParameterError(f"has no slider; {nearest_names(str(key), allowed)}", key=str(key), value=value)
+            raise ParameterError(f"has no slider; {nearest_names(key, allowed)}", key=key, value=value)
         low, high = allowed[key]
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise ParameterError(f"is {shown(value)}; a number is needed", key=key, value=value)
         if not low <= value <= high:
             raise ParameterError(
                 f"is {value:g}, must be {low:g} to {high:g}", key=key, value=value, allowed=(low, high)
             )
-        found[key] = float(value)
-    return found

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
 from contextlib import ExitStack
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from msgspec import UNSET
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.driver import DriverSetup
 from activesteer.driver.speed_hold import SpeedHold
-from activesteer.errors import ActiveSteerError, ParameterError, shown
+from activesteer.errors import ActiveSteerError
 from activesteer.explore.car_shape import BODIES, shape_of
-from activesteer.explore.choice import Choice, Folder
+from activesteer.explore.choice import Folder
+from activesteer.explore.messages import Act, Start
 from activesteer.explore.runs import Reply, free_path
 from activesteer.road.course import CONE_RADIUS_M
 from activesteer.road.footprint import Footprint
@@ -63,33 +64,6 @@ COURSES: Final = {
 """Name -> place to drive."""
 
 
-class Hands(NamedTuple):
-    """Positions of hands and feet.
-
-    Attributes:
-        steer: Position of the steering, -1 full right to 1 full left.
-        throttle: Throttle pedal, 0 to 1.
-        brake: Brake pedal, 0 to 1.
-        direct: Whether `steer` is the position of a gamepad's stick or a slider, and not of a key.
-    """
-
-    steer: float = 0.0
-    throttle: float = 0.0
-    brake: float = 0.0
-    direct: bool = False
-
-    @classmethod
-    def read(cls, message: Mapping[str, Any]) -> Hands:
-        """Read a message of the page."""
-        values = []
-        for key, low in (("steer", -1.0), ("throttle", 0.0), ("brake", 0.0)):
-            value = message.get(key, 0.0)
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= 1.0:
-                raise ParameterError(f"is {shown(value)}; a number from {low:g} to 1 is needed", key=key, value=value)
-            values.append(float(value))
-        return cls(*values, direct=message.get("direct") is True)
-
-
 class HandDriver:
     """A driver whose hands and feet are those of a person at the page.
 
@@ -105,7 +79,7 @@ class HandDriver:
     def __init__(self, setup: DriverSetup, hold_mps: float | None) -> None:
         """Take the car, with straight wheels and no foot on a pedal."""
         car = setup.single_track
-        self.hands, self.hold_mps = Hands(), hold_mps
+        self.hands, self.hold_mps = Act(steer=0.0), hold_mps
         self._wheelbase_m = car.cg_to_front_m + car.cg_to_rear_m
         # A car that does not understeer has no characteristic speed.
         self._understeer_s2pm2 = 1.0 / car.characteristic_speed_mps**2 if car.characteristic_speed_mps else 0.0
@@ -121,7 +95,7 @@ class HandDriver:
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
         """Move hands and feet by one step."""
         step_s, hands = self._setup.timestep_s, self.hands
-        target = hands.steer * self.full_turn_rad(measurement.speed_mps)
+        target = (hands.steer or 0.0) * self.full_turn_rad(measurement.speed_mps)
         self._angle_rad = _towards(self._angle_rad, target, _HANDS_RADPS * step_s)
         self._throttle = _towards(self._throttle, hands.throttle, _PEDAL_PER_S * step_s)
         self._brake = _towards(self._brake, hands.brake, _PEDAL_PER_S * step_s)
@@ -146,15 +120,16 @@ def _towards(value: float, target: float, most: float) -> float:
 class Drive:
     """A drive in real time, recorded to a file."""
 
-    def __init__(self, message: Mapping[str, Any], folder: Folder, pacer: Pacer | None = None) -> None:
+    def __init__(self, choice: Start, folder: Folder, pacer: Pacer | None = None) -> None:
         """Put the car at the start of a course.
 
         Args:
-            message: The choice of the page; `maneuver` is one of `COURSES`.
+            choice: The choice of the page; `maneuver` is one of `COURSES`.
             folder: The user's own files, and the place of the recording.
             pacer: Keeper of the pace; that of the clock by default.
         """
-        choice: Choice = folder.choice(message, COURSES)
+        folder.check(choice, COURSES)
+        self._folder = folder
         self._course = course = COURSES[choice.maneuver]
         overrides = {"speed_kmh": course.speed_kmh, "duration_s": _LONGEST_S}
         if course.mu is not None:
@@ -194,19 +169,17 @@ class Drive:
             tuple(arrays),
         )  # fmt: skip
 
-    def act(self, message: Mapping[str, Any]) -> None:
+    def act(self, message: Act) -> None:
         """Carry out a message of the page: hands, controller, speed to hold."""
-        if "controller" in message:
-            loop, name = self._simulation.loop, str(message["controller"])
+        if message.controller:
+            self._folder.check_controller(message.controller)
+            loop, name = self._simulation.loop, self._folder.located(message.controller)
             _, loop.controller = control_unit(name, self._simulation.scenario, loop.vehicle)
-            self._names["controller"] = name
-        if "hold" in message:
-            speed = self._simulation.motion.speed_mps
-            self._driver.hold_mps = max(speed, 0.0) if message["hold"] is True else None
-        if "steer" in message:
-            self._driver.hands = Hands.read(message)
-            number = message.get("number", 0)
-            self._seen = number if isinstance(number, int) else 0
+            self._names["controller"] = message.controller
+        if message.hold is not UNSET:
+            self._driver.hold_mps = max(self._simulation.motion.speed_mps, 0.0) if message.hold else None
+        if message.steer is not UNSET:
+            self._driver.hands, self._seen = message, message.number
 
     @property
     def done(self) -> bool:

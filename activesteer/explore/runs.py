@@ -20,7 +20,8 @@ from activesteer.analysis.report.run_page import write_report
 from activesteer.conventions import run_looks
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.car_shape import poses_of, shape_of
-from activesteer.explore.choice import Choice, Folder, numbers
+from activesteer.explore.choice import Folder, check_numbers
+from activesteer.explore.messages import Choice, Describe, Run
 from activesteer.explore.sliders import Slider, sliders
 from activesteer.metric_table import Better, recorded_metric
 from activesteer.recording import Recording
@@ -55,9 +56,9 @@ class Runs:
         self._kept: dict[str, Recording] = {}
         self._choice: tuple[Choice, dict[str, float]] | None = None
 
-    def describe(self, message: Mapping[str, Any]) -> Reply:
+    def describe(self, choice: Describe) -> Reply:
         """Return the sliders and the car of a choice."""
-        choice = self.folder.choice(message)
+        self.folder.check(choice)
         scenario = self._resolved(choice, {})
         header, arrays = shape_of(scenario.car.on(scenario.maneuver.road, 1e-3))
         return Reply(
@@ -70,17 +71,17 @@ class Runs:
             tuple(arrays),
         )
 
-    def run(self, message: Mapping[str, Any], values: object, stale: Callable[[], bool]) -> Iterator[Reply]:
+    def run(self, choice: Run, stale: Callable[[], bool]) -> Iterator[Reply]:
         """Drive the chosen controllers, and yield a reply for each as soon as it is driven.
 
         Args:
-            message: The choice.
-            values: Values of the sliders that were moved.
+            choice: The choice, with values of the sliders that were moved.
             stale: Whether the page has made a newer choice, for which this one is dropped.
         """
-        choice = self.folder.choice(message)
+        self.folder.check(choice)
         allowed = {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
-        overrides = numbers(values, allowed)
+        overrides = choice.values
+        check_numbers(overrides, allowed)
         scenario = self._held(choice, self._resolved(choice, overrides))
         looks = run_looks(choice.controllers)
         self._kept, self._choice = {}, (choice, overrides)
@@ -133,7 +134,7 @@ class Runs:
     def _sliders(self, choice: Choice, scenario: Scenario | None = None) -> list[Slider]:
         return sliders(scenario or self._resolved(choice, {}), self._located(choice))
 
-    def _held(self, choice: Choice, scenario: Scenario) -> Scenario:
+    def _held(self, choice: Run, scenario: Scenario) -> Scenario:
         """Return a scenario with its amplitude: that of the last search while a slider moves, else a new one."""
         maneuver: Any = scenario.maneuver
         if maneuver.search is None:
@@ -186,7 +187,7 @@ def free_path(folder: Path, stem: str, suffix: str) -> Path:
 
 def _plain(name: str) -> str:
     """Return a controller's name as part of a file name."""
-    return "".join(letter if letter.isalnum() else "_" for letter in name)
+    return "".join(letter if letter.isalnum() else "_" for letter in name)[:100]
 
 
 def _figures(recording: Recording) -> list[dict[str, Any]]:

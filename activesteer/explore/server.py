@@ -12,8 +12,9 @@ import multiprocessing
 import secrets
 import socket
 import struct
+from collections import deque
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any, Final
@@ -30,13 +31,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from activesteer.errors import ActiveSteerError
 from activesteer.explore.drive import COURSES
+from activesteer.explore.messages import MAX_MESSAGE_BYTES, End, Message, add, read
 from activesteer.explore.worker import work
 from activesteer.files import finite
 from activesteer.version import __version__
 
 HOST: Final = "127.0.0.1"
-_MAX_MESSAGE: Final = 20_000
-"""Most bytes of a message from the page; its choices have some hundred."""
 _TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
 _OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css", "car.js")
 """Files that the page shares with the report."""
@@ -70,13 +70,19 @@ class ExploreServer:
         self._host = f"{HOST}:{self._socket.getsockname()[1]}"
         self.url = f"http://{self._host}/{self._token}/"
         self._report = ""
-        context = multiprocessing.get_context("spawn")
-        self._pipe, theirs = context.Pipe()
-        self._worker = context.Process(target=work, args=(theirs, str(folder.resolve())), daemon=True)
-        self._worker.start()
-        theirs.close()
+        self._folder = str(folder.resolve())
+        self._waiting: deque[Message] = deque()
+        self._came = asyncio.Event()
         self._ready: tuple[dict[str, Any], list[Any]] | None = None
         self._page: WebSocket | None = None
+        self._start_worker()
+
+    def _start_worker(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._worker = context.Process(target=work, args=(theirs, self._folder), daemon=True)
+        self._worker.start()
+        theirs.close()
 
     @property
     def port(self) -> int:
@@ -90,7 +96,7 @@ class ExploreServer:
             listening: Function that is called once the server accepts connections.
         """
         config = uvicorn.Config(
-            self._app(listening), log_level="warning", lifespan="on", ws_max_size=_MAX_MESSAGE, server_header=False
+            self._app(listening), log_level="warning", lifespan="on", ws_max_size=MAX_MESSAGE_BYTES, server_header=False
         )
         try:
             uvicorn.Server(config).run(sockets=[self._socket])
@@ -108,10 +114,11 @@ class ExploreServer:
     def _app(self, listening: Callable[[], None]) -> Starlette:
         @asynccontextmanager
         async def lifespan(_app: Starlette) -> AsyncIterator[None]:
-            pump = asyncio.create_task(self._pump())
+            tasks = [asyncio.create_task(self._pump()), asyncio.create_task(self._feed())]
             listening()
             yield
-            pump.cancel()
+            for task in tasks:
+                task.cancel()
 
         token = f"/{self._token}"
         return Starlette(
@@ -163,33 +170,63 @@ class ExploreServer:
         try:
             while True:
                 text = await page.receive_text()
-                message = _read(text)
-                if message is None:
-                    await self._tell(page, "the page sent a message that is no JSON object")
+                try:
+                    message = read(text)
+                except ActiveSteerError as error:
+                    await self._tell(page, str(error))
                     continue
-                self._pipe.send(message)
-        except (WebSocketDisconnect, KeyError):
+                if not self._hand_on(message):
+                    await self._tell(page, "too many messages wait; this one is dropped")
+        except (WebSocketDisconnect, KeyError, RuntimeError):
             pass
         finally:
             if self._page is page:
                 self._page = None
-                self._pipe.send({"kind": "end"})
+                self._hand_on(End())
+
+    def _hand_on(self, message: Message) -> bool:
+        """Put a message for the worker into the queue; return False if it is full."""
+        taken = add(self._waiting, message)
+        self._came.set()
+        return taken
+
+    async def _feed(self) -> None:
+        """Pass messages to the worker, outside the event loop: the worker may be busy and its pipe full."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await self._came.wait()
+            self._came.clear()
+            while self._waiting:
+                with suppress(OSError):  # the pump replaces a worker that has ended
+                    await loop.run_in_executor(None, self._pipe.send, self._waiting.popleft())
 
     async def _pump(self) -> None:
-        """Pass messages of the worker to the page."""
+        """Pass messages of the worker to the page, and replace a worker that has ended."""
         loop = asyncio.get_running_loop()
         while True:
             try:
                 header, arrays = await loop.run_in_executor(None, self._pipe.recv)
             except (EOFError, OSError):
-                if self._page is not None:
-                    await self._tell(self._page, "the worker process has ended; start `activesteer explore` again")
-                return
+                if self._ready is None:  # another one would end, too
+                    await self._say("the worker process has ended; start `activesteer explore` again")
+                    return
+                await asyncio.sleep(
+                    1.0
+                )  # at the end of the program its signal ends the worker first, and then this task
+                self._pipe.close()
+                self._ready = None
+                await loop.run_in_executor(None, self._start_worker)
+                await self._say("the worker process had ended; a new one has started")
+                continue
             if header["kind"] == "ready":
                 self._ready = header, arrays
             if header["kind"] == "report":
                 self._report = header.pop("html")
             await self._deliver(header, arrays)
+
+    async def _say(self, error: str) -> None:
+        if self._page is not None:
+            await self._tell(self._page, error)
 
     async def _deliver(self, header: dict[str, Any], arrays: list[Any]) -> None:
         if self._page is not None:
@@ -200,7 +237,8 @@ class ExploreServer:
 
     @staticmethod
     async def _tell(page: WebSocket, error: str) -> None:
-        await page.send_bytes(_packed({"kind": "error", "text": error, "about": None}, []))
+        with suppress(WebSocketDisconnect, RuntimeError):  # the page is gone
+            await page.send_bytes(_packed({"kind": "error", "text": error, "about": None}, []))
 
 
 def _packed(header: dict[str, Any], arrays: list[Any]) -> bytes:
@@ -208,16 +246,3 @@ def _packed(header: dict[str, Any], arrays: list[Any]) -> bytes:
     text = json.dumps(finite({**header, "arrays": [list(shape) for shape, _ in arrays]}), allow_nan=False).encode()
     text += b" " * (-(4 + len(text)) % 4)  # the numbers begin at a multiple of their size
     return struct.pack("<I", len(text)) + text + b"".join(data for _, data in arrays)
-
-
-def _read(text: str) -> dict[str, Any] | None:
-    """Return a message of the page; None if it is no JSON object."""
-    try:
-        message = json.loads(text, parse_constant=_no_constant)
-    except (ValueError, RecursionError):
-        return None
-    return message if isinstance(message, dict) else None
-
-
-def _no_constant(name: str) -> None:
-    raise ValueError(name)

@@ -1,6 +1,7 @@
 """The worker process of the page: one thread that drives, told by messages through a pipe.
 
-A new choice drops the runs of an older one. An error becomes a message to the page; the process goes on.
+A new choice drops the runs of an older one. Any error, also one of own code, becomes a message to the page; the process
+goes on.
 """
 
 from __future__ import annotations
@@ -12,11 +13,11 @@ from collections.abc import Iterator
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
 
 from activesteer.errors import ActiveSteerError
 from activesteer.explore.choice import Folder
 from activesteer.explore.drive import Drive
+from activesteer.explore.messages import Act, Describe, End, Message, Report, Run, Save, Start, add
 from activesteer.explore.runs import Reply, Runs
 
 
@@ -31,7 +32,7 @@ def work(connection: Connection, folder: str) -> None:
 class _Worker:
     def __init__(self, connection: Connection, folder: Folder) -> None:
         self._connection, self._folder = connection, folder
-        self._waiting: deque[dict[str, Any]] = deque()
+        self._waiting: deque[Message] = deque()
         self._runs = Runs(folder)
         self._drive: Drive | None = None
         self._reports = Path(tempfile.mkdtemp(prefix="activesteer-"))
@@ -43,12 +44,7 @@ class _Worker:
             while True:
                 self._receive(wait=self._drive is None and not self._waiting)
                 while self._waiting:
-                    message = self._waiting.popleft()
-                    try:
-                        for reply in self._answers(message):
-                            self._send(reply)
-                    except ActiveSteerError as error:
-                        self._send(Reply({"kind": "error", "text": str(error), "about": message.get("kind")}))
+                    self._answer(self._waiting.popleft())
                 if self._drive is not None:
                     self._drive_on(self._drive)
         finally:
@@ -58,36 +54,42 @@ class _Worker:
                 file.unlink()
             self._reports.rmdir()
 
-    def _answers(self, message: dict[str, Any]) -> Iterator[Reply]:
-        kind = message.pop("kind", None)
-        number = message.pop("id", None)
-        if kind == "describe":
-            yield self._numbered(self._runs.describe(message), number)
-        elif kind == "run" and self._drive is None:  # a drive comes before curves; the page asks again after it
-            values = message.pop("values", {})
-            for reply in self._runs.run(message, values, self._stale):
-                yield self._numbered(reply, number)
-        elif kind == "save":
-            yield self._runs.save()
-        elif kind == "report":
-            path = self._reports / "report.html"
-            reply = self._runs.report(path)
-            yield Reply({**reply.header, "html": path.read_text("utf-8")})
-        elif kind == "start":
-            if self._drive is not None:
-                yield self._drive.end()
-            self._drive = None
-            self._drive = Drive(message, self._folder)
-            yield self._drive.start()
-        elif kind == "end":
-            if self._drive is not None:
-                drive, self._drive = self._drive, None
-                yield drive.end()
-        elif kind == "act":
-            if self._drive is not None:
-                self._drive.act(message)
-        elif kind != "run":
-            yield Reply({"kind": "error", "text": f"the page sent an unknown message: {kind!r}", "about": None})
+    def _answer(self, message: Message) -> None:
+        try:
+            for reply in self._answers(message):
+                self._send(reply)
+        except (EOFError, BrokenPipeError):  # the server is gone
+            raise
+        except (Exception, SystemExit) as error:
+            self._send(_error(error, message))
+
+    def _answers(self, message: Message) -> Iterator[Reply]:
+        match message:
+            case Describe():
+                yield _numbered(self._runs.describe(message), message.id)
+            case Run():
+                if self._drive is None:  # a drive comes before curves; the page asks again after it
+                    for reply in self._runs.run(message, self._stale):
+                        yield _numbered(reply, message.id)
+            case Save():
+                yield self._runs.save()
+            case Report():
+                path = self._reports / "report.html"
+                reply = self._runs.report(path)
+                yield Reply({**reply.header, "html": path.read_text("utf-8")})
+            case Start():
+                if self._drive is not None:
+                    drive, self._drive = self._drive, None
+                    yield drive.end()
+                self._drive = Drive(message, self._folder)
+                yield self._drive.start()
+            case End():
+                if self._drive is not None:
+                    drive, self._drive = self._drive, None
+                    yield drive.end()
+            case Act():
+                if self._drive is not None:
+                    self._drive.act(message)
 
     def _drive_on(self, drive: Drive) -> None:
         try:
@@ -95,27 +97,41 @@ class _Worker:
             if drive.done:
                 self._drive = None
                 self._send(drive.end())
-        except ActiveSteerError as error:
+        except (EOFError, BrokenPipeError):
+            raise
+        except (Exception, SystemExit) as error:
             self._drive = None
             ended = drive.end()
-            self._send(Reply({**ended.header, "error": str(error)}))
-
-    def _numbered(self, reply: Reply, number: Any) -> Reply:
-        return Reply({**reply.header, "id": number}, reply.arrays)
+            self._send(Reply({**ended.header, "error": _words(error)}))
 
     def _stale(self) -> bool:
         """Return whether a newer choice waits."""
         self._receive(wait=False)
-        return any(message.get("kind") in ("run", "start") for message in self._waiting)
+        return any(isinstance(message, (Run, Start)) for message in self._waiting)
 
     def _receive(self, *, wait: bool) -> None:
-        """Take all messages that have come; only the newest choice and the newest hands are kept."""
+        """Take all messages that have come."""
         while wait or self._connection.poll():
-            message = self._connection.recv()
+            add(self._waiting, self._connection.recv())
             wait = False
-            if message.get("kind") == "run":
-                self._waiting = deque(other for other in self._waiting if other.get("kind") != "run")
-            self._waiting.append(message)
 
     def _send(self, reply: Reply) -> None:
         self._connection.send((reply.header, [(array.shape, array.tobytes()) for array in reply.arrays]))
+
+
+def _numbered(reply: Reply, number: int) -> Reply:
+    return Reply({**reply.header, "id": number}, reply.arrays)
+
+
+def _error(error: BaseException, message: Message) -> Reply:
+    return Reply({"kind": "error", "text": _words(error), "about": type(message).__name__.lower()})
+
+
+def _words(error: BaseException) -> str:
+    """Return the message of our own errors, and the class of others with their message."""
+    if isinstance(error, ActiveSteerError):
+        return str(error)
+    try:
+        return f"{type(error).__name__}: {error}"
+    except (Exception, SystemExit):
+        return type(error).__name__

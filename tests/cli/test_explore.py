@@ -9,8 +9,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import closing
 from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
+import psutil
 import pytest
 
 from tests.cli.conftest import Call
@@ -18,18 +21,26 @@ from tests.cli.conftest import Call
 pytest.importorskip("uvicorn", reason="needs the extra `explore`")
 websockets = pytest.importorskip("websockets.sync.client", reason="needs the extra `explore`")
 
+SERVER: list[int] = []
+"""Process number of the running server."""
 COMMAND = [sys.executable, "-c", "from activesteer.cli import main; raise SystemExit(main())", "explore"]
 
 
 @pytest.fixture(scope="module")
-def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("explore")
+
+
+@pytest.fixture(scope="module")
+def url(folder: Path) -> Iterator[str]:
     """Address of a running page, which Ctrl-C ends at last."""
-    folder = tmp_path_factory.mktemp("explore")
     command = [*COMMAND, "--json", "-o", str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
         assert server.stderr is not None
-        yield json.loads(server.stdout.readline())["url"]
+        url = json.loads(server.stdout.readline())["url"]
+        SERVER[:] = [server.pid]
+        yield url
         server.send_signal(signal.SIGINT)
         assert server.wait(20) == 130
         assert "Traceback" not in server.stderr.read()
@@ -63,29 +74,76 @@ def test_a_page_from_elsewhere_gets_no_connection(url: str) -> None:
         pass
 
 
+class Page:
+    """A page without a browser."""
+
+    def __init__(self, url: str) -> None:
+        address, origin = url.replace("http:", "ws:") + "socket", url[:-1].rpartition("/")[0]
+        self.socket = websockets.connect(address, origin=origin, max_size=None)
+
+    def __enter__(self) -> Page:
+        self.socket.__enter__()
+        return self
+
+    def __exit__(self, *about: object) -> None:
+        self.socket.__exit__(*about)
+
+    def say(self, kind: str, **values: object) -> None:
+        self.socket.send(json.dumps({"kind": kind, **values}))
+
+    def hear(self, kind: str) -> dict[str, Any]:
+        """Return the next message of a kind."""
+        while True:
+            data = self.socket.recv(timeout=60)
+            header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
+            if header["kind"] == kind:
+                return header
+
+
 def test_wrong_messages_get_an_answer_and_the_page_goes_on(url: str) -> None:
-    address, origin = url.replace("http:", "ws:") + "socket", url[:-1].rpartition("/")[0]
-    with websockets.connect(address, origin=origin, max_size=None) as socket:
+    with Page(url) as page:
+        assert "slalom" in str(page.hear("ready")["maneuvers"])
+        page.say("save")
+        assert "no run to save" in page.hear("error")["text"]
+        page.say("run", maneuver="/etc/passwd")
+        assert "name a file in" in page.hear("error")["text"]
+        page.say("run", maneuver=300 * "a")
+        assert "length <= 200" in page.hear("error")["text"]
+        page.say("describe", id=1, maneuver="step_steer")
+        assert page.hear("description")["title"]
 
-        def heard(kind: str) -> dict[str, object]:
-            while True:
-                data = socket.recv(timeout=60)
-                header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
-                if header["kind"] == kind:
-                    return header
 
-        assert "slalom" in str(heard("ready")["maneuvers"])
-        for wrong in (
-            "{",
-            "[]",
-            '{"kind": "nothing"}',
-            '{"kind": "run", "maneuver": "/etc/passwd"}',
-            '{"kind": "save"}',
-        ):
-            socket.send(wrong)
-            assert heard("error")["text"]
-        socket.send(json.dumps({"kind": "describe", "id": 1, "maneuver": "step_steer"}))
-        assert heard("description")["title"]
+def test_any_error_of_an_own_controller_is_an_answer(url: str, folder: Path) -> None:
+    (folder / "ends.py").write_text("raise SystemExit(0)\nclass C: ...\n")
+    with Page(url) as page:
+        page.say("start", maneuver="plane", controllers=["ends.py:C"])
+        assert page.hear("error")["text"]
+        page.say("describe", maneuver="step_steer")
+        assert page.hear("description")
+
+
+def test_a_flood_of_messages_stops_neither_server_nor_worker(url: str) -> None:
+    with Page(url) as page:
+        page.say("start", maneuver="plane")
+        page.hear("drive")
+        for number in range(1500):
+            page.say("act", steer=0.1, number=number)
+            page.say("act", hold=True)
+        assert status(url, urlsplit(url).path)[0] == 200
+        page.say("end")
+        assert page.hear("driven")["error"] == ""
+
+
+def test_a_dead_worker_is_replaced(url: str) -> None:
+    with Page(url) as page:
+        page.hear("ready")
+        (worker,) = [
+            child for child in psutil.Process(SERVER[0]).children() if "spawn_main" in " ".join(child.cmdline())
+        ]
+        worker.kill()
+        assert "a new one has started" in page.hear("error")["text"]
+        page.say("describe", maneuver="step_steer")
+        assert page.hear("description")
 
 
 @pytest.mark.parametrize(("options", "said"), [(["--port", "70000"], "0 to 65535"), (["-o", "missing"], "no folder")])

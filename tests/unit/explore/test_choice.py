@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from collections import deque
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from activesteer.errors import ParameterError
-from activesteer.explore.choice import Folder, numbers
+from activesteer.explore.choice import Folder, check_numbers
+from activesteer.explore.messages import MAX_WAITING, Act, End, Message, Run, add, read
 from activesteer.explore.sliders import sliders
 from activesteer.scenario import resolve
 
@@ -41,14 +44,44 @@ class Mine:
 )
 def test_a_message_can_name_nothing_outside_the_lists_and_the_folder(message: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(ParameterError):
-        Folder(tmp_path).choice(message)
+        Folder(tmp_path).check(cast(Run, read(json.dumps({"kind": "run", **message}))))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{", "[]", "null", '{"kind": "nothing"}', '{"kind": "act", "steer": 2.0}', '{"kind": "act", "steer": NaN}',
+        '{"kind": "act", "throttle": -0.1}', '{"kind": "act", "brake": "full"}', '{"kind": "act", "steer": true}',
+        '{"kind": "save", "more": 1}', '{"kind": "run", "maneuver": "slalom", "values": {"v": 1' + 400 * "0" + "}}",
+        '{"kind": "run", "maneuver": "' + 300 * "a" + '.toml"}',
+        '{"kind": "run", "maneuver": "slalom", "id": ' + 900 * "[" + 900 * "]" + "}",
+        '{"kind": "run", "id": ' + 9000 * "[",
+        '{"kind": "save"' + 20_000 * " " + "}",
+    ],
+)  # fmt: skip
+def test_a_message_of_another_form_or_size_is_refused(text: str) -> None:
+    with pytest.raises(ParameterError):
+        read(text)
+
+
+def test_a_full_queue_holds_the_newest_choice_and_the_newest_hands() -> None:
+    waiting: deque[Message] = deque()
+    for number in range(1500):
+        assert add(waiting, Run(maneuver="slalom", id=number))
+        assert add(waiting, Act(steer=0.5, number=number))
+    assert [getattr(message, "id", None) for message in waiting if isinstance(message, Run)] == [1499]
+    assert isinstance(waiting[-1], Act)
+    assert waiting[-1].number == 1499
+    assert len(waiting) <= MAX_WAITING
+    assert [add(waiting, End()) for _ in range(200)].count(False) > 0
+    assert len(waiting) == MAX_WAITING
 
 
 def test_an_own_controller_in_the_folder_is_found_and_its_parameter_has_a_slider(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(OWN)
     folder = Folder(tmp_path)
-    chosen = folder.choice({"maneuver": "slalom", "controllers": ["mine.py:Mine"]})
-    own = folder.located(chosen.controllers[0])
+    folder.check_controller("mine.py:Mine")
+    own = folder.located("mine.py:Mine")
     found = {slider.key: slider for slider in sliders(resolve("slalom", controllers=[own]), [own])}
     assert found["controllers.Mine.gain_s"].value == 0.1
     assert found["controllers.Mine.gain_s"].unit == "s"
@@ -62,9 +95,7 @@ def test_sliders_have_the_values_and_units_of_the_files() -> None:
     assert "cones.spacing_m" not in found
 
 
-@pytest.mark.parametrize(
-    "values", [{"mass": 1.0}, {"speed": "80"}, {"speed": 1e9}, {"speed": True}, {"speed": None}, []]
-)
-def test_only_numbers_within_the_range_of_a_slider_are_taken(values: Any) -> None:
+@pytest.mark.parametrize("values", [{"mass": 1.0}, {"speed": 1e9}, {"speed": 19.0}])
+def test_only_numbers_within_the_range_of_a_slider_are_taken(values: dict[str, float]) -> None:
     with pytest.raises(ParameterError):
-        numbers(values, {"speed": (20.0, 160.0)})
+        check_numbers(values, {"speed": (20.0, 160.0)})

@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 import activesteer
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder
-from activesteer.explore.drive import Drive, Hands
+from activesteer.explore.drive import Drive
+from activesteer.explore.messages import Act, Start
 from activesteer.simulation.live_view import Pacer
 
 
@@ -29,7 +30,7 @@ class Clock:
 
 def drive(course: str, folder: Path, controller: str = "none") -> Drive:
     pacer = Pacer(clock=Clock(), sleep=lambda _: None)
-    return Drive({"maneuver": course, "controllers": [controller]}, Folder(folder), pacer)
+    return Drive(Start(maneuver=course, controllers=(controller,)), Folder(folder), pacer)
 
 
 def go(car: Drive, until_s: float) -> dict[str, Any]:
@@ -43,12 +44,12 @@ def test_steering_to_the_left_turns_left_and_the_recording_holds_the_drive(tmp_p
     car = drive("plane", tmp_path)
     shape = car.start()
     assert shape.header["cones"] == []
-    car.act({"steer": 0.5, "direct": True, "number": 7})
+    car.act(Act(steer=0.5, direct=True, number=7))
     frame = go(car, 1.5)
     assert frame["yaw_rate_degps"] > 5.0
     assert frame["seen"] == 7
     assert frame["speed_kmh"] == pytest.approx(60.0, abs=3.0)  # held
-    car.act({"controller": "ars"})
+    car.act(Act(controller="ars"))
     assert abs(go(car, 2.0)["rear_deg"]) > 0.05
     end = car.end().header
     recording = activesteer.Recording.open(car.path)
@@ -58,7 +59,7 @@ def test_steering_to_the_left_turns_left_and_the_recording_holds_the_drive(tmp_p
 
 def test_the_hands_turn_no_faster_than_hands_and_no_further_than_a_full_turn(tmp_path: Path) -> None:
     car = drive("plane", tmp_path)
-    car.act({"steer": 1.0})
+    car.act(Act(steer=1.0))
     angles = [go(car, 0.1 * count)["steering_wheel_deg"] for count in range(1, 12)]
     rates = [(b - a) / 0.1 for a, b in itertools.pairwise(angles)]
     assert max(rates) < 600.0
@@ -72,7 +73,7 @@ def test_the_hands_turn_no_faster_than_hands_and_no_further_than_a_full_turn(tmp
 
 def test_a_foot_on_the_brake_stops_the_car(tmp_path: Path) -> None:
     car = drive("slippery", tmp_path)
-    car.act({"brake": 1.0, "steer": 0.0})
+    car.act(Act(brake=1.0, steer=0.0))
     assert go(car, 5.0)["speed_kmh"] < 4.0
     car.end()
 
@@ -88,15 +89,13 @@ def test_a_car_that_drives_straight_on_hits_cones_once_and_leaves_the_others(tmp
     car.end()
 
 
-@pytest.mark.parametrize("message", [{"steer": 2.0}, {"steer": math.nan}, {"throttle": -0.1}, {"brake": "full"}])
-def test_positions_out_of_range_are_refused(message: dict[str, Any]) -> None:
-    with pytest.raises(ParameterError):
-        Hands.read(message)
-
-
-def test_an_unknown_controller_is_refused_and_the_drive_goes_on(tmp_path: Path) -> None:
-    car = drive("plane", tmp_path)
-    with pytest.raises(ActiveSteerError):
-        car.act({"controller": "arrs"})
+def test_an_unknown_controller_or_one_of_another_folder_is_refused_and_the_drive_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    (tmp_path / "elsewhere.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'w').close()\nclass C: ...\n")
+    car = drive("plane", tmp_path / "own")
+    for name in ("arrs", f"{tmp_path}/elsewhere.py:C", "../elsewhere.py:C"):
+        with pytest.raises(ParameterError):
+            car.act(Act(controller=name))
+    assert not (tmp_path / "executed").exists()
     assert go(car, 0.3)["time_s"] >= 0.3
     car.end()

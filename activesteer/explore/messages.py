@@ -1,0 +1,125 @@
+"""Messages of the page: their fields, ranges and sizes, checked in this one place, and the queue in which they wait."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import UNSET, Meta, Struct, UnsetType
+
+from activesteer.errors import ParameterError
+from activesteer.resources import DEFAULT_DRIVER
+
+MAX_MESSAGE_BYTES: Final = 20_000
+"""Largest message of the page; its choices have some hundred bytes."""
+MAX_CONTROLLERS: Final = 3
+MAX_WAITING: Final = 100
+"""Largest number of messages that wait; the newest choice and the newest hands replace older ones."""
+_MAX_NUMBERS: Final = 300
+
+_Name = Annotated[str, Meta(min_length=1, max_length=200)]
+_Number = Annotated[int, Meta(ge=0, le=2**53)]
+_Pedal = Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
+class Choice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind"):
+    """A run, or a drive by hand, as the page chose it."""
+
+    maneuver: _Name
+    """Manoeuvre, or course of a drive."""
+    vehicle: _Name = "compact"
+    """Car."""
+    driver: _Name = DEFAULT_DRIVER
+    """Driver; a drive by hand needs none."""
+    controllers: Annotated[tuple[_Name, ...], Meta(min_length=1, max_length=MAX_CONTROLLERS)] = ("none",)
+    """Controllers."""
+
+
+class Describe(Choice, frozen=True, tag="describe"):
+    """The page asks for the sliders and the car of a choice."""
+
+    id: _Number = 0
+    """Number that the reply repeats."""
+
+
+class Run(Choice, frozen=True, tag="run"):
+    """The page asks for runs."""
+
+    id: _Number = 0
+    """Number that the replies repeat."""
+    dragging: bool = False
+    """Whether a slider is being moved: the amplitude of the steering wheel is then held."""
+    values: Annotated[dict[_Name, float], Meta(max_length=_MAX_NUMBERS)] = {}
+    """Key of a slider -> value."""
+
+
+class Start(Choice, frozen=True, tag="start"):
+    """A drive by hand begins."""
+
+
+class Act(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="act"):
+    """Hands and feet, controller, or the speed to hold during a drive; what is unset stays as it is."""
+
+    steer: Annotated[float, Meta(ge=-1.0, le=1.0)] | UnsetType = UNSET
+    """Position of the steering, -1 full right to 1 full left; throttle, brake and direct count with it."""
+    throttle: _Pedal = 0.0
+    """Throttle pedal."""
+    brake: _Pedal = 0.0
+    """Brake pedal."""
+    direct: bool = False
+    """Whether `steer` is the position of a gamepad's stick or a slider, and not of a key."""
+    number: _Number = 0
+    """Number of these hands, which the next frame repeats."""
+    controller: _Name | UnsetType = UNSET
+    """Controller that takes over."""
+    hold: bool | UnsetType = UNSET
+    """Whether to hold the present speed."""
+
+
+class Save(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="save"):
+    """The page asks to write the last runs as recordings."""
+
+
+class Report(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="report"):
+    """The page asks for a report of the last runs."""
+
+
+class End(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="end"):
+    """The drive ends."""
+
+
+Message = Describe | Run | Start | Act | Save | Report | End
+_DECODER: Final = msgspec.json.Decoder(Message)
+
+
+def read(text: str | bytes) -> Message:
+    """Return a message of the page.
+
+    Raises:
+        ParameterError: it is no JSON, too large, or a field is unknown, missing, of another type or out of range.
+    """
+    if len(text) > MAX_MESSAGE_BYTES:
+        raise ParameterError(f"a message of the page has {len(text)} letters; {MAX_MESSAGE_BYTES} are allowed")
+    try:
+        return _DECODER.decode(text)
+    except (msgspec.MsgspecError, RecursionError, UnicodeError) as error:
+        raise ParameterError(f"a message of the page is not understood: {error}") from error
+
+
+def add(waiting: deque[Message], message: Message) -> bool:
+    """Append a message to a queue, where it replaces an older one of the same meaning; return False if it is full."""
+    if _is_replaced(message):
+        for older in [other for other in waiting if type(other) is type(message) and _is_replaced(other)]:
+            waiting.remove(older)
+    if len(waiting) >= MAX_WAITING:
+        return False
+    waiting.append(message)
+    return True
+
+
+def _is_replaced(message: Message) -> bool:
+    """Return whether a newer message of its type makes this one useless."""
+    if isinstance(message, Act):
+        return message.controller is UNSET and message.hold is UNSET
+    return not isinstance(message, (Start, End))
