@@ -70,6 +70,8 @@ def pytest_configure(config: pytest.Config) -> None:
         subprocess.run([sys.executable, "-c", drive], cwd=ROOT, check=True)
 
 
+# Before the hook of pytest-xdist, which reads the groups.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not hasattr(config, "workerinput"):
         return

@@ -124,6 +124,7 @@ def test_recovered_file_of_a_killed_run_opens_in_readers_that_seek(call, left, t
     assert "is the input file; choose another name" in refused.err
 
 
+@pytest.mark.slow
 def test_disk_that_fills_up_leaves_no_half_file_for_the_viewer(call, tmp_path):
     call("run", "straight_line", "--set", "duration_s=3", "-o", "run.mcap")
     done = activesteer(

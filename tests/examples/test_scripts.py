@@ -154,6 +154,7 @@ def test_own_cars_roll_as_their_changes_say(tmp_path: Path, show: Callable[..., 
     assert masses_kg == [0.0, 300.0]
 
 
+@pytest.mark.slow
 def test_own_study_shows_that_rear_steering_takes_the_overshoot_out(show: Callable[..., None]) -> None:
     scope = example("own_study")
     table = activesteer.study(scope["STUDY"], jobs=1)

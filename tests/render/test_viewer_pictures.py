@@ -106,8 +106,9 @@ def test_no_view_reports_anything(alone: dict[float, Pictures], together: Pictur
         assert {name: picture.reports for name, picture in pictures.items() if picture.reports} == {}
 
 
-def test_the_car_is_seen_from_behind_on_its_road(alone: dict[float, Pictures]) -> None:
-    pixels = alone[AT_S][CARS[1]].pixels
+def test_the_car_is_seen_from_behind_on_its_road(viewer: Headless, drives: Drives, folder: Path) -> None:
+    save(runs_of({"ars": drives["ars"]}), folder / "behind.rrd")
+    pixels = _looked_at(viewer, folder / "behind.rrd", (CARS[1],), (AT_S,))[AT_S][CARS[1]].pixels
     height, width = pixels.shape[:2]
     assert like(pixels[: height // 40], SKY, 6).mean() > 0.95
     assert like(pixels[-height // 5 :], ASPHALT, 12).mean() > 0.5

@@ -75,7 +75,12 @@ def passed(claims: list[Claim], fake: Fake) -> list[Claim]:
     return [claim for claim in claims if claim.passed and fake in claim.statement.rejects]
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+# Judging the fakes of the step steer and the sine with dwell takes ten seconds each; the quick tests try two others.
+_QUICK = ("double_lane_change", "double_lane_change_low_mu")
+_EACH = [pytest.param(name, marks=[] if name in _QUICK else pytest.mark.slow) for name in SCENARIOS]
+
+
+@pytest.mark.parametrize("scenario", _EACH)
 def test_other_runs_in_place_of_the_systems_prove_nothing(runs: Runs, scenario: str) -> None:
     none, ars, afs = (runs[scenario][system] for system in SYSTEMS)
     check = SCENARIOS[scenario]
@@ -86,7 +91,7 @@ def test_other_runs_in_place_of_the_systems_prove_nothing(runs: Runs, scenario: 
         assert passed(check(ended), Fake.CUT_SHORT) == []
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", _EACH)
 def test_a_system_turned_round_has_none_of_the_effects(runs: Runs, scenario: str) -> None:
     fakes = {system: simulate(scenario, turned_round(system)) for system in ("ars", "afs")}
     assert passed(SCENARIOS[scenario]({"none": runs[scenario]["none"], **fakes}), Fake.REVERSED) == []

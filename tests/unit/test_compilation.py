@@ -143,6 +143,7 @@ def test_without_a_folder_that_can_be_written_it_runs_and_says_so_once(package: 
     assert logged.split() == ["WARNING"]
 
 
+@pytest.mark.slow
 def test_only_some_states_of_a_function_are_kept(package: Path, tmp_path: Path) -> None:
     call = "from activesteer import compilation\ncompilation._KEPT = 2\n" + _CALL.format(package=package.name)
     kept = []

@@ -123,6 +123,7 @@ def test_a_wrong_table_is_named(tmp_path: Path, change: dict[str, object], key: 
         falsify({**REQUIREMENT, "falsify": {**REQUIREMENT["falsify"], **change}}, tmp_path, jobs=1, runs=2)
 
 
+@pytest.mark.slow
 def test_command_says_what_it_found_and_fails_on_a_violation(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     file = tmp_path / "r.toml"
     table = "\n".join(f"{key} = {json.dumps(value)}" for key, value in MANEUVER.items() if key != "steer")

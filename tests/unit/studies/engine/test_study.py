@@ -79,6 +79,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_a_killed_study_goes_on_with_what_is_missing(tmp_path):
     script = tmp_path / "script.py"
     script.write_text(_KILLED)

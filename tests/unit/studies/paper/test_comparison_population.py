@@ -139,6 +139,7 @@ def only_braking(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "comparison_study", shortened)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("only_braking")
 def test_command_goes_on_with_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     arguments = ["reproduce", "--controllers", "none,ars,afs,esc", "--population", "1", "--jobs", "1"]

@@ -60,6 +60,7 @@ def test_processes_and_interruptions_change_no_bit(serial: Path, tmp_path: Path)
     assert (tmp_path / RESULTS).read_bytes() == (serial / RESULTS).read_bytes()
 
 
+@pytest.mark.slow
 def test_all_three_systems_meet_the_same_samples(serial: Path) -> None:
     rows = pq.read_table(serial / RESULTS).to_pylist()
     keys = shortened(2).keys
