@@ -145,7 +145,8 @@ def _watch(options: argparse.Namespace) -> int:
     scenario = scenario_of(options)
     check_gains(scenario.overrides, [controller])
 
-    from activesteer.commands.window import check_display, watch
+    from activesteer.commands.window import watch
+    from activesteer.simulation.live_view import check_display
 
     check_display()
     watch(prepared(scenario), controller, pace, cutaway=options.cutaway)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import re
 import sys
 import threading
 import time
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from activesteer.errors import PlaybackError
-
-_ELSEWHERE: Final = "`activesteer video` makes a film of a recording without a window"
 _LONGEST_CLOSING_S: Final = 5.0
 
 
@@ -58,23 +53,3 @@ def _threads_joined() -> Iterator[None]:
     finally:
         for thread in set(threading.enumerate()) - before:
             thread.join(_LONGEST_CLOSING_S)
-
-
-def check_display() -> None:
-    """Check that there is a display with OpenGL; without one, the viewer would wait forever."""
-    import glfw
-
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        window = None
-        if glfw.init():
-            glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
-            window = glfw.create_window(16, 16, "activesteer", None, None)
-            if window:
-                glfw.destroy_window(window)
-            glfw.terminate()
-    if not window:
-        # GLFW's messages come as "(number) b'words'".
-        reasons = [re.sub(r"^\(\d+\) b'(.*)'$", r"\1", str(warning.message)) for warning in caught]
-        msg = f"there is no display to open a window on: {reasons[-1] if reasons else 'GLFW does not say why'}"
-        raise PlaybackError(f"{msg}; {_ELSEWHERE}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from inspect import signature
 from typing import Any, Final
 
 import gymnasium
@@ -13,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 from mujoco import MjvCamera
 from numpy.typing import NDArray
 
-from activesteer.errors import ParameterError, SimulationDiverged, shown
+from activesteer.errors import ParameterError, SimulationDiverged, nearest_names, shown
 from activesteer.learning.episodes import Episodes, Outcome
 from activesteer.learning.tasks import Task
 from activesteer.recording import Recording
@@ -60,13 +61,17 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 `interval_s`, `overrides`.
 
         Raises:
-            ActiveSteerError: an input is wrong.
+            ActiveSteerError: an input is wrong, or there is no display for `human`.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             allowed = ", ".join(self.metadata["render_modes"])
             raise ParameterError(f"is {shown(render_mode)}; {allowed} or None is needed", key="render_mode")
+        if render_mode == "human":
+            from activesteer.simulation.live_view import check_display  # noqa: PLC0415 - graphics only where asked for
+
+            check_display()
         self.render_mode = render_mode
-        self.episodes = Episodes(task, 1, **{"threads": 1, **options})
+        self.episodes = Episodes(task, 1, **{"threads": 1, **_known(options)})
         self.action_space = self.episodes.action_space
         self.observation_space = self.episodes.observation_space
         self._picture: _Picture | None = None
@@ -86,7 +91,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Drive until the next decision; see `gymnasium.Env.step`."""
-        found = self.episodes.step(np.asarray(action)[np.newaxis])
+        found = self.episodes.step([action])
         self._given.append(np.array(action, dtype=np.float64))
         info = {
             "reward_terms": {name: float(value[0]) for name, value in found.terms.items()},
@@ -111,8 +116,8 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def recording(self) -> Recording:
         """Drive the episode once more with the actions so far, and return its recording.
 
-        The recording equals the episode to the last bit. Its `save` writes a file for `activesteer replay`, `watch`,
-        `video` and `report`.
+        The recording equals the episode to the last bit. Its `save` writes a file for `activesteer replay`, `video`
+        and `report`.
         """
         simulation = Simulation(self.episodes.loop(0).scenario)
         with suppress(SimulationDiverged):  # the episode has diverged too
@@ -136,6 +141,15 @@ def _first(command: Any) -> Any:
     """Return the first of several commands."""
     first = (value[0].tolist() if isinstance(value, np.ndarray) else value for value in command)
     return type(command)(*(tuple(value) if isinstance(value, list) else value for value in first))
+
+
+def _known(options: dict[str, Any]) -> dict[str, Any]:
+    """Return options of `Episodes`, after checking their names."""
+    names = [name for name in signature(Episodes).parameters if name not in ("task", "n")]
+    for name in options:
+        if name not in names:
+            raise ParameterError(f"is no option; {nearest_names(name, names)}", key=name, allowed=names)
+    return options
 
 
 class _Picture:
@@ -207,7 +221,7 @@ class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.fl
             raise ParameterError("is offered by the single environment only", key="render_mode", value=render_mode)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**CarEnv.metadata, "autoreset_mode": self.autoreset_mode}
-        self.num_envs, self.episodes = num_envs, Episodes(task, num_envs, **options)
+        self.num_envs, self.episodes = num_envs, Episodes(task, num_envs, **_known(options))
         self.single_action_space = self.episodes.action_space
         self.single_observation_space = self.episodes.observation_space
         self.action_space = batch_space(self.single_action_space, num_envs)

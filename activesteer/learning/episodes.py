@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any, Final, NamedTuple
 
@@ -210,9 +211,7 @@ class Episodes:
             ParameterError: an action is not finite, or an episode has not been reset.
         """
         chosen = np.ones(self._n, dtype=bool) if episodes is None else np.asarray(episodes, dtype=bool)
-        given = np.asarray(actions, dtype=np.float64).reshape(self._n, len(self.actions))
-        if not np.isfinite(given[chosen]).all():
-            raise ParameterError(f"is {shown(actions)}; finite numbers are needed", key="action")
+        given = self._checked(actions, chosen)
         if not self._started[chosen].all():
             raise ParameterError("reset the environment before its first step", key="step")
         given = self.within_bounds(np.where(chosen[:, np.newaxis], given, 0.0))
@@ -233,6 +232,17 @@ class Episodes:
         terms["lost"] = -self.task.weights.get("lost", 0.0) * terminated
         reward = np.nan_to_num(sum(terms.values()), nan=-self.task.weights.get("lost", 0.0))
         return Outcome(self._observe(tracked), reward, terminated, truncated, terms, sideslip, _END_NAMES[end])
+
+    def _checked(self, actions: Any, chosen: NDArray[np.bool_]) -> Array:
+        """Return actions as numbers, shape (n, numbers)."""
+        shape = self._n, len(self.actions)
+        with suppress(TypeError, ValueError, OverflowError):
+            given = np.asarray(actions)
+            if given.dtype.kind in "fiub" and given.shape == shape and np.isfinite(given[chosen]).all():
+                return given.astype(np.float64)
+        raise ParameterError(
+            f"is {shown(actions)}; finite real numbers of shape {shape} are needed", key="action", value=actions
+        )
 
     def within_bounds(self, actions: Array) -> Array:
         """Limit actions to their bounds."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Final, Self
@@ -45,6 +45,7 @@ _MAX_TABLES: Final = 64
 _LEAST_STEPS: Final = 40
 """Car-steps below which a second thread costs more than it saves."""
 _MOST: Final = 1e12
+_MOST_STEPS: Final = 2**40
 """Largest number of a command without a range of its own."""
 _WHEEL, _FRONT = (
     [number.name for number in numbers_of(DriverCommand)].index(name)
@@ -247,9 +248,7 @@ class Batch:
             ParameterError: an argument is wrong; nothing was driven.
             ActiveSteerError: your own driver or controller failed. A car that diverges raises nothing: see `failures`.
         """
-        left = np.broadcast_to(np.asarray(steps), len(self))
-        if not np.issubdtype(left.dtype, np.integer) or (left < 0).any():
-            raise ParameterError(f"is {shown(steps)}; a whole number of steps, 0 or more, is needed", key="steps")
+        left = _steps(steps, len(self))
         drivers = None if driver_command is None else _columns(DRIVER, driver_command, len(self))
         if drivers is not None:
             drivers[:, _FRONT] = drivers[:, _WHEEL] / self._ratios
@@ -485,6 +484,17 @@ def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | 
     return [dict(changes) for changes in overrides]
 
 
+def _steps(steps: Any, n: int) -> NDArray[np.intp]:
+    """Return the number of steps of each car, after checking it."""
+    with suppress(ValueError, OverflowError):
+        given = np.asarray(steps)
+        if np.issubdtype(given.dtype, np.integer) and given.ndim < 2 and (given >= 0).all():
+            return np.broadcast_to(np.minimum(given, _MOST_STEPS).astype(np.intp), n)
+    raise ParameterError(
+        f"is {shown(steps)}; a whole number of steps, 0 or more, or {n} of them, is needed", key="steps", value=steps
+    )
+
+
 def _columns(kind: Kind, message: Any, n: int) -> Array:
     """Return the rows of a message of arrays, after checking them.
 
@@ -505,8 +515,10 @@ def _columns(kind: Kind, message: Any, n: int) -> Array:
                 raise kind.fail("", f"{name} cannot be given to a batch", value)
             continue
         try:
+            if np.iscomplexobj(value):
+                raise TypeError("is complex")
             rows[:, place : place + width] = np.reshape(value, (-1, width)) if np.ndim(value) else value
-        except (TypeError, ValueError) as reason:
+        except (TypeError, ValueError, OverflowError) as reason:
             shape = f"({n},)" if width == 1 else f"({n}, {width})"
             raise kind.fail(
                 "", f"{name} is {shown(value)}; a number, or an array of shape {shape}, is needed"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import time
+import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, Final, NamedTuple, Protocol
@@ -11,6 +13,7 @@ from typing import Any, Final, NamedTuple, Protocol
 from activesteer.conventions import run_looks
 from activesteer.display_units import quantity_of
 from activesteer.drawing.direction_of_motion import SLOWEST_MPS
+from activesteer.errors import PlaybackError
 from activesteer.maneuver import Maneuver
 from activesteer.road.footprint import Footprint
 from activesteer.simulation.appearance import scene_of
@@ -259,3 +262,23 @@ def _texts(simulation: ClosedLoop, time_s: float, speed: float, *, paused: bool)
     pace = "paused" if paused else f"{speed:g} x real time"
     told = [*(f"{item.value_text(value)} {item.unit.name}" for item, value in shown.items()), pace]
     return "\n".join(names), "\n".join([*told, "pause", "restart", "slower, faster"])
+
+
+def check_display() -> None:
+    """Check that there is a display with OpenGL; without one, the viewer would wait forever."""
+    import glfw
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        window = None
+        if glfw.init():
+            glfw.window_hint(glfw.VISIBLE, glfw.FALSE)
+            window = glfw.create_window(16, 16, "activesteer", None, None)
+            if window:
+                glfw.destroy_window(window)
+            glfw.terminate()
+    if not window:
+        # GLFW's messages come as "(number) b'words'".
+        reasons = [re.sub(r"^\(\d+\) b'(.*)'$", r"\1", str(warning.message)) for warning in caught]
+        msg = f"there is no display to open a window on: {reasons[-1] if reasons else 'GLFW does not say why'}"
+        raise PlaybackError(f"{msg}; `activesteer video` makes a film of a recording without a window")

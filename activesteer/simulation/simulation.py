@@ -122,7 +122,7 @@ class Simulation:
         self.context = RunContext.of(self.scenario, self.loop.vehicle, controller)
         self._given: dict[str, int] = {}
         self.events: tuple[Event, ...] = ()
-        self._pacer = None if realtime is False else Pacer(float(realtime), timestep_s)
+        self._pacer = None if realtime is False else Pacer(1.0 if realtime is True else realtime, timestep_s)
         self._link = None if udp is None else self._linked(UdpPort(udp) if isinstance(udp, int) else udp)
         self._failure: BaseException | None = None
         self._writer: McapWriter | None = None
@@ -488,7 +488,8 @@ class Simulation:
         Raises:
             RecordingError: the file cannot be written.
         """
-        assert self.loop.step_count == 0
+        if self.loop.step_count or self._writer is not None:
+            raise RecordingError("a run is recorded to one file, from its first step", key="path", value=path)
         with self.context.writer(path) as self._writer:
             keep = self.steps * len(self.context.channels) <= MAX_KEPT_VALUES
             recorder = Recorder(self.loop.vehicle, self.steps, self._writer, keep=keep, interval_s=self._block_s)

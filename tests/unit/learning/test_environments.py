@@ -1,5 +1,6 @@
 """Gymnasium environments: valid, repeatable, and many at once equal to one by one."""
 
+import math
 import warnings
 from typing import Any
 
@@ -9,8 +10,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from activesteer.errors import ParameterError
+from activesteer.errors import ParameterError, PlaybackError
 from activesteer.learning import TASKS, CarEnv, CarVectorEnv, normalised
+from tests.raising import raises
 
 SHORT = {"overrides": {"duration_s": 0.8}, "interval_s": 0.1}
 """Episodes of eight steps, so that some end while others go on."""
@@ -138,3 +140,20 @@ def test_observations_are_normalised_on_request() -> None:
 def test_wrong_options_are_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         CarEnv(**options)
+
+
+@pytest.mark.parametrize("action", ["left", [0.0, 1j], np.zeros(7), None, [10**400], [math.nan]])
+def test_an_action_of_another_form_is_one_error(action: Any) -> None:
+    env = CarEnv("SineWithDwell")
+    env.reset(seed=1)
+    with raises(ParameterError, key="action"):
+        env.step(action)
+    with raises(ParameterError, key="sensor"):
+        CarEnv("SineWithDwell", sensor="production")
+
+
+def test_a_window_without_a_display_is_refused_before_it_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(PlaybackError, match="no display to open a window on"):
+        CarEnv("SineWithDwell", render_mode="human")

@@ -10,8 +10,9 @@ import pytest
 import activesteer
 from activesteer import ActuatorCommand, Batch, DriverCommand, Simulation
 from activesteer.controllers import NoControl
-from activesteer.errors import ControllerError, ParameterError
+from activesteer.errors import ActiveSteerError, ControllerError, ParameterError
 from activesteer.signals import numbers_in
+from tests.raising import raises
 
 FRICTIONS = np.array([0.7, 0.8, 0.9])
 STEPS = 700
@@ -201,3 +202,30 @@ def test_wrong_commands_are_refused_before_anything_is_driven() -> None:
     assert batch.step_count.tolist() == [0, 0]
     assert isinstance(batch.loops[0].controller, NoControl)
     assert activesteer.Batch is Batch
+
+
+@pytest.mark.parametrize(
+    ("steps", "driver", "key"),
+    [
+        (10**400, None, "steps"),
+        ([1, 2, 3], None, "steps"),
+        ([[1, 2]], None, "steps"),
+        ("x", None, "steps"),
+        (1, DriverCommand(10**400), ""),  # pyright: ignore[reportArgumentType]
+        (1, DriverCommand(np.array([None, 1.0], dtype=object)), ""),  # pyright: ignore[reportArgumentType]
+        (1, DriverCommand(np.ones(3)), ""),  # pyright: ignore[reportArgumentType]
+        (1, DriverCommand(np.ones(2) * 1j), ""),  # pyright: ignore[reportArgumentType]
+    ],
+)
+def test_wrong_steps_and_commands_are_one_error_and_drive_nothing(steps: Any, driver: Any, key: str) -> None:
+    batch = Batch("straight_line", 2)
+    with raises(ActiveSteerError, **({"key": key} if key else {})):
+        batch.advance(steps, driver)
+    assert batch.step_count.tolist() == [0, 0]
+
+
+def test_a_state_of_another_road_is_refused() -> None:
+    dry, wet = (Batch("straight_line", 1, overrides={"road.mu": mu}) for mu in (0.9, 0.5))
+    with raises(ParameterError, key="state"):
+        wet.restore_state(dry.save_state())
+    wet.restore_state(wet.save_state())

@@ -318,3 +318,16 @@ def test_scenario_whose_amplitude_is_not_known_yet_is_prepared() -> None:
     simulation.run()
     assert_same(simulation.recording(), activesteer.simulate("step_steer", "ars", overrides=keys))
     assert simulation.recording()["steering_wheel_demand_rad"][-1] > 0.5
+
+
+def test_a_pace_that_is_no_number_and_a_second_file_are_refused(tmp_path):
+    with raises(ParameterError, key="realtime"):
+        Simulation("straight_line", realtime="x")  # pyright: ignore[reportArgumentType]
+    simulation = Simulation("straight_line", overrides={"duration_s": 0.2, "settle_s": 0.1})
+    with (
+        simulation.recorded_to(tmp_path / "a.mcap"),
+        raises(RecordingError),
+        simulation.recorded_to(tmp_path / "b.mcap"),
+    ):
+        pass
+    assert not (tmp_path / "b.mcap").exists()
