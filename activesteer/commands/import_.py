@@ -8,7 +8,8 @@ from typing import Any
 
 from activesteer.commands.arguments import add_json, add_output, add_vehicle
 from activesteer.commands.output import print_entry, print_json, print_notes
-from activesteer.errors import ParameterError
+from activesteer.errors import ParameterError, RecordingError
+from activesteer.files import replacing
 
 
 def add_to(commands: Any) -> None:
@@ -32,13 +33,19 @@ def add_to(commands: Any) -> None:
 
 def _import(options: argparse.Namespace) -> int:
     from activesteer.measured.importing import import_file
+    from activesteer.recording import check_target
 
     if options.output is not None and options.output.suffix != ".mcap":
         raise ParameterError(f"-o {options.output}: the name of a recording ends in .mcap")
     found = import_file(options.files, options.map, options.vehicle)
     output = options.output or options.files[0].with_suffix(".mcap")
     recording = found.recording
-    recording.save(output)
+    check_target(output)
+    with replacing(output, RecordingError) as part:
+        try:
+            recording.save(part)
+        except RecordingError as error:
+            raise RecordingError(error.problem.replace(str(part), str(output))) from error
     print_notes(found.notes)
     if options.json:
         step_s = float(recording.time_s[1] - recording.time_s[0])

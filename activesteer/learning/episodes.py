@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, shown
@@ -200,7 +200,7 @@ class Episodes:
         self.batch.sync([car])
         return self.batch.loops[car]
 
-    def step(self, actions: NDArray[Any], episodes: Sequence[int] | NDArray[Any] | None = None) -> Outcome:
+    def step(self, actions: ArrayLike, episodes: Sequence[int] | NDArray[Any] | None = None) -> Outcome:
         """Carry out the actions until the next decision.
 
         Args:

@@ -514,9 +514,9 @@ def _columns(kind: Kind, message: Any, n: int) -> Array:
             if value is not None:
                 raise kind.fail("", f"{name} cannot be given to a batch", value)
             continue
+        if np.iscomplexobj(value):
+            raise kind.fail("", f"{name} is {shown(value)}; real numbers are needed")
         try:
-            if np.iscomplexobj(value):
-                raise TypeError("is complex")
             rows[:, place : place + width] = np.reshape(value, (-1, width)) if np.ndim(value) else value
         except (TypeError, ValueError, OverflowError) as reason:
             shape = f"({n},)" if width == 1 else f"({n}, {width})"

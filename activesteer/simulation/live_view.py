@@ -266,7 +266,7 @@ def _texts(simulation: ClosedLoop, time_s: float, speed: float, *, paused: bool)
 
 def check_display() -> None:
     """Check that there is a display with OpenGL; without one, the viewer would wait forever."""
-    import glfw
+    import glfw  # noqa: PLC0415 - looks for its library when it is imported
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

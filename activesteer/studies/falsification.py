@@ -29,7 +29,7 @@ from activesteer.studies.engine.requirement import HARM, Requirement
 from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
 from activesteer.studies.engine.run_command import run_command
 from activesteer.studies.engine.run_task import Row, Status
-from activesteer.studies.engine.search import Judgement, claim_folder, import_optuna, search
+from activesteer.studies.engine.search import Judgement, claim_folder, import_optuna, refuse_study, search
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import Workers, workers_for
 
@@ -125,6 +125,7 @@ def falsify(
             raise ParameterError(nearest_names(name, labels), key="--maneuver", value=name, allowed=tuple(labels))
     optuna = import_optuna("falsify")
     folder, found = make_folder(output, StudyError), []
+    refuse_study(folder)
     planned = [
         (name, maneuver, Plan(_search_study(study, requirement, name, labels[maneuver])))
         for name in controllers or study.controllers

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
+import secrets
 import shutil
 import tempfile
 from dataclasses import dataclass
@@ -127,9 +128,21 @@ def new_vehicle(
         shutil.copyfile(table_path, files / f"table{table_path.suffix.lower()}")
         readme = readme_text(car, trimmed, f"table{table_path.suffix.lower()}")
         (files / "README.md").write_text(readme, encoding="utf-8")
-        with writing(target, ParameterError):
-            shutil.copytree(files, target, dirs_exist_ok=True)
+        _install(files, target)
     return NewVehicle(target, target / f"{name}.toml", tuple(car.assumptions), trimmed, tuple(questions))
+
+
+def _install(files: Path, target: Path) -> None:
+    """Copy files into a folder that appears complete: a full disk leaves nothing."""
+    part = target.with_name(f".{target.name}-{secrets.token_hex(4)}.part")
+    with writing(target, ParameterError):
+        try:
+            shutil.copytree(files, part)
+            target.mkdir(exist_ok=True)
+            for file in part.iterdir():
+                file.replace(target / file.name)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
 
 
 def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None) -> KcTables | None:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import activesteer
+from activesteer.errors import RecordingError
+from activesteer.recording import Recording
 
 NAMES = {
     "Lenkradwinkel [deg]": "steering_wheel_rad",
@@ -111,3 +113,22 @@ def test_what_was_fitted_is_printed_and_drives_the_car(call, truth, tmp_path):
     assert found == pytest.approx(1.0, abs=0.03)
     twice = call("run", "a.mcap", "--overrides", "found/overrides.toml", "--set", "factors.tyre_cornering_stiffness=1")
     assert "is given twice; leave one out" in twice.err
+
+
+def test_an_import_that_fails_while_writing_leaves_the_old_recording(call, tmp_path, monkeypatch):
+    (tmp_path / "run.csv").write_text(
+        "Time [s],v [km/h]\n" + "".join(f"{i / 100},{50 + i / 100}\n" for i in range(200))
+    )
+    assert call("import", "run.csv").status == 0
+    before = (tmp_path / "run.mcap").read_bytes()
+
+    def fill_up(_recording, path):
+        path.write_bytes(before[:100])
+        raise RecordingError(f"cannot write {path}: No space left on device")
+
+    monkeypatch.setattr(Recording, "save", fill_up)
+    told = call("import", "run.csv")
+    assert told.status == 1
+    assert "cannot write run.mcap: No space left on device" in told.err
+    assert (tmp_path / "run.mcap").read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.csv", "run.mcap"]

@@ -6,6 +6,8 @@ import contextlib
 import ctypes
 import fnmatch
 import functools
+import math
+import time
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -50,18 +52,23 @@ class Status(StrEnum):
 Row = dict[str, Any]
 
 
-def drive(settings: Settings, requests: Sequence[Request]) -> list[Row]:
+def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.inf) -> list[Row]:
     """Make some runs.
 
     Args:
         settings: What all runs of the study share.
         requests: The runs, grouped by sample, so that a search by driving is made once per sample.
+        most_s: Time after which no further sample is begun [s].
+
+    Returns:
+        The rows of the first requests, at least of one sample.
     """
+    end_s = time.monotonic() + most_s
     if problem := _problem(digest({"expected": settings.expected}), settings):
         return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
     rows: list[Row] = []
     place = 0
-    while place < len(requests):
+    while place < len(requests) and (not rows or time.monotonic() < end_s):
         group = [other for other in requests[place:] if _same_drive(other, requests[place])]
         rows += _drive_sample(settings, group)
         place += len(group)

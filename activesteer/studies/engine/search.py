@@ -37,8 +37,19 @@ def import_optuna(command: str) -> Any:
     return optuna
 
 
+def refuse_study(folder: Path) -> None:
+    """Check that a folder holds no study, whose files a search would mix with its own.
+
+    Raises:
+        StudyError: it does.
+    """
+    if (folder / "study.toml").exists():
+        raise StudyError(f"{folder} holds a study; use a new folder for the search", value=folder)
+
+
 def claim_folder(folder: Path, name: str, plan: Plan, text: str = "") -> None:
     """Write the study into a folder, or check that the folder holds the same search."""
+    refuse_study(folder)
     path = folder / f"{name}.toml"
     text = f"# {plan.digest}\n{text}{plan.study.to_toml()}"
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 RECORDINGS: Final = "recordings"
 _logger: Final = logging.getLogger(__name__)
+_KEPT_EVERY_S: Final = 4.0
+"""Time after which a task hands over its finished runs, so that a killed study loses few [s]."""
 
 
 class StudyProgress(NamedTuple):
@@ -129,7 +131,9 @@ def _drive_all(
     left = sum(len(span) for span in missing)
     done, here, failed = total - left, 0, 0
     size = task_size(left, len(plan.settings.controllers), workers.in_flight)
-    tasks = ((requests, drive, plan.settings, requests) for requests in _tasks(plan, missing, size, limit))
+    tasks = (
+        (requests, drive, plan.settings, requests, _KEPT_EVERY_S) for requests in _tasks(plan, missing, size, limit)
+    )
     queue = TaskQueue(workers)
     for requests, made, error in queue.outcomes(tasks):
         rows = made
@@ -142,6 +146,8 @@ def _drive_all(
             status = Status.CRASHED if isinstance(error, WorkerDied) else Status.FAILED
             rows = [failed_row(plan.settings, requests[0], status, f"{type(error).__name__}: {error}")]
         store.write(rows)
+        if left_over := requests[len(rows) :]:
+            queue.add(left_over, drive, plan.settings, left_over, _KEPT_EVERY_S)
         here += len(rows)
         failed += sum(row["status"] in (Status.FAILED, Status.CRASHED) for row in rows)
         if progress is not None:

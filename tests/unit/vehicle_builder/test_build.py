@@ -15,7 +15,7 @@ from activesteer.errors import ModelError, ParameterError, TyreFileError
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.vehicle.mass_properties import mass_properties
-from activesteer.vehicle_builder import new_vehicle
+from activesteer.vehicle_builder import build, new_vehicle
 from tests.raising import raises
 from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed
 
@@ -244,3 +244,15 @@ def test_impossible_cars_are_refused_and_leave_nothing_behind(
     with raises((ParameterError, ModelError), key=key):
         new_vehicle("bad", changed(COMPACT, tmp_path, *changes), tmp_path / "bad")
     assert not (tmp_path / "bad").exists()
+
+
+def test_a_disk_that_fills_up_leaves_no_part_of_a_car(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_source: Path, target: Path) -> None:
+        target.mkdir()
+        (target / "half.xml").write_text("<mujoco")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(build.shutil, "copytree", full)
+    with raises(ParameterError):
+        build._install(tmp_path, tmp_path / "mine")
+    assert list(tmp_path.iterdir()) == []

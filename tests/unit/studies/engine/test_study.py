@@ -20,6 +20,7 @@ from activesteer import study
 from activesteer.errors import StudyError
 from activesteer.recording import Recording
 from activesteer.resources import find_vehicle, models_dir
+from activesteer.studies.engine import study as engine_study
 from activesteer.studies.engine.store import Store
 from activesteer.studies.engine.workers import Workers, workers_for
 from tests.raising import raises
@@ -262,3 +263,13 @@ def test_environment_says_what_the_study_ran_on(serial):
     about = json.loads((serial.parent / "environment.json").read_text())
     assert {"activesteer", "mujoco", "numpy", "python"} <= set(about["versions"])
     assert about["runs"] == 8
+
+
+def test_a_task_hands_over_its_finished_runs_in_time(tmp_path, monkeypatch):
+    table = short_study(*[0.7 + 0.01 * number for number in range(8)])
+    study(table, output=tmp_path / "once", jobs=1)
+    monkeypatch.setattr(engine_study, "_KEPT_EVERY_S", 0.0)
+    study(table, output=tmp_path / "often", jobs=1, limit=7)
+    assert len(list((tmp_path / "often" / "parts").glob("[0-9]*.parquet"))) == 7
+    study(table, output=tmp_path / "often", jobs=1)
+    assert (tmp_path / "often/results.parquet").read_bytes() == (tmp_path / "once/results.parquet").read_bytes()

@@ -84,3 +84,10 @@ def test_a_set_dominates_another_that_is_nowhere_better():
     assert not _dominates(b, a)
     assert not _dominates(a, c)
     assert not _dominates(a, a)
+
+
+def test_a_search_does_not_mix_its_files_with_those_of_a_study(tmp_path):
+    (tmp_path / "study.toml").write_text("")
+    with raises(StudyError, value=tmp_path):
+        tune(GAINS, tmp_path, jobs=1, trials=1)
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
