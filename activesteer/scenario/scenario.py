@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import hashlib
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -47,6 +49,11 @@ class Scenario:
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
     own: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """Digest of the resolved parameters, equal for scenarios with the same inputs."""
+        return hashlib.sha256(json.dumps(describe(self), sort_keys=True, default=str).encode()).hexdigest()
 
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
         """Return the properties of the car that controllers may know."""

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import hashlib
-import json
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -23,7 +21,6 @@ from activesteer.faults import Fault, check_faults
 from activesteer.maneuver.phases import seen_of
 from activesteer.scenario import Scenario
 from activesteer.scenario.changing import changed
-from activesteer.scenario.scenario import describe
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.control_unit import ControlUnit, control_unit, told_by_sensor
 from activesteer.simulation.native_cars import NativeCars, has_law, is_own, law_of, tabulate
@@ -156,11 +153,6 @@ class ClosedLoop(Uncopyable):
         self.motion, self.step_count = vehicle.motion(), 0
         if settled:
             self.restore_state(settled)
-
-    @cached_property
-    def _inputs(self) -> str:
-        """Digest of manoeuvre, car and driver at the start."""
-        return hashlib.sha256(json.dumps(describe(self._start), sort_keys=True, default=str).encode()).hexdigest()
 
     @property
     def steps(self) -> int:
@@ -348,7 +340,7 @@ class ClosedLoop(Uncopyable):
             self.step_count,
             self.changes,
             copy.deepcopy(self.sequence),
-            self._inputs,
+            self._start.digest,
         )
 
     def restore_state(self, state: LoopState) -> None:
@@ -362,7 +354,7 @@ class ClosedLoop(Uncopyable):
         """
         if not isinstance(state, LoopState) or not _is_sound(state):
             raise ParameterError(f"is {shown(state)}; a state of this loop is needed", key="state", value=state)
-        if state.inputs != self._inputs:
+        if state.inputs != self._start.digest:
             raise ParameterError("was saved by a simulation with other inputs", key="state")
         if state.changes != self.changes:
             self._adopt(self._changed_by(state.changes))
