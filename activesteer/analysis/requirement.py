@@ -3,11 +3,12 @@
 An example is `max(0, lane_overstep_m(lqr)) - max(0, lane_overstep_m(none)) <= 0.05`. `METRIC(CONTROLLER, MANEUVER)` is
 the metric of that run [SI]; the manoeuvre may be left out if there is only one.
 `harm(CONTROLLER)` is the largest growth of a measure of harm against `none`, in multiples of its size
-(`analysis.harm`). `+ - * /`, `min`, `max` and `abs` are allowed; comparisons by `<=` and `>=` may be joined by `and`
-and `or`. `claim(S1)` is a statement of the paper.
+(`analysis.harm`). `+ - * /`, `min`, `max` and `abs` are allowed; comparisons may be joined by `and` and `or`.
+`claim(S1)` is a statement of the paper.
 
 The *margin* of a comparison is its distance to the limit, in multiples of the limit, or in SI units if the limit is 0.
-It is negative if the comparison is violated; `and` takes the smallest margin, `or` the largest.
+It is negative if the comparison is violated, and not defined (nan) if a metric is not. `and` takes the smallest margin,
+`or` the largest.
 
 Sources: G. Fainekos, G. Pappas, Robustness of temporal logic specifications for continuous-time signals, Theoretical
 Computer Science 410 (2009); Y. Annpureddy et al., S-TaLiRo, TACAS 2011; A. Donze, Breach, CAV 2010.
@@ -24,7 +25,7 @@ from typing import Final, NamedTuple
 from activesteer.analysis.harm import changes, severity
 from activesteer.config import Source
 from activesteer.errors import nearest_names, shown
-from activesteer.metric_table import METRICS, Better
+from activesteer.metric_table import METRICS
 
 HARM: Final = "harm"
 CLAIM: Final = "claim"
@@ -33,6 +34,9 @@ CLAIMS_FAILED: Final = "claims_failed"
 NONE: Final = "none"
 ANY: Final = "controller"
 """Name in a requirement for the controller that is examined."""
+_SIGNS: Final[dict[type, str]] = {ast.LtE: "<=", ast.GtE: ">=", ast.Lt: "<", ast.Gt: ">"}
+_TINY: Final = 1e-12
+"""Margin by which a value at the limit of < or > is beyond it."""
 _LONGEST: Final = 1000
 """Largest number of characters of an expression."""
 
@@ -155,8 +159,13 @@ class Expression:
             raise self._fail("there is no metric of a run, such as lane_overstep_m(none),")
 
     def __call__(self, runs: Runs) -> float:
-        """Return the value; nan if it is not defined. A metric that a run does not define is infinitely bad."""
+        """Return the value; nan if it is not defined."""
         return self._value(runs)
+
+    def undefined(self, runs: Runs) -> set[str]:
+        """Return the controllers whose runs do not define a metric of the expression."""
+        found = ((run.controller, runs[run].get(name)) for name, run in self.metrics if name != HARM)
+        return {controller for controller, value in found if value is None or math.isnan(value)}
 
     def _whole(self, node: ast.expr) -> _Number:
         return self._number(node)
@@ -206,41 +215,46 @@ class Expression:
         if name == HARM:
             self.metrics[name, base] = None
             return lambda runs: severity(changes(runs[base], runs[run]))
-        worst = -math.inf if name in METRICS and METRICS[name].better is Better.HIGHER else math.inf
-
-        def value(runs: Runs) -> float:
-            found = runs[run].get(name)
-            return worst if found is None or math.isnan(found) else found
-
-        return value
+        return _value_of(name, run)
 
 
 class Requirement(Expression):
-    """A comparison of such numbers, or several; its value is the margin, which is negative if it is violated."""
+    """A comparison of such numbers, or several; its value is the margin, which is negative if it is violated.
+
+    Attributes:
+        comparisons: Left side, sign and right side of each comparison.
+    """
 
     wanted = "a comparison such as stopping_distance_m(none) <= 45 is needed"
 
+    def __init__(self, text: str, names: Names, source: Source, where: tuple[str, ...]) -> None:
+        """Read a requirement; see `Expression`."""
+        self.comparisons: list[tuple[_Number, str, _Number]] = []
+        super().__init__(text, names, source, where)
+
     def _whole(self, node: ast.expr) -> _Number:
         if isinstance(node, ast.BoolOp):
-            function = _FUNCTIONS["min" if isinstance(node.op, ast.And) else "max"]
+            sign = 1.0 if isinstance(node.op, ast.And) else -1.0
             parts = [self._whole(part) for part in node.values]
-            return lambda runs: function([part(runs) for part in parts])
+            return lambda runs: sign * _all([sign * part(runs) for part in parts])
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == CLAIM:
             return self._claim(node)
-        if not isinstance(node, ast.Compare) or not all(isinstance(one, (ast.LtE, ast.GtE)) for one in node.ops):
-            raise self._fail(f"one <= or >= is needed: {self.wanted}")
+        if not isinstance(node, ast.Compare) or not all(type(one) in _SIGNS for one in node.ops):
+            raise self._fail(f"one of {', '.join(_SIGNS.values())} is needed: {self.wanted}")
         margins = [
-            self._comparison(left, right, right_is_more=isinstance(one, ast.LtE))
+            self._comparison(left, one, right)
             for left, one, right in zip((node.left, *node.comparators), node.ops, node.comparators, strict=False)
         ]
-        return lambda runs: least([margin(runs) for margin in margins])
+        return lambda runs: _all([margin(runs) for margin in margins])
 
-    def _comparison(self, left: ast.expr, right: ast.expr, *, right_is_more: bool) -> _Number:
+    def _comparison(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> _Number:
         """Return the margin; the limit is the side without a metric, or else the right one."""
         one, other = self._number(left), self._number(right)
-        less, more = (one, other) if right_is_more else (other, one)
+        self.comparisons.append((one, _SIGNS[type(sign)], other))
+        less, more = (one, other) if isinstance(sign, (ast.Lt, ast.LtE)) else (other, one)
         limit = other if any(isinstance(part, ast.Call) for part in ast.walk(left)) else one
-        return lambda runs: _margin(more(runs) - less(runs), limit(runs))
+        at_limit = -_TINY if isinstance(sign, (ast.Lt, ast.Gt)) else 0.0
+        return lambda runs: _margin(more(runs) - less(runs), limit(runs)) or at_limit
 
     def _claim(self, node: ast.Call) -> _Number:
         claims = self._names.claims
@@ -253,11 +267,12 @@ class Requirement(Expression):
         run = Run(NONE, maneuver)
         self.metrics[metric, run] = None
 
-        def margin(runs: Runs) -> float:
-            distance = runs[run].get(metric)
-            return -math.inf if distance is None else -distance
+        distance = _value_of(metric, run)
+        return lambda runs: -distance(runs)
 
-        return margin
+
+def _value_of(name: str, run: Run) -> _Number:
+    return lambda runs: math.nan if (value := runs[run].get(name)) is None else value
 
 
 def _text_of(node: ast.expr) -> str | None:
@@ -274,6 +289,12 @@ def _ratio(one: float, other: float) -> float:
 def least(values: Sequence[float]) -> float:
     """Return the smallest value; nan if one is not defined."""
     return math.nan if any(map(math.isnan, values)) else min(values)
+
+
+def _all(margins: Sequence[float]) -> float:
+    """Return the smallest margin; nan if one is not defined and no other is negative."""
+    known = [margin for margin in margins if not math.isnan(margin)]
+    return min(known) if len(known) == len(margins) or min(known, default=0.0) < 0.0 else math.nan
 
 
 def _largest(values: Sequence[float]) -> float:

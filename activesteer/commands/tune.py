@@ -76,7 +76,8 @@ def _lines(found: Tuning) -> Iterator[str]:
         yield "  ".join(f"{name} {value:.4g}" for name, value in trial.objectives.items()) or _held(trial)
         if found.plausibility is None or trial is found.front[0]:
             yield from _values(trial)
-    yield from (f"hold alone and never together: {' and '.join(pair)}" for pair in found.never_together)
+    if pairs := found.never_together:
+        yield f"hold alone and never together: {', '.join(map('+'.join, pairs))}"
     yield from (f"without effect: {key} changes no metric of any run" for key in found.without_effect)
 
 

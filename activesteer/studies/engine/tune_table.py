@@ -13,7 +13,7 @@ from enum import StrEnum
 from typing import Annotated, Any, Final, NamedTuple
 
 from activesteer.analysis.claims import SCENARIO_OF
-from activesteer.analysis.requirement import ANY, Condition, Expression, Names, Requirement, Run, Runs, least
+from activesteer.analysis.requirement import ANY, Condition, Expression, Names, Requirement, Run, Runs
 from activesteer.config import Range, build
 from activesteer.errors import nearest_names, shown
 from activesteer.metric_table import METRICS
@@ -139,7 +139,7 @@ class Judge:
 
     def __init__(self, plan: Plan, table: TuneTable, examined: str = "") -> None:
         """Read the expressions of a table; `controller` stands for the examined controller."""
-        study, shared, self._goal = plan.study, plan.settings, table.goal
+        study, shared, self._examined = plan.study, plan.settings, examined
         controllers, maneuvers = ([label for label, _ in items] for items in (shared.controllers, shared.maneuvers))
         claims = {claim: (f"{DISTANCE}{claim}", name) for claim, name in SCENARIO_OF.items() if name in maneuvers}
         names = Names(controllers, maneuvers, examined, claims if study.claims else {})
@@ -165,14 +165,16 @@ class Judge:
             return None
         vehicles = self._runs(rows)
         margins, constraints = (
-            {name: least([one(runs) for runs in vehicles]) for name, one in requirements.items()}
+            {name: min(_bounded(one(runs)) for runs in vehicles) for name, one in requirements.items()}
             for requirements in (self.statements, self.constraints)
         )
-        if self._goal is Goal.VIOLATE and math.isnan(margins[ANY]):
-            return None
-        margins, constraints = (
-            {name: _bounded(one) for name, one in found.items()} for found in (margins, constraints)
-        )
+        if self._examined and math.isnan(self.statements[ANY](vehicles[0])):
+            lacking = self.statements[ANY].undefined(vehicles[0])
+            if not lacking or (
+                self._examined in lacking and len(lacking) > 1
+            ):  # as a car that is lost with every controller
+                return None
+            margins[ANY] = -_MOST if self._examined in lacking else _MOST
         objectives = [sum(map(one, vehicles)) for one in self.objectives.values()] or [margins.get(ANY, 0.0)]
         if self.prior is not None:
             objectives = [sum(map(_cost, margins.values())) + _IMPLAUSIBLE * self.prior.implausibility(values)]

@@ -6,9 +6,12 @@ The targets were set before any of these controllers was tuned.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from typing import Any, Final, NamedTuple
 
+from activesteer.analysis.requirement import Names, Requirement, Run, Runs
+from activesteer.config import Source
 from activesteer.metric_table import metric
 
 NONE: Final = "none"
@@ -28,54 +31,18 @@ class Target(NamedTuple):
     passed: bool
 
 
-class _Rule(NamedTuple):
-    """A bound on the magnitude of a metric.
-
-    Attributes:
-        scenario: The scenario.
-        metric: The metric.
-        than: Controller whose value sets the bound; empty if the bound is `factor` itself.
-        factor: Factor on that value.
-        above: Whether it is a lower bound.
-        strict: Whether the bound itself is excluded.
-    """
-
-    scenario: str
-    metric: str
-    than: str = ""
-    factor: float = 1.0
-    above: bool = False
-    strict: bool = False
-
-    def judged(self, controller: str, values: Mapping[str, float]) -> Target | None:
-        """Return the verdict: failed if the value was sought and not found, None if it was not sought."""
-        if not values:
-            return None
-        value = abs(values.get(controller, math.nan))
-        bound = self.factor * (abs(values.get(self.than, math.nan)) if self.than else 1.0)
-        shown = metric(self.metric)
-        factor, unit = shown.unit.factor, shown.unit.name
-        sign = ("<" if not self.above else ">") + ("" if self.strict else "=")
-        whose = f", {self.factor:.0%} of {self.than}" if self.factor != 1.0 else f" of {self.than}"
-        text = (
-            f"{self.scenario}: {shown.label} {short(value * factor)} {unit}, "
-            f"asked for {sign} {short(bound * factor)} {unit}{whose if self.than else ''}"
-        )
-        further = value > bound if self.above else value < bound
-        return Target(controller, text, further or (value == bound and not self.strict))
-
-
 _RULES: Final = (
-    _Rule("step_steer", "yaw_rate_overshoot", factor=0.03),
-    _Rule("step_steer", "yaw_rate_response_time_s", NONE),
-    _Rule("step_steer", "ay_response_time_s", NONE),
-    _Rule("step_steer", "sideslip_peak_rad", NONE),
-    _Rule("slalom", "track_amplitude_m", NONE, strict=True),
+    ("step_steer", "abs(yaw_rate_overshoot(controller)) <= 0.03"),
+    ("step_steer", "abs(yaw_rate_response_time_s(controller)) <= abs(yaw_rate_response_time_s(none))"),
+    ("step_steer", "abs(ay_response_time_s(controller)) <= abs(ay_response_time_s(none))"),
+    ("step_steer", "abs(sideslip_peak_rad(controller)) <= abs(sideslip_peak_rad(none))"),
+    ("slalom", "track_amplitude_m(controller) < track_amplitude_m(none)"),
     # Cars with such systems gain as much.
-    _Rule("split_mu_braking", "stopping_distance_m", "esc", 0.94),
-    _Rule("split_mu_braking", "lateral_deviation_max_m", "esc"),
-    _Rule("severe_lane_change", "entry_speed_mps", NONE, above=True, strict=True),
+    ("split_mu_braking", "stopping_distance_m(controller) <= 0.94 * stopping_distance_m(esc)"),
+    ("split_mu_braking", "abs(lateral_deviation_max_m(controller)) <= abs(lateral_deviation_max_m(esc))"),
+    ("severe_lane_change", "entry_speed_mps(controller) > entry_speed_mps(none)"),
 )
+"""Scenario and requirement of each target."""
 
 
 def asked(controllers: Iterable[str]) -> list[str]:
@@ -84,14 +51,31 @@ def asked(controllers: Iterable[str]) -> list[str]:
 
 
 def targets(controllers: Sequence[str], rows: Iterable[Any]) -> list[Target]:
-    """Judge the nominal runs by their rows of `scenario`, `controller`, `metric` and `value`."""
-    known: dict[tuple[str, str], dict[str, float]] = {}
+    """Judge the nominal runs by their rows of `scenario`, `controller`, `metric` and `value`.
+
+    A target fails if its value was sought and not found. It is left out if no controller has the metric.
+    """
+    runs: defaultdict[Run, dict[str, float | None]] = defaultdict(dict)
+    sought = set()
     for row in rows:
-        known.setdefault((row.scenario, row.metric), {})[row.controller] = row.value
-    judged = (
-        rule.judged(name, known.get((rule.scenario, rule.metric), {})) for name in asked(controllers) for rule in _RULES
-    )
-    return [target for target in judged if target is not None]
+        runs[Run(row.controller, row.scenario)][row.metric] = row.value
+        sought.add((row.metric, row.scenario))
+    found = []
+    for name in asked(controllers):
+        for scenario, text in _RULES:
+            rule = Requirement(text, Names(None, [scenario], name), Source("targets"), ())
+            if (next(iter(rule.metrics))[0], scenario) in sought:
+                found.append(_judged(name, rule, runs))
+    return found
+
+
+def _judged(controller: str, rule: Requirement, runs: Runs) -> Target:
+    (metric_name, run), *others = rule.metrics
+    ((left, sign, right),) = rule.comparisons
+    shown = metric(metric_name)
+    value, limit = (f"{short(side(runs) * shown.unit.factor)} {shown.unit.name}" for side in (left, right))
+    of = f" ({others[0][1].controller})" if others else ""
+    return Target(controller, f"{run.maneuver}: {shown.label} {value}, asked for {sign} {limit}{of}", rule(runs) >= 0.0)
 
 
 def short(value: float) -> str:

@@ -95,12 +95,23 @@ def test_requirements_are_joined_by_their_smallest_or_largest_margin():
     assert margin(two.format("or"), lqr=moved) == pytest.approx(0.5)
 
 
-def test_a_metric_that_a_run_does_not_define_is_infinitely_bad():
-    nothing = {"lane_overstep_m": None}
-    assert margin("lane_overstep_m(lqr) <= 0.1", lqr=nothing) == -math.inf
-    assert margin("mean_deceleration_mps2(lqr) >= 3", lqr={}) == -math.inf
-    # What no controller prevents says nothing about one of them.
-    assert math.isnan(margin("lane_overstep_m(lqr) - lane_overstep_m(none) <= 0", lqr=nothing, none=nothing))
+def test_a_metric_that_a_run_does_not_define_decides_nothing():
+    text = "max(0, lane_overstep_m(lqr)) - min(0, lane_overstep_m(none)) <= 0"
+    assert math.isnan(margin(text, lqr={"lane_overstep_m": None}, none={"lane_overstep_m": 0.1}))
+    assert Requirement(text, NAMES, *WHERE).undefined(
+        {Run("lqr", "lane"): {"lane_overstep_m": math.nan}, Run("none", "lane"): {"lane_overstep_m": 0.1}}
+    ) == {"lqr"}
+    two = "lane_overstep_m(lqr) <= 0.1 {} lane_overstep_m(none) <= 0.1"
+    for word, other_m, whole in (("and", 0.2, -1.0), ("and", 0.0, math.nan), ("or", 0.0, 1.0), ("or", 0.2, math.nan)):
+        found = margin(two.format(word), lqr={}, none={"lane_overstep_m": other_m})
+        assert found == pytest.approx(whole, nan_ok=True), (word, other_m)
+
+
+def test_a_value_at_the_limit_breaks_a_strict_comparison():
+    at = {"lateral_displacement_m": 2.0}
+    assert margin("lateral_displacement_m(lqr) >= 2", lqr=at) == 0.0
+    assert margin("lateral_displacement_m(lqr) > 2", lqr=at) < 0.0
+    assert margin("lateral_displacement_m(lqr) < 2", lqr=at) < 0.0
 
 
 def test_harm_is_the_growth_in_multiples_of_its_size():
@@ -126,21 +137,21 @@ def test_an_expression_is_a_number_and_divides_by_zero():
     ("text", "words"),
     [
         ("1 <= 2", "no metric"),
-        ("lane_overstep_m(lqr)", "one <= or >="),
+        ("lane_overstep_m(lqr)", "one of <=, >="),
         ("lane_overstep(lqr) <= 0", "lane_overstep_m"),
         ("lane_overstep_m(lqrr) <= 0", "'lqr'"),
         ("lane_overstep_m(lqr, lanes) <= 0", "'lane'"),
         ("claim(S2)", "'S1'"),
         ("__import__('os') <= 0", "__import__"),
         ("lane_overstep_m.x(lqr) <= 0", "is no number"),
-        ("lane_overstep_m(lqr) < 1", "one <= or >="),
+        ("lane_overstep_m(lqr) == 1", "one of <=, >="),
         ("max(1) <= lane_overstep_m(lqr)", "max has 1"),
         ("(" * 900, "cannot be read"),
         ("9" * 900 + " <= lane_overstep_m(lqr)", "cannot be read"),
         ("9" * 2000, "characters"),
         ("[lane_overstep_m(lqr)][0] <= 1", "is no number"),
         ("True <= lane_overstep_m(lqr)", "is no number"),
-        ("not lane_overstep_m(lqr) <= 1", "one <= or >="),
+        ("not lane_overstep_m(lqr) <= 1", "one of <=, >="),
     ],
 )
 def test_a_text_that_is_no_requirement_is_refused(text: str, words: str):

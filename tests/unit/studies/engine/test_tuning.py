@@ -156,6 +156,22 @@ def test_a_run_that_fails_with_the_controller_alone_violates(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
+    ("own", "other", "margin"),
+    [(math.nan, 1.0, -1e6), (1.0, math.nan, 1e6), (math.nan, math.nan, None), (2.0, 1.0, -1.0)],
+)
+def test_a_metric_that_only_the_examined_run_lacks_is_a_violation(
+    tmp_path: Path, own: float, other: float, margin: float | None
+):
+    table = changed(WORST, violate="ay_peak_abs_mps2(controller) <= ay_peak_abs_mps2(none)")
+    (search,) = _searches(read_study(table), tmp_path, ["ars"], None)
+    about = {"maneuver": "short", "vehicle": "compact", "status": "ok"}
+    values = {"ars": own, "none": other}
+    rows = [{**about, "controller": name, "ay_peak_abs_mps2": value} for name, value in values.items()]
+    found = search.judge.judged(rows, {})
+    assert (found and found.margins["controller"]) == margin
+
+
+@pytest.mark.parametrize(
     ("table", "key", "words"),
     [
         (changed(GAINS, minimise={}), "tune", "exactly one"),

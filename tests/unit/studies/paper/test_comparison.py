@@ -67,7 +67,7 @@ def test_targets_are_for_those_beyond_the_paper_and_bounds_are_kept_as_they_are_
     passed = {name: [target.passed for target in made.targets if target.controller == name] for name in ("lqr", "mpc")}
     assert passed["lqr"] == [True, False, False]  # as large as without control is not below, and as fast not faster
     assert passed["mpc"] == [False, True, True]
-    assert "FAILED  slalom: track amplitude 2.2 m, asked for < 2.2 m of none" in made.to_text()
+    assert "FAILED  slalom: track amplitude 2.2 m, asked for < 2.2 m (none)" in made.to_text()
 
 
 def test_colours_say_what_is_better_whatever_the_direction_of_the_metric():
@@ -84,7 +84,7 @@ def test_colours_say_what_is_better_whatever_the_direction_of_the_metric():
 def test_a_run_without_the_metric_fails_its_target():
     made = made_up(none=(0.1, math.nan, 14.0), lqr=(0.01, 2.1, math.nan))
     assert [target.passed for target in made.targets] == [True, False, False]
-    assert "entry speed - km/h, asked for > 50.4 km/h of none" in made.to_text()
+    assert "entry speed - km/h, asked for > 50.4 km/h (none)" in made.to_text()
 
 
 def test_the_table_of_seven_controllers_fits_a_terminal():
