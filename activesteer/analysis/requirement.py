@@ -19,7 +19,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from activesteer.analysis.harm import changes, severity
@@ -42,7 +42,7 @@ _LONGEST: Final = 1000
 
 
 class Condition(NamedTuple):
-    """A condition.
+    """A condition of a claim: of several conditions, the smallest decides about all, the largest about any.
 
     Attributes:
         margin: Distance to the limit on the right side, in units of a scale [-]; below 0 if the condition is broken.
@@ -82,21 +82,6 @@ def at_most(value: float, limit: float, scale: float | None = None, *, strict: b
 def at_least(value: float, limit: float, scale: float | None = None, *, strict: bool = False) -> Condition:
     """Return the condition that a value is at least a limit; see `at_most`."""
     return at_most(-value, -limit, scale, strict=strict)
-
-
-def true(value: bool) -> Condition:
-    """Return a condition without a distance."""
-    return Condition(math.inf if value else -math.inf)
-
-
-def either(conditions: Iterable[Condition]) -> Condition:
-    """Return the condition that is nearest to holding: the alternative of all."""
-    return max(conditions)
-
-
-def both(conditions: Iterable[Condition]) -> Condition:
-    """Return the condition that is furthest from holding: all of them as one."""
-    return min(conditions)
 
 
 def _margin(room: float, limit: float) -> float:
@@ -139,6 +124,7 @@ class Expression:
     Attributes:
         text: The expression as text.
         metrics: The metrics that it reads, each with its run.
+        comparisons: Left side, sign and right side of each comparison of a requirement.
     """
 
     wanted = "a sum of metrics such as yaw_rate_overshoot(ars) is needed"
@@ -147,6 +133,7 @@ class Expression:
         """Read an expression; errors name its place in the source."""
         self.text, self._names = text, names
         self.metrics: dict[tuple[str, Run], None] = {}
+        self.comparisons: list[tuple[_Number, str, _Number]] = []
         self._fail = lambda problem: source.fail(where, f"{problem} in {shown(self.text)}", text)
         if len(text) > _LONGEST:
             raise source.fail(where, f"has {len(text)} characters; at most {_LONGEST} are allowed")
@@ -219,18 +206,9 @@ class Expression:
 
 
 class Requirement(Expression):
-    """A comparison of such numbers, or several; its value is the margin, which is negative if it is violated.
-
-    Attributes:
-        comparisons: Left side, sign and right side of each comparison.
-    """
+    """A comparison of such numbers, or several; its value is the margin, which is negative if it is violated."""
 
     wanted = "a comparison such as stopping_distance_m(none) <= 45 is needed"
-
-    def __init__(self, text: str, names: Names, source: Source, where: tuple[str, ...]) -> None:
-        """Read a requirement; see `Expression`."""
-        self.comparisons: list[tuple[_Number, str, _Number]] = []
-        super().__init__(text, names, source, where)
 
     def _whole(self, node: ast.expr) -> _Number:
         if isinstance(node, ast.BoolOp):

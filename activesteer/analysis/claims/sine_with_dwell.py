@@ -20,7 +20,7 @@ from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
 from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.loss_of_control import LOST_SIDESLIP_RAD
-from activesteer.analysis.requirement import Condition, at_least, at_most, both, either
+from activesteer.analysis.requirement import Condition, at_least, at_most
 from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
@@ -91,9 +91,7 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
 
 def _lost(runs: SystemRuns) -> Claim:
     none = runs.metrics["none"]
-    failed = either(
-        at_least(none[ratio], limit, strict=True) for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True)
-    )
+    failed = max(at_least(none[ratio], limit, strict=True) for ratio, limit in zip(RATIOS, RATIO_LIMITS, strict=True))
     lost = at_least(none[SIDESLIP], LOST_SIDESLIP_RAD, strict=True)
     alone = [
         at_least(none[SIDESLIP], 2.0 * runs.metrics[system][SIDESLIP], strict=True) for system in SYSTEMS_WITH_CONTROL
@@ -106,7 +104,7 @@ def _kept(runs: SystemRuns, statement: Statement, system: str) -> Claim:
     values = {
         f"{run}_{metric}": runs.metrics[run][metric] for metric in (*RATIOS, SIDESLIP) for run in ("none", system)
     }
-    breaks = both(_keeps(runs, "none")).negated
+    breaks = min(_keeps(runs, "none")).negated
     lowers = runs.lowers(system, SIDESLIP, 1.0, SIDESLIP_RAD)
     return runs.judge(statement, [*_keeps(runs, system), breaks, *lowers], values)
 

@@ -23,7 +23,7 @@ from activesteer.analysis.claims.path_following import (
     held_statement,
 )
 from activesteer.analysis.claims.system_runs import SystemRuns
-from activesteer.analysis.requirement import at_least, true
+from activesteer.analysis.requirement import Condition, at_least
 from activesteer.analysis.source import RecordingLike
 from activesteer.metric_table import (
     CONES_HIT,
@@ -83,7 +83,7 @@ def claims(recordings: Mapping[str, RecordingLike]) -> list[Claim]:
     wider = [at_least(none[TRACK] - runs.metrics[system][TRACK], TRACK_M) for system in SYSTEMS_WITH_CONTROL]
     kept = [at_least(afs[metric], NOT_REDUCED * none[metric]) for metric in (YAW_RATE, SIDESLIP)]
     large = at_least(afs[STEERING_PEAK], LARGE_STEERING_WHEEL_RAD, strict=True)
-    passes = true(afs[CONES_MISSED] == 0.0)
+    passes = Condition(math.inf if afs[CONES_MISSED] == 0.0 else -math.inf)
     calmest = [*runs.is_smallest("ars", YAW_RATE, YAW_RATE_RADPS), *runs.is_smallest("ars", SIDESLIP, SIDESLIP_RAD)]
     return [
         runs.judge(Z1, wider, runs.pick(TRACK, CONES_HIT)),

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from activesteer.analysis.claims import SCENARIO_OF
 from activesteer.analysis.requirement import ANY, Condition, Expression, Names, Requirement, Run, Runs
@@ -25,7 +25,6 @@ from activesteer.studies.engine.run_task import DISTANCE, Row, Status
 from activesteer.studies.engine.study_file import StudyFile
 
 TABLE: Final = "tune"
-SAMPLERS: Final = ("tpe", "cma_es", "nsga2", "random", "qmc", "grid")
 _MOST: Final = 1e6
 """Bound of a margin in a search, for runs that define no metric."""
 _ROOM: Final = 0.1
@@ -58,8 +57,8 @@ class TuneTable:
     """Sets to try first."""
     trials: Annotated[int, Range(1, 10_000_000)] = 100
     """Number of sets of each search."""
-    sampler: str = ""
-    """One of `SAMPLERS`; default: `cma_es` to satisfy statements without constraints, else `tpe`."""
+    sampler: Literal["auto", "tpe", "cma_es", "nsga2", "random", "qmc", "grid"] = "auto"
+    """Sampler of Optuna; `auto`: `cma_es` to satisfy statements without constraints, else `tpe`."""
 
     @property
     def goal(self) -> Goal:
@@ -83,8 +82,6 @@ def read_table(study: StudyFile) -> TuneTable:
         raise source.fail(
             (TABLE,), f"has the goals {', '.join(goals) or 'none'}; exactly one of {', '.join(Goal)} is needed"
         )
-    if table.sampler not in ("", *SAMPLERS):
-        raise source.fail((TABLE, "sampler"), nearest_names(table.sampler, SAMPLERS), table.sampler, SAMPLERS)
     if table.sampler == "cma_es" and (table.constraints or len(table.minimise) > 1):
         raise source.fail((TABLE, "sampler"), "cma_es allows one objective and no constraint; use tpe or nsga2")
     if study.case_list is not None or not study.factors:

@@ -1,8 +1,7 @@
 """Searches over the factors of a study by Optuna: resumable, and with several workers.
 
-The table [tune] has one goal: `minimise` objectives, `satisfy` as many statements as possible, or `violate` a
-requirement, which is searched for each controller in each manoeuvre. Objectives and requirements are expressions over
-the metrics of the runs, see `analysis.requirement`. A violation is a proof; the absence of one is none.
+`tune_table` describes the goals. A requirement to violate is searched for each controller in each manoeuvre. A
+violation is a proof; the absence of one is none.
 """
 
 from __future__ import annotations
@@ -39,8 +38,6 @@ _STARTUP: Final = 0.2
 """Fraction of the sets that the sampler draws at random before it learns to violate a requirement."""
 _WARM: Final = 10
 """Number of times that a warm start of CMA-ES counts its source: it learns from the best tenth of its sources."""
-_MARGINS: Final = "margins"
-_CONSTRAINTS: Final = "constraints"
 Progress = Callable[[str, int, int], None]
 """Called after every set with the name of the search, its finished sets, and their total."""
 
@@ -337,7 +334,9 @@ class _Search:
         """Return the sampler of Optuna; its seed differs when a search is resumed."""
         optuna, seed = _optuna(), self.plan.study.seed + len(made.trials)
         best: list[Any] = []
-        name = self.table.sampler or ("cma_es" if self.goal is Goal.SATISFY and not self.judge.constraints else "tpe")
+        name = self.table.sampler
+        if name == "auto":
+            name = "cma_es" if self.goal is Goal.SATISFY and not self.judge.constraints else "tpe"
         if name == "cma_es":
             states = (optuna.trial.TrialState.COMPLETE,)
             best = sorted(made.get_trials(deepcopy=False, states=states), key=lambda trial: trial.value)[:1]
@@ -366,8 +365,8 @@ class _Search:
             return
         if all(row["status"] == Status.OK for row in rows):
             self._seen = rows
-        trial.set_user_attr(_MARGINS, found.margins)
-        trial.set_user_attr(_CONSTRAINTS, found.constraints)
+        trial.set_user_attr("margins", found.margins)
+        trial.set_user_attr("constraints", found.constraints)
         for name, margin in found.constraints.items():
             trial.set_constraint(name, -margin)
         made.tell(trial, found.objectives)
@@ -377,15 +376,19 @@ class _Search:
         states = _optuna().trial.TrialState
         done = [trial for trial in made.get_trials(deepcopy=False) if trial.state.is_finished()]
         trials = [self._trial(trial) for trial in done if trial.state == states.COMPLETE]
-        front, study = self._front([trial for trial in trials if trial.allowed]), self.plan.study
+        best, study = {trial.number for trial in made.best_trials}, self.plan.study
+        front = [trial for trial in trials if trial.number in best]
         found = Tuning(self.goal, len(done), len(done) * len(self._places), trials, front)
         if self.goal is Goal.MINIMISE:
             return replace(found, without_effect=without_effect(self.plan, self._seen))
         if self.judge.prior is not None:
-            return replace(found, plausibility=self.judge.prior.plausibility(front[0].values) if front else None)
+            front = _plausible([trial for trial in trials if trial.allowed])
+            return replace(
+                found, front=front, plausibility=self.judge.prior.plausibility(front[0].values) if front else None
+            )
         commands = {
             label_of(name): run_command(study.maneuvers[0], name, study.vehicles[0], overrides, study.driver)
-            for one in front
+            for one in front[:1]
             for overrides in (self._requests(0, one.values)[0].overrides,)
             for name in study.controllers
         }
@@ -397,31 +400,23 @@ class _Search:
             trial.number,
             dict(trial.params),
             dict(zip(self.judge.objectives, trial.values, strict=True)) if self.judge.objectives else {},
-            trial.user_attrs[_MARGINS],
-            trial.user_attrs[_CONSTRAINTS],
+            trial.user_attrs["margins"],
+            trial.user_attrs["constraints"],
             math.nan if self.judge.prior is None else self.judge.prior.implausibility(trial.params),
         )
 
-    def _front(self, kept: Sequence[Trial]) -> list[Trial]:
-        if self.goal is Goal.MINIMISE:
-            return [trial for trial in kept if not any(dominates(other, trial) for other in kept)]
-        if self.goal is Goal.VIOLATE:
-            return [min(kept, key=lambda trial: trial.margins[ANY])] if kept else []
-        front: list[Trial] = []
-        for one in sorted(kept, key=lambda trial: (-len(trial.holding), trial.implausibility)):
-            last = front[-1] if front else None
-            if last is None or (len(one.holding) < len(last.holding) and one.implausibility < last.implausibility):
-                front.append(one)
-        return front
+
+def _plausible(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the most plausible set for each number of statements that hold, from the most down."""
+    front: list[Trial] = []
+    for one in sorted(trials, key=lambda trial: (-len(trial.holding), trial.implausibility)):
+        last = front[-1] if front else None
+        if last is None or (len(one.holding) < len(last.holding) and one.implausibility < last.implausibility):
+            front.append(one)
+    return front
 
 
 def _suggest(trial: Any, factor: Factor) -> Any:
     if factor.values:
         return trial.suggest_categorical(factor.key, factor.values)
     return trial.suggest_float(factor.key, factor.low, factor.high, log=factor.kind == "log_uniform")
-
-
-def dominates(a: Trial, b: Trial) -> bool:
-    """Return whether a set is nowhere worse than another in its objectives, and somewhere better."""
-    pairs = list(zip(a.objectives.values(), b.objectives.values(), strict=True))
-    return all(x <= y for x, y in pairs) and any(x < y for x, y in pairs)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from scipy.stats import spearmanr
 
 from activesteer.files import file_word
 from activesteer.plotting import Curve, Panel, Picture, draw, save
@@ -44,10 +45,10 @@ def _front(found: Tuning) -> Panel:
     for trials, label, look in (
         ([trial for trial in found.trials if not trial.allowed], "breaks a constraint", (_GREY, "", 1.2, "x")),
         ([trial for trial in found.trials if trial.allowed], "tried", (_GREY, "", 1.2, "o")),
-        (found.front, "best", (_BROKEN, "-", 1.2, "o")),
+        (found.front, "best", (_BROKEN, "", 1.2, "o")),
     ):
         if trials:
-            places = np.array(sorted(map(place, trials)))
+            places = np.array([place(trial) for trial in trials])
             curves.append(Curve(places[:, 0], places[:, 1], label, *look))
     return Panel(f"{x} [-]", f"{y} [-]", curves)
 
@@ -66,39 +67,30 @@ def _violations(found: Tuning) -> Picture:
     panels = [Panel("runs", "least margin so far [-]", [Curve(runs, falls, marker="o")], limits=limits)]
     broken = margins < 0.0
     columns = {key: [trial.values.get(key) for trial in found.trials] for key in found.front[0].values}
-    numbers = {key: _numbers(column) for key, column in columns.items()}
+    texts = {key: [] if _all_numbers(column) else sorted(set(map(str, column))) for key, column in columns.items()}
+    numbers = {
+        key: np.array([texts[key].index(str(value)) if texts[key] else value for value in column], dtype=np.float64)
+        for key, column in columns.items()
+    }
     for key in sorted(numbers, key=lambda key: -_correlation(numbers[key], shown))[:_FACTORS]:
         points = [
             Curve(numbers[key][part], shown[part], label, colour, "", 0.0, "o")
             for part, label, colour in ((~broken, "holds", _KEPT), (broken, "violated", _BROKEN))
             if part.any()
         ]
-        panels.append(Panel(_label(key, columns[key]), "margin [-]", points, limits=limits))
+        panels.append(Panel(_label(key, texts[key]), "margin [-]", points, limits=limits))
     title = f"{found.controller}, {found.maneuver}: {found.requirement}"
     return Picture(title, panels, None, 3, 12.0, 7.0)
 
 
-def _numbers(values: Sequence[object]) -> np.ndarray:
-    """Return numbers; the place of each in the sorted list, for texts."""
-    if all(isinstance(value, int | float) for value in values):
-        return np.array(values, dtype=np.float64)
-    texts = _texts(values)
-    return np.array([texts.index(str(value)) for value in values], dtype=np.float64)
+def _all_numbers(values: Sequence[object]) -> bool:
+    return all(isinstance(value, int | float) for value in values)
 
 
-def _texts(values: Sequence[object]) -> list[str]:
-    return sorted({str(value) for value in values})
-
-
-def _label(key: str, values: Sequence[object]) -> str:
-    if all(isinstance(value, int | float) for value in values):
-        return key
-    return f"{key} ({', '.join(f'{place}: {text}' for place, text in enumerate(_texts(values)))})"
+def _label(key: str, texts: Sequence[str]) -> str:
+    return f"{key} ({', '.join(f'{place}: {text}' for place, text in enumerate(texts))})" if texts else key
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     """Return the magnitude of Spearman's rank correlation; 0 for a constant."""
-    if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
-        return 0.0
-    first, second = (np.argsort(np.argsort(values)) for values in (x, y))
-    return float(abs(np.corrcoef(first, second)[0, 1]))
+    return 0.0 if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0 else abs(float(spearmanr(x, y).statistic))

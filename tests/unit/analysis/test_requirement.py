@@ -15,9 +15,6 @@ from activesteer.analysis.requirement import (
     Run,
     at_least,
     at_most,
-    both,
-    either,
-    true,
 )
 from activesteer.config import Source
 from activesteer.errors import StudyError
@@ -43,10 +40,9 @@ def test_the_distance_is_half_a_scale_away_and_one_if_undefined():
 
 def test_alternatives_take_the_nearest_and_all_the_furthest():
     near, far = at_most(1.1, 1.0), at_most(3.0, 1.0)
-    assert either([near, far]) == near
-    assert both([near, far]) == far
-    assert both([near, true(True)]) == near
-    assert true(False).negated.holds
+    assert max(near, far) == near
+    assert min(near, far) == far
+    assert far.negated.holds
 
 
 def test_a_claim_is_nearer_the_smaller_its_gap_and_at_zero_if_it_passes():
