@@ -1,9 +1,9 @@
-"""Write the paper's setting from a match: every number with its range and its reason.
+"""Write the paper's setting from a search: every number with its range and its reason.
 
     python tools/make_setting.py DIR [--number N]
     python tools/make_setting.py --studies
 
-DIR is the folder of `activesteer match match_paper -o DIR`; by default the best setting is taken. The tool rounds its
+DIR is the folder of `activesteer tune match_paper -o DIR`; by default the best setting is taken. The tool rounds its
 numbers to four digits, drives the 15 runs with 1 ms, and writes `activesteer/analysis/claims/paper_setting.toml`. It
 keeps the reasons in the file for the statements that fail, and marks those that it does not find there.
 
@@ -28,9 +28,9 @@ from activesteer.config import toml_value
 from activesteer.resources import find_study
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.matching import Match, read_match
 from activesteer.studies.engine.prior import Prior
 from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.engine.tuning import Tuning, read_tuning
 from activesteer.studies.paper.reproduction import reproduce
 
 STUDY: Final = "match_paper"
@@ -42,7 +42,7 @@ _WIDE: Final = {_BAND: {"log_uniform": [0.5, 2.0]}, "single_track.characteristic
 """Ranges of the second study that the population with the human driver does not have, relative to the setting."""
 FILE: Final = Path(setting_file.__file__).parent / "paper_setting.toml"
 _HEAD: Final = """# The paper's setting: numbers for all that the paper leaves open, with which most statements hold.
-# Selected by the verdicts of the claims, among the settings of `activesteer match match_paper`: the most plausible of
+# Selected by the verdicts of the claims, among the settings of `activesteer tune match_paper`: the most plausible of
 # those with the most statements. It shows under which conditions the statements are so; it is no evidence for them. The
 # ranges were committed before the search, which started from settings chosen by hand (docs/claims.md). Written by
 # tools/make_setting.py.
@@ -130,18 +130,18 @@ def text(found: Setting) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write(found: Match, number: int | None, jobs: int | None) -> Setting:
+def write(found: Tuning, number: int | None, jobs: int | None) -> Setting:
     """Write the setting, drive it, and write it again with the statements that fail."""
-    chosen = found.best if number is None else next(one for one in found.candidates if one.number == number)
+    sets = found.front if number is None else [one for one in found.trials if one.number == number]
+    chosen = next(iter(sets), None)
     if chosen is None:
-        raise SystemExit("the match has no complete setting")
-    kept = read_setting(PAPER).fails
-    size = found.prior.implausibility(chosen.values)
+        raise SystemExit("the search has no such setting")
+    kept, study = read_setting(PAPER).fails, read_study(STUDY)
     about = (
-        f"The paper's setting, selected by its verdicts: {found.prior.plausibility(chosen.values).value} "
-        f"(implausibility {size:.2f})"
+        f"The paper's setting, selected by its verdicts: {Prior(study).plausibility(chosen.values).value} "
+        f"(implausibility {chosen.implausibility:.2f})"
     )
-    made = Setting(about, tuple(numbers(found.study, chosen.values)), {})
+    made = Setting(about, tuple(numbers(study, chosen.values)), {})
     FILE.write_text(text(made), encoding="utf-8")
     read_setting.cache_clear()
     with tempfile.TemporaryDirectory() as folder:
@@ -211,13 +211,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?", metavar="DIR")
     parser.add_argument("--studies", action="store_true", help="write only the studies around the setting")
-    parser.add_argument("--number", type=int, metavar="N", help="number of the setting in the match")
+    parser.add_argument("--number", type=int, metavar="N", help="number of the set in the search")
     parser.add_argument("--jobs", type=int, metavar="N")
     options = parser.parse_args()
     if not options.studies:
         if options.folder is None:
-            parser.error("DIR is needed: the folder of a match")
-        found = write(read_match(STUDY, options.folder), options.number, options.jobs)
+            parser.error("DIR is needed: the folder of a search")
+        found = write(read_tuning(STUDY, options.folder), options.number, options.jobs)
         print(f"{FILE}: {len(found.numbers)} numbers; fails: {' '.join(found.fails) or '-'}")
     write_around()
 

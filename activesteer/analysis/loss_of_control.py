@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
 from activesteer.metric_table import (
     CONES_HIT,
     CONES_MISSED,
@@ -19,7 +18,8 @@ from activesteer.metric_table import (
 Metrics = Mapping[str, float | None]
 """Metrics of a run; a value that is not defined is None or nan."""
 
-
+LOST_SIDESLIP_RAD: Final = math.radians(20.0)
+"""Largest sideslip angle of a car that is not lost [rad]."""
 TURNED_ROUND_RAD: Final = math.radians(90.0)
 """Sideslip angle beyond which the car slides backwards, and its metrics say nothing [rad]."""
 LOST: Final = "lost"

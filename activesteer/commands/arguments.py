@@ -24,6 +24,8 @@ SUCCESSORS: Final = {
     "driver": "linearise --loop driver",
     "margins": "linearise --loop controller",
     "validate": "compare FOLDER` or `activesteer fit FOLDER",
+    "match": "tune STUDY",
+    "falsify": "tune STUDY -c CONTROLLER",
 }
 """Removed command -> what does its work now."""
 

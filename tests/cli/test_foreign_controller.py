@@ -43,9 +43,8 @@ TUNE = """
 "controllers.YawBeta.limit_deg" = { uniform = [2.8, 2.9] }
 [tune]
 trials = 2
-[[tune.objectives]]
-name = "overshoot"
-terms = [{ metric = "yaw_rate_overshoot", controller = "rsc.py:YawBeta" }]
+[tune.minimise]
+overshoot = 'abs(yaw_rate_overshoot("rsc.py:YawBeta"))'
 """
 
 

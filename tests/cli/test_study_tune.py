@@ -38,7 +38,7 @@ samples = 64
 
 [tune]
 trials = 3
-objectives = [{ name = "yaw", terms = [{ metric = "yaw_rate_overshoot", controller = "none" }] }]
+minimise = { yaw = "abs(yaw_rate_overshoot(none))" }
 """
 
 

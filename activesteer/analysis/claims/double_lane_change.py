@@ -12,7 +12,6 @@ from typing import Final
 
 from activesteer.analysis import path_following, track
 from activesteer.analysis.claims.claim import SYSTEMS, Claim, Kind, Statement
-from activesteer.analysis.claims.condition import at_least, at_most
 from activesteer.analysis.claims.path_following import (
     AFTER_SIDESLIP,
     AFTER_YAW_RATE,
@@ -25,6 +24,7 @@ from activesteer.analysis.claims.path_following import (
     held_statement,
 )
 from activesteer.analysis.claims.system_runs import SystemRuns
+from activesteer.analysis.requirement import at_least, at_most
 from activesteer.analysis.source import RecordingLike, read_course
 from activesteer.metric_table import CONES_HIT, SIDESLIP_RAD, YAW_RATE_RADPS
 

@@ -10,9 +10,9 @@ import math
 from typing import Final
 
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Kind, Statement
-from activesteer.analysis.claims.condition import Condition, at_most
 from activesteer.analysis.claims.system_runs import SystemRuns
 from activesteer.analysis.path_following import AFTER_S
+from activesteer.analysis.requirement import Condition, at_most
 from activesteer.metric_table import SIDESLIP_RAD, YAW_RATE_RADPS
 
 CALMED: Final = 0.5

@@ -1,7 +1,7 @@
 """Settings in which the paper's scenarios are driven: what the paper leaves open, as numbers with ranges and reasons.
 
 `human` is the nominal car with a driver from published ranges; it changes nothing. `paper` was selected by the verdicts
-of the claims (`activesteer match match_paper`), within ranges that were written down before: it shows under which
+of the claims (`activesteer tune match_paper`), within ranges that were written down before: it shows under which
 conditions the paper's statements hold together, and is no evidence for them.
 """
 

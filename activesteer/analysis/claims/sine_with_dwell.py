@@ -18,15 +18,14 @@ import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.condition import Condition, at_least, at_most, both, either
 from activesteer.analysis.claims.system_runs import SystemRuns
+from activesteer.analysis.loss_of_control import LOST_SIDESLIP_RAD
+from activesteer.analysis.requirement import Condition, at_least, at_most, both, either
 from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
 from activesteer.metric_table import SIDESLIP_RAD
 
-LOST_SIDESLIP_RAD: Final = math.radians(20.0)
-"""Largest sideslip angle of a car that is not lost [rad]."""
 KEPT_SIDESLIP_RAD: Final = math.radians(12.0)
 """Largest sideslip angle at which the steering still turns the car on a dry road [rad]."""
 MIN_ANGLE_RAD: Final = math.radians(0.1)

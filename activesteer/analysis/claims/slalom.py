@@ -13,7 +13,6 @@ from typing import Final
 
 from activesteer.analysis import path_following
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Kind, Statement
-from activesteer.analysis.claims.condition import at_least, true
 from activesteer.analysis.claims.path_following import (
     AFTER_SIDESLIP,
     AFTER_YAW_RATE,
@@ -24,6 +23,7 @@ from activesteer.analysis.claims.path_following import (
     held_statement,
 )
 from activesteer.analysis.claims.system_runs import SystemRuns
+from activesteer.analysis.requirement import at_least, true
 from activesteer.analysis.source import RecordingLike
 from activesteer.metric_table import (
     CONES_HIT,

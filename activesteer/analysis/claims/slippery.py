@@ -11,7 +11,6 @@ from typing import Final
 
 from activesteer.analysis import path_following
 from activesteer.analysis.claims.claim import SYSTEMS_WITH_CONTROL, Claim, Kind, Statement
-from activesteer.analysis.claims.condition import Condition, at_least, at_most
 from activesteer.analysis.claims.path_following import (
     LARGE_STEERING_WHEEL_RAD,
     SETTLED_YAW_RATE_RADPS,
@@ -20,6 +19,7 @@ from activesteer.analysis.claims.path_following import (
     held_statement,
 )
 from activesteer.analysis.claims.system_runs import Metrics, SystemRuns
+from activesteer.analysis.requirement import Condition, at_least, at_most
 from activesteer.analysis.series import rms
 from activesteer.analysis.source import RecordingLike
 from activesteer.metric_table import CONES_HIT, LANE_OVERSTEP, STAYS_IN_LANES, TRACK_M

@@ -15,8 +15,8 @@ import numpy as np
 from activesteer.analysis import step_response
 from activesteer.analysis.claims.action import mean_straight_ahead
 from activesteer.analysis.claims.claim import SYSTEMS, SYSTEMS_WITH_CONTROL, Claim, Fake, Kind, Statement
-from activesteer.analysis.claims.condition import at_least, at_most
 from activesteer.analysis.claims.system_runs import SystemRuns
+from activesteer.analysis.requirement import at_least, at_most
 from activesteer.analysis.series import crossing_time, smooth, timestep
 from activesteer.analysis.source import RecordingLike
 from activesteer.metric_table import SETTLED_SIDESLIP_RAD, STEER_RAD, TIME_S, YAW_RATE_RADPS

@@ -10,7 +10,7 @@ import numpy as np
 
 from activesteer.analysis.claims.action import MEAN_S, largest_action
 from activesteer.analysis.claims.claim import SYSTEMS, SYSTEMS_WITH_CONTROL, Claim, Statement, check_systems
-from activesteer.analysis.claims.condition import Condition, at_least, at_most
+from activesteer.analysis.requirement import Condition, at_least, at_most
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import Evaluable, RecordingLike
 from activesteer.errors import RecordingError

@@ -69,7 +69,7 @@ class Plan:
         for samples in self.samples:
             columns = {key: values for key, values in samples.columns.items() if _has_text(values)}
             rows: Iterable[tuple[Any, ...]] = dict.fromkeys(zip(*columns.values(), strict=True))
-            if study.tune or study.match or study.falsify:  # a search combines values as it proceeds
+            if study.tune:  # a search combines values as it proceeds
                 columns = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
                 rows = itertools.product(*columns.values())
             for row in rows if columns else ():

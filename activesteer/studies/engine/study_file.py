@@ -21,15 +21,19 @@ from activesteer.studies.engine.factors import Factor, is_plain, read_factor
 
 _KEYS: Final = (
     "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
-    "recordings", "curves", "claims", "timestep_s", "tune", "fit", "match", "falsify",
+    "recordings", "curves", "claims", "timestep_s", "tune", "fit",
 )  # fmt: skip
 SEARCHES: Final = {
-    "tune": "it says what is to be made small",
-    "match": "it says which statements should hold",
+    "tune": "it says what is to be minimised, satisfied or violated",
     "fit": "it says which channels are compared, and how noisy they are",
-    "falsify": "it says what shall hold",
 }
 """Tables of searches, which choose the factor values themselves; each with a hint for a missing table."""
+_SUCCESSORS: Final = {
+    "falsify": '[tune] with violate = "harm(controller) <= 1" and trials, the number of sets of each search',
+    "match": '[tune.satisfy] with lines such as prompt = "yaw_rate_response_time_s(ars) <= 0.1" or S1 = "claim(S1)", '
+    "and trials and seeds in [tune]",
+}
+"""Former key -> what does its work now."""
 _KEPT: Final = ("none", "failed", "all")
 
 
@@ -65,9 +69,7 @@ class StudyFile:
         claims: Whether to check the paper's claims for every sample; this needs its three systems.
         timestep_s: Step of engine, driver and controller [s].
         tune: The table [tune], unparsed; see `tuning`.
-        match: The table [match], unparsed; see `match_file`.
         fit: The table [fit], unparsed; see `measured.fit_file`.
-        falsify: The table [falsify], unparsed; see `falsification`.
         title: One line for the report.
         source: For error messages.
     """
@@ -87,9 +89,7 @@ class StudyFile:
     claims: bool = False
     timestep_s: float = DEFAULT_TIMESTEP_S
     tune: dict[str, Any] | None = None
-    match: dict[str, Any] | None = None
     fit: dict[str, Any] | None = None
-    falsify: dict[str, Any] | None = None
     title: str = ""
     source: Source = Source("study")
 
@@ -106,22 +106,6 @@ class StudyFile:
     def keys(self) -> tuple[str, ...]:
         """Varied keys, in the order of the file."""
         return tuple(self.case_list.columns) if self.case_list else tuple(factor.key for factor in self.factors)
-
-    def check_runs(self, where: tuple[str, ...], maneuver: str, controllers: Mapping[str, str]) -> None:
-        """Check that a part of a search names a manoeuvre of the study, or needs none, and its controllers."""
-        names = [label_of(item) for item in self.maneuvers]
-        if maneuver not in names and (maneuver or len(names) > 1):
-            raise self.source.fail((*where, "maneuver"), nearest_names(maneuver, names), maneuver)
-        names = [label_of(item) for item in self.controllers]
-        for key, name in controllers.items():
-            if name not in names and (name or key == "controller"):
-                raise self.source.fail((*where, key), nearest_names(name, names), name)
-
-    def check_metric(self, where: tuple[str, ...], metric: str, row: Mapping[str, Any]) -> None:
-        """Check that a run has the metric of a search."""
-        known = [name for name, value in row.items() if isinstance(value, float) and name not in self.keys]
-        if metric not in known:
-            raise self.source.fail(where, nearest_names(metric, known), metric)
 
     def to_table(self) -> dict[str, Any]:
         """Return the study as the table of a study file."""
@@ -167,7 +151,7 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
     Args:
         given: Name of a study of the package, a path, or a table. Relative paths in a file start at its folder, those
             in a table at the working directory.
-        search: `tune`, `match`, `fit` or `falsify` if the study must have that table.
+        search: `tune` or `fit` if the study must have that table.
     """
     if isinstance(given, StudyFile):
         return given
@@ -178,6 +162,8 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
         table, source = read_toml(path, StudyError)
         folder = path.resolve().parent
     for key in table:
+        if key in _SUCCESSORS:
+            raise source.fail((key,), f"is no table any more; write {_SUCCESSORS[key]}")
         if key not in _KEYS:
             raise source.fail((key,), f"there is no such key; {nearest_names(key, _KEYS)}")
     if search and search not in table:

@@ -1,225 +1,427 @@
-"""Tuning: values of a study's factors that minimise objectives, by Optuna; resumable, with several workers."""
+"""Searches over the factors of a study by Optuna: resumable, and with several workers.
+
+The table [tune] has one goal: `minimise` objectives, `satisfy` as many statements as possible, or `violate` a
+requirement, which is searched for each controller in each manoeuvre. Objectives and requirements are expressions over
+the metrics of the runs, see `analysis.requirement`. A violation is a proof; the absence of one is none.
+"""
 
 from __future__ import annotations
 
+import functools
+import itertools
 import json
 import math
 import os
+import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, Final
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final
 
-from activesteer.config import Range, build
-from activesteer.errors import StudyError
-from activesteer.files import make_folder, write_text
+from activesteer.analysis.requirement import ANY, Names, Requirement
+from activesteer.errors import ParameterError, StudyError, nearest_names, not_installed
+from activesteer.files import file_word, finite, make_folder, reading, write_text
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.effects import without_effect
+from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_task import Row, Status
-from activesteer.studies.engine.search import Judgement, claim_folder, import_optuna, search
-from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.engine.workers import workers_for
+from activesteer.studies.engine.prior import Plausibility
+from activesteer.studies.engine.run_command import run_command
+from activesteer.studies.engine.run_settings import Request, prepare
+from activesteer.studies.engine.run_task import Row, Status, drive
+from activesteer.studies.engine.store import LOCK, locked
+from activesteer.studies.engine.study_file import StudyFile, label_of, read_study
+from activesteer.studies.engine.task_queue import TaskQueue
+from activesteer.studies.engine.tune_table import TABLE, Goal, Judge, TuneTable, read_table
+from activesteer.studies.engine.workers import Workers, workers_for
 
-_VIOLATION: Final = "violation"
-
-
-@dataclass(frozen=True)
-class Term:
-    """A metric of one run, in an objective or a constraint."""
-
-    metric: str
-    """Name of the metric; `claims_failed` is the number of the paper's claims that fail, if the study checks them."""
-    controller: str
-    """Controller of the run."""
-    maneuver: str = ""
-    """Manoeuvre of the run; may be left out if there is only one."""
-    relative_to: str = ""
-    """Another controller; the magnitude is divided by that of its run."""
-    weight: float = 1.0
-    """Weight; negative if a larger value is better."""
-    limit: Annotated[float, Range(0.0)] = 1e12
-    """Upper bound of the magnitude."""
-
-
-@dataclass(frozen=True)
-class Objective:
-    """A sum to be minimised."""
-
-    name: str
-    """Name of the objective."""
-    terms: tuple[Term, ...]
-    """Terms of the sum: magnitudes times their weights."""
-
-
-@dataclass(frozen=True)
-class Constraint:
-    """A bound that must not be exceeded."""
-
-    metric: str
-    """See `Term`."""
-    controller: str
-    """See `Term`."""
-    maneuver: str = ""
-    """See `Term`."""
-    low: float = -1e12
-    """The metric is at least this."""
-    high: float = 1e12
-    """The metric is at most this."""
-
-
-@dataclass(frozen=True)
-class TuneTable:
-    """The table [tune] of a study file."""
-
-    objectives: tuple[Objective, ...]
-    """One objective, or several, for which the Pareto front is found."""
-    constraints: tuple[Constraint, ...] = ()
-    """Constraints."""
-    trials: Annotated[int, Range(1, 1_000_000)] = 100
-    """Number of sets to try."""
+_STARTUP: Final = 0.2
+"""Fraction of the sets that the sampler draws at random before it learns to violate a requirement."""
+_WARM: Final = 10
+"""Number of times that a warm start of CMA-ES counts its source: it learns from the best tenth of its sources."""
+_MARGINS: Final = "margins"
+_CONSTRAINTS: Final = "constraints"
+Progress = Callable[[str, int, int], None]
+"""Called after every set with the name of the search, its finished sets, and their total."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A set of values that was tried; the size of the violation of its constraints is 0 if there is none."""
+    """A set of values that was tried.
+
+    Attributes:
+        number: Its number.
+        values: Factor -> value.
+        objectives: Name of an objective -> its value.
+        margins: Name of a statement -> its margin, negative if it is violated; at most 1e6 in magnitude.
+        constraints: Name of a constraint -> its margin.
+        implausibility: Distance from the nominal values, see `prior`; nan if statements are not the goal.
+    """
 
     number: int
     values: dict[str, Any]
     objectives: dict[str, float]
-    violation: float
+    margins: dict[str, float] = field(default_factory=dict)
+    constraints: dict[str, float] = field(default_factory=dict)
+    implausibility: float = math.nan
+
+    @property
+    def holding(self) -> list[str]:
+        """Names of the statements that hold."""
+        return [name for name, margin in self.margins.items() if margin >= 0.0]
+
+    @property
+    def allowed(self) -> bool:
+        """True if all constraints are kept."""
+        return all(margin >= 0.0 for margin in self.constraints.values())
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """Result of a tuning.
+    """Result of a search.
 
     Attributes:
+        goal: Its goal.
         done: Number of all sets that were tried.
-        failed: Number of sets with a failed run.
-        front: Sets that no other set beats in every objective; with one objective, the best set.
+        runs: Number of their runs.
         trials: All sets that could be judged.
-        without_effect: Factors that change no metric of any run, if sets were tried now.
+        front: The best set. For several objectives, all sets that no other set beats. For statements, the most
+            plausible set for each number of them, from the most down. For a violation, the set with the least margin.
+        without_effect: Factors that change no metric of any run, if objectives are the goal and sets were tried now.
+        requirement: The requirement to violate.
+        controller: The examined controller of a violation.
+        maneuver: The manoeuvre of a violation.
+        commands: Controller -> command line that repeats its run of the worst set.
+        plausibility: Plausibility of the best set, if statements are the goal.
     """
 
+    goal: Goal
     done: int
-    failed: int
-    front: list[Trial]
+    runs: int
     trials: list[Trial]
-    without_effect: list[str]
+    front: list[Trial]
+    without_effect: list[str] = field(default_factory=list)
+    requirement: str = ""
+    controller: str = ""
+    maneuver: str = ""
+    commands: dict[str, str] = field(default_factory=dict)
+    plausibility: Plausibility | None = None
+
+    @property
+    def failed(self) -> int:
+        """Number of sets that could not be judged."""
+        return self.done - len(self.trials)
+
+    @property
+    def violations(self) -> int:
+        """Number of sets that violate the requirement."""
+        return sum(trial.margins[ANY] < 0.0 for trial in self.trials) if self.goal is Goal.VIOLATE else 0
+
+    @property
+    def fall(self) -> list[tuple[int, float]]:
+        """Number of runs and least margin so far, at every improvement of a search for a violation."""
+        found: list[tuple[int, float]] = []
+        for trial in self.trials if self.goal is Goal.VIOLATE else ():
+            if not found or trial.margins[ANY] < found[-1][1]:
+                found.append(((trial.number + 1) * self.runs // self.done, trial.margins[ANY]))
+        return found
+
+    @property
+    def never_together(self) -> list[tuple[str, str]]:
+        """Pairs of statements that each hold in some set, and in none of the sets together."""
+        held = [set(trial.holding) for trial in self.trials] if self.goal is Goal.SATISFY else []
+        ever = dict.fromkeys(
+            name for trial in self.trials for name in trial.margins if any(name in own for own in held)
+        )
+        return [pair for pair in itertools.combinations(ever, 2) if not any(own.issuperset(pair) for own in held)]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values, without the trials."""
+        names = {
+            Goal.MINIMISE: ("without_effect",),
+            Goal.SATISFY: ("never_together", "plausibility"),
+            Goal.VIOLATE: ("controller", "maneuver", "requirement", "violations", "fall", "commands"),
+        }[self.goal]
+        front = [vars(trial) for trial in self.front]
+        about = {name: getattr(self, name) for name in ("goal", "done", "failed", "runs", *names)}
+        return finite({**about, "front": front})
 
 
 def tune(
     study_file: FileOrTable,
     output: str | os.PathLike[str],
     *,
+    controllers: Sequence[str] | None = None,
+    maneuvers: Sequence[str] | None = None,
     trials: int | None = None,
+    runs: int | None = None,
     jobs: int | None = None,
     client: Any = None,
     scheduler: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Tuning:
-    """Search for the best set of a study's factors, driving each set in all manoeuvres with all controllers.
+    progress: Progress | None = None,
+) -> list[Tuning]:
+    """Search the ranges of a study's factors; every set is driven in all manoeuvres with all controllers.
 
-    A search found in the folder is resumed, up to `trials` sets in total, by default the number of the file. `progress`
-    is called after every set with the finished sets and the total. See `study` for the other arguments.
+    There is one search, or one for each controller in each manoeuvre if a requirement shall be violated; `controllers`
+    and `maneuvers` choose them, by default those of the file. Each has a folder below the output then. A search found
+    in its folder is resumed, up to `trials` sets in total, or as many as `runs` allows; by default those of the file.
+    See `study` for the other arguments.
     """
-    study = read_study(study_file, "tune")
-    table = _table(study)
-    optuna = import_optuna("tune")
-    plan = Plan(study)
     folder = make_folder(output, StudyError)
-    claim_folder(folder, "tune", plan)
-    seen: list[Sequence[Row]] = []
-
-    def judge(rows: Sequence[Row]) -> Judgement:
-        if any(row["status"] != Status.OK for row in rows):
-            return Judgement(None)
-        if not seen:
-            _check_metrics(study, table, rows)
-        seen[:] = [rows]
-        values, violation = _judged(table, rows)
-        return Judgement(values, {_VIOLATION: violation}, violation if table.constraints else None)
-
-    def sampler(seed: int) -> Any:
-        return optuna.samplers.TPESampler(seed=seed, constant_liar=True)
-
-    wanted = table.trials if trials is None else trials
+    if (folder / "study.toml").exists():
+        raise StudyError(f"{folder} holds a study; use a new folder for the search", value=folder)
+    searches = _searches(read_study(study_file, TABLE), folder, controllers, maneuvers)
+    _optuna()
     with workers_for(jobs, client=client, scheduler=scheduler) as workers:
-        made = search(plan, folder, "tune", sampler, len(table.objectives), wanted, judge, workers, progress)
-    result = _result(optuna, made, table, without_effect(plan, seen[-1] if seen else ()))
-    write_text(folder / "front.json", json.dumps([vars(trial) for trial in result.front], indent=2) + "\n", StudyError)
-    return result
+        return [search.run(workers, trials, runs, progress) for search in searches]
 
 
-def _table(study: StudyFile) -> TuneTable:
-    if study.case_list is not None or not study.factors:
-        raise study.source.fail(("factors",), "a search needs factors")
-    table = build(TuneTable, study.tune or {}, study.source, ("tune",))
-    if not table.objectives:
-        raise study.source.fail(("tune", "objectives"), "at least one is needed")
-    for place, part in _parts(table):
-        study.check_runs(place, part.maneuver, {key: getattr(part, key, "") for key in ("controller", "relative_to")})
-    return table
+def read_tuning(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Tuning:
+    """Return the search of a study in a folder as far as it is; it may be of another version of the package."""
+    (search,) = _searches(read_study(study_file, TABLE), Path(folder), None, None)
+    return search.result(search.stored())
 
 
-def _parts(table: TuneTable) -> Iterator[tuple[tuple[str, ...], Term | Constraint]]:
-    """Return all terms and constraints, with the keys that lead to them."""
-    for number, objective in enumerate(table.objectives):
-        for place, term in enumerate(objective.terms):
-            yield ("tune", "objectives", str(number), "terms", str(place)), term
-    for number, constraint in enumerate(table.constraints):
-        yield ("tune", "constraints", str(number)), constraint
+def _searches(
+    study: StudyFile, folder: Path, controllers: Sequence[str] | None, maneuvers: Sequence[str] | None
+) -> list[_Search]:
+    table, labels = read_table(study), {label_of(item): item for item in study.maneuvers}
+    if table.goal is not Goal.VIOLATE:
+        for option, given in {"--controller": controllers, "--maneuver": maneuvers}.items():
+            if given:
+                raise ParameterError("belongs to a search with the goal violate", key=option, value=given)
+        return [_Search(replace(study, metrics=()), table, folder)]
+    if len(study.vehicles) > 1:
+        raise study.source.fail(("vehicles",), "a search for a violation needs one vehicle")
+    for name in maneuvers or ():
+        if name not in labels:
+            raise ParameterError(nearest_names(name, labels), key="--maneuver", value=name, allowed=tuple(labels))
+    requirement = Requirement(table.violate, Names(None, [""], ANY), study.source, (TABLE, Goal.VIOLATE))
+    named = dict.fromkeys(run.controller for _, run in requirement.metrics if run.controller != ANY)
+    found = []
+    for name, maneuver in itertools.product(controllers or study.controllers, maneuvers or labels):
+        own = label_of(name)
+        one = replace(
+            study,
+            metrics=(),
+            controllers=(name, *(other for other in named if label_of(other) != own)),
+            maneuvers=(labels[maneuver],),
+            factors=tuple(
+                replace(factor, maneuvers=())
+                for factor in study.factors
+                if not factor.maneuvers or maneuver in factor.maneuvers
+            ),
+        )
+        if not one.factors:
+            raise study.source.fail(("factors",), f"none of them varies in {maneuver}; a search needs factors")
+        below = folder / f"{file_word(own)}-{file_word(maneuver)}"
+        found.append(_Search(one, table, make_folder(below, StudyError), own, maneuver))
+    return found
 
 
-def _check_metrics(study: StudyFile, table: TuneTable, rows: Sequence[Row]) -> None:
-    """Check that the runs have every metric; the first set without a failure shows their names."""
-    for place, part in _parts(table):
-        for row in _rows_of(part.controller, part.maneuver, rows):
-            study.check_metric((*place, "metric"), part.metric, row)
+@functools.cache
+def _optuna() -> Any:
+    try:
+        import cmaes  # noqa: F401, PLC0415 - of Optuna's CmaEsSampler
+        import optuna  # noqa: PLC0415 - an extra
+    except ImportError as reason:
+        raise not_installed(StudyError, "activesteer tune", str(reason.name), "study") from reason
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    return optuna
 
 
-def _judged(table: TuneTable, rows: Sequence[Row]) -> tuple[list[float] | None, float]:
-    """Return the objectives and the violation of the constraints; no objectives if a run lacks a metric."""
-    values = [sum(_value(term, rows) for term in objective.terms) for objective in table.objectives]
-    broken = 0.0
-    for constraint in table.constraints:
-        for found in _found(constraint.metric, constraint.controller, constraint.maneuver, rows):
-            broken += max(0.0, constraint.low - found, found - constraint.high)
-    finite = all(map(math.isfinite, values)) and math.isfinite(broken)
-    return (values if finite else None), broken
+class _Search:
+    """One search: its runs, its expressions and its folder."""
+
+    def __init__(
+        self, study: StudyFile, table: TuneTable, folder: Path, examined: str = "", maneuver: str = ""
+    ) -> None:
+        """Check the study; `examined` and `maneuver` are those of a search for a violation."""
+        self.plan, self.table, self.folder, self.goal = Plan(study), table, folder, table.goal
+        self.examined, self.maneuver = examined, maneuver
+        self.judge = Judge(self.plan, table, examined)
+        shared = self.plan.settings
+        items = (shared.maneuvers, shared.vehicles, shared.controllers)
+        self._places: Any = list(itertools.product(*(range(len(item)) for item in items)))
+        self._seen: Sequence[Row] = ()
+
+    def run(self, workers: Workers, trials: int | None, runs: int | None, progress: Progress | None) -> Tuning:
+        """Try sets until there are enough, and store the result."""
+        total = self.table.trials if trials is None else trials
+        total = max(1, runs // len(self._places)) if runs is not None else total
+        if self.table.sampler == "grid":
+            total = min(total, math.prod(len(factor.values) for factor in self.plan.study.factors))
+        with locked(self.folder / LOCK):
+            self._claim_folder()
+            made = self.stored()
+            self._search(made, total, workers, progress)
+        found = self.result(made)
+        name = "worst" if self.goal is Goal.VIOLATE else "front"
+        write_text(self.folder / f"{name}.json", json.dumps(found.to_json(), indent=2) + "\n", StudyError)
+        return found
+
+    def _claim_folder(self) -> None:
+        """Write the study into the folder, or check that the folder holds the same search."""
+        study = self.plan.study
+        lines = {key: value for key, value in (study.tune or {}).items() if key != "trials"}
+        text = f"# {self.plan.digest}\n{replace(study, tune=lines).to_toml()}"
+        path = self.folder / f"{TABLE}.toml"
+        if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
+            raise StudyError(f"{self.folder} holds another search; use a new folder", value=self.folder)
+        write_text(path, text, StudyError)
+
+    def stored(self) -> Any:
+        """Return the study of Optuna in the folder."""
+        optuna = _optuna()
+        from optuna.storages import JournalStorage, journal  # noqa: PLC0415 - an extra
+
+        path = self.folder / f"{TABLE}.journal"
+        if path.exists():
+            with reading(path, StudyError):
+                whole, _, rest = path.read_bytes().rpartition(b"\n")
+            if rest:  # a process was killed while writing
+                path.write_bytes(whole + b"\n" if whole else b"")
+        lock = journal.JournalFileOpenLock(str(path))
+        directions = ["minimize"] * max(1, len(self.judge.objectives))
+        storage = JournalStorage(journal.JournalFileBackend(str(path), lock_obj=lock))
+        return optuna.create_study(storage=storage, study_name=TABLE, load_if_exists=True, directions=directions)
+
+    def _search(self, made: Any, total: int, workers: Workers, progress: Progress | None) -> None:
+        states = _optuna().trial.TrialState
+        for left in made.get_trials(deepcopy=False, states=(states.RUNNING,)):  # left by a killed process
+            made.tell(left.number, state=states.FAIL)
+        waiting = len(made.get_trials(deepcopy=False, states=(states.WAITING,)))
+        done = len(made.trials) - waiting
+        if done >= total:
+            return
+        if not made.trials:
+            seeds = self._seeds()
+            waiting = len(seeds)
+            for seed in seeds:
+                made.enqueue_trial(seed)
+        prepare(workers, self.plan.settings)
+        for end in dict.fromkeys((min(done + waiting, total), total)):
+            made.sampler = self._sampler(made, total)
+            for trial, rows, error in TaskQueue(workers).outcomes(self._tasks(made, end - done)):
+                done += 1
+                self._tell(made, trial, [] if error is not None else rows)
+                if progress is not None:
+                    progress(f"{self.examined} {self.maneuver}".strip(), done, total)
+
+    def _tasks(self, made: Any, count: int) -> Iterator[tuple[Any, ...]]:
+        for _ in range(count):
+            trial = made.ask()
+            values = {factor.key: _suggest(trial, factor) for factor in self.plan.study.factors}
+            yield trial, drive, self.plan.settings, self._requests(trial.number, values)
+
+    def _requests(self, number: int, values: dict[str, Any]) -> list[Request]:
+        """Return the runs of a set of values, in all manoeuvres and vehicles with all controllers."""
+        return [self.plan.request_with(run, number, place, values) for run, place in enumerate(self._places)]
+
+    def _seeds(self) -> list[dict[str, Any]]:
+        """Return the sets to try first: those of the file; a whole grid; the nominal values to satisfy statements."""
+        factors, prior, seeds = self.plan.study.factors, self.judge.prior, self.table.seeds
+        # Optuna's own samplers of grids end the search when they are through, which fails outside of its loop.
+        if self.table.sampler == "grid":
+            combinations = itertools.product(*(factor.values for factor in factors))
+            return [dict(zip(self.plan.study.keys, values, strict=True)) for values in combinations]
+        if prior is None:
+            return list(seeds)
+        nominal = dict(prior.nominal)
+        for factor in factors:
+            if not factor.values:
+                nominal[factor.key] = min(max(nominal[factor.key], factor.low), factor.high)
+        return [nominal, *({**nominal, **seed} for seed in seeds)]
+
+    def _sampler(self, made: Any, total: int) -> Any:
+        """Return the sampler of Optuna; its seed differs when a search is resumed."""
+        optuna, seed = _optuna(), self.plan.study.seed + len(made.trials)
+        best: list[Any] = []
+        name = self.table.sampler or ("cma_es" if self.goal is Goal.SATISFY and not self.judge.constraints else "tpe")
+        if name == "cma_es":
+            states = (optuna.trial.TrialState.COMPLETE,)
+            best = sorted(made.get_trials(deepcopy=False, states=states), key=lambda trial: trial.value)[:1]
+        startup = max(10, round(_STARTUP * total)) if self.goal is Goal.VIOLATE else 10
+        samplers = optuna.samplers
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+            return {
+                "tpe": lambda: samplers.TPESampler(seed=seed, constant_liar=True, n_startup_trials=startup),
+                "cma_es": lambda: samplers.CmaEsSampler(
+                    seed=seed, warn_independent_sampling=False, source_trials=best * _WARM or None
+                ),
+                "nsga2": lambda: samplers.NSGAIISampler(seed=seed, population_size=min(50, max(4, total // 10))),
+                "random": lambda: samplers.RandomSampler(seed=seed),
+                "grid": lambda: samplers.RandomSampler(seed=seed),
+                "qmc": lambda: samplers.QMCSampler(
+                    seed=seed, warn_independent_sampling=False, warn_asynchronous_seeding=False
+                ),
+            }[name]()
+
+    def _tell(self, made: Any, trial: Any, rows: Sequence[Row]) -> None:
+        """Judge a set by the rows of its runs."""
+        found = self.judge.judged(rows, trial.params)
+        if found is None:
+            made.tell(trial, state=_optuna().trial.TrialState.FAIL)
+            return
+        if all(row["status"] == Status.OK for row in rows):
+            self._seen = rows
+        trial.set_user_attr(_MARGINS, found.margins)
+        trial.set_user_attr(_CONSTRAINTS, found.constraints)
+        for name, margin in found.constraints.items():
+            trial.set_constraint(name, -margin)
+        made.tell(trial, found.objectives)
+
+    def result(self, made: Any) -> Tuning:
+        """Return the result of the sets that were tried."""
+        states = _optuna().trial.TrialState
+        done = [trial for trial in made.get_trials(deepcopy=False) if trial.state.is_finished()]
+        trials = [self._trial(trial) for trial in done if trial.state == states.COMPLETE]
+        front, study = self._front([trial for trial in trials if trial.allowed]), self.plan.study
+        found = Tuning(self.goal, len(done), len(done) * len(self._places), trials, front)
+        if self.goal is Goal.MINIMISE:
+            return replace(found, without_effect=without_effect(self.plan, self._seen))
+        if self.judge.prior is not None:
+            return replace(found, plausibility=self.judge.prior.plausibility(front[0].values) if front else None)
+        commands = {
+            label_of(name): run_command(study.maneuvers[0], name, study.vehicles[0], overrides, study.driver)
+            for one in front
+            for overrides in (self._requests(0, one.values)[0].overrides,)
+            for name in study.controllers
+        }
+        text = self.judge.statements[ANY].text
+        return replace(found, requirement=text, controller=self.examined, maneuver=self.maneuver, commands=commands)
+
+    def _trial(self, trial: Any) -> Trial:
+        return Trial(
+            trial.number,
+            dict(trial.params),
+            dict(zip(self.judge.objectives, trial.values, strict=True)) if self.judge.objectives else {},
+            trial.user_attrs[_MARGINS],
+            trial.user_attrs[_CONSTRAINTS],
+            math.nan if self.judge.prior is None else self.judge.prior.implausibility(trial.params),
+        )
+
+    def _front(self, kept: Sequence[Trial]) -> list[Trial]:
+        if self.goal is Goal.MINIMISE:
+            return [trial for trial in kept if not any(dominates(other, trial) for other in kept)]
+        if self.goal is Goal.VIOLATE:
+            return [min(kept, key=lambda trial: trial.margins[ANY])] if kept else []
+        front: list[Trial] = []
+        for one in sorted(kept, key=lambda trial: (-len(trial.holding), trial.implausibility)):
+            last = front[-1] if front else None
+            if last is None or (len(one.holding) < len(last.holding) and one.implausibility < last.implausibility):
+                front.append(one)
+        return front
 
 
-def _value(term: Term, rows: Sequence[Row]) -> float:
-    total = 0.0
-    found = _found(term.metric, term.controller, term.maneuver, rows)
-    others = _found(term.metric, term.relative_to, term.maneuver, rows) if term.relative_to else [1.0] * len(found)
-    for value, other in zip(found, others, strict=True):
-        total += min(abs(value) / max(abs(other), 1e-9), term.limit)
-    return term.weight * total
+def _suggest(trial: Any, factor: Factor) -> Any:
+    if factor.values:
+        return trial.suggest_categorical(factor.key, factor.values)
+    return trial.suggest_float(factor.key, factor.low, factor.high, log=factor.kind == "log_uniform")
 
 
-def _found(metric: str, controller: str, maneuver: str, rows: Sequence[Row]) -> list[float]:
-    """Return a metric for every vehicle."""
-    return [float(row.get(metric, math.nan)) for row in _rows_of(controller, maneuver, rows)]
-
-
-def _rows_of(controller: str, maneuver: str, rows: Sequence[Row]) -> list[Row]:
-    return [row for row in rows if row["controller"] == controller and maneuver in ("", row["maneuver"])]
-
-
-def _result(optuna: Any, made: Any, table: TuneTable, idle: list[str]) -> Tuning:
-    complete = made.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
-    names = [objective.name for objective in table.objectives]
-    judged = [
-        Trial(trial.number, dict(trial.params), dict(zip(names, trial.values, strict=True)),
-              float(trial.user_attrs.get(_VIOLATION, 0.0)))
-        for trial in complete
-    ]  # fmt: skip
-    kept = [trial for trial in judged if trial.violation == 0.0]
-    front = [trial for trial in kept if not any(_dominates(other, trial) for other in kept)]
-    return Tuning(len(made.trials), len(made.trials) - len(judged), front, judged, idle)
-
-
-def _dominates(a: Trial, b: Trial) -> bool:
+def dominates(a: Trial, b: Trial) -> bool:
+    """Return whether a set is nowhere worse than another in its objectives, and somewhere better."""
     pairs = list(zip(a.objectives.values(), b.objectives.values(), strict=True))
-    return all(x <= y for x, y in pairs) and (any(x < y for x, y in pairs))
+    return all(x <= y for x, y in pairs) and any(x < y for x, y in pairs)

@@ -1,0 +1,288 @@
+"""Requirements on runs, with a graded distance: expressions over metrics, and the conditions of claims.
+
+An example is `max(0, lane_overstep_m(lqr)) - max(0, lane_overstep_m(none)) <= 0.05`. `METRIC(CONTROLLER, MANEUVER)` is
+the metric of that run [SI]; the manoeuvre may be left out if there is only one.
+`harm(CONTROLLER)` is the largest growth of a measure of harm against `none`, in multiples of its size
+(`analysis.harm`). `+ - * /`, `min`, `max` and `abs` are allowed; comparisons by `<=` and `>=` may be joined by `and`
+and `or`. `claim(S1)` is a statement of the paper.
+
+The *margin* of a comparison is its distance to the limit, in multiples of the limit, or in SI units if the limit is 0.
+It is negative if the comparison is violated; `and` takes the smallest margin, `or` the largest.
+
+Sources: G. Fainekos, G. Pappas, Robustness of temporal logic specifications for continuous-time signals, Theoretical
+Computer Science 410 (2009); Y. Annpureddy et al., S-TaLiRo, TACAS 2011; A. Donze, Breach, CAV 2010.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from activesteer.analysis.harm import changes, severity
+from activesteer.config import Source
+from activesteer.errors import nearest_names, shown
+from activesteer.metric_table import METRICS, Better
+
+HARM: Final = "harm"
+CLAIM: Final = "claim"
+CLAIMS_FAILED: Final = "claims_failed"
+"""Number of the paper's statements that fail in a manoeuvre."""
+NONE: Final = "none"
+ANY: Final = "controller"
+"""Name in a requirement for the controller that is examined."""
+_LONGEST: Final = 1000
+"""Largest number of characters of an expression."""
+
+
+class Condition(NamedTuple):
+    """A condition.
+
+    Attributes:
+        margin: Distance to the limit on the right side, in units of a scale [-]; below 0 if the condition is broken.
+        strict: Whether a value at the limit breaks it.
+    """
+
+    margin: float
+    strict: bool = False
+
+    @property
+    def holds(self) -> bool:
+        """True if the condition holds."""
+        return self.margin > 0.0 if self.strict else self.margin >= 0.0
+
+    @property
+    def distance(self) -> float:
+        """Distance from holding: 0 if it holds, 0.5 a scale away from the limit, 1 far away or undefined."""
+        if self.holds:
+            return 0.0
+        return max(1e-6, self.margin / (self.margin - 1.0)) if math.isfinite(self.margin) else 1.0
+
+    @property
+    def negated(self) -> Condition:
+        """The opposite condition."""
+        return Condition(-self.margin, not self.strict)
+
+
+def at_most(value: float, limit: float, scale: float | None = None, *, strict: bool = False) -> Condition:
+    """Return the condition that a value is at most a limit, or below it; an undefined value (nan) breaks it.
+
+    The difference that counts as 1 is by default the magnitude of the limit.
+    """
+    margin = _margin(limit - value, limit if scale is None else scale)
+    return Condition(-math.inf if math.isnan(margin) else margin, strict)
+
+
+def at_least(value: float, limit: float, scale: float | None = None, *, strict: bool = False) -> Condition:
+    """Return the condition that a value is at least a limit; see `at_most`."""
+    return at_most(-value, -limit, scale, strict=strict)
+
+
+def true(value: bool) -> Condition:
+    """Return a condition without a distance."""
+    return Condition(math.inf if value else -math.inf)
+
+
+def either(conditions: Iterable[Condition]) -> Condition:
+    """Return the condition that is nearest to holding: the alternative of all."""
+    return max(conditions)
+
+
+def both(conditions: Iterable[Condition]) -> Condition:
+    """Return the condition that is furthest from holding: all of them as one."""
+    return min(conditions)
+
+
+def _margin(room: float, limit: float) -> float:
+    return room / max(abs(limit), 1e-9) if limit and math.isfinite(room) else room
+
+
+class Run(NamedTuple):
+    """Place of a run in a set: its controller and its manoeuvre."""
+
+    controller: str
+    maneuver: str
+
+
+Runs = Mapping[Run, Mapping[str, float | None]]
+"""Place of a run -> its metrics; a metric that the run does not define is None or nan."""
+
+
+class Names(NamedTuple):
+    """Names that an expression may use.
+
+    Attributes:
+        controllers: Controllers of the runs; None for any.
+        maneuvers: Manoeuvres of the runs.
+        examined: Controller for which `controller` stands; empty if it stands for none.
+        claims: Statement of the paper -> metric of its distance, and its manoeuvre.
+    """
+
+    controllers: Sequence[str] | None
+    maneuvers: Sequence[str]
+    examined: str = ""
+    claims: Mapping[str, tuple[str, str]] = {}
+
+
+_Number = Callable[[Runs], float]
+
+
+class Expression:
+    """A number over the metrics of runs.
+
+    Attributes:
+        text: The expression as text.
+        metrics: The metrics that it reads, each with its run.
+    """
+
+    wanted = "a sum of metrics such as yaw_rate_overshoot(ars) is needed"
+
+    def __init__(self, text: str, names: Names, source: Source, where: tuple[str, ...]) -> None:
+        """Read an expression; errors name its place in the source."""
+        self.text, self._names = text, names
+        self.metrics: dict[tuple[str, Run], None] = {}
+        self._fail = lambda problem: source.fail(where, f"{problem} in {shown(self.text)}", text)
+        if len(text) > _LONGEST:
+            raise source.fail(where, f"has {len(text)} characters; at most {_LONGEST} are allowed")
+        try:
+            tree = ast.parse(text, mode="eval").body
+            self._value = self._whole(tree)
+        except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError):
+            raise self._fail(f"cannot be read: {self.wanted}") from None
+        if not self.metrics:
+            raise self._fail("there is no metric of a run, such as lane_overstep_m(none),")
+
+    def __call__(self, runs: Runs) -> float:
+        """Return the value; nan if it is not defined. A metric that a run does not define is infinitely bad."""
+        return self._value(runs)
+
+    def _whole(self, node: ast.expr) -> _Number:
+        return self._number(node)
+
+    def _number(self, node: ast.expr) -> _Number:
+        if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and not isinstance(node.value, bool):
+            constant = float(node.value)
+            return lambda _: constant
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            inner = self._number(node.operand)
+            return lambda runs: -inner(runs)
+        if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+            act, one, other = _OPERATORS[type(node.op)], self._number(node.left), self._number(node.right)
+            return lambda runs: act(one(runs), other(runs))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+            name = node.func.id
+            if name in _FUNCTIONS:
+                function, parts = _FUNCTIONS[name], [self._number(part) for part in node.args]
+                if len(parts) != 1 if name == "abs" else len(parts) < 2:
+                    raise self._fail(f"{name} has {len(parts)} arguments")
+                return lambda runs: function([part(runs) for part in parts])
+            words = [word.id if isinstance(word, ast.Name) else _text_of(word) for word in node.args]
+            if len(words) in (1, 2) and None not in words:
+                return self._metric(name, *map(str, words))
+        raise self._fail(f"{ast.unparse(node)} is no number, metric(controller), sum, product, min, max or abs")
+
+    def _metric(self, name: str, controller: str, maneuver: str = "") -> _Number:
+        names = self._names
+        known = [HARM, CLAIMS_FAILED, *METRICS]
+        if name not in known:
+            raise self._fail(f"{name}: {nearest_names(name, known)};")
+        if controller == ANY and names.examined:
+            controller = names.examined
+        if names.controllers is not None and controller not in names.controllers:
+            raise self._fail(
+                f"{controller} is no controller of the runs; {nearest_names(controller, names.controllers)};"
+            )
+        if not maneuver and len(names.maneuvers) == 1:
+            maneuver = names.maneuvers[0]
+        if maneuver not in names.maneuvers:
+            problem = (
+                f"{maneuver} is no manoeuvre of the runs" if maneuver else f"{name}({controller}, MANEUVER) is needed"
+            )
+            raise self._fail(f"{problem}; {nearest_names(maneuver, names.maneuvers)};")
+        run, base = Run(controller, maneuver), Run(NONE, maneuver)
+        self.metrics[name, run] = None
+        if name == HARM:
+            self.metrics[name, base] = None
+            return lambda runs: severity(changes(runs[base], runs[run]))
+        worst = -math.inf if name in METRICS and METRICS[name].better is Better.HIGHER else math.inf
+
+        def value(runs: Runs) -> float:
+            found = runs[run].get(name)
+            return worst if found is None or math.isnan(found) else found
+
+        return value
+
+
+class Requirement(Expression):
+    """A comparison of such numbers, or several; its value is the margin, which is negative if it is violated."""
+
+    wanted = "a comparison such as stopping_distance_m(none) <= 45 is needed"
+
+    def _whole(self, node: ast.expr) -> _Number:
+        if isinstance(node, ast.BoolOp):
+            function = _FUNCTIONS["min" if isinstance(node.op, ast.And) else "max"]
+            parts = [self._whole(part) for part in node.values]
+            return lambda runs: function([part(runs) for part in parts])
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == CLAIM:
+            return self._claim(node)
+        if not isinstance(node, ast.Compare) or not all(isinstance(one, (ast.LtE, ast.GtE)) for one in node.ops):
+            raise self._fail(f"one <= or >= is needed: {self.wanted}")
+        margins = [
+            self._comparison(left, right, right_is_more=isinstance(one, ast.LtE))
+            for left, one, right in zip((node.left, *node.comparators), node.ops, node.comparators, strict=False)
+        ]
+        return lambda runs: least([margin(runs) for margin in margins])
+
+    def _comparison(self, left: ast.expr, right: ast.expr, *, right_is_more: bool) -> _Number:
+        """Return the margin; the limit is the side without a metric, or else the right one."""
+        one, other = self._number(left), self._number(right)
+        less, more = (one, other) if right_is_more else (other, one)
+        limit = other if any(isinstance(part, ast.Call) for part in ast.walk(left)) else one
+        return lambda runs: _margin(more(runs) - less(runs), limit(runs))
+
+    def _claim(self, node: ast.Call) -> _Number:
+        claims = self._names.claims
+        word = node.args[0].id if len(node.args) == 1 and isinstance(node.args[0], ast.Name) else ""
+        if word not in claims:
+            raise self._fail(
+                f"{ast.unparse(node)} needs claims = true and a statement of the runs; {nearest_names(word, claims)};"
+            )
+        metric, maneuver = claims[word]
+        run = Run(NONE, maneuver)
+        self.metrics[metric, run] = None
+
+        def margin(runs: Runs) -> float:
+            distance = runs[run].get(metric)
+            return -math.inf if distance is None else -distance
+
+        return margin
+
+
+def _text_of(node: ast.expr) -> str | None:
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
+
+
+def _ratio(one: float, other: float) -> float:
+    """Return the quotient; infinite for a division of another number by 0."""
+    if other:
+        return one / other
+    return math.copysign(math.inf, one) if one else math.nan
+
+
+def least(values: Sequence[float]) -> float:
+    """Return the smallest value; nan if one is not defined."""
+    return math.nan if any(map(math.isnan, values)) else min(values)
+
+
+def _largest(values: Sequence[float]) -> float:
+    return math.nan if any(map(math.isnan, values)) else max(values)
+
+
+_FUNCTIONS: Final[dict[str, Callable[[Sequence[float]], float]]] = {
+    "min": least, "max": _largest, "abs": lambda values: abs(values[0]),
+}  # fmt: skip
+_OPERATORS: Final[dict[type, Callable[[float, float], float]]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: _ratio,
+}  # fmt: skip

@@ -1,0 +1,208 @@
+"""The table [tune] of a study file, and the judgement of sets of values by it.
+
+The table has one goal: `minimise` objectives, `satisfy` as many statements as possible, or `violate` a requirement.
+They are expressions over the metrics of the runs of a set, see `analysis.requirement`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Annotated, Any, Final, NamedTuple
+
+from activesteer.analysis.claims import SCENARIO_OF
+from activesteer.analysis.requirement import ANY, Condition, Expression, Names, Requirement, Run, Runs, least
+from activesteer.config import Range, build
+from activesteer.errors import nearest_names, shown
+from activesteer.metric_table import METRICS
+from activesteer.studies.engine.factors import Factor
+from activesteer.studies.engine.plan import Plan
+from activesteer.studies.engine.prior import Prior
+from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
+from activesteer.studies.engine.run_task import DISTANCE, Row, Status
+from activesteer.studies.engine.study_file import StudyFile
+
+TABLE: Final = "tune"
+SAMPLERS: Final = ("tpe", "cma_es", "nsga2", "random", "qmc", "grid")
+_MOST: Final = 1e6
+"""Bound of a margin in a search, for runs that define no metric."""
+_ROOM: Final = 0.1
+"""Margin above which a statement that holds costs nothing."""
+_IMPLAUSIBLE: Final = 0.3
+"""Cost of a setting at the ends of its ranges; a statement that fails costs 1 to 2."""
+
+
+class Goal(StrEnum):
+    """Goals of a search."""
+
+    MINIMISE = "minimise"
+    SATISFY = "satisfy"
+    VIOLATE = "violate"
+
+
+@dataclass(frozen=True)
+class TuneTable:
+    """The table [tune] of a study file."""
+
+    minimise: dict[str, str] = field(default_factory=dict)
+    """Name -> expression that shall be small; for several, the Pareto front is found."""
+    satisfy: dict[str, str] = field(default_factory=dict)
+    """Name -> requirement; as many as possible shall hold."""
+    violate: str = ""
+    """Requirement whose worst case is searched; `controller` stands for the examined controller."""
+    constraints: dict[str, str] = field(default_factory=dict)
+    """Name -> requirement that the best set must keep."""
+    seeds: tuple[dict[str, Any], ...] = ()
+    """Sets to try first."""
+    trials: Annotated[int, Range(1, 10_000_000)] = 100
+    """Number of sets of each search."""
+    sampler: str = ""
+    """One of `SAMPLERS`; default: `cma_es` to satisfy statements without constraints, else `tpe`."""
+
+    @property
+    def goal(self) -> Goal:
+        """The goal."""
+        return next(goal for goal in Goal if getattr(self, goal))
+
+
+def read_table(study: StudyFile) -> TuneTable:
+    """Return the checked table [tune] of a study."""
+    source, given = study.source, {key: _in_one_line(value) for key, value in (study.tune or {}).items()}
+    if "objectives" in given or not isinstance(given.get("constraints", {}), Mapping):
+        raise source.fail(
+            (TABLE, "objectives" if "objectives" in given else "constraints"),
+            "lists of tables are now lines of expressions: [tune.minimise] with lines such as response = "
+            '"min(abs(yaw_rate_overshoot(ars, step_steer) / yaw_rate_overshoot(none, step_steer)), 2)", and '
+            '[tune.constraints] with lines such as turns = "lateral_displacement_m(ars, sine_with_dwell) >= 1.83"',
+        )
+    table = build(TuneTable, given, source, (TABLE,))
+    goals = [goal for goal in Goal if getattr(table, goal)]
+    if len(goals) != 1:
+        raise source.fail(
+            (TABLE,), f"has the goals {', '.join(goals) or 'none'}; exactly one of {', '.join(Goal)} is needed"
+        )
+    if table.sampler not in ("", *SAMPLERS):
+        raise source.fail((TABLE, "sampler"), nearest_names(table.sampler, SAMPLERS), table.sampler, SAMPLERS)
+    if table.sampler == "cma_es" and (table.constraints or len(table.minimise) > 1):
+        raise source.fail((TABLE, "sampler"), "cma_es allows one objective and no constraint; use tpe or nsga2")
+    if study.case_list is not None or not study.factors:
+        raise source.fail(("factors",), "a search needs factors")
+    ranged = [factor.key for factor in study.factors if not factor.values]
+    if table.sampler == "grid" and table.seeds:
+        raise source.fail((TABLE, "seeds"), "a grid has no seeds; leave them out")
+    if table.sampler == "grid" and ranged:
+        raise source.fail((TABLE, "sampler"), f"grid needs a grid or a choice of every factor; {ranged[0]} has a range")
+    factors = {factor.key: factor for factor in study.factors}
+    for number, seed in enumerate(table.seeds):
+        for key, value in seed.items():
+            place = (TABLE, "seeds", str(number), key)
+            if key not in factors:
+                raise source.fail(place, nearest_names(key, factors), key)
+            if not _is_in(factors[key], value):
+                problem = f"{shown(value)} is outside of the factor; allowed are {shown(factors[key].extremes)}"
+                raise source.fail(place, problem, value)
+    return table
+
+
+def _in_one_line(value: Any) -> Any:
+    """Return a text of several lines, or a table of such texts, with blanks in place of the line breaks."""
+    if isinstance(value, Mapping):
+        return {key: _in_one_line(item) for key, item in value.items()}
+    return " ".join(value.split()) if isinstance(value, str) else value
+
+
+def _is_in(factor: Factor, value: Any) -> bool:
+    if factor.values:
+        return value in factor.values
+    return isinstance(value, (int, float)) and factor.low <= value <= factor.high
+
+
+class Judgement(NamedTuple):
+    """Judgement of a set: what shall be small, and the margins of its statements and of its constraints, by name."""
+
+    objectives: list[float]
+    margins: dict[str, float]
+    constraints: dict[str, float]
+
+
+class Judge:
+    """Judge of the sets of a search.
+
+    Attributes:
+        objectives: Name -> objective.
+        statements: Name -> statement; `controller` is the name of the requirement to violate.
+        constraints: Name -> constraint.
+        prior: Nominal values of the factors, if statements are the goal.
+    """
+
+    def __init__(self, plan: Plan, table: TuneTable, examined: str = "") -> None:
+        """Read the expressions of a table; `controller` stands for the examined controller."""
+        study, shared, self._goal = plan.study, plan.settings, table.goal
+        controllers, maneuvers = ([label for label, _ in items] for items in (shared.controllers, shared.maneuvers))
+        claims = {claim: (f"{DISTANCE}{claim}", name) for claim, name in SCENARIO_OF.items() if name in maneuvers}
+        names = Names(controllers, maneuvers, examined, claims if study.claims else {})
+        self._source, self._about = study.source, {*IDENTITY, *OUTCOME, *study.keys}
+        self._lines: list[tuple[tuple[str, ...], Expression]] = []
+
+        def read(kind: type[Expression], lines: Mapping[str, str], *where: str) -> dict[str, Any]:
+            found = {name: kind(text, names, study.source, (TABLE, *where, name)) for name, text in lines.items()}
+            self._lines += [((TABLE, *where, name), one) for name, one in found.items()]
+            return found
+
+        self.objectives: dict[str, Expression] = read(Expression, table.minimise, Goal.MINIMISE)
+        self.statements: dict[str, Requirement] = read(Requirement, table.satisfy, Goal.SATISFY)
+        if table.violate:
+            self.statements[ANY] = read(Requirement, {Goal.VIOLATE: table.violate})[Goal.VIOLATE]
+        self.constraints: dict[str, Requirement] = read(Requirement, table.constraints, "constraints")
+        self.prior = Prior(study) if table.satisfy else None
+
+    def judged(self, rows: Sequence[Row], values: Mapping[str, Any]) -> Judgement | None:
+        """Judge a set by the rows of its runs; None if it cannot be judged."""
+        whole = [row["status"] == Status.OK for row in rows]
+        if not any(whole) or (self.objectives and not all(whole)):
+            return None
+        vehicles = self._runs(rows)
+        margins, constraints = (
+            {name: least([one(runs) for runs in vehicles]) for name, one in requirements.items()}
+            for requirements in (self.statements, self.constraints)
+        )
+        if self._goal is Goal.VIOLATE and math.isnan(margins[ANY]):
+            return None
+        margins, constraints = (
+            {name: _bounded(one) for name, one in found.items()} for found in (margins, constraints)
+        )
+        objectives = [sum(map(one, vehicles)) for one in self.objectives.values()] or [margins.get(ANY, 0.0)]
+        if self.prior is not None:
+            objectives = [sum(map(_cost, margins.values())) + _IMPLAUSIBLE * self.prior.implausibility(values)]
+        return Judgement(objectives, margins, constraints) if all(map(math.isfinite, objectives)) else None
+
+    def _runs(self, rows: Sequence[Row]) -> list[Runs]:
+        """Return the metrics of the runs for each vehicle; those of a failed run are not defined."""
+        names: dict[str, dict[str, None]] = {}
+        for row in rows:
+            own = names.setdefault(row["maneuver"], {})
+            if row["status"] == Status.OK:
+                own.update(dict.fromkeys(name for name in row if name not in self._about))
+        for where, one in self._lines:
+            for name, run in one.metrics:
+                if name in METRICS and (known := names[run.maneuver]) and name not in known:
+                    problem = f"the runs of {run.maneuver} have no such metric; {nearest_names(name, known)}"
+                    raise self._source.fail(where, problem, name)
+        found: dict[str, dict[Run, dict[str, float | None]]] = {}
+        for row in rows:
+            metrics = {name: row.get(name) for name in names[row["maneuver"]]}
+            found.setdefault(row["vehicle"], {})[Run(row["controller"], row["maneuver"])] = metrics
+        return list(found.values())
+
+
+def _bounded(margin: float) -> float:
+    return -_MOST if math.isnan(margin) else min(max(margin, -_MOST), _MOST)
+
+
+def _cost(margin: float) -> float:
+    """Return the cost of a statement: 1 to 2 by its distance if it fails, and a little if its margin is thin."""
+    if margin < 0.0:
+        return 1.0 + Condition(margin).distance
+    return 0.3 * max(0.0, 1.0 - margin / _ROOM)

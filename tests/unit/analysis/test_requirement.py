@@ -1,0 +1,157 @@
+"""Conditions and requirements have the verdict of their inequality and a distance that grows with the gap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import pytest
+
+from activesteer.analysis.requirement import (
+    ANY,
+    Expression,
+    Names,
+    Requirement,
+    Run,
+    at_least,
+    at_most,
+    both,
+    either,
+    true,
+)
+from activesteer.config import Source
+from activesteer.errors import StudyError
+from tests.raising import raises
+from tests.unit.analysis.good_runs import check, good
+
+
+def test_a_condition_is_its_inequality():
+    assert at_most(1.0, 1.0).holds
+    assert not at_most(1.0, 1.0, strict=True).holds
+    assert at_least(2.0, 1.0, strict=True).holds
+    assert not at_most(math.nan, 1.0).holds
+    assert at_most(1.0, 1.0).negated.holds is at_most(1.0, 1.0).strict
+
+
+def test_the_distance_is_half_a_scale_away_and_one_if_undefined():
+    assert at_most(0.5, 1.0).distance == 0.0
+    assert at_most(2.0, 1.0).distance == pytest.approx(0.5)
+    assert at_least(-1.0, 0.0, 0.5).distance == pytest.approx(2.0 / 3.0)
+    assert at_most(math.nan, 1.0).distance == 1.0
+    assert 0.0 < at_most(1.0, 1.0, strict=True).distance < 1e-5
+
+
+def test_alternatives_take_the_nearest_and_all_the_furthest():
+    near, far = at_most(1.1, 1.0), at_most(3.0, 1.0)
+    assert either([near, far]) == near
+    assert both([near, far]) == far
+    assert both([near, true(True)]) == near
+    assert true(False).negated.holds
+
+
+def test_a_claim_is_nearer_the_smaller_its_gap_and_at_zero_if_it_passes():
+    arguments = good("slalom")
+    distances = []
+    for amplitude_m in (1.4, 1.6, 1.7, 2.0):
+        arguments["ars"]["amplitude_m"] = amplitude_m
+        distances.append(check("slalom", arguments)["Z1"].distance)
+    assert distances[0] == pytest.approx(-1.0, abs=1e-4)  # graded: it nears -1
+    assert sorted(distances) == distances
+    assert distances[1] > 0.0
+
+
+def test_delays_are_compared_at_the_level_of_the_car_without_control():
+    """A system that answers as soon and turns further reaches 90 % of its own steady state later."""
+    arguments = good("step_steer")
+    s2 = check("step_steer", arguments)["S2"]
+    assert s2.passed
+    assert s2.values["none_yaw_rate_delay_s"] == pytest.approx(s2.values["none_yaw_rate_response_time_s"])
+
+
+NAMES = Names(["lqr", "none", "my.py:Mine"], ["lane"], "lqr", {"S1": ("distance_S1", "lane")})
+WHERE = Source("test.toml", error=StudyError), ("tune", "violate")
+
+
+def margin(text: str, **runs: Mapping[str, float | None]) -> float:
+    """Return the margin of a requirement for the metrics of the runs by controller."""
+    return Requirement(text, NAMES, *WHERE)({Run(name, "lane"): metrics for name, metrics in runs.items()})
+
+
+def test_the_margin_is_the_distance_to_the_limit_in_multiples_of_it():
+    text = "max(0, lane_overstep_m(lqr)) - max(0, lane_overstep_m(none)) <= 0.05"
+    assert margin(text, lqr={"lane_overstep_m": 2.45}, none={"lane_overstep_m": 0.12}) == pytest.approx(-45.6)
+    assert margin(text, lqr={"lane_overstep_m": -0.4}, none={"lane_overstep_m": -0.9}) == pytest.approx(1.0)
+    moved = {"lateral_displacement_m": 2.0}
+    assert margin("lateral_displacement_m(controller) >= 2 * 0.8", lqr=moved) == pytest.approx(0.25)
+    assert margin("1.6 <= lateral_displacement_m(lqr, lane)", lqr=moved) == pytest.approx(0.25)
+    assert margin("lateral_displacement_m(lqr) <= 0", lqr=moved) == -2.0
+
+
+def test_requirements_are_joined_by_their_smallest_or_largest_margin():
+    moved = {"lateral_displacement_m": 2.0}
+    assert margin("1 <= lateral_displacement_m(lqr) <= 4", lqr=moved) == pytest.approx(0.5)
+    two = "lateral_displacement_m(lqr) >= 4 {} lateral_displacement_m(lqr) <= 4"
+    assert margin(two.format("and"), lqr=moved) == pytest.approx(-0.5)
+    assert margin(two.format("or"), lqr=moved) == pytest.approx(0.5)
+
+
+def test_a_metric_that_a_run_does_not_define_is_infinitely_bad():
+    nothing = {"lane_overstep_m": None}
+    assert margin("lane_overstep_m(lqr) <= 0.1", lqr=nothing) == -math.inf
+    assert margin("mean_deceleration_mps2(lqr) >= 3", lqr={}) == -math.inf
+    # What no controller prevents says nothing about one of them.
+    assert math.isnan(margin("lane_overstep_m(lqr) - lane_overstep_m(none) <= 0", lqr=nothing, none=nothing))
+
+
+def test_harm_is_the_growth_in_multiples_of_its_size():
+    lane = {"lane_overstep_m": 0.1, "cones_hit": 1.0, "sideslip_peak_abs_rad": 0.1}
+    assert margin("harm(controller) <= 1", none=lane, lqr=lane | {"lane_overstep_m": 0.2}) == pytest.approx(-1.0)
+
+
+def test_a_claim_of_the_paper_has_its_own_distance():
+    assert margin("claim(S1)", none={"distance_S1": -0.2}) == 0.2
+    assert margin("claim(S1) and lane_overstep_m(none) <= 0", none={"distance_S1": 0.7, "lane_overstep_m": 0.0}) == -0.7
+
+
+def test_an_expression_is_a_number_and_divides_by_zero():
+    ratio = Expression("min(2, abs(ay_overshoot('my.py:Mine') / ay_overshoot(none)))", NAMES, *WHERE)
+    assert list(ratio.metrics) == [("ay_overshoot", Run("my.py:Mine", "lane")), ("ay_overshoot", Run("none", "lane"))]
+    mine, none = Run("my.py:Mine", "lane"), Run("none", "lane")
+    assert ratio({mine: {"ay_overshoot": -0.3}, none: {"ay_overshoot": 0.2}}) == pytest.approx(1.5)
+    assert ratio({mine: {"ay_overshoot": -0.3}, none: {"ay_overshoot": 0.0}}) == 2.0
+    assert math.isnan(ratio({mine: {"ay_overshoot": 0.0}, none: {"ay_overshoot": 0.0}}))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1 <= 2", "no metric"),
+        ("lane_overstep_m(lqr)", "one <= or >="),
+        ("lane_overstep(lqr) <= 0", "lane_overstep_m"),
+        ("lane_overstep_m(lqrr) <= 0", "'lqr'"),
+        ("lane_overstep_m(lqr, lanes) <= 0", "'lane'"),
+        ("claim(S2)", "'S1'"),
+        ("__import__('os') <= 0", "__import__"),
+        ("lane_overstep_m.x(lqr) <= 0", "is no number"),
+        ("lane_overstep_m(lqr) < 1", "one <= or >="),
+        ("max(1) <= lane_overstep_m(lqr)", "max has 1"),
+        ("(" * 900, "cannot be read"),
+        ("9" * 900 + " <= lane_overstep_m(lqr)", "cannot be read"),
+        ("9" * 2000, "characters"),
+        ("[lane_overstep_m(lqr)][0] <= 1", "is no number"),
+        ("True <= lane_overstep_m(lqr)", "is no number"),
+        ("not lane_overstep_m(lqr) <= 1", "one <= or >="),
+    ],
+)
+def test_a_text_that_is_no_requirement_is_refused(text: str, words: str):
+    with raises(StudyError, file="test.toml", key="tune.violate") as told:
+        Requirement(text, NAMES, *WHERE)
+    assert words in str(told.value)
+
+
+def test_the_examined_controller_is_named_only_where_there_is_one():
+    with raises(StudyError, key="tune.violate") as told:
+        Requirement("harm(controller) <= 1", NAMES._replace(examined=""), *WHERE)
+    assert "controller is no controller of the runs" in str(told.value)
+    open_names = Names(None, [""], ANY)
+    assert list(Requirement("harm(controller) <= 1", open_names, *WHERE).metrics)[1][1].controller == "none"
