@@ -35,8 +35,8 @@ _CONTROLLER: Final = "ars"
 """The most expensive of the paper's controllers."""
 _LQR: Final = "estimator_lqr_us"
 """Metric of `lqr`, which runs in native code: against the loop with `_CONTROLLER`."""
-_FAMILY: Final = {"integrated_us": "integrated", "mpc_us": "mpc"}
-"""Metric of a controller with an estimator that runs in Python -> controller; both need a solver from an extra."""
+_FAMILY: Final = {"integrated_us": "integrated"}
+"""Metric of a controller with an estimator that runs in Python -> controller, which needs a solver from an extra."""
 _GIVEN: Final = "given_"
 """Prefix of the stages that replay the commands of such a controller: a car with moving actuators costs the engine
 more than one with resting actuators."""
