@@ -22,7 +22,7 @@ from activesteer.signals import NO_BRAKES, NO_TORQUES, ActuatorCommand, DriverCo
 class Controller(Protocol):
     """Interface of a controller: one method, called once every step of the simulation.
 
-    Example:
+    Examples:
         >>> import activesteer
         >>> class CounterSteer:
         ...     def __init__(self, gain=0.1):
