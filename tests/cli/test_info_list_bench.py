@@ -14,7 +14,7 @@ import pytest
 import activesteer
 from activesteer.cli import main
 from activesteer.resources import list_maneuvers
-from activesteer.studies.chassis_benchmark import DrivenStop
+from activesteer.studies.benchmark import DrivenStop
 from activesteer.version import __version__
 
 KEYS = {
