@@ -119,7 +119,6 @@ _FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides"})
 """Tables that only locate a parameter."""
 _PARAMETER_WORDS: Final = {
     "mu": "friction coefficient", "cg": "centre of gravity", "ars": "ARS", "afs": "AFS", "lqr": "LQR", "esc": "ESC",
-    "mpc": "MPC",
 }  # fmt: skip
 
 

@@ -52,7 +52,7 @@ COLOURS: Final = 64
 """A plot has few colours and their shades: a palette makes the file a third as large."""
 SYSTEMS: Final = ("none", "ars", "afs")
 CORNER_WORDS: Final = {"fl": "front left", "rl": "rear left"}
-COMPARED: Final = ("none", "ars", "afs", "ars_sideslip", "esc", "lqr", "mpc", "integrated")
+COMPARED: Final = ("none", "ars", "afs", "ars_sideslip", "esc", "lqr", "integrated")
 """Controllers of the page on chassis control."""
 
 

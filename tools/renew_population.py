@@ -56,7 +56,7 @@ PAGE: Final = DOCS / "population.md"
 CHASSIS_CONTROL: Final = DOCS / "chassis_control.md"
 BEGIN: Final = "<!-- the table is written by tools/renew_population.py -->\n"
 END: Final = "<!-- end of the table -->\n"
-COMPARED: Final = ("none", "ars", "afs", "esc", "lqr", "mpc", "integrated")
+COMPARED: Final = ("none", "ars", "afs", "esc", "lqr", "integrated")
 """Controllers of the comparison, unless others are given."""
 RUNS: Final = "runs.parquet"
 _EVERY: Final = 2

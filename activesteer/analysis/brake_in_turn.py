@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
 
@@ -44,7 +45,8 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         - `yaw_rate_deviation_after_1000ms_radps`: the same less the yaw rate that keeps the car on the circle at its
           present speed, in the direction of the turn; above 0 the car turns in.
         - `path_deviation_after_1000ms_m`: distance of the centre of gravity from the circle, outwards positive.
-        - `yaw_rate_peak_abs_radps`, `sideslip_peak_abs_rad`: from the beginning of braking on.
+        - `yaw_rate_peak_abs_radps`, `sideslip_peak_abs_rad`: from the beginning of braking on; sideslip above
+          10 km/h.
 
         A value is nan if the run ends before it.
 
@@ -91,7 +93,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         "yaw_rate_deviation_after_1000ms_radps": side * yaw_rate_then - speed_then / radius_m,
         "path_deviation_after_1000ms_m": math.hypot(x_then - middle_x, y_then - middle_y) - radius_m,
         "yaw_rate_peak_abs_radps": float(np.abs(recording["yaw_rate_radps"][begin:]).max()),
-        "sideslip_peak_abs_rad": float(np.abs(recording["sideslip_rad"][begin:]).max()),
+        "sideslip_peak_abs_rad": float(np.abs(counted_sideslip(recording, begin)).max()),
         "speed_end_mps": float(recording["speed_mps"][-1]),
     }
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
@@ -25,9 +26,9 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     """Return peaks and root mean squares of a run.
 
     Returns:
-        `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip and roll; the
-        largest steering wheel angle; `tyre_use_max`, the largest fraction of its available friction that any tyre
-        uses; and `speed_end_mps`.
+        `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip (above 10 km/h)
+        and roll; the largest steering wheel angle; `tyre_use_max`, the largest fraction of its available friction that
+        any tyre uses; and `speed_end_mps`.
 
     Raises:
         RecordingError: a channel is missing.
@@ -55,7 +56,7 @@ def measured_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _size(recording: RecordingLike, name: str, unit: str) -> dict[str, float]:
-    channel = np.asarray(recording[f"{name}_{unit}"], dtype=np.float64)
+    channel = counted_sideslip(recording) if name == "sideslip" else np.asarray(recording[f"{name}_{unit}"], np.float64)
     return {
         f"{name}_peak_abs_{unit}": float(np.abs(channel).max()),
         f"{name}_rms_{unit}": float(np.sqrt(np.mean(channel**2))),

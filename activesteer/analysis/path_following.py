@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from activesteer.analysis import lanes, track
-from activesteer.analysis.series import Array, lag, largest_rate, rate_rms, rms, timestep
+from activesteer.analysis.series import Array, counted_sideslip, lag, largest_rate, rate_rms, rms, timestep
 from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
 from activesteer.conventions import CORNERS
 from activesteer.road.course import Course
@@ -83,8 +83,8 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
     """Return the metrics of a run along a path, with the reasons for those that could not be evaluated.
 
     - Sizes: `<name>_peak_abs_<unit>`, `<name>_rms_<unit>` of yaw rate, sideslip, lateral acceleration (`ay`) and roll
-      over the whole run. `<name>_gates_rms_<unit>` and `<name>_after_gates_rms_<unit>` of the steering wheel and of all
-      these but roll.
+      over the whole run, sideslip above 10 km/h. `<name>_gates_rms_<unit>` and `<name>_after_gates_rms_<unit>` of the
+      steering wheel and of all these but roll.
     - Lag behind the steering wheel up to the last gate: `yaw_rate_lag_s`, `ay_lag_s`.
     - Steering effort: `steering_wheel_peak_abs_rad`, `steering_wheel_rms_rad`, and the same of its rate.
     - Distance of the front axle centre from the path: `track_deviation_max_m`, `track_deviation_rms_m`; heading at the
@@ -114,12 +114,12 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
     windows = find_windows(recording, course)
     values: dict[str, float] = {}
     for name, unit in SIGNALS:
-        channel = recording[f"{name}_{unit}"]
+        channel = counted_sideslip(recording) if name == "sideslip" else recording[f"{name}_{unit}"]
         values[f"{name}_peak_abs_{unit}"] = float(np.abs(channel).max())
         values[f"{name}_rms_{unit}"] = rms(channel)
     if course.last_gate_x_m is not None:
         for name, unit in OSCILLATING:
-            channel = recording[f"{name}_{unit}"]
+            channel = counted_sideslip(recording) if name == "sideslip" else recording[f"{name}_{unit}"]
             values[f"{name}_gates_rms_{unit}"] = rms(channel[windows.gates])
             values[f"{name}_after_gates_rms_{unit}"] = rms(channel[windows.after])
     wheel = recording["steering_wheel_rad"]

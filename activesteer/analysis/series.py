@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
 
 Array = NDArray[np.floating]
@@ -18,6 +19,10 @@ and takes white noise at 1 kHz down to a quarter."""
 
 RATE_SPAN_S: Final = 0.01
 """Interval over which a rate of change is taken [s]."""
+
+ANGLES_COUNT_ABOVE_MPS: Final = 10.0 / 3.6
+"""Speed above which angles between velocities count in metrics [m/s]. A car that brakes to rest swings on its tyres,
+and its sideslip angle then says nothing about its path."""
 
 PEAK_MARGIN: Final = 0.005
 """Fraction above the steady-state value below which a maximum is no peak."""
@@ -41,6 +46,21 @@ class StepResponse(NamedTuple):
     peak_time_s: float
     overshoot: float
     notes: tuple[str, ...]
+
+
+def counted_sideslip(recording: RecordingLike, start: int = 0) -> Array:
+    """Return the sideslip angle [rad], with 0 where the car is not faster than `ANGLES_COUNT_ABOVE_MPS`.
+
+    Args:
+        recording: The run; without a speed, as in measured data, all samples count.
+        start: First sample.
+    """
+    sideslip_rad = np.asarray(recording["sideslip_rad"], dtype=np.float64)[start:]
+    try:
+        speed_mps = recording["speed_mps"][start:]
+    except RecordingError:
+        return sideslip_rad
+    return np.where(speed_mps <= ANGLES_COUNT_ABOVE_MPS, 0.0, sideslip_rad)
 
 
 def smooth(values: Array, timestep_s: float) -> Array:

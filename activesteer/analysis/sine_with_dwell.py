@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.filters import low_pass
-from activesteer.analysis.series import crossing_time, timestep
+from activesteer.analysis.series import counted_sideslip, crossing_time, timestep
 from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.zeroing import THRESHOLD_RAD, offset, zeroing_range
 from activesteer.conventions import Array
@@ -118,7 +118,8 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         - `lateral_displacement_m`: displacement of the centre of gravity 1.07 s after the beginning of steer, across
           the heading at that beginning, positive to the side of the first half.
         - `lateral_displacement_by_ay_m`: the same from the lateral acceleration, as in the standards.
-        - `<name>_peak_abs_<unit>`: over the whole run; `heading_end_rad`, against its first sample.
+        - `<name>_peak_abs_<unit>`: over the whole run, sideslip above 10 km/h; `heading_end_rad`, against its first
+          sample.
 
         A value is nan if the run ends before it.
 
@@ -146,7 +147,8 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     values["lateral_displacement_m"] = _displacement(recording, times)
     values["lateral_displacement_by_ay_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
     for name, unit in PEAKS:
-        values[f"{name}_peak_abs_{unit}"] = float(np.abs(recording[f"{name}_{unit}"]).max())
+        channel = counted_sideslip(recording) if name == "sideslip" else recording[f"{name}_{unit}"]
+        values[f"{name}_peak_abs_{unit}"] = float(np.abs(channel).max())
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     values["heading_end_rad"] = float(recording["yaw_rad"][-1] - recording["yaw_rad"][0])
     return values

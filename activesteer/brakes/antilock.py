@@ -5,14 +5,18 @@ car's. Its deceleration shows this before its slip is large, on any road, withou
 Each wheel runs through the phases
 
     OFF -> RELEASE -> RECOVER -> BUILD -> RELEASE ...
+    OFF -> RELEASE -> RECOVER -> HOLD -> RELEASE ...      at low speed
 
 RELEASE lowers the pressure to a fraction of the friction torque (`friction_Nm`, from pressure and deceleration of the
 wheel). On ice it lowers the pressure further, if that leaves too little torque to speed the wheel up, and still further
 if the wheel does not gain speed. RECOVER waits until the wheel rolls with the car again. BUILD starts just below the
 last friction torque and rises slowly, and faster the longer it lasts, as on a road with increasing friction. A wheel
 whose limit exceeds the driver's demand is OFF. A front wheel that a controller brakes beyond the pedal may slip by
-`intervention_slip`: a tyre at a large slip angle takes brake force only with a large slip (van Zanten 2000). Near
-standstill, slowly rising pressures hand the car over to the driver.
+`intervention_slip`: a tyre at a large slip angle takes brake force only with a large slip (van Zanten 2000).
+
+At low speed the tyre builds up force slowly (relaxation length over speed), so that a wheel swings on it, and neither
+its deceleration nor a small slip tell of locking. There HOLD keeps the pressure just below the last limit, and only a
+large slip releases the wheel. At standstill, rising pressures hand the car over to the driver.
 
 Source of the cycle by wheel deceleration: Bosch, Automotive Handbook, chapter on ABS; Pasillas-Lepine (2006), Hybrid
 modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Fractions, thresholds and rates
@@ -25,17 +29,25 @@ from typing import Final
 
 from activesteer.compilation import compiled, inlined
 
-OFF, RELEASE, RECOVER, BUILD = 0.0, 1.0, 2.0, 3.0
+OFF, RELEASE, RECOVER, BUILD, HOLD = 0.0, 1.0, 2.0, 3.0, 4.0
 
 _REGAINS_mps2: Final = 3.0
 """A wheel that accelerates relative to the car by more than this is recovering; below it, the wheel rolls with the car.
 """
+_LOCKED_SLIP: Final = 0.9
+"""Slip beyond which a wheel stands, apart from its swinging on the tyre."""
 _PATIENCE_S: Final = 0.03
 """Time in which a released wheel must gain speed before its pressure is lowered further [s]."""
+_TYRE_LAG_M: Final = 0.5
+"""Distance after which a slowly rolling tyre follows its slip [m], about a relaxation length."""
 _SETTLES_S: Final = 0.08
 """Time in which the wheel follows the first pressure of BUILD, while the tyre's carcass winds up [s]."""
 _KEPT: Final = 0.9
 """Friction torque of a wheel that is released again so soon, as a fraction of the previous one."""
+_MEAN_S: Final = 0.5
+"""Time constant of the mean friction torque of a wheel in cycles [s]: some of them."""
+_HELD_LESS: Final = 0.95
+"""Held pressure after a release, as a fraction of the previous one."""
 _IMPATIENCE_S: Final = 0.25
 """Time in which the rate of BUILD increases by its initial value [s]."""
 
@@ -58,6 +70,24 @@ def _release(setup, state, wheel):
     _begin(state, wheel, RELEASE)
 
 
+@compiled
+def _hold(setup, state, wheel):
+    held_Nm = max(state.mean_Nm[wheel], 0.0)
+    state.limit_Pa[wheel] = held_Nm / setup.torque_per_pressure_NmpPa[wheel]
+    _begin(state, wheel, HOLD)
+
+
+@compiled
+def _resume(setup, state, wheel, slow):
+    """Build up pressure again from just below the last friction torque."""
+    if slow:
+        _hold(setup, state, wheel)
+        return
+    borne_Nm = setup.resume_fraction * state.borne_Nm[wheel]
+    state.limit_Pa[wheel] = borne_Nm / setup.torque_per_pressure_NmpPa[wheel]
+    _begin(state, wheel, BUILD)
+
+
 @inlined
 def _largest_slip(setup, state, wheel, fed_Pa):
     """Slip that releases a wheel in any case; more for a front wheel that a controller brakes."""
@@ -74,6 +104,38 @@ def _least_slip(setup, state, wheel, car_mps2):
     return minimum + setup.min_slip_speed_mps / state.reference_mps
 
 
+@inlined
+def _follow_mean(setup, state, wheel, slow):
+    """Follow the friction torque at the limit: its peak before the first release, its mean in cycles."""
+    difference_Nm = state.friction_Nm[wheel] - state.mean_Nm[wheel]
+    if state.phase[wheel] == OFF and difference_Nm > 0.0:
+        state.mean_Nm[wheel] += difference_Nm
+    elif state.phase[wheel] == OFF or not slow:
+        state.mean_Nm[wheel] += setup.interval_s / _MEAN_S * difference_Nm
+
+
+@inlined
+def _rolls_slowly(setup, state, wheel, locking, gain):
+    """Advance a wheel that is not released at low speed."""
+    if locking and gain < _REGAINS_mps2:
+        state.mean_Nm[wheel] *= _HELD_LESS
+        _release(setup, state, wheel)
+    elif state.phase[wheel] == HOLD:
+        rate = setup.hold_rise_per_s * state.mean_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
+        state.limit_Pa[wheel] += rate * setup.interval_s
+
+
+@inlined
+def _recover(setup, state, wheel, gain, regains, slow):
+    """Advance a wheel that regains speed."""
+    state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
+    state.regained_mps2[wheel] = max(state.regained_mps2[wheel], gain)
+    if gain < max(_REGAINS_mps2, setup.rolls_fraction * state.regained_mps2[wheel]):
+        _resume(setup, state, wheel, slow)
+    elif not regains:
+        _begin(state, wheel, RELEASE)
+
+
 @compiled
 def _wheel(setup, state, wheel, car_mps2, fed_Pa):
     """Advance one wheel by one interval."""
@@ -82,10 +144,18 @@ def _wheel(setup, state, wheel, car_mps2, fed_Pa):
     slip = (state.reference_mps - state.wheel_mps[wheel]) / state.reference_mps
     gain = state.wheel_mps2[wheel] - car_mps2
     # A locked wheel also gains speed relative to a braking car, but does not recover.
-    regains = gain > _REGAINS_mps2 and (slip < largest_slip or state.wheel_mps2[wheel] > 0.0)
-    phase = state.phase[wheel]
+    regains = gain > _REGAINS_mps2 and (slip < largest_slip or (slip < _LOCKED_SLIP and state.wheel_mps2[wheel] > 0.0))
+    slow = state.reference_mps < setup.hold_speed_mps
     state.phase_s[wheel] += setup.interval_s
-    if phase in (OFF, BUILD):
+    _follow_mean(setup, state, wheel, slow)
+    if slow and state.phase[wheel] == BUILD:
+        _hold(setup, state, wheel)
+    phase = state.phase[wheel]
+    if slow and phase in (OFF, HOLD):
+        _rolls_slowly(setup, state, wheel, slip > largest_slip + setup.hold_slip_mps / state.reference_mps, gain)
+    elif phase == HOLD:
+        _begin(state, wheel, BUILD)
+    elif phase in (OFF, BUILD):
         threshold = setup.first_deceleration_mps2 if phase == OFF else setup.deceleration_mps2
         minimum = _least_slip(setup, state, wheel, car_mps2) if largest_slip == setup.largest_slip else largest_slip
         if (gain < -threshold and slip > minimum) or (slip > largest_slip and gain < _REGAINS_mps2):
@@ -105,17 +175,11 @@ def _wheel(setup, state, wheel, car_mps2, fed_Pa):
         if regains:
             state.regained_mps2[wheel] = gain
             _begin(state, wheel, RECOVER)
-        elif state.phase_s[wheel] > _PATIENCE_S:
+        elif state.phase_s[wheel] > (_PATIENCE_S + _TYRE_LAG_M / state.reference_mps if slow else _PATIENCE_S):
             lower = state.limit_Pa[wheel] - setup.fall_Paps * setup.interval_s
             state.limit_Pa[wheel] = max(lower, 0.0)
     else:
-        state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
-        state.regained_mps2[wheel] = max(state.regained_mps2[wheel], gain)
-        if gain < max(_REGAINS_mps2, setup.rolls_fraction * state.regained_mps2[wheel]):
-            state.limit_Pa[wheel] = setup.resume_fraction * state.borne_Nm[wheel] / per_pressure
-            _begin(state, wheel, BUILD)
-        elif not regains:
-            _begin(state, wheel, RELEASE)
+        _recover(setup, state, wheel, gain, regains, slow)
 
 
 @compiled

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from activesteer.brakes.antilock import antilock
-from activesteer.brakes.hydraulics import ask, flow
+from activesteer.brakes.hydraulics import ask, flow, pedal_pressure
 from activesteer.brakes.records import NO_LIMIT_NM
 from activesteer.brakes.reference_speed import follow_car, follow_wheels
 from activesteer.brakes.traction import traction
@@ -37,7 +37,7 @@ def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm, 
         follow_wheels(setup, state, speeds_radps)
         follow_car(setup, state, ax_mps2, braked)
         if setup.abs != 0.0:
-            antilock(setup, state, ax_mps2, steered_Pa, pedal * setup.full_pedal_pressure_Pa)
+            antilock(setup, state, ax_mps2, steered_Pa, pedal_pressure(setup, pedal))
         if setup.tcs != 0.0:
             traction(setup, state, drive_Nm, braked)
     flow(setup, state, pedal)

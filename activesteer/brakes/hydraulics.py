@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from activesteer.compilation import compiled
+from activesteer.compilation import compiled, inlined
+
+
+@inlined
+def pedal_pressure(setup, pedal):
+    """Return the pressure that the pedal feeds [Pa]: none within its dead travel, and linear beyond it."""
+    return max(pedal - setup.dead_travel, 0.0) / (1.0 - setup.dead_travel) * setup.full_pedal_pressure_Pa
 
 
 @compiled
@@ -15,9 +21,9 @@ def ask(setup, state, pedal, asked_Nm):
         pedal: Brake pedal position, 0 to 1.
         asked_Nm: Brake torques that the controller demands [Nm], order of `CORNERS`.
     """
-    highest = setup.full_pedal_pressure_Pa
+    highest, fed = setup.full_pedal_pressure_Pa, pedal_pressure(setup, pedal)
     for wheel in range(4):
-        pressure = pedal * highest
+        pressure = fed
         if asked_Nm[wheel] != 0.0:
             pressure += asked_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
         state.demand_Pa[wheel] = min(max(pressure, 0.0), highest)
@@ -34,7 +40,7 @@ def flow(setup, state, pedal):
         state: Its `BRAKE_STATE`; `pressure_Pa` is advanced.
         pedal: Brake pedal position, 0 to 1; up to its pressure the pedal feeds a brake, beyond it the pump does.
     """
-    fed = pedal * setup.full_pedal_pressure_Pa
+    fed = pedal_pressure(setup, pedal)
     for wheel in range(4):
         pressure = state.pressure_Pa[wheel]
         wanted = max(min(state.demand_Pa[wheel], state.allowed_Pa[wheel]), state.traction_Pa[wheel])

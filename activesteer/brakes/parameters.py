@@ -14,10 +14,13 @@ Fraction = Annotated[float, Range(0.0, 1.0)]
 
 @dataclass(frozen=True)
 class Hydraulics:
-    """Pressures of the wheel brakes downstream of master cylinder and valves; all four are assumptions, see docs."""
+    """Pedal travel and pressures of the wheel brakes; all of them are assumptions, see docs."""
 
     full_pedal_pressure_Pa: Annotated[float, Range(1e6, 3e7)] = 10e6
     """Pressure at full pedal, and the pump's highest pressure [Pa]."""
+    dead_travel: Annotated[float, Range(0.0, 0.9)] = 0.0
+    """Pedal position up to which no pressure builds up: play, clearance of the pads, cut-off holes [-]. With 0 the
+    pedal position is the fraction of the pressure, as the manoeuvre files state it."""
     rise_Paps: Annotated[float, Range(1e6, 1e9)] = 100e6
     """Fastest rise while the pedal feeds the wheel [Pa/s]: booster and inlet valve, 0 to 100 bar in 0.1 s."""
     fall_Paps: Annotated[float, Range(1e6, 1e9)] = 100e6
@@ -34,7 +37,14 @@ class Antilock:
 
     select_low: bool = True
     """Whether both rear wheels get the pressure of the wheel with less grip."""
-    lowest_speed_mps: Annotated[float, Range(0.5, 10.0)] = 1.5
+    hold_speed_mps: Annotated[float, Range(0.5, 20.0)] = 5.0
+    """Speed below which pressures are held and slip alone releases a wheel [m/s]; a tyre of 0.4 m relaxation length
+    then takes more than 0.08 s to build up its force."""
+    hold_slip_mps: NotNegative = 0.3
+    """Speed difference added to the largest slip there, by which the estimated speed may be off [m/s]."""
+    hold_rise_per_s: NotNegative = 0.03
+    """Rate of the held pressure, as a fraction of the last limit per second [1/s]."""
+    lowest_speed_mps: Annotated[float, Range(0.1, 10.0)] = 0.5
     """Speed below which the system hands the brakes over to the driver [m/s] ..."""
     hand_over_Paps: NotNegative = 4e6
     """... by letting the pressures rise at this rate to the driver's demand [Pa/s]."""

@@ -13,7 +13,7 @@ from activesteer.brakes.parameters import Antilock, Brakes, Hydraulics, Traction
 from activesteer.conventions import CORNERS
 from activesteer.native_records import numbers_type
 
-_HYDRAULICS: Final = ("full_pedal_pressure_Pa", "rise_Paps", "fall_Paps", "pump_rise_Paps")
+_HYDRAULICS: Final = ("full_pedal_pressure_Pa", "dead_travel", "rise_Paps", "fall_Paps", "pump_rise_Paps")
 _ANTILOCK: Final = tuple(Antilock.__dataclass_fields__)
 _OF_WHEELS: Final = (
     "rolling_radius_m", "torque_per_pressure_NmpPa", "parking_torque_Nm", "drive_fraction", "inertia_kgm2",
@@ -30,7 +30,7 @@ demand that closes in one step."""
 
 PER_WHEEL: Final = (
     "demand_Pa", "pressure_Pa", "limit_Pa", "allowed_Pa", "traction_Pa", "phase", "phase_s", "friction_Nm",
-    "borne_Nm", "regained_mps2", "wheel_mps", "wheel_mps2",
+    "borne_Nm", "mean_Nm", "regained_mps2", "wheel_mps", "wheel_mps2",
 )  # fmt: skip
 ALONE: Final = (
     "drive_limit_Nm", "traction_Nm", "reference_mps", "offset_mps2", "side_Pa", "steps_left",
@@ -43,8 +43,8 @@ demand_Pa: pressure that driver and controller demand;
 pressure_Pa: pressure in the wheel brake; limit_Pa: anti-lock limit of the wheel by itself; allowed_Pa: limit with
 regard to the other wheels; traction_Pa: demand of traction control; phase, phase_s: phase of the anti-lock control, see
 `antilock`, and time in it; friction_Nm: torque of the road from the wheel's motion; borne_Nm: last friction torque of
-the wheel at its limit; regained_mps2: largest acceleration of the wheel in its recovery; wheel_mps, wheel_mps2: speed
-and acceleration of its circumference.
+the wheel at its limit; mean_Nm: mean of the friction torque over some cycles; regained_mps2: largest acceleration of
+the wheel in its recovery; wheel_mps, wheel_mps2: speed and acceleration of its circumference.
 
 drive_limit_Nm: limit of the drive torque by traction control; traction_Nm: its integral; tcs_active: whether traction
 control acts; reference_mps: estimated speed of the car; offset_mps2: estimated error of the acceleration; side_Pa:

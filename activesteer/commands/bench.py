@@ -37,7 +37,7 @@ def add_to(commands: Any) -> None:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    from activesteer.studies.benchmark import bench, bench_tyre
+    from activesteer.studies import benchmark
 
     if options.rounds is not None and options.rounds < 1:
         raise ParameterError(f"--rounds {options.rounds}: at least 1 is needed")
@@ -48,25 +48,20 @@ def _bench(options: argparse.Namespace) -> int:
         raise ParameterError("has no effect with --maneuvers: each is driven once", key="--rounds")
     if options.maneuvers:
         return _maneuvers(options)
+    rounds = options.rounds or benchmark.ROUNDS
     if options.batch:
-        return _batch(options)
-    results = (bench_tyre if options.tyre else bench)(options.rounds or 5)
-    tell(options, results, (f"{name:28} {value:8.2f}" for name, value in results.items()))
-    return 0
-
-
-def _batch(options: argparse.Namespace) -> int:
-    from activesteer.studies.batch_benchmark import bench_batch, table_of
-
-    results = bench_batch(options.rounds or 5)
-    tell(options, results, [table_of(results)])
+        results = benchmark.bench_batch(rounds)
+        tell(options, results, [benchmark.batch_table(results)])
+    else:
+        results = (benchmark.bench_tyre if options.tyre else benchmark.bench)(rounds)
+        tell(options, results, (f"{name:28} {value:8.2f}" for name, value in results.items()))
     return 0
 
 
 def _maneuvers(options: argparse.Namespace) -> int:
     from activesteer.analysis.tables import comparison
     from activesteer.files import write_text
-    from activesteer.studies import maneuver_benchmark as benchmark
+    from activesteer.studies import benchmark
 
     baseline = {} if options.renew else benchmark.read_baseline()
     found = benchmark.bench_maneuvers()
@@ -79,12 +74,11 @@ def _maneuvers(options: argparse.Namespace) -> int:
     if options.json:
         print_json(benchmark.as_json(found, drifts))
         return 1 if drifts else 0
-    for name in dict.fromkeys(run.maneuver for run in found.runs):
-        runs = {run.controller: run for run in found.runs if run.maneuver == name}
-        factors = ", ".join(f"{system} {run.real_time_factor:.0f}" for system, run in runs.items())
-        search = benchmark.search_told(found, name)
+    for name, runs in found.by_maneuver().items():
+        factors = ", ".join(f"{run.controller} {run.real_time_factor:.0f}" for run in runs)
+        search = found.search_told(name)
         print(f"{name}: {factors} times real time" + (f"; {search}" if search else ""))
-        print(comparison({system: run.metrics for system, run in runs.items()}))
+        print(comparison({run.controller: run.metrics for run in runs}))
         print()
     print(f"peak memory {found.peak_memory_B / 1e6:.0f} MB")
     if options.renew:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -25,22 +25,6 @@ _ROUNDS: Final = 8
 _MOST: Final = 0.95
 """Fraction of the largest axle force up to which slip angles are tabulated [-]. There one percent of force is 0.3 deg
 of slip angle for the compact's tyre; at 0.99 it is 0.7 deg, and the friction is not known to a percent."""
-
-
-class Axle(NamedTuple):
-    """State of an axle, left positive.
-
-    Attributes:
-        slope: Slope of its curve, as a fraction of the slope at zero slip angle [-].
-        force_rad: Side force over its stiffness [rad].
-        slip_angle_rad: Slip angle [rad].
-        secant: Force over slip angle, as a fraction of its value at zero slip angle [-].
-    """
-
-    slope: float
-    force_rad: float
-    slip_angle_rad: float
-    secant: float
 
 
 class AxleSlopes(NativeBlock):
@@ -80,27 +64,17 @@ class AxleSlopes(NativeBlock):
         )
 
     def at(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-        """Return the slopes of front and rear axle [-].
+        """Return the slopes of front and rear axle, as fractions of the slopes at zero slip angle [-].
 
         Args:
             now: The motion, faster than walking speed.
             front_rad: Angle of the front wheels [rad].
             rear_rad: Angle of the rear wheels [rad].
         """
-        front, rear = self.axles(now, front_rad, rear_rad)
-        return front.slope, rear.slope
-
-    def axles(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[Axle, Axle]:
-        """Return the states of front and rear axle; arguments as in `at`."""
         turning = now.yaw_rate_radps / now.speed_mps
         front = front_rad - now.sideslip_rad - self._car.cg_to_front_m * turning
         rear = rear_rad - now.sideslip_rad + self._car.cg_to_rear_m * turning
-        return self._axle(0, front, now.friction), self._axle(1, rear, now.friction)
-
-    def peak_rad(self, axle: int, friction: float) -> float:
-        """Return the slip angle of the largest force of an axle, 0 front or 1 rear [rad]."""
-        curve = self._curves[axle]
-        return friction * self._step_rad * curve.index(max(curve))
+        return self._slope(0, front, now.friction), self._slope(1, rear, now.friction)
 
     def excess_rad(self, ay_mps2: float, friction: float) -> tuple[float, float]:
         """Return the additional slip angles of a steady turn that the curvature of the axle curves requires.
@@ -114,14 +88,10 @@ class AxleSlopes(NativeBlock):
         """
         return excess(self, ay_mps2, friction)
 
-    def _axle(self, axle: int, slip_angle_rad: float, friction: float) -> Axle:
-        curve, place = self._curves[axle], abs(slip_angle_rad) / friction / self._step_rad
-        index = min(int(place), len(curve) - 2)
-        rise = curve[index + 1] - curve[index]
-        force = friction * (curve[index] + rise * min(place - index, 1.0))
-        slope = max(rise / self._step_rad, LEAST)
-        secant = force / abs(slip_angle_rad) if slip_angle_rad else 1.0
-        return Axle(slope, math.copysign(force, slip_angle_rad), slip_angle_rad, secant)
+    def _slope(self, axle: int, slip_angle_rad: float, friction: float) -> float:
+        curve = self._curves[axle]
+        index = min(int(abs(slip_angle_rad) / friction / self._step_rad), len(curve) - 2)
+        return max((curve[index + 1] - curve[index]) / self._step_rad, LEAST)
 
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:

@@ -162,28 +162,3 @@ class IntegratedParameters:
     """Distance of an actuator from its demand that is tolerated [rad]."""
     window_s: _Lag
     """Time in which an actuator must approach its demand; after the same time again it counts as failed [s]."""
-
-
-@dataclass(frozen=True)
-class MpcParameters:
-    """Both axles within an envelope (`mpc`).
-
-    A yaw rate error, a sideslip angle, two angles and their changes, each as large as its scale, cost the same.
-    """
-
-    yaw_rate_scale_radps: _Scale
-    """Scale of the yaw rate error [rad/s]."""
-    sideslip_scale_rad: _Scale
-    """Scale of the sideslip angle [rad]."""
-    rear_scale_rad: _Scale
-    """Scale of the difference from the steady-state rear angle [rad]."""
-    superposition_scale_rad: _Scale
-    """Scale of the difference from the steady-state superposition angle [rad]."""
-    change_scale_rad: _Scale
-    """Scale of the change of an angle from one block to the next [rad]."""
-    reference_length_m: _Length
-    """Distance over which the desired yaw rate follows the driver [m]."""
-    friction_fraction: _Fraction
-    """Fraction of the estimated friction that the desired yaw rate may use [-]; the envelope allows all of it."""
-    relaxation_length_m: _Length
-    """Distance over which an axle of the model builds up its force [m]."""

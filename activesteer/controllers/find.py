@@ -10,7 +10,7 @@ import numpy as np
 from activesteer.config import Range, field_path, leaf_keys
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
-from activesteer.controllers.registry import WITHOUT_FILE
+from activesteer.controllers.registry import IN_EXAMPLES, WITHOUT_FILE
 from activesteer.controllers.variant import read_variant
 from activesteer.coupling.fmu import find_fmu, is_fmu
 from activesteer.errors import ControllerError, shown
@@ -22,7 +22,7 @@ from activesteer.signals import NO_BRAKES, NO_TORQUES, ActuatorCommand, DriverCo
 class Controller(Protocol):
     """Interface of a controller: one method, called once every step of the simulation.
 
-    Example:
+    Examples:
         >>> import activesteer
         >>> class CounterSteer:
         ...     def __init__(self, gain=0.1):
@@ -125,6 +125,8 @@ def find_controller(given: Any) -> Plugin:
     if is_variant(given):
         variant = read_variant(given)
         return Plugin(CONTROLLER, variant.name, variant.name, variant, variant.gains, variant.files, ours=True)
+    if isinstance(given, str) and given in IN_EXAMPLES:
+        raise ControllerError(f"{given!r} is an example now; use -c {IN_EXAMPLES[given]}", value=given)
     return find_fmu(given, CONTROLLER) if is_fmu(given) else find(given, CONTROLLER)
 
 

@@ -13,7 +13,6 @@ from activesteer.controllers.file_gains import (
     EscParameters,
     IntegratedParameters,
     LqrParameters,
-    MpcParameters,
     SideslipRearSteerParameters,
     TorqueVectoringParameters,
     file_gains,
@@ -82,7 +81,7 @@ class FrontSuperpositionParameters:
 
 @dataclass(frozen=True)
 class ServoParameters:
-    """The actuators of both axles as `lqr`, `integrated` and `mpc` know them; angles at the road wheels."""
+    """The actuators of both axles as `lqr` and `integrated` know them; angles at the road wheels."""
 
     lag_s: _Lag = 0.025
     """Lag of both actuators [s]."""
@@ -100,8 +99,8 @@ class ServoParameters:
 class ControllerParameters:
     """Parameters of all controllers of a vehicle file.
 
-    The files in `models/controllers` give what the vehicle file leaves out of `ars_sideslip`, `lqr`, `esc`,
-    `integrated` and `mpc`.
+    The files in `models/controllers` give what the vehicle file leaves out of `ars_sideslip`, `lqr`, `esc`
+    and `integrated`.
     """
 
     desired_yaw_rate: DesiredYawRateParameters = DesiredYawRateParameters()
@@ -122,8 +121,6 @@ class ControllerParameters:
     """Single brakes."""
     integrated: IntegratedParameters = field(default_factory=partial(file_gains, "integrated", IntegratedParameters))
     """Steering and brakes together."""
-    mpc: MpcParameters = field(default_factory=partial(file_gains, "mpc", MpcParameters))
-    """Both axles within an envelope."""
     tv: TorqueVectoringParameters = field(default_factory=partial(file_gains, "tv", TorqueVectoringParameters))
     """Torque vectoring."""
     estimator: EstimatorParameters = EstimatorParameters()

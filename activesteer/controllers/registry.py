@@ -17,7 +17,6 @@ from activesteer.controllers.esc import Esc
 from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.lqr import Lqr
-from activesteer.controllers.mpc import Mpc
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.observer import Observer
 from activesteer.controllers.rear_steer import RearSteer
@@ -32,10 +31,11 @@ CONTROLLERS: Final[dict[str, type[Any]]] = {
     "ars_sideslip": SideslipRearSteer,
     "esc": Esc,
     "lqr": Lqr,
-    "mpc": Mpc,
     "integrated": Integrated,
     "tv": TorqueVectoring,
 }
 """Name -> class."""
 WITHOUT_FILE: Final = {name: kind for name, kind in CONTROLLERS.items() if not hasattr(kind, "gains")}
 """Those whose gains the vehicle file gives."""
+IN_EXAMPLES: Final = {"mpc": "examples/own_mpc.py:EnvelopeMpc"}
+"""Former name -> example that replaces it."""

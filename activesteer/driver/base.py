@@ -16,7 +16,7 @@ class Driver(Protocol):
 
     A driver that acts less often counts the steps (`DriverSetup.timestep_s`) and repeats the last command in between.
 
-    Example:
+    Examples:
         >>> import math
         >>> import activesteer
         >>> class Holds:

@@ -29,7 +29,7 @@ def _advance() -> Any:
 class Estimator(NativeBlock):
     """Estimator of speed, sideslip, yaw rate and friction from the sensors.
 
-    Example:
+    Examples:
         >>> import activesteer
         >>> class Watching:
         ...     def __init__(self, setup):

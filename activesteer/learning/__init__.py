@@ -1,6 +1,6 @@
 """Gymnasium environments on `Batch`; importing this package registers them.
 
-Example:
+Examples:
     >>> import gymnasium
     >>> import activesteer.learning
     >>> env = gymnasium.make("activesteer/SineWithDwell-v0")

@@ -29,7 +29,7 @@ MIN_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
 class Maneuver(ABC):
     """Base of all kinds. The fields are the keys of the TOML file.
 
-    Example:
+    Examples:
         >>> from activesteer.scenario import resolve
         >>> table = {"kind": "open_loop", "speed_kmh": 72.0, "duration_s": 4.0, "hold_last": True,
         ...          "steering": {"time_s": [1.0, 2.0], "steering_wheel_deg": [0.0, 45.0]}}

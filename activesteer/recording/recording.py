@@ -35,7 +35,7 @@ class Recording:
         attachments: Name -> file kept with the run.
         scene: Shape of the car: solids in body frames, and links between bodies.
 
-    Example:
+    Examples:
         >>> import activesteer
         >>> recording = activesteer.simulate("straight_line", overrides={"duration_s": 2.0})
         >>> recording.save("straight.mcap")

@@ -44,7 +44,7 @@ class TyreRig:
         pressure_Pa: Inflation pressure [Pa].
         timestep_s: Step of the engine [s].
 
-    Example:
+    Examples:
         >>> import math
         >>> from activesteer.resources import models_dir
         >>> from activesteer.rigs.tyre_rig import TyreRig

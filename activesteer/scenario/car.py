@@ -97,7 +97,7 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
         vehicle: Name, path, or table of a vehicle.
         overrides: Dotted key -> value, such as `factors.mass` or `vehicle.tyres.rear`.
 
-    Example:
+    Examples:
         >>> from activesteer.road.road import Road
         >>> from activesteer.scenario import load_car
         >>> car = load_car("compact", {"load.payload_kg": 200.0}).on(Road(mu=0.5))

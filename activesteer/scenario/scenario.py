@@ -104,7 +104,7 @@ def resolve(
         ModelError: the model file is not found.
         TyreFileError: a tyre file is not found or wrong.
 
-    Example:
+    Examples:
         >>> from activesteer.scenario import resolve
         >>> scenario = resolve("double_lane_change", overrides={"speed_kmh": 72, "factors.mass": 1.1})
         >>> scenario.maneuver.speed_mps, scenario.car.config.factors.mass

@@ -71,7 +71,7 @@ class Batch:
         threads: Number of threads.
         failures: Number of each car that has diverged -> its error. The car stands still until it is reset.
 
-    Example:
+    Examples:
         >>> import numpy as np
         >>> import activesteer
         >>> batch = activesteer.Batch("sine_with_dwell", 3, overrides={"road.mu": np.array([0.6, 0.8, 1.0])})

@@ -42,7 +42,7 @@ def simulate(
     Raises:
         ActiveSteerError: an input is wrong, or the run failed; `recording` of the error then holds the recorded rows.
 
-    Example:
+    Examples:
         >>> import activesteer
         >>> none, ars = (
         ...     activesteer.simulate("step_steer", controller, overrides={"speed_kmh": 100, "road.mu": 0.9})

@@ -73,7 +73,7 @@ class Simulation:
         context: Contents of the recording apart from its rows.
         events: What was changed on the way; see `set` and `fail`.
 
-    Example:
+    Examples:
         >>> import activesteer
         >>> simulation = activesteer.Simulation("straight_line", overrides={"duration_s": 1.0})
         >>> while not simulation.done:
@@ -295,7 +295,7 @@ class Simulation:
             ParameterError: there is no such key, it cannot change during a run, or nothing reads it.
             ManeuverError: a value of the manoeuvre is wrong or has no effect, or the simulation is being driven.
 
-        Example:
+        Examples:
             >>> import activesteer
             >>> simulation = activesteer.Simulation("straight_line", overrides={"duration_s": 1.0})
             >>> _ = simulation.advance(500)
@@ -319,7 +319,7 @@ class Simulation:
             ParameterError: the text has another form.
             ManeuverError: the car has no such part, the part has a fault at this time, or the time is past.
 
-        Example:
+        Examples:
             >>> import activesteer
             >>> simulation = activesteer.Simulation("step_steer", "ars", overrides={"duration_s": 2.0})
             >>> _ = simulation.advance(800)

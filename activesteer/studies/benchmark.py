@@ -1,83 +1,89 @@
-"""Time of a step and its parts. All values come from one run, interleaved, so that their ratios are meaningful."""
+"""What `activesteer bench` measures: time of a step, of many cars, of a tyre; key metrics against a stored baseline.
+
+All times of a table come from one process, interleaved, so that their ratios are meaningful.
+"""
 
 from __future__ import annotations
 
 import importlib.util
+import json
+import math
 import multiprocessing
 import os
+import resource
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from importlib import import_module
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
 
+from activesteer.analysis.claims import SCENARIOS, SYSTEMS
+from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
+from activesteer.brakes.control_unit import step_brakes
+from activesteer.compilation import compiled
+from activesteer.conventions import CORNERS
+from activesteer.errors import ActiveSteerError, RecordingError
+from activesteer.files import read_text, write_json
+from activesteer.metric_table import recorded_metric
 from activesteer.scenario import Scenario, resolve
+from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.simulation.amplitude_store import searched_anew
+from activesteer.simulation.batch import Batch
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
-from activesteer.studies.chassis_benchmark import DrivenStop
 from activesteer.tyre.benchmark import bench as tyre_bench
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 
-_ROUNDS: Final = 5
+ROUNDS: Final = 5
 """Rounds; the best one counts, because a disturbance only makes a machine slower."""
 _CALLS: Final = 5000
 _CONTROLLER: Final = "ars"
 """The most expensive of the paper's controllers."""
-_LQR: Final = "estimator_lqr_us"
-"""Metric of `lqr`, which runs in native code: against the loop with `_CONTROLLER`."""
-_FAMILY: Final = {"integrated_us": "integrated", "mpc_us": "mpc"}
-"""Metric of a controller with an estimator that runs in Python -> controller; both need a solver from an extra."""
-_GIVEN: Final = "given_"
-"""Prefix of the stages that replay the commands of such a controller: a car with moving actuators costs the engine
-more than one with resting actuators."""
 _RUNS_PER_PROCESS: Final = 4
+_PRODUCTION: Final = {"sensors.preset": "production"}
 
 
-def bench(rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measure one step at several stages, and the blocks of the loop; `docs/performance.md` explains the results.
-
-    Args:
-        rounds: How often everything is measured; the best counts.
-    """
+def bench(rounds: int = ROUNDS) -> dict[str, float]:
+    """Measure one step at several stages, and the blocks of the loop; `docs/performance.md` explains the results."""
     scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
     sedan = prepared(resolve("step_steer", "sedan"))
-    sensed = prepared(resolve("step_steer", overrides={"sensors.preset": "production"}))
-    stop = DrivenStop()
+    sensed = prepared(resolve("step_steer", overrides=_PRODUCTION))
     driven, along_path_driven = _KeptInputs(scenario), _KeptInputs(along_path)
     with tempfile.TemporaryDirectory() as folder:
         stages: dict[str, Callable[[], float]] = {
-            "bare_step_us": lambda: _bare(scenario),
-            "plant_step_us": lambda: _plant(scenario),
+            "bare_step_us": lambda: _engine(scenario, forces=False),
+            "plant_step_us": lambda: _engine(scenario, forces=True),
             "engine_step_us": driven.replay_us,
             "path_engine_step_us": along_path_driven.replay_us,
             "closed_loop_step_us": lambda: _closed_loop(scenario),
             "path_following_step_us": lambda: _closed_loop(along_path),
             "with_file_step_us": lambda: _with_file(scenario, Path(folder) / "bench.mcap"),
             "sedan_step_us": lambda: _closed_loop(sedan),
-            _LQR: lambda: _closed_loop(sensed, "lqr"),
+            "estimator_lqr_us": lambda: _closed_loop(sensed, "lqr"),
             "production_step_us": lambda: _closed_loop(sensed),
-            "sensors_and_brakes_us": stop.step_us,
-            "two_threads_step_us": lambda: _in_threads(scenario, 2),
+            "sensors_and_brakes_us": DrivenStop().step_us,
+            "two_threads_step_us": lambda: _closed_loop(scenario, threads=2),
         }
-        solver = importlib.util.find_spec("daqp") is not None
-        family = _FAMILY if solver else {}
-        for name, system in family.items():
-            asked = _asked(sensed, system)
-            stages[name] = lambda system=system: _closed_loop(sensed, system)
-            stages[_GIVEN + name] = lambda system=system, asked=asked: _closed_loop(sensed, system, _Given(asked))
+        if importlib.util.find_spec("daqp") is not None:
+            # Less a loop that replays its commands: a car with moving actuators costs the engine more.
+            asked = _asked(sensed, "integrated")
+            stages["integrated_us"] = lambda: _closed_loop(sensed, "integrated")
+            stages["given_us"] = lambda: _closed_loop(sensed, "integrated", _Given(asked))
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
-    best |= {name: best[name] - best.pop(_GIVEN + name) for name in family}
-    best[_LQR] -= best["production_step_us"]
+    if "given_us" in best:
+        best["integrated_us"] -= best.pop("given_us")
+    best["estimator_lqr_us"] -= best["production_step_us"]
     step_us = 1e6 * driven.vehicle.timestep_s
     for stage in ("closed_loop", "path_following", "with_file"):
         engine = "path_engine" if stage == "path_following" else "engine"
@@ -100,66 +106,58 @@ def _interleaved(stages: dict[str, Callable[[], float]], rounds: int) -> dict[st
     return results
 
 
-def _per_step_us(function: Callable[[], object], steps: int) -> float:
+def _per_call_us(function: Callable[..., object], count: int, *arguments: Any) -> float:
     start = time.perf_counter()
-    function()
-    return (time.perf_counter() - start) / steps * 1e6
+    for _ in range(count):
+        function(*arguments)
+    return (time.perf_counter() - start) / count * 1e6
 
 
-def _bare(scenario: Scenario) -> float:
-    """Return the time of the engine alone: same model, same start, no callbacks.
+def _engine(scenario: Scenario, *, forces: bool) -> float:
+    """Return the time of the engine's step on a standing car [us], with or without our forces.
 
-    The force of the callbacks at the start is applied as a constant, so that the car stays near its place. A falling
+    Without them, their value at the start is applied as a constant, so that the car stays near its place. A falling
     car, with its springs at their stops, would be another problem for the engine's solver.
     """
-    simulation = ClosedLoop(scenario, _CONTROLLER)
-    model, data, steps = simulation.vehicle.model, simulation.vehicle.data, simulation.steps
+    loop = ClosedLoop(scenario, _CONTROLLER)
+    model, data = loop.vehicle.model, loop.vehicle.data
+    if forces:
+        return _per_call_us(mujoco.mj_step, loop.steps, model, data)
     mujoco.mj_forward(model, data)
     carried = data.qfrc_passive.copy()
     remove_native_forces()
     try:
         mujoco.mj_forward(model, data)
         data.qfrc_applied[:] = carried - data.qfrc_passive
-        return _per_step_us(lambda: _repeat(mujoco.mj_step, model, data, steps), steps)
+        return _per_call_us(mujoco.mj_step, loop.steps, model, data)
     finally:
         install_native_forces()
-
-
-def _plant(scenario: Scenario) -> float:
-    simulation = ClosedLoop(scenario, _CONTROLLER)
-    model, data, steps = simulation.vehicle.model, simulation.vehicle.data, simulation.steps
-    return _per_step_us(lambda: _repeat(mujoco.mj_step, model, data, steps), steps)
 
 
 class _KeptInputs:
     """A run with the recorded inputs of the engine."""
 
     def __init__(self, scenario: Scenario) -> None:
-        simulation = ClosedLoop(scenario, _CONTROLLER)
-        self.vehicle = simulation.vehicle
+        loop = ClosedLoop(scenario, _CONTROLLER)
+        self.vehicle = loop.vehicle
         self._start = self.vehicle.save_state()
-        self._inputs = np.empty((simulation.steps, self.vehicle.model.nu))
+        self._inputs = np.empty((loop.steps, self.vehicle.model.nu))
         for inputs in self._inputs:
-            simulation.advance(1)
+            loop.advance(1)
             inputs[:] = self.vehicle.data.ctrl
 
     def replay_us(self) -> float:
         """Return the time of the engine alone per step of the same drive [us], all in one native call."""
         self.vehicle.restore_state(self._start)
-        return _per_step_us(lambda: self.vehicle.replay(self._inputs), len(self._inputs))
-
-
-def _repeat(step: Callable[..., object], model: mujoco.MjModel, data: mujoco.MjData, steps: int) -> None:
-    for _ in range(steps):
-        step(model, data)
+        return _per_call_us(self.vehicle.replay, 1, self._inputs) / len(self._inputs)
 
 
 def _asked(scenario: Scenario, controller: str) -> list[ActuatorCommand]:
     """Return the commands of a controller in each step, without its estimates."""
-    simulation, asked = ClosedLoop(scenario, controller), []
-    for _ in range(simulation.steps):
-        simulation.advance(1)
-        asked.append(simulation.commands[1]._replace(estimate=None))
+    loop, asked = ClosedLoop(scenario, controller), []
+    for _ in range(loop.steps):
+        loop.advance(1)
+        asked.append(loop.commands[1]._replace(estimate=None))
     return asked
 
 
@@ -173,33 +171,29 @@ class _Given:
         return self._next()
 
 
-def _closed_loop(scenario: Scenario, controller: str = _CONTROLLER, given: _Given | None = None) -> float:
-    simulation = ClosedLoop(scenario, controller)
-    recorder = Recorder(simulation.vehicle, simulation.steps)
+def _closed_loop(
+    scenario: Scenario, controller: str = _CONTROLLER, given: _Given | None = None, threads: int = 0
+) -> float:
+    """Return the time per step of a run, or of several together, each in a thread of its own [us]."""
+    loops = [ClosedLoop(scenario, controller) for _ in range(max(threads, 1))]
+    recorders = [Recorder(loop.vehicle, loop.steps) for loop in loops]
+
+    def drive(loop: ClosedLoop, recorder: Recorder) -> None:
+        loop.advance(loop.steps, recorder, controller=given)
 
     def run() -> None:
-        simulation.advance(simulation.steps, recorder, controller=given)
-        recorder.flush()
-
-    return _per_step_us(run, simulation.steps)
-
-
-def _in_threads(scenario: Scenario, count: int) -> float:
-    """Return the time per step of all simulations together [us], each in a thread of its own."""
-    simulations = [ClosedLoop(scenario, _CONTROLLER) for _ in range(count)]
-    recorders = [Recorder(simulation.vehicle, simulation.steps) for simulation in simulations]
-    pairs = zip(simulations, recorders, strict=True)
-    threads = [threading.Thread(target=simulation.run, args=(recorder,)) for simulation, recorder in pairs]
-
-    def run() -> None:
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        if threads:
+            started = [threading.Thread(target=drive, args=pair) for pair in zip(loops, recorders, strict=True)]
+            for thread in started:
+                thread.start()
+            for thread in started:
+                thread.join()
+        else:
+            drive(loops[0], recorders[0])
         for recorder in recorders:
             recorder.flush()
 
-    return _per_step_us(run, sum(simulation.steps for simulation in simulations))
+    return _per_call_us(run, 1) / sum(loop.steps for loop in loops)
 
 
 def _runs_per_min() -> float:
@@ -222,68 +216,364 @@ def _step_steers(count: int) -> None:
 def _with_file(scenario: Scenario, path: Path) -> float:
     """Return the time per step of a run as on the command line [us], without building, settling and opening."""
     simulation = Simulation(scenario, _CONTROLLER)
+    start = 0.0
     with simulation.recorded_to(path):
         start = time.perf_counter()
         simulation.run()
     return (time.perf_counter() - start) / simulation.steps * 1e6
 
 
-def bench_tyre(rounds: int = _ROUNDS) -> dict[str, float]:
+def _blocks(scenario: Scenario) -> dict[str, float]:
+    """Measure each block of the loop on its own, in the order of the data; the vehicle writes the rows."""
+    loop = ClosedLoop(scenario, _CONTROLLER)
+    vehicle = loop.vehicle
+    measurement, motion, setpoint = vehicle.measure(), vehicle.motion(), loop.maneuver.setpoint(0.6)
+    command = loop.driver.step(setpoint, measurement, motion)
+    steer = loop.controller.step(command, measurement)
+    found = {
+        "maneuver_us": _per_call_us(loop.maneuver.setpoint, _CALLS, 0.6),
+        "driver_us": _per_call_us(loop.driver.step, _CALLS, setpoint, measurement, motion),
+        "controller_us": _per_call_us(loop.controller.step, _CALLS, command, measurement),
+        "vehicle_us": 0.0,
+        "recorder_us": 0.0,
+    }
+    recorder = Recorder(vehicle, _CALLS)
+    vehicle.record_on(recorder.tape)
+    parts = recorder.blocks(range(_CALLS))
+    while recorder.rows < _CALLS:
+        start = time.perf_counter()
+        part = next(parts)
+        found["recorder_us"] += (time.perf_counter() - start) / _CALLS * 1e6
+        found["vehicle_us"] += _per_call_us(vehicle.step, len(part), command, steer) * len(part) / _CALLS
+    found["recorder_us"] += _per_call_us(recorder.flush, 1) / _CALLS
+    return found
+
+
+_SCALARS: Final = (
+    "speed_mps", "yaw_rate_radps", "ay_mps2", "ax_mps2", "steering_wheel_rad", "rear_steer_rad", "superposition_rad",
+)  # fmt: skip
+_WHEELS: Final = 1 + len(_SCALARS)
+_PEDAL: Final = _WHEELS + len(CORNERS)
+
+
+class DrivenStop:
+    """A stop from 100 km/h with a working anti-lock system and the sensors of production cars.
+
+    Sensors, brakes and anti-lock system alone repeat it in native code.
+    """
+
+    def __init__(self) -> None:
+        scenario = resolve("straight_braking", overrides=_PRODUCTION)
+        recording = run_scenario(scenario)
+        speeds = [recording[f"{corner}_wheel_speed_radps"] for corner in CORNERS]
+        scalars = [recording[name] for name in _SCALARS]
+        self._rows = np.column_stack([recording.time_s, *scalars, *speeds, recording["brake_pedal"]])
+        # Use the state at the beginning of the recording, so that the brakes decide as they did.
+        self._vehicle = ClosedLoop(scenario).vehicle
+        self.anti_lock_fraction = self._drive()[1] / len(self._rows)
+
+    def _drive(self) -> tuple[float, int]:
+        """Return the duration of the work [s] and the number of steps with pressure reduced by the anti-lock system."""
+        (setup, state), sensors = self._vehicle.brakes, self._vehicle.sensors
+        assert sensors is not None
+        work = (
+            self._rows, sensors.chains, sensors.memory.copy(), setup["rolling_radius_m"][0] / len(CORNERS),
+            self._vehicle.timestep_s, *(record.copy().view(np.recarray)[0] for record in (setup, state)),
+        )  # fmt: skip
+        start = time.perf_counter()
+        held = _sense_and_brake(*work)
+        return time.perf_counter() - start, held
+
+    def step_us(self) -> float:
+        """Return the time of sensors, brakes and anti-lock system together in a step of the stop [us]."""
+        return 1e6 * self._drive()[0] / len(self._rows)
+
+
+@compiled
+def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
+    """Step sensors and brakes as `native_step.step` does; return the number of steps with reduced pressure."""
+    asked_Nm, held = np.zeros(4), 0
+    for row in rows:
+        speeds = memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4]
+        step_brakes(setup, state, speeds, memory[AX], row[_PEDAL], 0.0, asked_Nm, 0.0)
+        held += state.allowed_Pa[0] < state.demand_Pa[0]
+        wheels, p = row[_WHEELS:_PEDAL], state.pressure_Pa
+        truth = (
+            row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7],
+            (wheels[0], wheels[1], wheels[2], wheels[3]), (p[0], p[1], p[2], p[3]),
+        )  # fmt: skip
+        measured(chains, memory, radii_m, timestep_s, truth)
+    return held
+
+
+def bench_tyre(rounds: int = ROUNDS) -> dict[str, float]:
     """Measure the cost of the tyres: one evaluation of the front tyre, and all four in the engine.
 
     `four_tyres_us` are the microseconds that four tyres with contact, relaxation and the application of their forces
     add to the engine's passive forces, in the same state.
     """
     scenario = resolve("straight_line")
-    simulation = ClosedLoop(scenario)
-    model, data = simulation.vehicle.model, simulation.vehicle.data
-    header = fb.header_of(model)
+    vehicle = ClosedLoop(scenario).vehicle
+    header = fb.header_of(vehicle.model)
     wheels = float(header["n_wheels"][0])
-    with_tyres: list[float] = []
-    without: list[float] = []
-    for _ in range(rounds):
-        for measured, present in ((with_tyres, wheels), (without, 0.0)):
-            header["n_wheels"] = present
-            measured.append(_per_step_us(lambda: _repeat(mujoco.mj_passive, model, data, _CALLS), _CALLS))
-    return tyre_bench(scenario.car.tyres[0], rounds) | {"four_tyres_us": min(with_tyres) - min(without)}
+
+    def passive_us(present: float) -> float:
+        header["n_wheels"] = present
+        return _per_call_us(mujoco.mj_passive, _CALLS, vehicle.model, vehicle.data)
+
+    found = _interleaved({"with": lambda: passive_us(wheels), "without": lambda: passive_us(0.0)}, rounds)
+    four_us = min(found["with"]) - min(found["without"])
+    return tyre_bench(scenario.car.tyres[0], rounds) | {"four_tyres_us": four_us}
 
 
-def _blocks(scenario: Scenario) -> dict[str, float]:
-    """Measure each block of the loop on its own, in the order of the data; the vehicle writes the rows."""
-    simulation = ClosedLoop(scenario, _CONTROLLER)
-    maneuver, driver, controller, vehicle = (
-        simulation.maneuver,
-        simulation.driver,
-        simulation.controller,
-        simulation.vehicle,
-    )
-    measurement, motion = vehicle.measure(), vehicle.motion()
-    setpoint = maneuver.setpoint(0.6)
-    command = driver.step(setpoint, measurement, motion)
-    steer = controller.step(command, measurement)
-    blocks: dict[str, Callable[[], object]] = {
-        "maneuver_us": lambda: maneuver.setpoint(0.6),
-        "driver_us": lambda: driver.step(setpoint, measurement, motion),
-        "controller_us": lambda: controller.step(command, measurement),
-    }
-    found = {name: _per_step_us(lambda block=block: _call(block, _CALLS), _CALLS) for name, block in blocks.items()}
-    recorder = Recorder(vehicle, _CALLS)
-    vehicle.record_on(recorder.tape)
-    parts = recorder.blocks(range(_CALLS))
+SIZES: Final = (1, 16, 256, 1024)
+"""Numbers of cars of a batch."""
+_MEASURED: Final = 256
+"""Number of cars of the figures without a number of cars in their names."""
+_CAR_STEPS: Final = 51_200
+"""Car-steps of one measurement."""
+_INTERVAL: Final = 10
+"""Steps between two calls of the vectorised controller."""
 
-    def step() -> None:
-        vehicle.step(command, steer)
 
-    found |= {"vehicle_us": 0.0, "recorder_us": 0.0}
-    while recorder.rows < _CALLS:
-        start = time.perf_counter()
-        part = next(parts)
-        found["recorder_us"] += (time.perf_counter() - start) / _CALLS * 1e6
-        found["vehicle_us"] += _per_step_us(lambda part=part: _call(step, len(part)), _CALLS)
-    found["recorder_us"] += _per_step_us(recorder.flush, _CALLS)
+def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
+    """Measure batches of cars in the sine with dwell, with ideal sensors, and keep the best of some interleaved rounds.
+
+    Returns:
+        `batch_cpu_us_per_car_step` (processor time, native code alone, one thread), `batch_cpu_us_two_threads` (the
+        same with two threads), `batch_threads_2_speedup` (by the clock), `batch_car_steps_per_s` (all processors, with
+        measurements and the vectorised `ars` every 10 ms); these four for 256 cars, and with the number of cars in the
+        name for all `SIZES`; `batch_MB_per_car`.
+    """
+    found: dict[str, float] = {}
+    for size in SIZES:
+        before, threads = _memory_MB(), os.cpu_count() or 1
+        batch = Batch("sine_with_dwell", size, threads=threads)
+        held = _memory_MB() - before
+        start, controller = batch.save_state(), batch.vectorised(_CONTROLLER, _INTERVAL * 1e-3)
+        steps = max(_INTERVAL, _CAR_STEPS // size // _INTERVAL * _INTERVAL)
+        steps = min(steps, int(batch.steps[0]) // _INTERVAL * _INTERVAL)
+        best = {}
+        for _ in range(rounds):
+            for name, count in (("one", 1), ("two", 2), ("controlled", threads)):
+                batch.restore_state(start)
+                batch.threads = count
+                wall, cpu = time.perf_counter(), time.process_time()
+                if name == "controlled":
+                    measurement = batch.measurement
+                    for _ in range(steps // _INTERVAL):
+                        command = controller.step(batch.driver_command, measurement)
+                        measurement = batch.advance(_INTERVAL, actuator_command=command)
+                else:
+                    batch.advance(steps)
+                spent = np.array([time.perf_counter() - wall, time.process_time() - cpu])
+                best[name] = np.minimum(best.get(name, spent), spent)
+        total = size * steps
+        figures = {
+            "batch_car_steps_per_s": total / float(best["controlled"][0]),
+            "batch_cpu_us_per_car_step": float(best["one"][1]) / total * 1e6,
+            "batch_cpu_us_two_threads": float(best["two"][1]) / total * 1e6,
+            "batch_threads_2_speedup": float(best["one"][0] / best["two"][0]),
+        }
+        found |= {f"{name}_{size}": value for name, value in figures.items()}
+        if size == _MEASURED:
+            found = figures | found
+        if size == SIZES[-1]:
+            found["batch_MB_per_car"] = held / size
     return found
 
 
-def _call(block: Callable[[], object], count: int) -> None:
-    for _ in range(count):
-        block()
+def _memory_MB() -> float:
+    """Return the memory that this process holds [MB]; 0 where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    except (OSError, ValueError, AttributeError):
+        return 0.0
+
+
+def batch_table(found: dict[str, Any]) -> str:
+    """Return the results of `bench_batch` as a table, a line for each number of cars."""
+    lines = [f"{'cars':>6} {'us/car-step':>12} {'2 threads':>10} {'speed-up':>9} {'car-steps/s':>12}"]
+    for size in SIZES:
+        us, two, speedup, rate = (
+            found[f"batch_{name}_{size}"]
+            for name in ("cpu_us_per_car_step", "cpu_us_two_threads", "threads_2_speedup", "car_steps_per_s")
+        )
+        lines.append(f"{size:6d} {us:12.2f} {two:10.2f} {speedup:9.2f} {rate:12.0f}")
+    return "\n".join([*lines, f"memory {found['batch_MB_per_car']:.2f} MB per car"])
+
+
+BASELINE: Final = Path(__file__).with_name("maneuver_baseline.json")
+"""Key metrics of each scenario and system as they were when they were last renewed on purpose."""
+DRIVEN: Final = {
+    **dict.fromkeys((*SCENARIOS, "fishhook", "j_turn", "brake_in_turn_release"), SYSTEMS),
+    "start_stop": ("none",),
+}
+"""Manoeuvre -> controllers that drive it."""
+
+Baseline = dict[str, dict[str, dict[str, float]]]
+"""Manoeuvre -> controller -> name of the metric -> value [SI], nan where the run does not define one."""
+
+
+class BenchmarkRun(NamedTuple):
+    """One manoeuvre driven with one controller; times with settling, building and metrics, key metrics in SI."""
+
+    maneuver: str
+    kind: str
+    controller: str
+    simulated_s: float
+    wall_s: float
+    metrics: dict[str, float]
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time over wall time."""
+        return self.simulated_s / self.wall_s
+
+
+class Drift(NamedTuple):
+    """A key metric [SI] that differs from the baseline by more than its tolerance; None where a side has none."""
+
+    maneuver: str
+    controller: str
+    metric: str
+    old: float | None
+    new: float | None
+    tolerance: float
+
+    def __str__(self) -> str:
+        """Return one line with old and new value and the tolerance."""
+        metric = recorded_metric(self.metric)
+        old, new = ("missing" if value is None else metric.text(value) for value in (self.old, self.new))
+        tolerance = f"{self.tolerance * metric.unit.factor:.3g} {metric.unit.name}".removesuffix(" -")
+        return f"{self.maneuver}, {self.controller}: {metric.label} {old} -> {new} (tolerance {tolerance})"
+
+
+class Benchmark(NamedTuple):
+    """All runs, the time of the search for a manoeuvre's steering amplitude, and the largest memory of this process."""
+
+    runs: list[BenchmarkRun]
+    search_s: dict[str, float]
+    peak_memory_B: int
+
+    def key_metrics(self) -> Baseline:
+        """Return the key metrics of all runs, rounded to six digits."""
+        found: Baseline = {}
+        for run in self.runs:
+            rounded = {name: float(f"{value:.6g}") for name, value in run.metrics.items()}
+            found.setdefault(run.maneuver, {})[run.controller] = rounded
+        return found
+
+    def by_maneuver(self) -> dict[str, list[BenchmarkRun]]:
+        """Return the runs of each manoeuvre."""
+        found: dict[str, list[BenchmarkRun]] = {}
+        for run in self.runs:
+            found.setdefault(run.maneuver, []).append(run)
+        return found
+
+    def search_told(self, maneuver: str) -> str:
+        """Return the time of the search for a manoeuvre's amplitude in words; empty where nothing is searched."""
+        search_s = self.search_s.get(maneuver)
+        return "" if search_s is None else f"search of the steering amplitude {search_s:.2f} s"
+
+
+def bench_maneuvers() -> Benchmark:
+    """Drive the paper's five scenarios and the manoeuvres in phases in this process, after searching the amplitudes."""
+    import_module("scipy.signal")  # the metrics load it at their first use; that is no time of a run
+    runs, search_s = [], {}
+    for name, systems in DRIVEN.items():
+        scenario = resolve(name)
+        with searched_anew():
+            start = time.perf_counter()
+            found = prepared(scenario)
+            if scenario.maneuver.search is not None:
+                search_s[name] = time.perf_counter() - start
+        simulated_s = scenario.maneuver.settle_s + scenario.maneuver.duration_s
+        for system in systems:
+            start = time.perf_counter()
+            recording = run_scenario(found, system)
+            wall_s = time.perf_counter() - start
+            names = [metric.name for metric in evaluation_of(recording).key_metrics]
+            if missing := [each for each in names if each not in recording.metrics]:
+                raise RecordingError(f"{name}, {system}: there is no key metric {missing[0]}")
+            metrics = {each: recording.metrics[each] for each in names}
+            runs.append(BenchmarkRun(name, scenario.maneuver.kind, system, simulated_s, wall_s, metrics))
+    # Linux gives kibibytes.
+    return Benchmark(runs, search_s, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+
+
+def drifts(benchmark: Benchmark, baseline: Baseline) -> list[Drift]:
+    """Return the key metrics that differ from the baseline by more than their tolerance, or that one side lacks."""
+    kinds = {run.maneuver: run.kind for run in benchmark.runs}
+    olds, news, found = _flat(baseline), _flat(benchmark.key_metrics()), []
+    for run in dict.fromkeys(run[:2] for run in (*olds, *news)):
+        declared = EVALUATIONS[kinds[run[0]]].key_metrics if run[0] in kinds else ()
+        known = {metric.name: metric for metric in declared}
+        for name in dict.fromkeys(key[2] for key in (*olds, *news) if key[:2] == run):
+            old, new = olds.get((*run, name)), news.get((*run, name))
+            metric = known.get(name) or recorded_metric(name)
+            tolerance = metric.tolerance_of(old) if old is not None and math.isfinite(old) else metric.tolerance
+            if old is None or new is None or not np.isclose(new, old, rtol=0.0, atol=tolerance, equal_nan=True):
+                found.append(Drift(*run, name, old, new, tolerance))
+    return found
+
+
+def _flat(baseline: Baseline) -> dict[tuple[str, str, str], float]:
+    return {
+        (maneuver, controller, name): value
+        for maneuver, systems in baseline.items()
+        for controller, metrics in systems.items()
+        for name, value in metrics.items()
+    }
+
+
+def read_baseline(path: Path = BASELINE) -> Baseline:
+    """Return the stored baseline; null stands for nan.
+
+    Raises:
+        RecordingError: the file is missing or is no baseline; renew it with `activesteer bench --maneuvers --renew`.
+    """
+    try:
+        stored = json.loads(read_text(path, RecordingError))
+        for maneuver, controller, name in _flat(stored):
+            value = stored[maneuver][controller][name]
+            stored[maneuver][controller][name] = math.nan if value is None else float(value)
+    except (ValueError, TypeError, AttributeError) as error:
+        raise RecordingError("is no baseline of key metrics; renew it with --renew", file=str(path)) from error
+    return stored
+
+
+def write_baseline(benchmark: Benchmark, path: Path = BASELINE) -> Path:
+    """Write the key metrics of a benchmark as the new baseline."""
+    return write_json(path, benchmark.key_metrics(), ActiveSteerError)
+
+
+def as_json(benchmark: Benchmark, found: Sequence[Drift]) -> dict[str, Any]:
+    """Return a benchmark and its drifts as JSON values."""
+    return {
+        "runs": [run._asdict() | {"real_time_factor": run.real_time_factor} for run in benchmark.runs],
+        "search_s": benchmark.search_s,
+        "peak_memory_B": benchmark.peak_memory_B,
+        "drifts": [drift._asdict() for drift in found],
+    }
+
+
+def as_markdown(benchmark: Benchmark, found: Sequence[Drift]) -> str:
+    """Return a summary for the page of a continuous-integration run: verdict, drifts, a table for each manoeuvre."""
+    checked = sum(len(run.metrics) for run in benchmark.runs)
+    verdict = f"{len(found)} of {checked} key metrics drift" if found else f"{checked} key metrics as in the baseline"
+    parts = [f"# Benchmark of the manoeuvres\n\n{verdict}; peak memory {benchmark.peak_memory_B / 1e6:.0f} MB."]
+    if found:
+        parts.append("\n".join(f"- {drift}" for drift in found))
+    for maneuver, runs in benchmark.by_maneuver().items():
+        rows = [["metric", "unit", *(run.controller for run in runs)], ["---"] * 2 + ["---:"] * len(runs)]
+        for name in runs[0].metrics:
+            metric = recorded_metric(name)
+            rows.append([metric.label, metric.unit.name, *(metric.text(run.metrics[name]) for run in runs)])
+        rows.append(["time of the run", "s", *(f"{run.wall_s:.2f}" for run in runs)])
+        rows.append(["times real time", "-", *(f"{run.real_time_factor:.0f}" for run in runs)])
+        table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+        search = f"{benchmark.search_told(maneuver).capitalize()}.\n\n" if maneuver in benchmark.search_s else ""
+        parts.append(f"## {maneuver}\n\n{search}{table}")
+    return "\n\n".join(parts) + "\n"

@@ -114,7 +114,7 @@ class MagicFormula:
     Attributes:
         parameters: Its coefficients.
 
-    Example:
+    Examples:
         >>> import numpy as np
         >>> from activesteer.resources import models_dir
         >>> from activesteer.tyre.evaluation import MagicFormula

@@ -79,7 +79,7 @@ def new_vehicle(
         TyreFileError: a tyre file is not found or wrong.
         ModelError: the car cannot stand.
 
-    Example:
+    Examples:
         >>> from activesteer.resources import models_dir
         >>> from activesteer.vehicle_builder import check_vehicle, new_vehicle
         >>> made = new_vehicle("mine", models_dir() / "tables" / "wishbone.csv")

@@ -31,6 +31,7 @@ def refused(told, *texts: str) -> None:
         (["step_ster"], ["no manoeuvre is named 'step_ster'", "did you mean 'step_steer'"]),
         (["nowhere/mine.toml"], ["nowhere/mine.toml does not exist"]),
         (["step_steer", "-c", "asr"], ["there is no controller 'asr'", "did you mean 'ars'"]),
+        (["step_steer", "-c", "mpc"], ["'mpc' is an example now; use -c examples/own_mpc.py:EnvelopeMpc"]),
         (["step_steer", "-c", "mine.py:Mine"], ["controller mine.py:Mine: mine.py does not exist"]),
         (["step_steer", "--vehicle", "compct"], ["no vehicle is named 'compct'", "did you mean 'compact'"]),
         (["step_steer", "--set", "road.mue=1"], ["override road.mue", "did you mean 'road.mu'"]),

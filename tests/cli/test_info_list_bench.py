@@ -14,7 +14,7 @@ import pytest
 import activesteer
 from activesteer.cli import main
 from activesteer.resources import list_maneuvers
-from activesteer.studies.chassis_benchmark import DrivenStop
+from activesteer.studies.benchmark import DrivenStop
 from activesteer.version import __version__
 
 KEYS = {
@@ -128,7 +128,7 @@ def test_info_of_something_else_is_an_error(call, tmp_path, data, told):
     assert str(path) in answer.err
 
 
-DIFFERENCES = {"estimator_lqr_us", "integrated_us", "mpc_us"}
+DIFFERENCES = {"estimator_lqr_us", "integrated_us"}
 
 
 def test_bench_has_the_promised_keys_and_ratios(call, monkeypatch):

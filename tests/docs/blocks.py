@@ -6,8 +6,7 @@ The convention, which a reader of the source sees:
 - `python` and `toml` that begin with a comment naming a file, as `# mine.py`, become that file and are not executed.
 - `sh` are command lines, all run. In `console` they follow a `$`, and what they print stands below; a line `...` leaves
   lines out, numbers may differ by 2 % or by two units of their last digit.
-- `text` is neither. The reference has `py` for signatures and `pycon` for the examples of docstrings, which
-  `test_docstrings.py` runs.
+- `text` is neither.
 - A command with a comment that begins with `slow` is run by the slow tests only, one with `window` (it opens one) by
   none. Both are checked as far as the command line's own parser goes.
 """

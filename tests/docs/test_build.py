@@ -16,6 +16,7 @@ from tests.conftest import PHONE
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
+pytestmark = pytest.mark.slow  # the reference is parsed from the sources
 ROOT = Path(__file__).resolve().parents[2]
 LOADED = re.compile(
     r"<(?:script|img|iframe)[^>]*\bsrc=[\"']?(?:https?:)?//|<link(?![^>]*canonical)[^>]*href=[\"']?(?:https?:)?//"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pkgutil
 import re
 from pathlib import Path
 
@@ -39,6 +40,13 @@ def test_every_page_of_manoeuvres_has_a_film(page: Path) -> None:
 def test_every_kind_of_manoeuvre_is_in_the_reference() -> None:
     page = (DOCS / "reference" / "manoeuvres.md").read_text(encoding="utf-8")
     assert not [kind for kind in KINDS if f"## {kind}\n" not in page]
+
+
+@pytest.mark.parametrize("page", sorted((DOCS / "reference").glob("*.md")), ids=lambda page: page.stem)
+def test_reference_names_what_exists_and_has_a_docstring(page: Path) -> None:
+    names = re.findall(r"^::: (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert names
+    assert not [name for name in names if not pkgutil.resolve_name(name).__doc__]
 
 
 @pytest.mark.parametrize("command", all_commands().names())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import math
 import re
 import runpy
 import shlex
@@ -23,7 +24,7 @@ EXAMPLES = ROOT / "examples"
 NEED_MORE = {"train_rear_steer.py", "udp_client.py"}
 """Scripts that need arguments, minutes of training or another process; tests of learning and of UDP use them."""
 SLOW = {"cosimulation.py"}
-SHOWN = {f"own_{name}.py" for name in ("car", "controller", "driver", "loop", "manoeuvre", "study")}
+SHOWN = {f"own_{name}.py" for name in ("car", "controller", "driver", "loop", "manoeuvre", "mpc", "study")}
 """Scripts with a test of their own below, which drives once and gives the result to the part that prints."""
 SCRIPTS = [
     pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.name in SLOW else [])
@@ -101,6 +102,16 @@ def test_own_controller_keeps_the_car_from_spinning(show: Callable[..., None]) -
     sideslip_rad = {name: run.metrics["sideslip_peak_abs_rad"] for name, run in runs.items()}
     assert sideslip_rad["yaw damper"] < 0.3 * sideslip_rad["none"]
     assert runs["yaw damper"]["rear_steer_demand_rad"].any()
+
+
+def test_own_mpc_keeps_the_car_within_its_envelope(show: Callable[..., None]) -> None:
+    pytest.importorskip("daqp")
+    scope = example("own_mpc")
+    found = scope["compare"]()
+    peaks = {name: run.metrics["sideslip_peak_abs_rad"] for name, run in found.items()}
+    assert peaks["envelope"] < math.radians(5.0) < peaks["none"]
+    assert found["envelope"].metrics["lateral_displacement_m"] > 1.83  # FMVSS 126
+    show("own_mpc", scope, compare=lambda: found)
 
 
 def test_own_driver_keeps_the_lane_change_but_cuts_it(show: Callable[..., None]) -> None:

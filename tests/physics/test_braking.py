@@ -49,6 +49,36 @@ def test_no_wheel_locks_and_nine_tenths_of_the_friction_are_used(vehicle: str, c
     assert 0.9 <= found["braking_efficiency"] <= 1.0
 
 
+@pytest.mark.parametrize("friction", [1.0, 0.6, 0.3])
+@pytest.mark.parametrize("vehicle", ["compact", "sedan", pytest.param("bmw_m8", marks=pytest.mark.slow)])
+def test_a_full_stop_keeps_its_deceleration_to_walking_pace(vehicle: str, friction: float) -> None:
+    """Within a tenth of that around 10 m/s, down to 0.5 m/s, as production cars do."""
+    changes = {"speed_kmh": 60, "road.mu": friction, "maneuver.duration_s": 2.0 + 3.0 / friction}
+    recording = simulate("straight_braking", vehicle=vehicle, overrides=changes)
+    time_s, speed_mps = recording.time_s, recording["vx_mps"]
+
+    def deceleration_mps2(from_mps: float, to_mps: float) -> float:
+        first, last = (int(np.argmax(speed_mps < limit)) for limit in (from_mps, to_mps))
+        return (speed_mps[first] - speed_mps[last]) / (time_s[last] - time_s[first])
+
+    fast_mps2 = deceleration_mps2(11.5, 8.0)
+    for from_mps, to_mps in ((4.0, 2.5), (2.5, 1.5), (1.5, 1.0), (1.0, 0.5)):
+        assert deceleration_mps2(from_mps, to_mps) == pytest.approx(fast_mps2, rel=0.1), (from_mps, to_mps)
+
+
+def test_dead_travel_and_build_up_of_pressure_delay_a_hard_stop_by_half_a_second() -> None:
+    """From the pedal to 0.4 g a hard, not panicked stop takes 0.5 to 0.7 s."""
+
+    def delay_s(**hydraulics: float) -> float:
+        changes = {f"vehicle.brakes.hydraulics.{key}": value for key, value in hydraulics.items()}
+        recording = simulate("straight_braking", overrides={"brake.rise_s": 0.7, "brake.pedal": 0.6} | changes)
+        strong = recording["ax_mps2"] < -0.4 * GRAVITY_MPS2
+        return float(recording.time_s[int(np.argmax(strong))]) - 0.5
+
+    assert delay_s() < 0.42
+    assert 0.5 < delay_s(dead_travel=0.2, rise_Paps=10e6) < 0.7
+
+
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
 def test_a_car_rocks_back_at_the_stop_by_its_suspension_and_tyres_alone(vehicle: str) -> None:
     """Two amplitudes of a swing, whose first is what deceleration over stiffness bends both by: some centimetres.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.bands import Band, bands_of
 from activesteer.analysis.loss_of_control import LOST_SIDESLIP_RAD
+from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RunLook, run_looks
 from activesteer.display_units import Quantity, quantity_of
@@ -74,7 +75,7 @@ class DrawnRun(NamedTuple):
     @property
     def lost(self) -> bool:
         """Return True if the car spins."""
-        return bool(np.abs(self.recording["sideslip_rad"]).max() > LOST_SIDESLIP_RAD)
+        return bool(np.abs(counted_sideslip(self.recording)).max() > LOST_SIDESLIP_RAD)
 
 
 def curves(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:

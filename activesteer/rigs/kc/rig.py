@@ -37,7 +37,7 @@ def kinematics_compliance(
         ModelError: the model is not found, lacks a part, or has no equilibrium.
         TyreFileError: a tyre file is not found or wrong.
 
-    Example:
+    Examples:
         >>> from activesteer.rigs.kc.rig import kinematics_compliance
         >>> result = kinematics_compliance("compact")
         >>> result["front", "bump_steer"] < 0.0

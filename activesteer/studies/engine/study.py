@@ -74,7 +74,7 @@ def study(
         ActiveSteerError: an input is wrong, the folder cannot be written or holds another study, or the workers cannot
             be reached. A failed run is a row and raises nothing.
 
-    Example:
+    Examples:
         >>> from activesteer import study
         >>> table = study({
         ...     "maneuvers": ["step_steer"],

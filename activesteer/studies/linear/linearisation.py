@@ -179,7 +179,7 @@ def linearise(
         ParameterError: the speed is too low, or the vehicle is not found or wrong.
         ModelError: the car cannot be built, or does not roll straight ahead at this speed.
 
-    Example:
+    Examples:
         >>> from activesteer.studies.linear.linearisation import linearise
         >>> system = linearise("compact", speed_mps=25.0)
         >>> system.ninputs, system.noutputs

@@ -53,7 +53,7 @@ def load_tir(path: str | Path, mounted: Side | None = None, *, slip_tangent: boo
     Raises:
         TyreFileError: the file cannot be read, a line cannot be understood, or a value is missing or not allowed.
 
-    Example:
+    Examples:
         >>> from activesteer.resources import models_dir
         >>> from activesteer.tyre.file.tir import load_tir
         >>> tyre = load_tir(models_dir() / "tyres" / "compact_205_55R16.tir")

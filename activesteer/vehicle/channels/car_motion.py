@@ -14,7 +14,9 @@ from activesteer.signals import Channel
 from activesteer.vehicle.channels.raw_rows import Column, sensor
 
 STANDSTILL_MPS: Final = 0.2
-"""Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]."""
+"""Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]: a car at rest swings on its tyres."""
+FULL_SIDESLIP_MPS: Final = 1.0
+"""From this speed on the recorded sideslip angle is the true one; below, it fades to 0 at `STANDSTILL_MPS` [m/s]."""
 ROCKS_BACK_MPS: Final = 1.0
 """Limit for driving backwards, for a stopped car that swings back on suspension and tyres [m/s]."""
 
@@ -39,7 +41,7 @@ MOTION_CHANNELS: Final = tuple(
         ("ax_mps2", "m/s2", "longitudinal acceleration, in the road plane"),
         ("ay_mps2", "m/s2", "lateral acceleration, in the road plane, left positive"),
         ("az_mps2", "m/s2", "vertical acceleration"),
-        ("sideslip_rad", "rad", "sideslip angle at the centre of gravity, atan(vy/vx)"),
+        ("sideslip_rad", "rad", "sideslip angle at the centre of gravity, atan(vy/vx); fades to 0 below 1 m/s"),
         ("front_axle_x_m", "m", "position of the middle of the front axle, world x"),
         ("front_axle_y_m", "m", "position of the middle of the front axle, world y"),
     )
@@ -136,5 +138,7 @@ class CarMotion:
         _in_the_road_plane(columns, np.sin(angles), np.cos(angles), gravity_mps2, turned)
         self.vx_mps, self.vy_mps, self.ax_mps2, self.ay_mps2, self.az_mps2, self.yaw_rate_radps = turned.T
         self.speed_mps = np.hypot(columns[:, 4], columns[:, 5])
-        slowest = np.where(self.vx_mps < 0.0, ROCKS_BACK_MPS, STANDSTILL_MPS)
-        self.sideslip_rad = np.where(self.speed_mps > slowest, np.arctan2(self.vy_mps, self.vx_mps), 0.0)
+        backwards = self.vx_mps < 0.0
+        fading = np.clip((self.speed_mps - STANDSTILL_MPS) / (FULL_SIDESLIP_MPS - STANDSTILL_MPS), 0.0, 1.0)
+        fading = np.where(backwards, self.speed_mps > ROCKS_BACK_MPS, fading)
+        self.sideslip_rad = fading * np.arctan2(self.vy_mps, self.vx_mps)

@@ -44,7 +44,13 @@ _ROAD: Final = (
 _BRAKES: Final = (
     ("demand_Pa", "brake_pressure_demand_Pa", "Pa", "brake pressure demand of driver and controller", "corners"),
     ("pressure_Pa", "brake_pressure_Pa", "Pa", "pressure in the wheel brake", "corners"),
-    ("phase", "abs_phase", "", "anti-lock control: 0 off, 1 releases, 2 recovers, 3 builds up pressure", "corners"),
+    (
+        "phase",
+        "abs_phase",
+        "",
+        "anti-lock control: 0 off, 1 releases, 2 recovers, 3 builds up, 4 holds pressure",
+        "corners",
+    ),
     (
         "reference_mps",
         "abs_speed_mps",

@@ -8,10 +8,20 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from activesteer.analysis.series import crossing_time, lag, largest_rate, rate_rms, rms, smooth, step_response, timestep
+from activesteer.analysis.series import (
+    counted_sideslip,
+    crossing_time,
+    lag,
+    largest_rate,
+    rate_rms,
+    rms,
+    smooth,
+    step_response,
+    timestep,
+)
 from activesteer.errors import RecordingError
 from tests.raising import raises
-from tests.unit.analysis.synthetic import first_order, second_order
+from tests.unit.analysis.synthetic import SyntheticRun, first_order, second_order
 
 TIME_S = np.arange(6001) * 0.001
 
@@ -157,3 +167,18 @@ def test_lag_outside_the_range_or_of_nothing_does_not_exist():
     assert math.isnan(lag(sine, later, 0.001, 0.6))
     assert math.isnan(lag(sine, np.zeros_like(sine), 0.001, 0.6))
     assert math.isnan(lag(sine[:1000], later[:1000], 0.001, 0.6))
+
+
+def test_a_sideslip_angle_counts_while_the_car_drives_and_not_while_it_swings_to_rest():
+    """Two cars brake to rest. The one with less sideslip on its way swings more at the end."""
+    speed_mps = np.linspace(20.0, 0.0, len(TIME_S))
+    calm, wild = (
+        SyntheticRun(TIME_S, {"speed_mps": speed_mps, "sideslip_rad": np.where(speed_mps > 2.7, driven, swings)})
+        for driven, swings in ((0.01, 0.1), (0.02, 0.05))
+    )
+    assert [np.abs(counted_sideslip(run)).max() for run in (calm, wild)] == [0.01, 0.02]
+    assert counted_sideslip(calm, 5250).max() == 0.0
+
+
+def test_without_a_speed_every_sideslip_angle_counts():
+    assert counted_sideslip(SyntheticRun(TIME_S, {"sideslip_rad": 0.1 + 0.0 * TIME_S})).min() == 0.1

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from activesteer.brakes import Brakes
-from activesteer.brakes.antilock import BUILD, OFF, RECOVER, RELEASE, antilock
+from activesteer.brakes.antilock import BUILD, HOLD, OFF, RECOVER, RELEASE, antilock
 from activesteer.brakes.parameters import Antilock
 from tests.unit.brakes.test_hydraulics import of
 
@@ -133,9 +133,24 @@ def test_a_wheel_that_stands_does_not_regain_speed_because_the_car_brakes() -> N
 
 def test_a_slow_car_is_handed_over_to_the_driver() -> None:
     setup, state = braking(phase=RELEASE)
-    state.reference_mps, state.allowed_Pa[0] = 1.0, 3e6
+    state.reference_mps, state.allowed_Pa[0] = 0.9 * setup.lowest_speed_mps, 3e6
     assert step(setup, state, 2) == [pytest.approx(3e6 + 4e6 * INTERVAL_S), pytest.approx(3e6 + 8e6 * INTERVAL_S)]
     assert state.phase[0] == OFF
+
+
+def test_a_slow_car_holds_what_the_road_has_borne_and_a_swinging_wheel_does_not_release_it() -> None:
+    """The deceleration would release it at speed; then only a slip far beyond the limit does."""
+    setup, state = braking(phase=BUILD, slip=0.0, gain_mps2=-30.0)
+    state.reference_mps, state.mean_Nm[0] = 3.0, 800.0
+    state.wheel_mps[0] = 2.6
+    limits = step(setup, state, 100)
+    assert limits[0] == pytest.approx(800.0 / PER_PRESSURE, rel=1e-3)
+    assert 1.0 < limits[-1] / limits[0] < 1.02
+    assert state.phase[0] == HOLD
+    state.wheel_mps[0] = 0.3
+    step(setup, state)
+    assert state.phase[0] == RELEASE
+    assert state.mean_Nm[0] == pytest.approx(0.95 * 800.0)
 
 
 def test_a_released_pedal_ends_the_control() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.brakes import Brakes
-from activesteer.brakes.antilock import BUILD, OFF, antilock
+from activesteer.brakes.antilock import BUILD, HOLD, OFF, antilock
 from activesteer.brakes.control_unit import step_brakes
 from activesteer.brakes.records import NO_LIMIT_NM
 from activesteer.brakes.reference_speed import follow_car, follow_wheels
@@ -94,8 +94,8 @@ def test_either_front_wheel_holds_back_the_other(controlled: int) -> None:
     assert state.allowed_Pa[2] == state.limit_Pa[2]
 
 
-def test_below_walking_pace_the_anti_lock_system_hands_over_and_above_it_controls() -> None:
-    for speed_mps, phase in ((1.6, BUILD), (1.4, OFF)):
+def test_the_anti_lock_system_controls_then_holds_then_hands_over_as_the_car_gets_slow() -> None:
+    for speed_mps, phase in ((5.1, BUILD), (4.9, HOLD), (0.6, HOLD), (0.4, OFF)):
         setup, state = of(CAR)
         state.demand_Pa[:], state.limit_Pa[:], state.phase[0], state.borne_Nm[0] = 5e6, 4e6, BUILD, 440.0
         state.reference_mps = speed_mps

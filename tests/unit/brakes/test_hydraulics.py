@@ -57,6 +57,13 @@ def test_pressure_rises_at_its_fastest_and_then_by_its_lag() -> None:
     assert pressures(slow, 0.5, NOTHING, 50)[-1, 0] == pytest.approx(50.0 * BAR * (1.0 - math.exp(-1.0)), rel=1e-9)
 
 
+def test_the_dead_travel_of_the_pedal_builds_up_no_pressure() -> None:
+    car = Brakes(2200.0, 700.0, hydraulics=Hydraulics(dead_travel=0.2))
+    assert pressures(car, 0.2, NOTHING, 300)[-1, 0] == 0.0
+    assert pressures(car, 0.6, NOTHING, 300)[-1, 0] == pytest.approx(50.0 * BAR, rel=1e-6)
+    assert pressures(car, 1.0, NOTHING, 300)[-1, 0] == pytest.approx(100.0 * BAR, rel=1e-6)
+
+
 def test_pressure_falls_no_faster_than_the_valve_lets_it() -> None:
     rows = pressures(CAR, 0.0, NOTHING, 300, start_Pa=100.0 * BAR)[:, 3]
     assert np.diff(rows).min() == pytest.approx(-100.0 * BAR / 0.1 * 0.001, rel=1e-9)

@@ -1,4 +1,4 @@
-"""The quadratic programmes of `mpc` and `integrated`, against their cost sums and forces."""
+"""The quadratic programme of `integrated` and the turn of `lqr`, against their forces."""
 
 from __future__ import annotations
 
@@ -13,16 +13,14 @@ from activesteer.controllers.axle_slopes import AxleSlopes
 from activesteer.controllers.esc import wheel_torques
 from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.lqr import SPEEDS_MPS, Lqr, _gain, _place, schedule, steady_turn
-from activesteer.controllers.mpc import GIVEN, STATES, envelope_problem, model
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
 from activesteer.signals import Estimate
 from activesteer.theory.single_track import SingleTrack
-from tests.unit.controllers.cars import CAR, held, measured, steering
+from tests.unit.controllers.cars import held, measured, steering
 
 pytest.importorskip("daqp")
-INTERVAL_S, SPEED_MPS, LAG_S = 0.01, 25.0, 0.05
-BLOCKS, LOOKED_AT = (1, 2, 3, 6, 12), (2, 4, 7, 10, 13, 19, 25)
+INTERVAL_S, SPEED_MPS = 0.01, 25.0
 
 
 @pytest.fixture(scope="module")
@@ -30,55 +28,10 @@ def known():
     return resolve("straight_line").controller_setup(INTERVAL_S)
 
 
-def driven(p, z, angles):
-    """Cost of driving with angles in blocks, and yaw rate and rear slip angle at the checked calls."""
-    a, b = model(CAR, p, LAG_S, INTERVAL_S, SPEED_MPS, 0.8, 0.6)
-    given = dict(zip((*STATES, *GIVEN), z, strict=True))
-    before = np.array([given["superposition_before"], given["rear_before"]])
-    steady = np.array([given["superposition_steady"], given["rear_steady"]])
-    scales = np.array([p.superposition_scale_rad, p.rear_scale_rad])
-    cost, bounded = 0.0, []
-    z = a @ z + b @ before
-    each_call = [block for block, calls in zip(angles, BLOCKS, strict=True) for _ in range(calls)]
-    for call, demanded in enumerate(each_call, start=2):
-        z = a @ z + b @ demanded
-        yaw_rate, sideslip, rear = z[0], z[1], z[3]
-        cost += ((yaw_rate - given["desired"]) / p.yaw_rate_scale_radps) ** 2 + (sideslip / p.sideslip_scale_rad) ** 2
-        cost += (((demanded - steady) / scales) ** 2).sum()
-        if call in LOOKED_AT:
-            bounded.append((yaw_rate, rear - sideslip + CAR.cg_to_rear_m * yaw_rate / SPEED_MPS))
-    for one, other in zip([before, *angles[:-1]], angles, strict=True):
-        cost += (((other - one) / p.change_scale_rad) ** 2).sum()
-    return cost, np.array(bounded).T.ravel()
-
-
-def test_programme_costs_what_driving_on_with_its_angles_costs(known, rng):
-    p = known.gains.mpc
-    problem = envelope_problem(CAR, p, LAG_S, INTERVAL_S, SPEED_MPS, 0.8, 0.6)
-    z, angles = rng.normal(0.0, 0.05, len(STATES) + len(GIVEN)), rng.normal(0.0, 0.05, (len(BLOCKS), 2))
-    x = np.append(angles.ravel(), (0.0, 0.0))
-    cost, bounded = driven(p, z, angles)
-    without, _ = driven(p, z, np.zeros_like(angles))
-    assert x @ problem.hessian @ x + 2.0 * (problem.gradient @ z) @ x == pytest.approx(cost - without)
-    assert problem.rows @ x + problem.offsets @ z == pytest.approx(np.tile(bounded, 2))
-
-
-def test_leaving_the_envelope_is_dear_and_softens_each_bound_by_its_own_slack(known):
-    problem = envelope_problem(CAR, known.gains.mpc, LAG_S, INTERVAL_S, SPEED_MPS)
-    slacks = np.zeros(len(problem.hessian))
-    slacks[-2:] = 0.3, 0.02
-    looks = len(LOOKED_AT)
-    softened = np.repeat([0.3, 0.02], looks)
-    assert problem.rows @ slacks == pytest.approx(np.concatenate([-softened, softened]))
-    # A rad/s beyond costs a hundred times what an error of a rad/s over the whole horizon costs.
-    error = (sum(BLOCKS) + 1) / known.gains.mpc.yaw_rate_scale_radps**2
-    assert problem.hessian[-1, -1] == problem.hessian[-2, -2] > 30.0 * error
-
-
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_rear_wheels_turn_out_of_the_turn_by_what_a_heavily_loaded_axle_needs_more(known, side):
     slopes = AxleSlopes(known)
-    controller, driver = load_controller("mpc", known), steering(0.09 * side)
+    controller, driver = load_controller("lqr", known), steering(0.09 * side)
     answer = held(controller, driver, measured(0.25 * side, SPEED_MPS), 300)
     straight = steady_turn(known.single_track, SPEED_MPS)[1, 0] * answer.yaw_rate_desired_radps
     more = answer.prediction_rad - straight

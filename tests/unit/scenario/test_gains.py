@@ -54,7 +54,7 @@ def test_one_of_the_controllers_must_read_a_setting():
 def test_shared_settings_are_those_of_each_that_shares_them():
     shared = {"controllers.servos.lag_s": 0.03, "vehicle.controllers.bus_delay_s": 0.01, "controllers.lqr": {}}
     assert not unread_gains(shared, ["integrated"])
-    assert list(unread_gains(shared, ["mpc"])) == ["controllers.lqr"]
+    assert list(unread_gains(shared | {"controllers.ars": {}}, ["lqr"])) == ["controllers.ars"]
     assert list(unread_gains(shared, ["none"])) == list(shared)
 
 

@@ -53,7 +53,7 @@ def test_friction_changes_from_the_next_step_on_and_is_an_event_of_the_file(tmp_
 
 
 @pytest.mark.parametrize(
-    ("controller", "key"), [("ars", "ars.limit_deg"), ("mpc", "servos.lag_s"), (Follows, "Follows.gain_s")]
+    ("controller", "key"), [("ars", "ars.limit_deg"), ("lqr", "servos.lag_s"), (Follows, "Follows.gain_s")]
 )
 def test_a_parameter_set_to_its_value_changes_nothing_to_the_last_bit(controller, key) -> None:
     plain, changed = step_steer(controller), step_steer(controller)

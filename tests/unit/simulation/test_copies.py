@@ -30,7 +30,6 @@ RUNS = {
     "steering": ("step_steer", "ars", {}),
     "brakes": ("split_mu_braking", "integrated", {}),
     "estimator and sensors": ("step_steer", "lqr", {"sensors.preset": "production"}),
-    "solver": ("step_steer", "mpc", {}),
 }
 OWN = """
 from beside import GAIN
@@ -48,7 +47,7 @@ class Mine:
 
 def driven(run: str = "steering", steps: int = 1200, **more: Any) -> Simulation:
     maneuver, controller, keys = RUNS[run]
-    if controller in ("mpc", "integrated"):
+    if controller == "integrated":
         pytest.importorskip("daqp")
     simulation = Simulation(maneuver, controller, overrides={**KEYS, **keys}, **more)
     simulation.advance(steps)

@@ -118,7 +118,7 @@ def test_keys_are_checked_before_anything_runs(change, monkeypatch):
 def test_a_key_that_one_of_the_runs_reads_is_taken():
     for change in (
         {"factors": {"controllers.ars.limit_deg": {"grid": [2.0, 3.0]}}, "controllers": ["none", "ars"]},
-        {"factors": {"controllers.servos.lag_s": {"grid": [0.02, 0.03]}}, "controllers": ["none", "mpc"]},
+        {"factors": {"controllers.servos.lag_s": {"grid": [0.02, 0.03]}}, "controllers": ["none", "lqr"]},
         {"factors": {"controllers.bus_delay_s": {"grid": [0.0, 0.01]}}, "controllers": ["afs"]},
         {"overrides": {"controllers.afs.limit_deg": 2.0}, "controllers": ["ars", "afs"]},
         {"factors": {"driver.preview_s": {"grid": [1.0, 1.5]}}, "maneuvers": ["step_steer", "slalom"]},

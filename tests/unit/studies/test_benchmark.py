@@ -10,8 +10,8 @@ import pytest
 from activesteer.analysis.metrics import EVALUATIONS
 from activesteer.cli import main
 from activesteer.errors import RecordingError
-from activesteer.studies import maneuver_benchmark as benchmark
-from activesteer.studies.maneuver_benchmark import Benchmark, BenchmarkRun, drifts, read_baseline, write_baseline
+from activesteer.studies import benchmark
+from activesteer.studies.benchmark import Benchmark, BenchmarkRun, drifts, read_baseline, write_baseline
 from tests.raising import raises
 
 
