@@ -16,9 +16,9 @@ from activesteer.analysis.bands import Band, bands_of
 from activesteer.analysis.claims.sine_with_dwell import LOST_SIDESLIP_RAD
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RunLook, run_looks
-from activesteer.display_units import Quantity, quantity_of
 from activesteer.errors import ParameterError
 from activesteer.plotting import plain_axis
+from activesteer.units import Quantity, quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
