@@ -90,7 +90,7 @@ def all_commands() -> Commands:
         "drive": "listing run explore",
         "recordings": "info report compare replay video import_",
         "car": "vehicle tyre kc export",
-        "study": "study tune fit envelope fault_map identify linearise",
+        "study": "study tune fit identify linearise",
         "verify": "reproduce test bench",
     }.items():
         commands.begin_group(title)

@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.analysis.claims import PAPER, SCENARIO_OF, STATEMENTS, Kind, not_reproduced, read_setting
-from activesteer.analysis.claims.population import Population, read_population, stored_population
+from activesteer.analysis.claims.population import Population as StoredPopulation
+from activesteer.analysis.claims.population import stored_population
 from activesteer.theory.proportions import percent
 from tools.make_setting import AROUND
+from tools.population_results import Population, read_population
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "claims.md"
 BEGIN: Final = "<!-- the table is written by tools/make_claims_table.py -->\n"
@@ -96,7 +98,7 @@ def _mean(population: Population | None, claims: Sequence[str], at: str) -> str:
     return f"{percent(sum(found) / len(found))} %" if found else ""
 
 
-def _proportion(population: Population | None, number: str) -> tuple[str, str, str]:
+def _proportion(population: Population | StoredPopulation | None, number: str) -> tuple[str, str, str]:
     found = None if population is None else population.of(number)
     if found is None:
         return "", "", ""

@@ -14,6 +14,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,7 +22,6 @@ import numpy as np
 from PIL import Image
 
 from activesteer import ActuatorCommand, Simulation, study
-from activesteer.analysis.claims.population import read_population
 from activesteer.analysis.figures import BY_KIND, style, time_histories, time_panels
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
@@ -32,14 +32,14 @@ from activesteer.scenario import resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.run_task import CLAIM
+from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops
-from activesteer.studies.paper.comparison import compare
-from activesteer.studies.paper.comparison_figure import comparison_figure, comparison_population_figure
-from activesteer.studies.paper.envelope import envelope
-from activesteer.studies.paper.envelope_figure import envelope_figure
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
 from activesteer.units import DisplayUnit, Quantity, quantity_of
+from tools.compare_controllers import compare
+from tools.comparison_figures import comparison_figure, comparison_population_figure
+from tools.population_results import read_population
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -85,12 +85,8 @@ PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
 MIN_SPAN: Final = 0.1
 """No axis of these is enlarged further than this, in its unit, so that what stays as it is looks so."""
 
-ENVELOPES: Final[Mapping[str, tuple[Sequence[float], Sequence[float]]]] = {
-    "slalom": ((80, 90, 100, 110, 120), (1.6, 1.9, 2.2, 2.5, 2.8)),
-    "double_lane_change": ((70, 75, 80, 85, 90, 100), (0.0, 0.1, 0.2)),
-    "double_lane_change_low_mu": ((60, 65, 70, 75, 80, 90), (0.0, 0.1, 0.2)),
-}
-"""Manoeuvre -> speeds [km/h] and lines [m] of its map."""
+ENVELOPES: Final = ("slalom", "double_lane_change", "double_lane_change_low_mu")
+"""Manoeuvres with a map of speed and line."""
 
 
 def main(names: Sequence[str]) -> None:
@@ -331,9 +327,20 @@ def _comparison_population() -> dict[str, Figure]:
 
 
 def _envelope(name: str) -> Figure:
-    """Map of the runs that succeed, with the typical driver."""
-    speeds_kmh, lines_m = ENVELOPES[name]
-    return envelope_figure(envelope(name, SYSTEMS, speeds_kmh=speeds_kmh, lines_m=lines_m))
+    """Map of the systems that get through a course, with the typical driver."""
+    planned = read_study("envelope_slalom" if name == "slalom" else "envelope")
+    (speed, speeds), (line, lines) = ((factor.key, factor.values) for factor in planned.factors)
+    passes: dict[tuple[float, float], list[str]] = {(x, y): [] for x in lines for y in speeds}
+    for row in study(replace(planned, maneuvers=(name,))).to_pylist():
+        stays = row.get("stays_in_lanes") == 1.0 or (row.get("cones_hit"), row.get("cones_missed")) == (0.0, 0.0)
+        if stays:
+            passes[row[line], row[speed]].append(row["controller"])
+    counts = np.array([[float(len(passes[x, y])) for y in speeds] for x in lines])
+    texts = [["" if len(passes[x, y]) == len(SYSTEMS) else " ".join(passes[x, y]) for y in speeds] for x in lines]
+    names = [f"{value:g}" for value in speeds], [f"{value:g} m" for value in lines]
+    heat = Heat(counts, texts, *names, (0.0, float(len(SYSTEMS))), ("#e6b8af", "#fff2cc", "#d9ead3"), "speed [km/h]")
+    legend = [("all get through", "#d9ead3"), ("none", "#e6b8af")]
+    return draw(Picture(f"{name}: systems that get through", [heat], None, 1, 9.0, 3.6, legend, shared_legend=True))
 
 
 def _draw(kind: str, runs: Mapping[str, Any]) -> Figure:

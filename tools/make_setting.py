@@ -31,7 +31,7 @@ from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.prior import Prior
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.tuning import Tuning, read_tuning
-from activesteer.studies.paper.reproduction import reproduce
+from activesteer.studies.reproduction import reproduce
 
 STUDY: Final = "match_paper"
 AROUND: Final = {"around_paper_setting": False, "around_paper_setting_wide": True}

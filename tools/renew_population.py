@@ -6,7 +6,7 @@
     python tools/renew_population.py --judge S2=S1 W2=W2 W3=W3
 
 The stored population has 250 samples, which take a quarter of an hour on two idle processors. The tool resumes an
-interrupted run and accepts a folder that `activesteer reproduce --population N -o DIR` has finished. Call
+interrupted run and accepts a folder that `activesteer study population -o DIR` has finished. Call
 tools/make_claims_table.py afterwards. The second line does the same for the comparison of controllers, whose table
 stands in docs/chassis_control.md; call `tools/make_doc_pictures.py comparison_population` after it. The third line
 drives the two populations around the paper's setting, whose shares stand in docs/claims.md. The fourth line judges the
@@ -32,7 +32,7 @@ import pyarrow.parquet as pq
 from activesteer.analysis.bands import FILE as BANDS
 from activesteer.analysis.bands import TRACK, Band
 from activesteer.analysis.claims import PAPER, SCENARIO_OF, STATEMENTS, SYSTEMS, Claim, Kind, read_setting
-from activesteer.analysis.claims.population import SUMMARY, Change, Population, read_population
+from activesteer.analysis.claims.population import SUMMARY
 from activesteer.commands.progress import RunCounter
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
@@ -45,11 +45,11 @@ from activesteer.studies.engine.store import RESULTS
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.studies.paper.comparison_population import comparison_text
-from activesteer.studies.paper.population import STUDY, population, population_study, summarise
 from activesteer.theory.proportions import percent
+from tools.comparison_text import comparison_text
 from tools.make_claims_table import NOT_REPRODUCED, REPRODUCED
 from tools.make_setting import AROUND
+from tools.population_results import STUDY, Change, Population, population, population_study, read_population, summarise
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
 PAGE: Final = DOCS / "population.md"
@@ -74,7 +74,7 @@ _HEAD: Final = """# The population
 
 After this page you know how often each claim holds if car, road, driver, line, gains and sensors vary.
 
-`activesteer reproduce --population {samples} --seed {seed}` drives {samples} variations of the {vehicle}, its road, its
+`activesteer study population` drives {samples} variations of the {vehicle}, its road, its
 driver, his line and the gains through the paper's five scenarios with all three systems: {runs} runs. The package
 stores the results (`studies/population/`). `activesteer reproduce` prints the proportions beside every nominal verdict,
 and the figures show 10 to 90 % of the runs behind the curves. `tools/renew_population.py` renews the results and this

@@ -24,10 +24,18 @@ SUCCESSORS: Final = {
     "driver": "linearise --loop driver",
     "margins": "linearise --loop controller",
     "validate": "compare FOLDER` or `activesteer fit FOLDER",
+    "envelope": "study envelope -o DIR",
+    "fault-map": "study fault_map -o DIR` or `activesteer test r79-circle",
     "match": "tune STUDY",
     "falsify": "tune STUDY -c CONTROLLER",
 }
 """Removed command -> what does its work now."""
+_SUCCESSOR_OPTIONS: Final = {
+    "--population": "`activesteer study population -o DIR` checks the claims in other cars, `activesteer study "
+    "comparison -o DIR -c CONTROLLER` compares controllers",
+    "--controllers": "`activesteer study side_by_side -o DIR -c CONTROLLER` compares controllers",
+}
+"""Removed option of `reproduce` -> what does its work now."""
 
 
 class Commands:
@@ -98,6 +106,8 @@ class Commands:
         """Correction of an unknown argument."""
         known = list(parser._option_string_actions)
         option = unknown.partition("=")[0]
+        if parser.prog.endswith("reproduce") and option in ("-c", "--controller", *_SUCCESSOR_OPTIONS):
+            return _SUCCESSOR_OPTIONS.get(option, _SUCCESSOR_OPTIONS["--controllers"])
         if option in known:
             return f"put {option} after the command: activesteer {next(w for w in words if w[0] != '-')} {option}"
         if close := difflib.get_close_matches(option, known, 1, 0.7):
@@ -243,10 +253,9 @@ def add_cutaway(parser: argparse.ArgumentParser, when: str = "") -> None:
 
 def scenario_of(options: argparse.Namespace) -> Scenario:
     """Return the scenario that the arguments describe."""
-    from activesteer.faults import fault_table
     from activesteer.scenario import resolve
 
-    faults = {"fault": [fault_table(text) for text in options.faults]} if options.faults else {}
+    faults = {"fault": " ".join(options.faults)} if options.faults else {}
     overrides = overrides_of(options, faults)
     given = getattr(options, "controller", None) or ()
     controllers = [given] if isinstance(given, str) else given

@@ -9,14 +9,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.arguments import add_json, add_output, add_vehicle, add_workers
-from activesteer.commands.output import print_entry, print_json, tell, wrapped
-from activesteer.commands.progress import ProgressBar, RunCounter
-from activesteer.errors import ParameterError
+from activesteer.commands.arguments import add_jobs, add_json, add_output, add_vehicle
+from activesteer.commands.output import print_entry, print_json, wrapped
+from activesteer.commands.progress import ProgressBar
 
 if TYPE_CHECKING:
     from activesteer.analysis.claims.scorecard import Judged
-    from activesteer.studies.paper.reproduction import Reproduction
+    from activesteer.studies.reproduction import Reproduction
 
 SETTINGS: Final = {"paper": "paper's setting", "human": "human driver"}
 """As in `activesteer.analysis.claims.setting`, which takes too long to import for `--help`."""
@@ -25,48 +24,18 @@ SETTINGS: Final = {"paper": "paper's setting", "human": "human driver"}
 def add_to(commands: Any) -> None:
     """Add the command to the command line."""
     parser = commands.add_parser("reproduce", help="drive the scenarios of the paper and check its claims")
-    words = "folder for recordings, report and figures (default: runs, comparison or population)"
-    add_output(parser, "DIR", words)
+    add_output(parser, "DIR", "folder for recordings, report and figures", "runs")
     add_vehicle(parser)
     parser.add_argument(
         "--setting", action="append", dest="settings", choices=list(SETTINGS),
         help="paper: the most plausible numbers found for what the paper leaves open, selected by the verdicts; human: "
         "the nominal car with a driver from published ranges (default). Both may be given",
     )  # fmt: skip
-    add_workers(parser)
+    add_jobs(parser)
     parser.add_argument("--all", action="store_true", help="also print every claim with its numbers")
     parser.add_argument("--figures", action="store_true", help="also draw the figures")
-    parser.add_argument(
-        "--population", type=int, metavar="N",
-        help="instead, check each claim for N cars, roads and drivers (15 N runs); with --controllers, compare these "
-        "controllers for N cars",
-    )  # fmt: skip
-    parser.add_argument(
-        "-c", "--controllers", "--controller", action="append", dest="controllers", metavar="C,C...",
-        help="instead, compare these controllers with the sensors of production cars: in the five scenarios, a step at "
-        "120 km/h, the severe lane change, braking on split friction and in a turn, a turn across snow",
-    )  # fmt: skip
-    parser.add_argument("--seed", type=int, metavar="S", help="seed of the population (default: the stored one)")
     add_json(parser)
-    parser.set_defaults(action=_reproduce)
-
-
-def _reproduce(options: argparse.Namespace) -> int:
-    # The handler of signals looks there for saved files.
-    given = {"comparison": options.controllers, "population": options.population}
-    default = "_".join(name for name, value in given.items() if value is not None) or "runs"
-    options.output = options.output or Path(default)
-    if options.settings and default != "runs":
-        raise ParameterError("--setting is for the 15 runs of the paper; leave out --population and --controllers")
-    if options.population is not None:
-        options.how_to_resume = "; the same command resumes it"
-        return _population(options)
-    for name in ("seed", "scheduler"):
-        if getattr(options, name) is not None:
-            raise ParameterError(f"--{name} belongs to --population")
-    if options.controllers is not None:
-        return _compare(options)
-    return _settings(options)
+    parser.set_defaults(action=_settings)
 
 
 def _settings(options: argparse.Namespace) -> int:
@@ -94,7 +63,7 @@ def _settings(options: argparse.Namespace) -> int:
 
 
 def _driven(options: argparse.Namespace, folders: Mapping[str, Path]) -> dict[str, Reproduction]:
-    from activesteer.studies.paper.reproduction import reproduce
+    from activesteer.studies.reproduction import reproduce
 
     results: dict[str, Reproduction] = {}
     with ProgressBar("reproduce", quiet=options.json) as bar:
@@ -187,29 +156,6 @@ def _print_settings(results: Mapping[str, Reproduction]) -> None:
     print("\n".join(wrapped(words)))
 
 
-def _compare(options: argparse.Namespace) -> int:
-    from activesteer.studies.paper.comparison import compare
-
-    with ProgressBar("compare", quiet=options.json) as bar:
-        made = compare(
-            _controllers(options),
-            options.output,
-            options.vehicle,
-            jobs=options.jobs,
-            progress=lambda what, done, total: bar(done / total, what),
-        )
-    for (scenario, name), problem in made.failures.items():
-        print(f"{scenario} {name} failed: {problem}", file=sys.stderr)
-    figures = []
-    if options.figures:
-        from activesteer.plotting import save
-        from activesteer.studies.paper.comparison_figure import comparison_figure
-
-        figures = [save(comparison_figure(made), options.output / "comparison.png")]
-    tell(options, made.to_json(), wrapped(made.to_text()), figures)
-    return 1 if made.failures else 0
-
-
 def _report(results: Iterable[Reproduction], folder: Path) -> Path | None:
     """Write a page with all runs, including those that ended early; return None if no run made a step."""
     from activesteer.analysis.report import write_report
@@ -226,36 +172,3 @@ def _report(results: Iterable[Reproduction], folder: Path) -> Path | None:
                     if len(recording) and recording.metadata["complete"] is ((scenario, system) not in result.failures):
                         recordings[str(path)] = recording
     return write_report(recordings, folder / "report.html") if recordings else None
-
-
-def _population(options: argparse.Namespace) -> int:
-    from activesteer.studies.paper.comparison_population import comparison_json, comparison_text
-    from activesteer.studies.paper.population import population
-
-    if options.figures and options.controllers is None:
-        raise ParameterError("--figures draws the nominal runs; leave out --population")
-    controllers = None if options.controllers is None else _controllers(options)
-    with RunCounter("population", quiet=options.json) as counter:
-        found = population(
-            options.population,
-            controllers,
-            seed=options.seed,
-            vehicle=options.vehicle,
-            output=options.output,
-            jobs=options.jobs,
-            scheduler=options.scheduler,
-            progress=counter,
-        )
-    figures = None
-    if options.figures:
-        from activesteer.plotting import save
-        from activesteer.studies.paper.comparison_figure import comparison_population_figure
-
-        figures = [save(comparison_population_figure(found), options.output / "comparison_population.png")]
-    table = found.to_json() if controllers is None else comparison_json(found)
-    tell(options, table, wrapped(found.to_text() if controllers is None else comparison_text(found)), figures)
-    return 0
-
-
-def _controllers(options: argparse.Namespace) -> list[str]:
-    return [name.strip() for name in ",".join(options.controllers).split(",") if name.strip()]

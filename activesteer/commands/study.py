@@ -6,7 +6,14 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from activesteer.commands.arguments import add_json, add_output, add_workers
+from activesteer.commands.arguments import (
+    add_controller,
+    add_json,
+    add_output,
+    add_overrides,
+    add_workers,
+    overrides_of,
+)
 from activesteer.commands.output import print_json
 from activesteer.commands.progress import RunCounter
 from activesteer.errors import StudyError
@@ -17,6 +24,13 @@ def add_to(commands: Any) -> None:
     parser = commands.add_parser("study", help="drive many runs over varied parameters")
     parser.add_argument("study", metavar="STUDY_OR_DIR", help="a study file or its name, or the folder of a study")
     add_output(parser, "DIR", "folder for the results, needed for a new study; a study found there is resumed")
+    add_controller(parser, several=True, default="those of the study")
+    parser.add_argument(
+        "--vehicle", action="append", metavar="NAME_OR_PATH", help="a car instead of the study's; may be repeated"
+    )
+    parser.add_argument("--driver", metavar="DRIVER", help="a driver instead of the study's")
+    parser.add_argument("--samples", type=int, metavar="N", help="number of samples instead of the study's")
+    add_overrides(parser)
     add_workers(parser)
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--limit", type=int, metavar="N", help="drive at most N runs now")
@@ -29,9 +43,16 @@ def add_to(commands: Any) -> None:
 def _study(options: argparse.Namespace) -> int:
     if options.limit is not None and options.limit < 1:
         raise StudyError(f"--limit {options.limit}: at least 1 is needed")
-    from activesteer.studies.engine.study_file import read_study
+    from activesteer.studies.engine.study_file import changed_study, read_study
 
     given = Path(options.study)
+    changes = {
+        "controllers": options.controller, "vehicles": options.vehicle, "driver": options.driver,
+        "overrides": overrides_of(options), "samples": options.samples,
+    }  # fmt: skip
+    changes = {key: value for key, value in changes.items() if value}
+    if changes and given.is_dir():
+        raise StudyError(f"{given} holds a study, which keeps its {' and '.join(changes)}; give a study file instead")
     folder = options.output or (given if given.is_dir() else None)
     if folder is None:
         read_study(options.study)
@@ -49,7 +70,7 @@ def _study(options: argparse.Namespace) -> int:
     options.how_to_resume = f"; resume with `activesteer study {folder}`"
     with RunCounter("study", quiet=options.json) as counter:
         study(
-            given / "study.toml" if given.is_dir() else options.study,
+            given / "study.toml" if given.is_dir() else changed_study(options.study, changes),
             output=folder,
             jobs=options.jobs,
             scheduler=options.scheduler,

@@ -15,6 +15,7 @@ from activesteer.config import check_overruled, field_in_unit, key_hint, key_pat
 from activesteer.controllers import ControllerSetup
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
+from activesteer.faults import fault_table
 from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
 from activesteer.maneuver.road_files import with_road_files
 from activesteer.plugins import Plugin
@@ -92,7 +93,8 @@ def resolve(
         overrides: Dotted key -> value, such as `speed_kmh`, `road.mu` or `controllers.ars.limit_deg`. Start the key
             with `maneuver.` or `vehicle.` if both have it, and with `driver.` for keys of the driver. Parameters of
             your own code have keys such as `controllers.YawBeta.k_beta` and `driver.Cautious.preview_s`. The key
-            `driver` replaces the driver.
+            `driver` replaces the driver, the key `fault` the faults: tables, or texts such as `rear:stuck@2.0`,
+            separated by spaces.
         driver: Name, path or table of a driver, or your own code; see `find_driver`.
         controllers: Controllers whose parameters `overrides` may set, as for `simulate`; needed for your own code only.
 
@@ -119,6 +121,8 @@ def resolve(
         # A given table may come from a recording, which holds both an input and the value derived from it.
         check_overruled(kind, table, source, leaf_keys(table))
     changes = plain(overrides)
+    if isinstance(faults := changes.get("fault"), str):
+        changes["fault"] = [fault_table(text) for text in faults.split()]
     driver = changes.pop("driver", driver)
     sorted_out: dict[str, list[Override]] = {part: [] for part in (*_PARTS, "controllers")}
     owned = own_controllers(controllers) if any(map(own_path, changes)) else {}

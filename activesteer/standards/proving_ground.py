@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.standards.fault_circle import fault_circles
 from activesteer.standards.standard import Run
 from activesteer.studies.engine import run_task
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.workers import Workers
-from activesteer.studies.paper.fault_map import fault_map
-from activesteer.studies.paper.fault_situations import PRESETS
 
 
 @dataclass(frozen=True)
@@ -73,19 +72,12 @@ class ProvingGround:
         )
         return [_run(row, case) for row, case in zip(table.to_pylist(), cases, strict=True)]
 
-    def fault_map(self, preset: str) -> list[dict[str, Any]]:
+    def fault_circles(self) -> list[dict[str, Any]]:
         """See `Ground`; the runs are not kept."""
-        selection = PRESETS[preset]
-        return fault_map(
-            self.controller,
-            self.vehicle,
-            self.overrides,
-            speeds_kmh=selection.speeds_kmh,
-            situations=selection.situations,
-            driver=self.driver,
-            workers=self.workers,
-            progress=lambda done, total: self.progress("fault_map", done, total),
-        ).rows
+        return fault_circles(
+            self.controller, self.vehicle, self.overrides, self.driver, self.workers,
+            lambda done, total: self.progress("fault_circles", done, total),
+        )  # fmt: skip
 
 
 def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> Run:

@@ -11,9 +11,9 @@ import numpy as np
 from activesteer.errors import SimulationDiverged
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
+from activesteer.standards.fault_circle import FIGURES
 from activesteer.standards.page_parts import cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
-from activesteer.studies.paper.fault_situations import FIGURES
 from activesteer.units import display_unit
 
 
@@ -42,9 +42,6 @@ SPEED_KMH: Final = 10.0
 """Speed of the spiral [km/h]."""
 RIM_RADIUS_M: Final = 0.185
 """Nominal radius of the steering wheel [m]: an assumption (diameter 370 mm); vehicle files have none."""
-PRESET: Final = "un_r79"
-"""Name of the annex 4 circle in the fault map."""
-CIRCLES: Final = {"circle_100m": "left", "circle_100m_right": "right"}
 _TURNED_S: Final = 3.0
 """Time in which the steering wheel reaches the Ackermann angle of the radius [s]; the limit is a third longer."""
 _BEGIN_S: Final = 0.5
@@ -82,11 +79,7 @@ def _examine(ground: Ground) -> Findings:
                 "steering": name, "direction": side, "radius_m": requirement.radius_m, "time_s": found.time_s,
                 "effort_N": found.effort_N, "limit_N": requirement.limit_N, "pass": good,
             })  # fmt: skip
-    faults = [
-        {"fault": row["fault"], "direction": CIRCLES[row["situation"]]}
-        | {name: row[name] for name in (*FIGURES, "error") if name in row}
-        for row in _fault_map(ground)
-    ]
+    faults = _faults(ground)
     values = {
         "rim_radius_m": RIM_RADIUS_M, "efforts": efforts, "faults": faults,
         "pass": all(row["pass"] for row in efforts),
@@ -100,9 +93,9 @@ def _examine(ground: Ground) -> Findings:
     return Findings(values, summary, [_effort_table(efforts), _fault_table(faults)], pictures)
 
 
-def _fault_map(ground: Ground) -> list[dict[str, Any]]:
+def _faults(ground: Ground) -> list[dict[str, Any]]:
     try:
-        return ground.fault_map(PRESET)
+        return ground.fault_circles()
     except SimulationDiverged as reason:
         raise NoResult(f"the car without fault does not complete the circle: {reason}") from reason
 

@@ -123,12 +123,8 @@ class Ground(Protocol):
         """
         ...
 
-    def fault_map(self, preset: str) -> list[dict[str, Any]]:
-        """Drive the faults of the controller's actuators and sensors.
-
-        Args:
-            preset: Name of speeds and situations, one of `studies.paper.fault_situations.PRESETS`.
-        """
+    def fault_circles(self) -> list[dict[str, Any]]:
+        """Drive the faults of the controller's actuators and sensors; see `fault_circle.fault_circles`."""
         ...
 
 

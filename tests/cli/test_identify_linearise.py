@@ -59,7 +59,6 @@ def test_linearise_takes_other_values_of_the_car(capsys):
         (["linearise", "--set", "driver.preview_s=1"], "driver"),
         (["identify", "--set", "duration_s=50"], "manoeuvre"),
         (["linearise", "--loop", "driver", "-c", "none", "--set", "settle_s=1"], "manoeuvre"),
-        (["fault-map", "--jobs", "1", "--speeds-kmh", "60", "--set", "speed_kmh=50"], "manoeuvre"),
     ],
 )
 def test_what_makes_its_manoeuvre_itself_takes_no_override_of_it(capsys, words, part):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from activesteer.recording import Recording
-from activesteer.studies.paper.reproduction import Reproduction, reproduce
+from activesteer.studies.reproduction import Reproduction, reproduce
 
 
 @pytest.fixture(scope="session")

@@ -15,12 +15,11 @@ import pytest
 
 from activesteer.analysis.bands import TRACK, bands_of
 from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS
-from activesteer.analysis.claims.population import Population, read_population, stored_population
 from activesteer.analysis.loss_of_control import is_lost
 from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.run_task import CLAIM, Row, drive
-from activesteer.studies.paper.population import CHANGES, population_study, summarise
+from tools.population_results import CHANGES, Population, population_study, read_population, summarise
 from tools.renew_population import CHASSIS_CONTROL, PAGE, comparison_page, page, stored_runs
 
 TOLERANCE = 1e-3
@@ -34,7 +33,7 @@ Rows = dict[tuple[int, str, str], Row]
 
 @cache
 def stored() -> Population:
-    found = stored_population("compact")
+    found = read_population("population")
     assert found is not None
     return found
 

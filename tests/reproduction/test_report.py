@@ -9,8 +9,8 @@ import pytest
 
 from activesteer.analysis.claims import STATEMENTS
 from activesteer.cli import main
-from activesteer.studies.paper import reproduction
-from activesteer.studies.paper.reproduction import Reproduction
+from activesteer.studies import reproduction
+from activesteer.studies.reproduction import Reproduction
 
 
 def test_reproduce_writes_a_report_of_all_runs(

@@ -14,7 +14,7 @@ from activesteer.cli import main
 from activesteer.commands.paper_figures import draw_all
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
-from activesteer.studies.paper.reproduction import Reproduction, reproduce
+from activesteer.studies.reproduction import Reproduction, reproduce
 from tests.raising import raises
 
 Runs = dict[str, dict[str, Recording]]
@@ -100,8 +100,8 @@ def test_a_run_that_fails_ends_no_other(tmp_path: Path, monkeypatch: pytest.Monk
         "class Mine:\n    def step(self, command, measurement):\n        raise RuntimeError('after all')\n"
     )
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("activesteer.studies.paper.reproduction.SCENARIOS", {"slalom": SCENARIOS["slalom"]})
-    monkeypatch.setattr("activesteer.studies.paper.reproduction.SYSTEMS", ("none", "mine.py:Mine"))
+    monkeypatch.setattr("activesteer.studies.reproduction.SCENARIOS", {"slalom": SCENARIOS["slalom"]})
+    monkeypatch.setattr("activesteer.studies.reproduction.SYSTEMS", ("none", "mine.py:Mine"))
     result = reproduce(tmp_path)
     assert list(result.failures) == [("slalom", "mine.py:Mine")]
     assert "after all" in result.failures["slalom", "mine.py:Mine"]

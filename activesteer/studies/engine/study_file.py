@@ -199,6 +199,16 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
     return study
 
 
+def changed_study(given: FileOrTable, changes: dict[str, Any]) -> StudyFile:
+    """Return a study with other controllers, vehicles, driver or samples, and more overrides."""
+    study = read_study(given)
+    table = study.to_table() | {key: value for key, value in changes.items() if key != "samples"}
+    table["overrides"] = study.overrides | changes.get("overrides", {})
+    if "samples" in changes:
+        table["design"]["samples"] = changes["samples"]
+    return read_study(table) if changes else study
+
+
 class _WrongValueError(Exception):
     """Return the expected form of a value, in words."""
 

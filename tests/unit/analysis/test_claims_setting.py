@@ -21,7 +21,7 @@ from activesteer.analysis.claims import (
 )
 from activesteer.errors import ParameterError
 from activesteer.scenario import resolve, value_of
-from activesteer.studies.paper.reproduction import reproduce
+from activesteer.studies.reproduction import reproduce
 from tests.raising import raises
 
 

@@ -104,7 +104,7 @@ def test_the_share_of_the_population_stands_beside_the_nominal_verdict():
         ClaimProportion("S2", True, 100, 0.5, 0.4, 0.6, "road.mu", 0.3, 1),
         ClaimProportion("D1", False, 100, 0.0, 0.0, 0.04),
     )
-    population = Population(100, 1, "compact", {}, proportions, ())
+    population = Population(100, 1, "compact", proportions)
     claims = [claim("S1", True), claim("S2", True), claim("D1", False), claim("D2", True)]
     card = scorecard(claims, known={"D1": "why"}, population=population)
     lines = card.to_text().splitlines()

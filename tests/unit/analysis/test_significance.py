@@ -9,7 +9,7 @@ import pytest
 from activesteer.analysis.report.results import KEY_FIGURES
 from activesteer.analysis.report.significance import Change, significance
 from activesteer.metric_table import METRICS
-from activesteer.studies.paper.comparison import SHOWN
+from tools.compare_controllers import SHOWN
 
 JUDGED = [metric for metric in METRICS.values() if metric.better is not None]
 

@@ -38,7 +38,7 @@ class WrittenGround:
         self.asked.setdefault(series, []).extend(dict(case) for case in cases)
         return [_run(case, self.driven(series, case)) for case in cases]
 
-    def fault_map(self, preset: str) -> list[dict[str, Any]]:
+    def fault_circles(self) -> list[dict[str, Any]]:
         raise NotImplementedError
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from activesteer.files import json_text
 from activesteer.standards.examination import examine
+from activesteer.standards.fault_circle import CIRCLES, FIGURES
 from activesteer.standards.r79_circle import EFFORTS, RIM_RADIUS_M, STANDARD, reached
 from activesteer.standards.standard import Run
-from activesteer.studies.paper.fault_situations import FIGURES, PRESETS
 from tests.unit.standards.grounds import WrittenGround
 from tests.unit.standards.signals import run_of, times
 
@@ -35,10 +35,10 @@ class SpiralGround(WrittenGround):
     def __init__(self, tightest_m: float = 9.0, force_N: float = 100.0) -> None:
         super().__init__(lambda _, case: spiral(tightest_m, force_N, math.copysign(1.0, case["steer.rate_degps"])))
 
-    def fault_map(self, preset: str) -> list[dict[str, Any]]:
+    def fault_circles(self) -> list[dict[str, Any]]:
         one = dict.fromkeys(FIGURES, 0.1) | {"fault": "rear:stuck", "fault_tolerant_time_s": None}
         lost = dict.fromkeys(FIGURES, math.nan) | {"fault": "rear:float", "error": "the car tips over"}
-        return [row | {"situation": situation} for row in (one, lost) for situation in PRESETS[preset].situations]
+        return [row | {"direction": direction} for row in (one, lost) for direction in CIRCLES]
 
 
 def test_force_until_the_radius_of_a_known_spiral():
@@ -87,7 +87,7 @@ def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
 
 
 def test_the_compact_is_steered_alike_to_both_sides_and_corrected_in_both_circles(monkeypatch):
-    monkeypatch.setattr("activesteer.studies.paper.fault_map.usual_faults", lambda _: ["rear:offset=1deg"])
+    monkeypatch.setattr("activesteer.standards.fault_circle.usual_faults", lambda _: ["rear:offset=1deg"])
     found = examine("r79-circle", ["ars"], jobs=1).findings["ars"]
     efforts = {(row["steering"], row["direction"]): row["effort_N"] for row in found.values["efforts"]}
     for name in EFFORTS:

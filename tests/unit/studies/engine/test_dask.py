@@ -22,7 +22,6 @@ from activesteer.errors import StudyError
 from activesteer.measured.fitting import fit
 from activesteer.studies.engine.task_queue import TaskQueue, in_parallel
 from activesteer.studies.engine.workers import Workers, workers_for
-from activesteer.studies.paper.fault_map import fault_map
 from tests.raising import raises
 from tests.unit.studies.short import RATIO, short_study, write_controller
 
@@ -78,12 +77,6 @@ def test_a_cluster_gives_the_same_bits_as_this_process(cluster, tmp_path):
     study(table, output=tmp_path / "dask", scheduler=str(cluster.file))
     study(table, output=tmp_path / "serial", jobs=1)
     assert (tmp_path / "dask/results.parquet").read_bytes() == (tmp_path / "serial/results.parquet").read_bytes()
-
-
-@pytest.mark.slow
-def test_a_cluster_drives_a_fault_map_as_this_process_does(cluster):
-    cell: dict[str, Any] = {"faults": ["rear:stuck"], "speeds_kmh": [60.0], "situations": ["straight", "turn"]}
-    assert fault_map("ars", **cell, scheduler=str(cluster.file)).rows == fault_map("ars", **cell, jobs=1).rows
 
 
 @pytest.mark.slow

@@ -12,17 +12,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from activesteer.analysis.claims import SYSTEMS, Claim
-from activesteer.analysis.claims.population import NO_FACTOR, ClaimProportion, Population
-from activesteer.cli import main
+from activesteer.analysis.claims.population import NO_FACTOR, ClaimProportion
 from activesteer.errors import StudyError
 from activesteer.metric_table import CONES_MISSED
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.paper.population import population_study, summarise
 from activesteer.theory.proportions import Proportion, ProportionVerdict
 from tests.raising import raises
 from tools import renew_population
+from tools.population_results import Population, population_study, summarise
 
 RESULTS = "results.parquet"
 
@@ -175,9 +174,3 @@ def test_a_share_is_whole_only_where_it_is() -> None:
     for share, shown in ((1.0, " 100 %"), (0.999, " 99.9 %"), (0.001, " 0.1 %"), (0.0, " 0 %")):
         claim = ClaimProportion("S1", True, 1000, share, 0.0, 1.0)
         assert shown in Population(1000, 1, "compact", {}, (claim,), ()).to_text()
-
-
-@pytest.mark.parametrize("arguments", [["--seed", "2"], ["--scheduler", "tcp://nowhere:1"], ["--population", "0"]])
-def test_options_that_cannot_be_are_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["reproduce", *arguments]) == 1
-    assert ("samples" if "0" in arguments else "belongs to --population") in capsys.readouterr().err

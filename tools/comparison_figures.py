@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.analysis.claims.population import Population
 from activesteer.analysis.report.significance import Change, significance
 from activesteer.metric_table import metric as declared
 from activesteer.plotting import Heat, Picture, draw
-from activesteer.studies.paper.comparison import Comparison
-from activesteer.studies.paper.comparison_targets import short
 from activesteer.theory.proportions import percent
+from tools.compare_controllers import Comparison
+from tools.controller_targets import short
+from tools.population_results import Population
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

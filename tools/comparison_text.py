@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from activesteer.analysis.claims.population import TOTAL, Population, SystemEffect
 from activesteer.analysis.harm import MEASURES
 from activesteer.metric_table import SIDESLIP_PEAKS
-from activesteer.studies.paper.comparison_targets import (
+from tools.controller_targets import (
     HARMED_PROPORTION,
     NONE,
     TRACK_HARM_M,
@@ -16,7 +15,7 @@ from activesteer.studies.paper.comparison_targets import (
     asked,
     targets_text,
 )
-from activesteer.studies.paper.population import STEERING_EFFORT
+from tools.population_results import STEERING_EFFORT, TOTAL, Population, SystemEffect
 
 _ROW: Final = "{:14}{:>20}{:>12}{:>14}{:>14}{:>12}{:>12}"
 _GROWTH: Final = "    {:14}{:>9}{:>9}{:>9}{:>9}  {:8}{:>4} of {}"

@@ -5,29 +5,23 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pytest
 
-from activesteer.analysis.claims.population import Population, SystemEffect
-from activesteer.cli import main
 from activesteer.commands.arguments import pairs
 from activesteer.errors import ParameterError, StudyError
 from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.paper import population as module
-from activesteer.studies.paper.comparison_population import (
+from activesteer.theory.proportions import Proportion
+from tests.raising import raises
+from tools.comparison_text import (
     comparison_json,
     comparison_text,
     population_targets,
 )
-from activesteer.studies.paper.population import STEERING_EFFORT, comparison_study, summarise
-from activesteer.theory.proportions import Proportion
-from tests.raising import raises
+from tools.population_results import STEERING_EFFORT, Population, SystemEffect, comparison_study, summarise
 
 NAMES = ("none", "ars", "afs", "esc", "lqr")
 SPIN_RAD = 1.0
@@ -123,36 +117,3 @@ def test_every_sample_drives_one_manoeuvre_around_the_limit_of_its_road():
 def test_without_the_car_without_control_nothing_is_driven():
     with raises(ParameterError, key="--controllers", allowed=["none"]):
         comparison_study(("ars", "afs", "lqr"), 4)
-
-
-@pytest.fixture
-def only_braking(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only the fastest scenario."""
-    study = comparison_study
-
-    def shortened(*given: Any) -> StudyFile:
-        table: dict[str, Any] = study(*given).to_table() | {"maneuvers": ["brake_in_turn"]}
-        keys = ("factors.mass", "road.mu", "turn.lateral_acceleration_mps2")
-        table["factors"] = {key: table["factors"][key] | {"maneuvers": ["brake_in_turn"]} for key in keys}
-        return read_study(table)
-
-    monkeypatch.setattr(module, "comparison_study", shortened)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("only_braking")
-def test_command_goes_on_with_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    arguments = ["reproduce", "--controllers", "none,ars,afs,esc", "--population", "1", "--jobs", "1"]
-    arguments += ["-o", str(tmp_path / "study")]
-    assert main([*arguments, "--json", "--figures"]) == 0
-    first = json.loads(capsys.readouterr().out)
-    assert {(row["scenario"], row["controller"]) for row in first["table"]} == {
-        ("brake_in_turn", name) for name in ("none", "ars", "afs", "esc")
-    }
-    assert Path(first.pop("figures")[0]).stat().st_size > 5_000
-    assert main([*arguments, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == first
-    assert main(arguments) == 0
-    text = capsys.readouterr().out
-    assert "all scenarios" in text
-    assert "harmed" in text

@@ -1,11 +1,14 @@
-"""Comparison of controllers in the paper's five scenarios and five harder ones, with the sensors of production cars.
+"""Compare controllers in the paper's five scenarios and five harder ones, with the sensors of production cars.
 
-All controllers drive the same scenarios. The comparison uses the metrics of their recordings under their recorded
-names.
+    python tools/compare_controllers.py [--controllers C,C...] [--vehicle NAME] [-o DIR] [--jobs N]
+
+It prints the table and the targets of docs/chassis_control.md, and keeps the recordings. For your own car and
+controllers, `activesteer study side_by_side -c CONTROLLER` drives the same scenarios.
 """
 
 from __future__ import annotations
 
+import argparse
 import functools
 import math
 import os
@@ -16,18 +19,18 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from activesteer import simulate
 from activesteer.analysis.claims import SCENARIOS
 from activesteer.analysis.energy import METRICS as ENERGIES
 from activesteer.controllers import find_controller
-from activesteer.errors import ParameterError
+from activesteer.errors import ParameterError, SimulationDiverged
 from activesteer.files import make_folder
 from activesteer.metric_table import metric as declared
 from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.studies.paper.comparison_targets import Target, short, targets, targets_text
-from activesteer.studies.paper.envelope import LINES, entry_speed
-from activesteer.studies.paper.reproduction import Progress, drive
+from activesteer.studies.reproduction import Progress, drive
+from tools.controller_targets import Target, short, targets, targets_text
 
 CASES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     **{name: (name, {}) for name in SCENARIOS},
@@ -66,6 +69,10 @@ ENTRY_DRIVER: Final = "expert"
 """Driver of the severe lane change, as in ISO 3888-2: the default driver leaves its lanes at every speed."""
 ENTRY_LINE: Final = {"lane.margin_m": 0.15}
 """Distance of his line from the cones, the middle one of the distances in the test of ISO 3888-2."""
+ENTRY_RANGE_KMH: Final = (40.0, 160.0)
+"""Range of the entry speed, which is found to 1 km/h."""
+_AFTER_S: Final = 4.0
+"""Time after the last gate [s]: metrics use 3 s of it."""
 _LANE_CHANGE: Final = "severe_lane_change"
 _LABEL: Final = 41
 _COLUMN: Final = 7
@@ -130,15 +137,6 @@ class Comparison:
             lines.append(f"{label:{_LABEL}}{cells}")
         return "\n".join([*lines, *(["", targets_text(self.targets)] if self.targets else [])])
 
-    def to_json(self) -> dict[str, Any]:
-        """Return all values."""
-        return {
-            "table": [row._asdict() for row in self.rows],
-            "targets": [target._asdict() for target in self.targets],
-            "files": [str(file) for file in self.files],
-            "failures": {f"{scenario} {name}": problem for (scenario, name), problem in self.failures.items()},
-        }
-
 
 def compare(
     controllers: Sequence[str],
@@ -190,9 +188,30 @@ def compare(
 
 
 def _entry_speed(vehicle: FileOrTable, controller: str, seed: int) -> float:
-    overrides = SENSORS | ENTRY_LINE | {"sensors.seed": seed}
-    found = entry_speed(_LANE_CHANGE, vehicle, overrides, LINES["lane_change"], ENTRY_DRIVER, controller)
-    return math.nan if found is None else found / 3.6
+    """Return the highest speed at which a car stays in the severe lane change, by bisection [m/s]; nan for none."""
+    changes = SENSORS | ENTRY_LINE | {"sensors.seed": seed}
+    course = resolve(_LANE_CHANGE, vehicle, changes, ENTRY_DRIVER, [controller]).maneuver.course
+    assert course is not None
+    last_gate_x_m = course.last_gate_x_m
+    assert last_gate_x_m is not None
+
+    def keeps(speed_kmh: float) -> bool:
+        driven = {"speed_kmh": speed_kmh, "duration_s": round(3.6 * last_gate_x_m / speed_kmh + _AFTER_S, 2)}
+        try:
+            run = simulate(_LANE_CHANGE, controller, vehicle, overrides=changes | driven, driver=ENTRY_DRIVER)
+        except SimulationDiverged:
+            return False
+        return run.metrics["stays_in_lanes"] == 1.0
+
+    low, high = ENTRY_RANGE_KMH
+    if not keeps(low):
+        return math.nan
+    if keeps(high):
+        return high / 3.6
+    for _ in range(math.ceil(math.log2(high - low))):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if keeps(middle) else (low, middle)
+    return low / 3.6
 
 
 def _entry_speeds(controller: str, speeds_mps: Sequence[float]) -> list[Row]:
@@ -200,3 +219,22 @@ def _entry_speeds(controller: str, speeds_mps: Sequence[float]) -> list[Row]:
         return []
     values = np.min(speeds_mps), np.median(speeds_mps), np.max(speeds_mps)
     return [Row(_LANE_CHANGE, controller, name, float(value)) for name, value in zip(_ENTRY, values, strict=True)]
+
+
+def main() -> int:
+    """Run the tool."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--controllers", default="none,ars,afs,ars_sideslip,esc,lqr,integrated", metavar="C,C...")
+    parser.add_argument("--vehicle", default="compact", metavar="NAME")
+    parser.add_argument("-o", "--output", type=Path, default=Path("build", "compare_controllers"), metavar="DIR")
+    parser.add_argument("--jobs", type=int, metavar="N")
+    options = parser.parse_args()
+    made = compare(options.controllers.split(","), options.output, options.vehicle, jobs=options.jobs)
+    print(made.to_text())
+    for (scenario, name), problem in made.failures.items():
+        print(f"{scenario} {name} failed: {problem}")
+    return 1 if made.failures else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

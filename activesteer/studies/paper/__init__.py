@@ -1,1 +1,0 @@
-"""The studies of the paper and of its controllers: reproduction, population, comparison, envelope and fault map."""
