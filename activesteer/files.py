@@ -17,15 +17,9 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from activesteer import limits
 from activesteer.errors import ActiveSteerError, shown
 
-MAX_TEXT_BYTES: Final = 2_000_000
-"""Default limit of a text file; files of the package have about 20 kB."""
-MAX_CSV_BYTES: Final = 10_000_000
-"""Limit of a CSV; an hour of samples every 10 ms has 8 MB."""
-MAX_NUMBER: Final = 1e12
-"""Largest absolute value of a number in a file, in any unit. A larger number is meaningless for a car and may
-overflow."""
 _passing: Final[set[Path]] = set()
 _DECIMAL_COMMA: Final = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
@@ -168,7 +162,9 @@ def why_no_file(path: str | os.PathLike[str]) -> str:
     return "is a folder" if stat.S_ISDIR(mode) else "is not a regular file"
 
 
-def read_bytes(path: str | os.PathLike[str], error: type[ActiveSteerError], max_bytes: int = MAX_TEXT_BYTES) -> bytes:
+def read_bytes(
+    path: str | os.PathLike[str], error: type[ActiveSteerError], max_bytes: int = limits.MAX_TEXT_BYTES
+) -> bytes:
     """Read a regular file of limited size.
 
     Raises:
@@ -192,7 +188,7 @@ def read_bytes(path: str | os.PathLike[str], error: type[ActiveSteerError], max_
 def read_text(
     path: str | os.PathLike[str],
     error: type[ActiveSteerError],
-    max_bytes: int = MAX_TEXT_BYTES,
+    max_bytes: int = limits.MAX_TEXT_BYTES,
 ) -> str:
     """Read a text file in UTF-8; see `read_bytes`. Line ends are normalised, and a byte order mark is removed."""
     try:
@@ -234,7 +230,7 @@ def read_csv(
     Raises:
         ActiveSteerError: the file cannot be read, or is no CSV; of class `error`.
     """
-    lines = [line.partition("#")[0] for line in read_text(path, error, MAX_CSV_BYTES).split("\n")]
+    lines = [line.partition("#")[0] for line in read_text(path, error, limits.MAX_CSV_BYTES).split("\n")]
     separator = next((sign for line in lines for sign in ";\t," if sign in line), ",")
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
     rows = []
@@ -254,19 +250,13 @@ def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, c
     """Return the number in a cell of a CSV.
 
     Raises:
-        ActiveSteerError: the cell holds no finite number, or one above `MAX_NUMBER`; of class `error`.
+        ActiveSteerError: the cell holds no finite number, or one above `limits.MAX_NUMBER`; of class `error`.
     """
     try:
         value = float(cell)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        raise error(f"{shown(cell)} is not a finite number", file=file, line=line, key=column, value=cell)
-    if abs(value) > MAX_NUMBER:
-        raise error(
-            f"is {value:g}; the largest number allowed in a file is {MAX_NUMBER:g}", file=file, line=line, key=column,
-            value=cell, allowed=MAX_NUMBER,
-        )  # fmt: skip
+    limits.check_number(value, error, text=cell, file=file, line=line, key=column)
     return value
 
 

@@ -92,7 +92,7 @@ def summary() -> list[str]:
     return lines
 
 
-def _mean(population: Population | None, claims: Sequence[str], at: str) -> str:
+def _mean(population: Population | StoredPopulation | None, claims: Sequence[str], at: str) -> str:
     """Return the mean share of claims at a value of a choice, in words."""
     found = [claim.at[at] for claim in population.claims if claim.id in claims] if population else []
     return f"{percent(sum(found) / len(found))} %" if found else ""

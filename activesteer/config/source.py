@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from activesteer.errors import ActiveSteerError, ParameterError
-from activesteer.files import MAX_NUMBER
+from activesteer.limits import MAX_NUMBER
 
 
 class Range(NamedTuple):

@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from activesteer import limits
 from activesteer.config.source import Source
 from activesteer.errors import ActiveSteerError, ParameterError, shown
 from activesteer.files import read_text
 
-_MAX_DEPTH: Final = 32
-_DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{_MAX_DEPTH}}}""")
+_DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{limits.MAX_TOML_DEPTH}}}""")
 """Dotted key with too many parts; the time of tomllib grows with the square of their number."""
 
 
@@ -38,7 +38,7 @@ def _parsed(text: str) -> dict[str, Any]:
         ValueError: the text is no TOML, is nested too deeply, or has a number with too many digits.
     """
     if _DEEP_KEY.search(text):
-        raise ValueError(f"a key is nested more than {_MAX_DEPTH} deep")
+        raise ValueError(f"a key is nested more than {limits.MAX_TOML_DEPTH} deep")
     try:
         return tomllib.loads(text)
     except RecursionError:

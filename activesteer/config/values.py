@@ -7,15 +7,14 @@ import math
 import types
 import typing
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 from activesteer.config.keys import element_of, field_in_unit, fields_of, hints_of, no_such_key, spellings
 from activesteer.config.source import Range, Source
 from activesteer.errors import ActiveSteerError, shown
-from activesteer.files import MAX_NUMBER
+from activesteer.limits import MAX_NUMBER, MAX_TOML_LETTERS
 
 T = TypeVar("T")
-_MAX_TEXT: Final = 1000
 """Longest text [characters]."""
 
 
@@ -135,8 +134,8 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
     good = isinstance(raw, hint) or (hint is float and isinstance(raw, int))
     if not good or (isinstance(raw, bool) and hint is not bool):
         raise source.fail(path, f"{shown(raw)} is not {wanted}", raw, hint)
-    if isinstance(raw, str) and (len(raw) > _MAX_TEXT or not raw.isprintable()):
-        raise source.fail(path, f"{shown(raw)} is not a text of at most {_MAX_TEXT} printable characters", raw)
+    if isinstance(raw, str) and (len(raw) > MAX_TOML_LETTERS or not raw.isprintable()):
+        raise source.fail(path, f"{shown(raw)} is not a text of at most {MAX_TOML_LETTERS} printable characters", raw)
     if hint in (bool, str):
         return raw
     number: Any = raw

@@ -9,10 +9,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from activesteer import limits
 from activesteer.config import Range, Source
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
-from activesteer.files import MAX_CSV_BYTES, read_bytes
+from activesteer.files import read_bytes
 from activesteer.maneuver.along_course import AlongCourse
 from activesteer.maneuver.csv_table import find_csv
 from activesteer.maneuver.path_points import COLUMNS, OPTIONAL, check_points, read_csv
@@ -76,7 +77,7 @@ class FollowPath(AlongCourse):
         except ManeuverError as reason:
             raise source.fail(("path", "csv"), str(reason), reason.value, reason.allowed) from reason
         filled = {**table, "path": {**points, **columns}}
-        return filled, {f"path/{file.name}": read_bytes(file, ManeuverError, MAX_CSV_BYTES)}
+        return filled, {f"path/{file.name}": read_bytes(file, ManeuverError, limits.MAX_CSV_BYTES)}
 
     def _make_course(self) -> Course:
         path = Path.through(self.path.x_m or (), self.path.y_m or ())

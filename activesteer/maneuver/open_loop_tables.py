@@ -8,10 +8,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+from activesteer import limits
 from activesteer.config import Range, Source
 from activesteer.conventions import CORNERS
 from activesteer.errors import ManeuverError
-from activesteer.files import MAX_CSV_BYTES, read_bytes
+from activesteer.files import read_bytes
 from activesteer.maneuver.csv_table import find_csv, read_columns
 
 
@@ -146,7 +147,7 @@ def with_tables(
             filled[name] = _read(file, columns)
         except ManeuverError as reason:
             raise source.fail((key,), str(reason)) from reason
-        files[f"tables/{file.name}"] = read_bytes(file, ManeuverError, MAX_CSV_BYTES)
+        files[f"tables/{file.name}"] = read_bytes(file, ManeuverError, limits.MAX_CSV_BYTES)
     return filled, files
 
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
-from typing import Any, Final
+from typing import Any
 
+from activesteer import limits
 from activesteer.config import Source
 from activesteer.errors import ManeuverError, shown
-from activesteer.files import MAX_CSV_BYTES, is_file, read_bytes
+from activesteer.files import is_file, read_bytes
 from activesteer.maneuver.csv_table import find_csv, read_columns
-from activesteer.road.crg import MAX_BYTES, packed, referenced
-
-_MAX_CHAIN: Final = 4
+from activesteer.road.crg import packed, referenced
 
 
 def with_road_files(
@@ -41,7 +40,7 @@ def with_road_files(
         except ManeuverError as reason:
             raise source.fail(path, f"{file.name}: {reason}", reason.value, reason.allowed) from reason
         if key == "profile":
-            files[f"road/{file.name}"] = read_bytes(file, ManeuverError, MAX_CSV_BYTES)
+            files[f"road/{file.name}"] = read_bytes(file, ManeuverError, limits.MAX_CSV_BYTES)
     return {**table, "road": filled}, files
 
 
@@ -57,9 +56,9 @@ def _profile(file: Path) -> dict[str, list[float]]:
 
 def _crg(file: Path) -> list[str]:
     """Return an OpenCRG file with the files that it refers to, packed."""
-    files = {file.name: read_bytes(file, ManeuverError, MAX_BYTES)}
+    files = {file.name: read_bytes(file, ManeuverError, limits.MAX_CRG_BYTES)}
     name, place = file.name, file
-    for _ in range(_MAX_CHAIN):
+    for _ in range(limits.MAX_CRG_FILES):
         other = referenced(files[name])
         if other is None:
             return list(packed(files))
@@ -69,5 +68,5 @@ def _crg(file: Path) -> list[str]:
         if found is None:
             raise ManeuverError(f"refers to {shown(other)}, which is not found beside it")
         name, place = other, found
-        files[name] = read_bytes(found, ManeuverError, MAX_BYTES)
-    raise ManeuverError(f"refers to more than {_MAX_CHAIN} files in a chain")
+        files[name] = read_bytes(found, ManeuverError, limits.MAX_CRG_BYTES)
+    raise ManeuverError(f"refers to more than {limits.MAX_CRG_FILES} files in a chain")

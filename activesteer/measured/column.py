@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from activesteer import limits
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, shown
 from activesteer.files import shown_path
-from activesteer.recording.contents import MAX_ROWS
-
-MAX_BYTES: Final = 2**30
-"""Largest size of a file that is read whole, decompressed [bytes]."""
 
 
 class Column(NamedTuple):
@@ -33,11 +30,8 @@ class Column(NamedTuple):
 
 
 def check_rows(count: int, path: Path) -> None:
-    """Refuse a file with more than `MAX_ROWS` rows, which its metadata state before the rows are read."""
-    if count > MAX_ROWS:
-        raise RecordingError(
-            f"{shown_path(path)} has {count} rows; at most {MAX_ROWS} are allowed", value=count, allowed=MAX_ROWS
-        )
+    """Refuse a file with too many rows, which its metadata state before the rows are read."""
+    limits.check_count(count, limits.MAX_ROWS, "rows", RecordingError, file=path.name)
 
 
 @contextmanager

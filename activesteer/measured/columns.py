@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from activesteer import limits
 from activesteer.child_process import Child, ChildFault
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, nearest_names, shown
@@ -17,13 +18,8 @@ from activesteer.files import is_file, shown_path, why_no_file
 from activesteer.measured import foreign_files
 from activesteer.measured.column import Column
 from activesteer.measured.csv_columns import csv_columns
-from activesteer.recording.contents import MAX_ROWS
 
-_LIMIT_S: Final = 120.0
-"""Time limit for opening a file and for reading a column; a column of `MAX_ROWS` rows takes some seconds [s]."""
-_MAX_MEMORY_BYTES: Final = 2**32
-"""Limit of the memory of a reader: a file of `MAX_BYTES`, and its numbers in several copies [bytes]."""
-_MAX_ANSWER_BYTES: Final = 16 * MAX_ROWS + 2**20
+_MAX_ANSWER_BYTES: Final = 16 * limits.MAX_ROWS + 2**20
 """Longest answer of a reader: values and times of a column [bytes]."""
 
 
@@ -76,11 +72,11 @@ def find(columns: list[Column], name: str, path: Path) -> Column:
 
 def _in_child(path: Path) -> list[Column]:
     """Return the columns of a file that a child process reads, which lives as long as the columns."""
-    child = Child(foreign_files.__file__, _MAX_MEMORY_BYTES, quiet=True)
+    child = Child(foreign_files.__file__, limits.MAX_READER_BYTES, quiet=True)
 
     def asked(request: Any, doing: str) -> tuple[dict[str, Any], bytes]:
         try:
-            answer = child.ask(json.dumps(request).encode(), doing, _LIMIT_S, _MAX_ANSWER_BYTES)
+            answer = child.ask(json.dumps(request).encode(), doing, limits.MAX_READER_S, _MAX_ANSWER_BYTES)
         except ChildFault as fault:
             raise RecordingError(f"cannot read {shown_path(path)}: its reader {fault}", value=path) from fault
         head, _, content = answer.partition(b"\n")

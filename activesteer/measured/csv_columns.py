@@ -12,10 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from activesteer import limits
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, shown
 from activesteer.files import read_bytes
-from activesteer.measured.column import MAX_BYTES, Column, check_rows, numbers, understood
+from activesteer.measured.column import Column, check_rows, numbers, understood
 
 _HEAD_LINES: Final = 200
 """Number of lines within which the numbers of a CSV must begin."""
@@ -38,7 +39,7 @@ def csv_columns(path: Path) -> list[Column]:
     import pyarrow as pa  # noqa: PLC0415 - slow to import
     from pyarrow import csv as arrow  # noqa: PLC0415
 
-    data = read_bytes(path, RecordingError, MAX_BYTES)
+    data = read_bytes(path, RecordingError, limits.MAX_MEASURED_BYTES)
     check_rows(max(data.count(b"\n"), data.count(b"\r")), path)
     lines = _text(data).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     head = lines[:_HEAD_LINES]

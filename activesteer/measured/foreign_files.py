@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import struct
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +16,7 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, not_installed, shown
 from activesteer.files import shown_path
-from activesteer.measured.column import MAX_BYTES, Column, check_rows, numbers, understood
+from activesteer.measured.column import Column, check_rows, numbers, understood
 
 _MAT_HEADER: Final = 128
 """Length of the header of a MATLAB file of version 5 [bytes]."""
@@ -97,7 +95,6 @@ def _mat(path: Path) -> list[Column]:
 
     try:
         with understood(path, "MATLAB file"):
-            _check_mat_size(path)
             check_rows(max((max(shape, default=0) for _, shape, _ in whosmat(path)), default=0), path)
             variables = loadmat(path, simplify_cells=True)
     except RecordingError as error:
@@ -113,32 +110,6 @@ def _mat(path: Path) -> list[Column]:
         for name, values in _flat(variables)
         if not name.startswith(("__", "units.", "metrics.", "meanings."))
     ]
-
-
-def _check_mat_size(path: Path) -> None:
-    """Refuse a MATLAB file that is too large when it is decompressed, without keeping what is decompressed.
-
-    Raises:
-        RecordingError: it has more than `MAX_BYTES`.
-    """
-    left = MAX_BYTES - path.stat().st_size
-    with path.open("rb") as file:
-        order = {b"IM": "<", b"MI": ">"}.get(file.read(_MAT_HEADER)[-2:])
-        while order and left > 0 and len(tag := file.read(8)) == 8:
-            kind, length = struct.unpack(f"{order}II", tag)
-            if kind != _MAT_COMPRESSED:
-                file.seek(length, 1)
-                continue
-            unpacker = zlib.decompressobj()
-            while length > 0 and left > 0 and (packed := file.read(min(length, _PIECE_BYTES))):
-                length -= len(packed)
-                while packed and left > 0:
-                    left -= len(unpacker.decompress(packed, _PIECE_BYTES))
-                    packed = unpacker.unconsumed_tail
-    if left <= 0:
-        raise RecordingError(
-            f"{shown_path(path)} has more than {MAX_BYTES} bytes when decompressed", value=path, allowed=MAX_BYTES
-        )
 
 
 def _flat(table: Mapping[str, Any], start: str = "") -> Iterator[tuple[str, Any]]:

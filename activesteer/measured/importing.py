@@ -9,11 +9,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from activesteer import limits
 from activesteer.analysis.metrics import metrics
 from activesteer.config import field_in_unit
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, nearest_names, shown
-from activesteer.files import MAX_NUMBER
 from activesteer.measured.columns import Column, find, read_columns, second_of
 from activesteer.measured.map_file import ChannelMap, MeasurementMap, read_map
 from activesteer.measured.motion import moved_car, with_motion
@@ -29,7 +29,6 @@ from activesteer.measured.names import (
 from activesteer.measured.plausibility import suspicions
 from activesteer.measured.resampling import Samples, gaps, resampled, samples
 from activesteer.recording import Recording
-from activesteer.recording.contents import MAX_ROWS
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.signals import Channel
@@ -261,7 +260,7 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
     found = written_unit(unit)
     if found is None or not alike(found, find_unit("s")):
         raise RecordingError(f"the time has the unit {shown(unit)}; known are s, ms, us", file=path.name, value=unit)
-    return _plausible(column.read()[0] * found.factor, "s", column.name, path)
+    return _plausible(column.read()[0] * found.factor, column.name, path)
 
 
 def known_time_unit(name: str) -> str:
@@ -304,21 +303,12 @@ def _signal(name: str, wanted: str, source: _Source, shared: Array | None, chose
                     f"{column.name} starts at {time_s[0]:g} s, after zero_until_s", key=f"channels.{name}.zero_until_s"
                 )
             values = values - values[early].mean()
-    return Samples(time_s, _plausible(values * (known.sign * found.factor), wanted, column.name, path))
+    return Samples(time_s, _plausible(values * (known.sign * found.factor), column.name, path))
 
 
-def _plausible(values: Array, unit: str, column: str, path: Path) -> Array:
-    """Return the values if they are small enough for a file.
-
-    Raises:
-        RecordingError: a value is above `MAX_NUMBER`.
-    """
-    if not (np.abs(values[np.isfinite(values)]) <= MAX_NUMBER).all():
-        raise RecordingError(
-            f"column {shown(column)} holds {np.abs(values[np.isfinite(values)]).max():g} {unit}; the largest number "
-            f"allowed in a file is {MAX_NUMBER:g}",
-            file=path.name, allowed=MAX_NUMBER,
-        )  # fmt: skip
+def _plausible(values: Array, column: str, path: Path) -> Array:
+    """Return the values if they are small enough for a file."""
+    limits.check_numbers(values, RecordingError, infinite=True, file=path.name, key=f"column {shown(column)}")
     return values
 
 
@@ -340,8 +330,7 @@ def _grid(signals: Mapping[str, Samples], chosen: MeasurementMap, path: Path) ->
             file=path.name,
         )
     count = int((end - start) / step + 1e-6) + 1
-    if count > MAX_ROWS:
-        raise RecordingError(f"{count} rows of {step:g} s, at most {MAX_ROWS} are allowed", file=path.name)
+    limits.check_count(count, limits.MAX_ROWS, f"rows of {step:g} s", RecordingError, file=path.name)
     return np.minimum(start + np.arange(count) * step, end), step
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
+from activesteer import limits
 from activesteer.errors import RecordingError, nearest_names
 from activesteer.signals import Channel
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
 _GROUP = re.compile(r"[a-z][a-z0-9_]{0,254}")
-_MAX_LETTERS = 1000
 TIME = "time_s"
 """Name of the time column in every export; no channel may have it."""
 
@@ -38,7 +38,7 @@ class ChannelTable:
                     value=channel.name,
                 )
             for text in (channel.unit, channel.meaning):
-                if not isinstance(text, str) or len(text) > _MAX_LETTERS or not text.isprintable():
+                if not isinstance(text, str) or len(text) > limits.MAX_DESCRIPTION_LETTERS or not text.isprintable():
                     raise RecordingError(
                         f"channel {channel.name!r}: unit and meaning are texts of one line, not {text!r:.100}"
                     )

@@ -35,7 +35,7 @@ from mcap.records import (
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import MCAP0_MAGIC
 
-from activesteer.recording.contents import MAX_EXPANSION
+from activesteer import limits
 
 _ZSTD = zstandard.ZstdCompressionParameters.from_level(
     1, strategy=zstandard.STRATEGY_FAST, hash_log=12, min_match=5, target_length=1
@@ -129,7 +129,7 @@ class McapFile:
         """
         records = chunk.records
         compressed, compression = self._compressor.compress(records), "zstd"
-        if len(records) > MAX_EXPANSION * len(compressed):
+        if len(records) > limits.MAX_EXPANSION * len(compressed):
             compressed, compression = records, ""
         head = _CHUNK_HEAD.pack(
             Opcode.CHUNK,

@@ -6,13 +6,12 @@ are numbers, and a small file cannot fill memory or time.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
+from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.files import MAX_NUMBER
 from activesteer.recording.events import events_of
 from activesteer.recording.schemas import WORLD
 from activesteer.road.course import course_of
@@ -21,36 +20,6 @@ from activesteer.road.footprint import footprint_of
 from activesteer.road.recorded import fail, table_of, text
 from activesteer.road.road import road_of
 
-MAX_ROWS: Final = 20_000_000
-"""Largest number of rows: five and a half hours at 1 ms, 160 MB in memory per channel."""
-MAX_CHANNELS: Final = 10_000
-"""Largest number of channels; a car has about 150."""
-MAX_FILE_BYTES: Final = 2**35
-"""Largest size of a file; 20 million rows have about 15 GB. A sparse file of any size could take forever to read."""
-MAX_CHUNK_BYTES: Final = 2**26
-"""Largest size of a chunk, compressed or not; one second of a car is 1 MB."""
-MAX_EXPANSION: Final = 200
-"""Largest expansion of a chunk by decompression. The writer leaves a chunk uncompressed if it would exceed this ratio.
-Driving gives 2 to 4, standing still about 50."""
-MAX_OTHER_BYTES: Final = 2**28
-"""Largest size of all attachments, schemas and metadata together; models with meshes have about 50 MB."""
-MAX_OTHER_RECORDS: Final = 20_000
-"""Largest number of attachments, schemas, topics and metadata records together."""
-MAX_FOREIGN_MESSAGES: Final = 100_000
-"""Largest number of messages in topics of other tools."""
-MAX_BODIES: Final = 1000
-"""Largest number of bodies with poses; a car has about 30."""
-MAX_PARTS: Final = 100_000
-"""Largest number of parts of a scene; a car has about 60."""
-
-_MAX_NAME: Final = 5000
-"""Longest name of an entry or a controller; a controller name contains a path of up to 4096 letters."""
-_MAX_TEXT: Final = 100_000
-_MAX_DEPTH: Final = 16
-_MAX_ENTRIES: Final = 20_000
-"""Largest number of named values in all tables of the metadata; a run has about 150."""
-_MAX_ELEMENTS: Final = 5_000_000
-"""Largest number of values in all lists of the metadata: a path with a point per centimetre for 20 km."""
 _SHOWN: Final = 100
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
 
@@ -59,8 +28,7 @@ Check = Callable[[Any, str], object]
 
 
 def _name(value: Any, key: str) -> None:
-    if len(text(value, key)) > _MAX_NAME:
-        raise fail(key, f"has {len(value)} letters, at most {_MAX_NAME} are allowed")
+    _letters(text(value, key), key, limits.MAX_NAME_LETTERS)
 
 
 def _flag(value: Any, key: str) -> None:
@@ -151,6 +119,10 @@ def check_metadata(metadata: Mapping[str, Any]) -> None:
 _MISSING: Final = object()
 
 
+def _count(count: int, most: int, what: str, **place: Any) -> None:
+    limits.check_count(count, most, what, RecordingError, **{"file": "the metadata", **place})
+
+
 class _Sizes:
     """Counter of the values in a tree."""
 
@@ -158,21 +130,19 @@ class _Sizes:
         self._entries = self._elements = 0
 
     def check(self, value: Any, key: str, depth: int = 0) -> None:
-        if depth > _MAX_DEPTH:
-            raise fail(key[:_SHOWN], f"is nested more than {_MAX_DEPTH} levels deep")
+        if depth > limits.MAX_METADATA_DEPTH:
+            raise fail(key[:_SHOWN], f"is nested more than {limits.MAX_METADATA_DEPTH} levels deep")
         if isinstance(value, Mapping):
             self._entries += len(value)
-            if self._entries > _MAX_ENTRIES:
-                raise RecordingError(f"the metadata have more than {_MAX_ENTRIES} entries")
+            _count(self._entries, limits.MAX_METADATA_ENTRIES, "entries")
             for name, entry in value.items():
-                _letters(name, key or "the name of an entry", _MAX_NAME)
+                _letters(name, key or "the name of an entry", limits.MAX_NAME_LETTERS)
                 self.check(entry, f"{key}.{name}" if key else name, depth + 1)
         elif isinstance(value, str):
-            _letters(value, key, _MAX_TEXT)
+            _letters(value, key, limits.MAX_METADATA_LETTERS)
         elif isinstance(value, Sequence):
             self._elements += len(value)
-            if self._elements > _MAX_ELEMENTS:
-                raise RecordingError(f"the lists in the metadata have more than {_MAX_ELEMENTS} values")
+            _count(self._elements, limits.MAX_METADATA_ELEMENTS, "values in lists")
             for entry in value:
                 if entry.__class__ is not float:
                     self.check(entry, key, depth + 1)
@@ -182,8 +152,7 @@ class _Sizes:
 
 def _letters(value: str, key: str, maximum: int) -> None:
     """Check that a text is short enough and can be encoded in UTF-8."""
-    if len(value) > maximum:
-        raise fail(key[:_SHOWN], f"has {len(value)} letters, at most {maximum} are allowed")
+    _count(len(value), maximum, "letters", key=key[:_SHOWN])
     try:
         value.encode()
     except UnicodeEncodeError:
@@ -196,18 +165,13 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
     Raises:
         RecordingError: a name or value is wrong, or there are too many.
     """
-    if len(metrics) > MAX_CHANNELS:
-        raise RecordingError(f"{len(metrics)} metrics, at most {MAX_CHANNELS} are allowed")
+    _count(len(metrics), limits.MAX_CHANNELS, "metrics")
     for name, value in metrics.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
             raise RecordingError(f"metric name {name!r:.{_SHOWN}}: letters, digits and '_', a letter first")
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, which is no number", key=name, value=value)
-        if MAX_NUMBER < abs(value) < math.inf:
-            raise RecordingError(
-                f"metric {name!r} is {value:g}; the largest number allowed in a file is {MAX_NUMBER:g}",
-                key=name, value=value, allowed=MAX_NUMBER,
-            )  # fmt: skip
+        limits.check_numbers(float(value), RecordingError, infinite=True, key=name)
 
 
 def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
@@ -216,8 +180,7 @@ def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
     Raises:
         RecordingError: a name is no text or empty, or there are too many.
     """
-    if len(names) > maximum:
-        raise RecordingError(f"{len(names)} {what}, at most {maximum} are allowed")
+    _count(len(names), maximum, what)
     for name in names:
         if not isinstance(name, str) or not 0 < len(name) <= 255 or not name.isprintable():
             raise RecordingError(f"{what}: {name!r:.{_SHOWN}} is no name of 1 to 255 letters")
@@ -229,7 +192,7 @@ def check_bodies(names: Sequence[Any]) -> None:
     Raises:
         RecordingError: see `check_names`; or a name occurs twice, or is that of the world.
     """
-    check_names(names, "bodies", MAX_BODIES)
+    check_names(names, "bodies", limits.MAX_BODIES)
     if len({WORLD, *names}) != len(names) + 1:
         raise RecordingError(
             f"body names must differ from each other and from {WORLD!r}: {', '.join(names)}", value=tuple(names)

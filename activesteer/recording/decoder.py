@@ -11,9 +11,8 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
+from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.files import MAX_NUMBER
-from activesteer.recording.contents import MAX_FOREIGN_MESSAGES
 from activesteer.recording.encoder import MESSAGE_HEAD, message_record
 from activesteer.recording.format import TRANSFORMS_TOPIC
 from activesteer.recording.protobuf import FixedMessage
@@ -118,13 +117,9 @@ class BlockDecoder:
                 raise RecordingError(f"{group.topic} and {first} have different times")
             values = [run[:, place] for run in runs for place in range(run.shape[1])]
             columns.update(zip(group.columns, values, strict=True))
-            if any(_too_large(run).any() for run in runs):
-                place = next(place for place, column in enumerate(values) if _too_large(column).any())
-                largest = values[place][_too_large(values[place])][0]
-                raise RecordingError(
-                    f"channel {group.names[place]} holds {largest:g}; the largest number allowed in a file is "
-                    f"{MAX_NUMBER:g}"
-                )
+            if any(limits.too_large(run, infinite=True).any() for run in runs):
+                for place, column in enumerate(values):
+                    limits.check_numbers(column, RecordingError, infinite=True, key=f"channel {group.names[place]}")
         poses = [] if self._transforms_id is None else starts[self._transforms_id]
         _, times, *runs = self._poses.parse(_messages(data, poses, len(self._poses)), TRANSFORMS_TOPIC)
         positions = np.empty((len(poses), len(self.body_names), 3))
@@ -155,8 +150,7 @@ class BlockDecoder:
                 if opcode not in _OTHERS and not (opcode == Opcode.MESSAGE and number in self._others):
                     raise RecordingError(self._complaint(opcode, length, number))
                 foreign += 1
-                if foreign > MAX_FOREIGN_MESSAGES:
-                    raise RecordingError(f"more than {MAX_FOREIGN_MESSAGES} records of other tools in a chunk")
+                limits.check_count(foreign, limits.MAX_FOREIGN_MESSAGES, "records of other tools", RecordingError)
                 if opcode == Opcode.MESSAGE:
                     stop = position + _RECORD_HEAD + length
                     others.setdefault(number, []).append(data[position + _RECORD_HEAD + MESSAGE_HEAD : stop])
@@ -172,12 +166,6 @@ class BlockDecoder:
             return f"a message belongs to topic {number}, which does not exist"
         needed = self._lengths[number] - _RECORD_HEAD
         return f"{self._topics[number]}: a message has {length} bytes instead of {needed}"
-
-
-def _too_large(values: NDArray) -> NDArray[np.bool_]:
-    """Return which values are finite and above `MAX_NUMBER`."""
-    size = np.abs(values)
-    return (size > MAX_NUMBER) & (size < np.inf)
 
 
 def _messages(data: bytes, starts: Sequence[int], length: int) -> NDArray[np.uint8]:

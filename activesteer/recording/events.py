@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 
+from activesteer import limits
 from activesteer.errors import RecordingError
 from activesteer.recording.schemas import LOG_SCHEMA, message_class
 from activesteer.road.recorded import fail, sequence, table_of, text
 
-MAX_EVENTS: Final = 10_000
-"""Largest number of events in a recording."""
-_MAX_LETTERS: Final = 2000
 _INFO: Final = 2
 """Level of the messages in Foxglove's log."""
 
@@ -38,11 +36,10 @@ def events_of(metadata: Mapping[str, Any]) -> list[Event]:
     """Return the events in the metadata of a recording.
 
     Raises:
-        RecordingError: an event is damaged, or there are more than `MAX_EVENTS`.
+        RecordingError: an event is damaged, or there are more than `limits.MAX_EVENTS`.
     """
     listed = sequence(metadata.get("events", ()), "events")
-    if len(listed) > MAX_EVENTS:
-        raise fail("events", f"has {len(listed)} entries, at most {MAX_EVENTS} are allowed")
+    limits.check_count(len(listed), limits.MAX_EVENTS, "entries", RecordingError, file="the metadata", key="events")
     return [_event(entry, f"events.{index}") for index, entry in enumerate(listed)]
 
 
@@ -75,6 +72,5 @@ def _event(entry: object, key: str) -> Event:
     time_s, kind, what = table.get("time_s"), text(table.get("kind"), f"{key}.kind"), text(table.get("what"), key)
     if isinstance(time_s, bool) or not isinstance(time_s, int | float) or not 0.0 <= time_s <= 1e6:
         raise fail(f"{key}.time_s", f"is {time_s!r:.40}, expected a time from 0 to 1e6 s")
-    if max(len(kind), len(what)) > _MAX_LETTERS:
-        raise RecordingError(f"an event has more than {_MAX_LETTERS} letters")
+    limits.check_count(max(len(kind), len(what)), limits.MAX_EVENT_LETTERS, "letters", RecordingError, key=key)
     return Event(float(time_s), kind, what)

@@ -14,8 +14,8 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
+from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.files import MAX_NUMBER
 from activesteer.recording.contents import check_metadata, check_metrics
 
 FORMAT_VERSION = 1
@@ -63,7 +63,7 @@ def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict
     metrics = {name: value.item() if isinstance(value, np.generic) else value for name, value in metrics.items()}
     # As in the rows, a value that is too large for a file becomes infinite.
     metrics |= {name: math.copysign(math.inf, value) for name, value in metrics.items()
-                if isinstance(value, float) and abs(value) > MAX_NUMBER}  # fmt: skip
+                if isinstance(value, float) and abs(value) > limits.MAX_NUMBER}  # fmt: skip
     check_metrics(metrics)
     for key, value in metadata.items():
         if key in ("metrics", "events"):

@@ -14,22 +14,18 @@ from mcap.records import Channel
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from activesteer import limits
 from activesteer.errors import RecordingError
 from activesteer.files import shown_path
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.contents import (
-    MAX_CHANNELS,
-    MAX_CHUNK_BYTES,
-    MAX_FILE_BYTES,
-    MAX_OTHER_RECORDS,
-    MAX_ROWS,
     check_bodies,
     check_metadata,
     check_metrics,
     check_names,
 )
 from activesteer.recording.decoder import Block, BlockDecoder, Group
-from activesteer.recording.events import MAX_EVENTS, decode_event, tables_of
+from activesteer.recording.events import decode_event, tables_of
 from activesteer.recording.format import (
     EVENTS_TOPIC,
     FORMAT_RECORD,
@@ -105,12 +101,7 @@ def read_mcap(path: Path) -> Contents:
             raise RecordingError(
                 f"{shown_path(path)} is not an MCAP file; `activesteer import` converts measured data", value=path
             )
-        if size > MAX_FILE_BYTES:
-            raise RecordingError(
-                f"{shown_path(path)} has {size} bytes, at most {MAX_FILE_BYTES} are allowed",
-                value=size,
-                allowed=MAX_FILE_BYTES,
-            )
+        limits.check_count(size, limits.MAX_FILE_BYTES, "bytes", RecordingError, file=shown_path(path))
         records = read_records(descriptor, size)
         try:
             contents = _decode(descriptor, records)
@@ -145,7 +136,7 @@ def _decode(descriptor: int, records: Records) -> Contents:
         None if transforms is None else transforms.id,
         [other for other in records.topics if other not in known],
     )
-    check_names(list(records.attachments), "attachments", MAX_OTHER_RECORDS)
+    check_names(list(records.attachments), "attachments", limits.MAX_OTHER_RECORDS)
     rows = _Rows(len(channels), len(records.chunks))
     scenes: list[bytes] = []
     events: list[bytes] = []
@@ -159,8 +150,7 @@ def _decode(descriptor: int, records: Records) -> Contents:
             break
         scenes += block.others.get(scene.id, ()) if scene else ()
         events += block.others.get(log.id, ()) if log else ()
-        if len(events) > MAX_EVENTS:
-            raise RecordingError(f"there are more than {MAX_EVENTS} events")
+        limits.check_count(len(events), limits.MAX_EVENTS, "events", RecordingError)
     if len(scenes) > 1:
         raise RecordingError(f"there are {len(scenes)} scenes")
     parts = decode_scene(scenes[0]) if scenes else ()
@@ -173,8 +163,7 @@ def _decode(descriptor: int, records: Records) -> Contents:
 
 
 def _content(descriptor: int, start: int, length: int) -> bytes:
-    if length > MAX_CHUNK_BYTES:
-        raise RecordingError(f"it has {length} bytes, at most {MAX_CHUNK_BYTES} are allowed")
+    limits.check_count(length, limits.MAX_CHUNK_BYTES, "bytes", RecordingError)
     return read_bytes(descriptor, start, length)
 
 
@@ -200,8 +189,7 @@ class _Rows:
                 raise RecordingError("times do not increase")
             if int(time_ns[-1]) >= _END_OF_TIME_NS:
                 raise RecordingError(f"a time is {time_ns[-1] / 1e9:g} s")
-        if self._rows + len(block.row_ns) > MAX_ROWS:
-            raise RecordingError(f"there are more than {MAX_ROWS} rows")
+        limits.check_count(self._rows + len(block.row_ns), limits.MAX_ROWS, "rows", RecordingError)
         for kind, time_ns in enumerate((block.row_ns, block.pose_ns)):
             self._last_ns[kind] = int(time_ns[-1]) if len(time_ns) else self._last_ns[kind]
         self._rows += len(block.row_ns)
@@ -235,8 +223,7 @@ def _channels(records: Records, topics: Mapping[str, Channel]) -> tuple[ChannelT
             continue
         schema = records.schemas[topic.schema_id]
         names, layout = state_fields(schema.data, schema.name)
-        if len(described) + len(names) > MAX_CHANNELS:
-            raise RecordingError(f"there are more than {MAX_CHANNELS} channels")
+        limits.check_count(len(described) + len(names), limits.MAX_CHANNELS, "channels", RecordingError)
         if not names:
             raise RecordingError(f"topic {name!r:.100} has no channels")
         singles = [run.dtype == "<f4" for run in layout.runs for _ in range(run.count)]

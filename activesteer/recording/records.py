@@ -16,9 +16,9 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, DataEnd, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
+from activesteer import limits
 from activesteer.errors import RecordingError
 from activesteer.files import reading, shown_path
-from activesteer.recording.contents import MAX_OTHER_BYTES, MAX_OTHER_RECORDS
 from activesteer.recording.rows import BROKEN, read_bytes
 
 _RECORD: Final = struct.Struct("<BQ")
@@ -76,10 +76,10 @@ class Records:
             raise RecordingError(f"a record of {length} bytes reaches beyond the end")
         if opcode in _READ:
             self._bytes, self._count = self._bytes + length, self._count + 1
-            if self._bytes > MAX_OTHER_BYTES or self._count > MAX_OTHER_RECORDS:
+            if self._bytes > limits.MAX_OTHER_BYTES or self._count > limits.MAX_OTHER_RECORDS:
                 raise RecordingError(
                     "attachments, schemas and metadata are too large",
-                    value=self._bytes, allowed=MAX_OTHER_BYTES,
+                    value=self._bytes, allowed=limits.MAX_OTHER_BYTES,
                 )  # fmt: skip
             self._take(opcode, read_bytes(descriptor, first, length))
         elif opcode == Opcode.CHUNK:

@@ -20,8 +20,8 @@ from mcap.exceptions import McapError
 from mcap.records import Chunk
 from numpy.typing import NDArray
 
+from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.recording.contents import MAX_CHUNK_BYTES, MAX_EXPANSION
 from activesteer.recording.decoder import Block, BlockDecoder
 from activesteer.road.recorded import LIMIT_M
 from activesteer.signals import Channel
@@ -110,7 +110,7 @@ def messages_of(content: bytes) -> tuple[bytes, int]:
     try:
         chunk = Chunk.read(ReadDataStream(BytesIO(content)))
         size, packed = chunk.uncompressed_size, len(chunk.data)
-        if size > MAX_CHUNK_BYTES or size > max(_SMALL_BYTES, MAX_EXPANSION * packed):
+        if size > limits.MAX_CHUNK_BYTES or size > max(_SMALL_BYTES, limits.MAX_EXPANSION * packed):
             raise RecordingError(f"a chunk of {packed} bytes would become {size}")
         data = _decompressed(chunk.compression, chunk.data, size)
     except BROKEN as error:
@@ -130,7 +130,7 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
         # A frame may declare another size than its record, and that size would be allocated.
         if zstandard.frame_content_size(data) not in (-1, size):
             raise RecordingError("a chunk declares a wrong size")
-        return zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES).decompress(data, max_output_size=size)
+        return zstandard.ZstdDecompressor(max_window_size=limits.MAX_CHUNK_BYTES).decompress(data, max_output_size=size)
     if compression == "lz4":
         return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
     raise RecordingError(f"a chunk has the compression {compression!r:.40}; known are zstd and lz4")

@@ -6,8 +6,9 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Any, Final, NamedTuple
 
+from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.recording.contents import MAX_PARTS, check_names, check_numbers
+from activesteer.recording.contents import check_names, check_numbers
 from activesteer.recording.schemas import SCENE_SCHEMA, message_class
 
 _FIELDS = {"box": "cubes", "cylinder": "cylinders", "sphere": "spheres"}
@@ -155,8 +156,7 @@ def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
         ValueError, TypeError, KeyError: a link is broken.
     """
     update = message_class(SCENE_SCHEMA).FromString(data)
-    if len(update.entities) > MAX_PARTS:
-        raise RecordingError(f"a scene has {len(update.entities)} entities, at most {MAX_PARTS} are allowed")
+    limits.check_count(len(update.entities), limits.MAX_PARTS, "entities", RecordingError, key="scene")
     primitives: list[ScenePart] = []
     for entity in update.entities:
         primitives += [_link_of(json.loads(pair.value)) for pair in entity.metadata if pair.key == _LINK_KEY]
@@ -183,7 +183,7 @@ def check_scene(parts: Sequence[ScenePart]) -> None:
     Raises:
         RecordingError: a kind is unknown, a name is wrong, or a number is out of range.
     """
-    check_names([part.body if isinstance(part, Primitive) else part.name for part in parts], "parts", MAX_PARTS)
+    check_names([part.body if isinstance(part, Primitive) else part.name for part in parts], "parts", limits.MAX_PARTS)
     for part in parts:
         check_numbers(part.rgba, "colour", 0.0, 1.0)
         if isinstance(part, Primitive):
@@ -194,6 +194,6 @@ def check_scene(parts: Sequence[ScenePart]) -> None:
             raise RecordingError(f"{part.name}: link of kind {part.kind!r:.100}, known are: {', '.join(LINK_KINDS)}")
         if len(part.points) < 2:
             raise RecordingError(f"{part.name} has {len(part.points)} points, at least 2 are needed")
-        check_names([body for body, _ in part.points], f"bodies of {part.name}", MAX_PARTS)
+        check_names([body for body, _ in part.points], f"bodies of {part.name}", limits.MAX_PARTS)
         numbers = [number for _, point in part.points for number in point]
         check_numbers([*numbers, part.radius_m], f"place or radius of {part.name}", -_MAX_SIZE_M, _MAX_SIZE_M)

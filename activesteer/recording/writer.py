@@ -14,17 +14,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.files import MAX_NUMBER, shown_path
+from activesteer.files import shown_path
 from activesteer.recording.arrays import nanoseconds, shaped
 from activesteer.recording.channels import ChannelTable
 from activesteer.recording.container import McapFile
 from activesteer.recording.contents import (
-    MAX_CHANNELS,
-    MAX_CHUNK_BYTES,
-    MAX_OTHER_BYTES,
-    MAX_OTHER_RECORDS,
-    MAX_ROWS,
     check_bodies,
     check_names,
 )
@@ -57,7 +53,7 @@ from activesteer.signals import Channel
 from activesteer.version import __version__
 
 _ROWS_PER_CHUNK = 1000
-_CHUNK_BYTES = MAX_CHUNK_BYTES // 8
+_CHUNK_BYTES = limits.MAX_CHUNK_BYTES // 8
 """Size of a chunk of very wide rows without poses."""
 _ERROR_LETTERS = 2000
 _BLOCKS_IN_FLIGHT = 1  # More blocks would be lost by a kill, and would fill memory with a slow disk.
@@ -102,13 +98,10 @@ class McapWriter:
         self.channels = ChannelTable(channels)
         self.body_names = tuple(body_names)
         check_bodies(self.body_names)
-        if len(self.channels) > MAX_CHANNELS:
-            raise RecordingError(
-                f"{len(self.channels)} channels, a recording has at most {MAX_CHANNELS}", allowed=MAX_CHANNELS
-            )
-        check_names(list(attachments or {}), "attachments", MAX_OTHER_RECORDS)
-        if (size := sum(map(len, (attachments or {}).values()))) > MAX_OTHER_BYTES // 2:
-            raise RecordingError(f"the attachments have {size} bytes, at most {MAX_OTHER_BYTES // 2} are allowed")
+        limits.check_count(len(self.channels), limits.MAX_CHANNELS, "channels", RecordingError)
+        check_names(list(attachments or {}), "attachments", limits.MAX_OTHER_RECORDS)
+        size = sum(map(len, (attachments or {}).values()))
+        limits.check_count(size, limits.MAX_OTHER_BYTES // 2, "bytes", RecordingError, key="attachments")
         texts, metrics = metadata_texts(metadata or {})
         events = events_of(metadata or {})
         scene_data = encode_scene(scene)
@@ -176,7 +169,7 @@ class McapWriter:
     ) -> None:
         """Write a block, best of about one simulated second. The arrays may be reused after the call.
 
-        A value above `MAX_NUMBER` is written as infinity of its sign.
+        A value above `limits.MAX_NUMBER` is written as infinity of its sign.
 
         Args:
             time_s: Time of each row [s], >= 0, increasing from row to row and from block to block, shape (n,).
@@ -194,13 +187,12 @@ class McapWriter:
         pose_ns = nanoseconds(pose_time_s, "pose_time_s", self._last_pose_ns)
         rows, poses, bodies = len(row_ns), len(pose_ns), len(self.body_names)
         values = shaped(values, "values", (rows, len(self.channels)))
-        if (huge := np.abs(values) > MAX_NUMBER).any():  # the run diverges
+        if (huge := np.abs(values) > limits.MAX_NUMBER).any():  # the run diverges
             values = np.where(huge, np.copysign(np.inf, values), values)
         positions = shaped(positions_m, "positions_m", (poses, bodies, 3))
         turns = shaped(quaternions, "quaternions", (poses, bodies, 4))
         self._row_count += rows
-        if self._row_count > MAX_ROWS:
-            raise RecordingError(f"{self.path}: a recording has at most {MAX_ROWS} rows")
+        limits.check_count(self._row_count, limits.MAX_ROWS, "rows", RecordingError, file=str(self.path))
         pose_done = 0
         piece_rows = min(_ROWS_PER_CHUNK, max(1, _CHUNK_BYTES // max(1, self._encoder.row_bytes)))
         for start in range(0, max(rows, min(poses, 1)), piece_rows):

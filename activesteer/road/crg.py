@@ -22,27 +22,18 @@ import math
 import re
 import zlib
 from collections.abc import Callable, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer import limits
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, shown
-from activesteer.files import MAX_NUMBER
 from activesteer.road.grid import Grid
 from activesteer.road.path import Path
 
-MAX_BYTES: Final = 20_000_000
-_MAX_POINTS: Final = 4_000_000
-_MAX_COLUMNS: Final = 10_000
-_MAX_FILES: Final = 4
 _HIGHEST_M: Final = 1000.0
 _LINE_BYTES: Final = 80
-_MAX_LOST: Final = 20
-_JUMP, _LEAST, _DOUBTFUL, _OF, _SURE = 0.5, 1e-12, 4, 8, 0.99
-"""Numbers of a row and the one before differ by less, have a greater size, and fewer of eight do not; a place
-for a lost byte is sure where this fraction of the numbers around follow [m, rad]."""
 _PIECE: Final = 1000
 """Letters of each piece of a file in the metadata of a recording."""
 _LINE_STEP_M: Final = 0.25
@@ -89,7 +80,9 @@ def unpacked(texts: tuple[str, ...]) -> CrgRoad:
     """
     try:
         unpacking = zlib.decompressobj()
-        content = unpacking.decompress(base64.b64decode("".join(texts), validate=True), _MAX_FILES * MAX_BYTES)
+        content = unpacking.decompress(
+            base64.b64decode("".join(texts), validate=True), limits.MAX_CRG_FILES * limits.MAX_CRG_BYTES
+        )
         files = {}
         while content:
             name, size, content = content.split(b"\0", 2)
@@ -128,13 +121,13 @@ def read_crg(name: str, content_of: Callable[[str], bytes]) -> CrgRoad:
     """
     file = _split(content_of(name))
     mods = file.blocks.get("ROAD_CRG_MODS")
-    for _ in range(_MAX_FILES):
+    for _ in range(limits.MAX_CRG_FILES):
         if "ROAD_CRG_FILE" not in file.blocks:
             break
         file = _split(content_of("".join(file.blocks["ROAD_CRG_FILE"])))
         mods = file.blocks.get("ROAD_CRG_MODS") if mods is None else mods
     else:
-        raise ManeuverError(f"refers to more than {_MAX_FILES} files in a chain")
+        raise ManeuverError(f"refers to more than {limits.MAX_CRG_FILES} files in a chain")
     for block in ("ROAD_CRG", "KD_DEFINITION"):
         if block not in file.blocks:
             raise ManeuverError(f"is no OpenCRG file: there is no block ${block}")
@@ -174,15 +167,13 @@ def _number(text: str, key: str) -> float:
     """Return the number in a text.
 
     Raises:
-        ManeuverError: it is none, is not finite, or is above `MAX_NUMBER`.
+        ManeuverError: it is none, is not finite, or is above `limits.MAX_NUMBER`.
     """
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not abs(value) <= MAX_NUMBER:
-        needed = f"a number from {-MAX_NUMBER:g} to {MAX_NUMBER:g} is needed"
-        raise ManeuverError(f"{key} is {shown(text)}; {needed}", value=text, allowed=MAX_NUMBER)
+    limits.check_number(value, ManeuverError, text=text, key=key)
     return value
 
 
@@ -193,8 +184,7 @@ def _road(head: dict[str, float], mods: dict[str, float], file: _Blocks) -> CrgR
     if not 1e-3 <= step <= 1000.0:
         raise ManeuverError(f"REFERENCE_LINE_INCREMENT is {step:g} m, 0.001 to 1000 m are allowed")
     data = _data(file.data, form, len(columns))
-    if (np.abs(data) > MAX_NUMBER).any():
-        raise ManeuverError(f"has numbers above {MAX_NUMBER:g} in its data", allowed=MAX_NUMBER)
+    limits.check_numbers(data, ManeuverError, key="data")
     if "reference_line_end_u" in head:
         span = (head["reference_line_end_u"] - head.get("reference_line_start_u", 0.0)) * scale["scale_length"]
         rows = round(span / step) + 1
@@ -240,8 +230,9 @@ def _columns(lines: list[str]) -> tuple[list[str], str]:
     if form not in (*_TEXT_CELLS, *_BINARY):
         raise ManeuverError(f"the data format is {shown(form)}; known are {', '.join((*_TEXT_CELLS, *_BINARY))}")
     names = [line[2:].partition(",")[0].strip().lower() for line in lines if line.startswith("D:")]
-    if not 0 < len(names) <= _MAX_COLUMNS:
-        raise ManeuverError(f"has {len(names)} data columns; 1 to {_MAX_COLUMNS} are allowed")
+    limits.check_count(len(names), limits.MAX_CRG_COLUMNS, "data columns", ManeuverError)
+    if not names:
+        raise ManeuverError("has no data columns")
     return names, form
 
 
@@ -249,11 +240,12 @@ def _data(data: bytes, form: str, columns: int) -> Array:
     """Return the data, shape (rows, columns), missing values as nan."""
     if form in _BINARY:
         number = np.dtype(_BINARY[form])
-        data = _with_lost_bytes(data, number, columns)
-        rows = len(data) // (number.itemsize * columns)
-        _check_size(rows, columns)
-        # Zeros fill the last record of 80 bytes.
         row = number.itemsize * columns
+        rows = len(data) // row
+        # Zeros fill the last record of 80 bytes.
+        if len(data) % _LINE_BYTES and len(data) % row:
+            raise ManeuverError("has lost or gained bytes, as in a transfer as text; get it again as binary data")
+        limits.check_count(rows * columns, limits.MAX_CRG_POINTS, "points", ManeuverError)
         padding = min(_LINE_BYTES - 1, len(data) - len(data.rstrip(b"\0")))
         rows = max(rows - max(0, padding - len(data) % row) // row, 0)
         with np.errstate(invalid="ignore"):  # missing values may be signalling
@@ -262,7 +254,7 @@ def _data(data: bytes, form: str, columns: int) -> Array:
     lines = [line for line in data.decode("latin-1").splitlines() if line.strip()]
     per_row = -(-columns // (_LINE_BYTES // width))
     rows = len(lines) // per_row
-    _check_size(rows, columns)
+    limits.check_count(rows * columns, limits.MAX_CRG_POINTS, "points", ManeuverError)
     found = np.empty((rows, columns))
     for row in range(rows):
         text = "".join(line.ljust(_LINE_BYTES)[:_LINE_BYTES] for line in lines[row * per_row : (row + 1) * per_row])
@@ -273,54 +265,6 @@ def _data(data: bytes, form: str, columns: int) -> Array:
             except ValueError as reason:
                 raise ManeuverError(f"row {row + 1} of the data: {shown(cell)} is no number") from reason
     return found
-
-
-def _with_lost_bytes(data: bytes, number: np.dtype[Any], columns: int) -> bytes:
-    """Return binary data with the carriage returns that a transfer as text has removed.
-
-    Version control takes a file with a long header for text and turns each pair of carriage return and line feed into a
-    line feed, also among the numbers; ASAM's own example `belgian_block.crg` is such a file. Behind a lost byte the
-    numbers do not follow those of the row before. So the byte belongs before one of the last line feeds, where nearly
-    all of the following numbers do. If there is no such place, the data stays as it is.
-    """
-    given, size, place = data, number.itemsize, columns
-    for _ in range(_MAX_LOST):
-        end = len(data) // (columns * size) * columns
-        follows = _follows(data, number, columns, place)[: end - place]
-        doubtful = (
-            np.flatnonzero(np.convolve(~follows, np.ones(8), "valid") >= _DOUBTFUL) if follows.size > 8 else follows
-        )
-        if not doubtful.size:
-            return data
-        last = place + int(doubtful[0]) + _OF
-        feeds = [at for at in range((last - 2 * columns) * size, last * size) if data[at : at + 1] == b"\n"]
-        tried = [(_mended(data, feed, last, number, columns), feed) for feed in feeds]
-        score, feed = max(tried, default=(0.0, 0))
-        if score < _SURE:
-            return given
-        data, place = data[:feed] + b"\r" + data[feed:], max(columns, feed // size)
-    return given
-
-
-def _mended(data: bytes, feed: int, last: int, number: np.dtype[Any], columns: int) -> float:
-    """Return the fraction of the numbers around a place that follow those before, with a byte added before `feed`."""
-    mended = data[:feed] + b"\r" + data[feed : (last + 4 * columns) * number.itemsize]
-    return float(_follows(mended, number, columns, max(columns, last - 2 * columns)).mean())
-
-
-def _follows(data: bytes, number: np.dtype[Any], columns: int, first: int) -> NDArray[np.bool_]:
-    """Return which numbers from the first one on are missing, or near the number of the row before."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        count = len(data) // number.itemsize - first + columns
-        values = np.frombuffer(data, number, count, (first - columns) * number.itemsize).astype(np.float64)
-        step = np.abs(values[columns:] - values[:-columns])
-        tiny = (values[columns:] != 0.0) & (np.abs(values[columns:]) < _LEAST)
-    return np.isnan(step) | ((step < _JUMP) & ~tiny)
-
-
-def _check_size(rows: int, columns: int) -> None:
-    if rows * columns > _MAX_POINTS:
-        raise ManeuverError(f"has {rows} x {columns} points; at most {_MAX_POINTS} are allowed")
 
 
 def _places(head: dict[str, float], names: list[str]) -> Array:
@@ -366,7 +310,7 @@ def _evenly(places: Array, heights: Array) -> tuple[Array, float, float]:
     """Return heights at even distances across, first distance and step [m]; exact where all places are multiples."""
     step = float(np.diff(places).min())
     count = max(2, round((places[-1] - places[0]) / step) + 1)
-    if heights.shape[0] * count > _MAX_POINTS:
+    if heights.shape[0] * count > limits.MAX_CRG_POINTS:
         raise ManeuverError(f"has long sections too close together for its width of {places[-1] - places[0]:g} m")
     even, step = np.linspace(places[0], places[-1], count, retstep=True)
     if np.allclose(even, places[: len(even)] if len(even) == len(places) else math.inf):

@@ -8,11 +8,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer import limits
 from activesteer.errors import RecordingError, shown
 
 LIMIT_M: Final = 1e6
 """Largest distance of a place from 0, and largest size, on a road [m]."""
-_MAX_ELEMENTS: Final = 1_000_000
 
 
 def fail(key: str, problem: str) -> RecordingError:
@@ -31,8 +31,7 @@ def sequence(value: object, key: str) -> Sequence[Any]:
     """Return the value if it is a list, else raise."""
     if not isinstance(value, list | tuple):
         raise fail(key, f"is {shown(value)}, expected a list")
-    if len(value) > _MAX_ELEMENTS:
-        raise fail(key, f"has {len(value)} elements, at most {_MAX_ELEMENTS} are allowed")
+    limits.check_count(len(value), limits.MAX_LIST_ELEMENTS, "elements", RecordingError, file="the metadata", key=key)
     return value
 
 

@@ -22,9 +22,10 @@ from activesteer.coupling.udp import UdpLink, UdpPort
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
 from activesteer.faults import Fault, fault_table
+from activesteer.limits import MAX_EVENTS
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording
-from activesteer.recording.events import MAX_EVENTS, Event, tables_of
+from activesteer.recording.events import Event, tables_of
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint

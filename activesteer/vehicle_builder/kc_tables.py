@@ -21,10 +21,11 @@ from typing import Any, Final
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
+from activesteer import limits
 from activesteer.config import Source, read_toml
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names, shown
-from activesteer.files import MAX_NUMBER, csv_number, is_file, is_folder, read_csv
+from activesteer.files import csv_number, is_file, is_folder, read_csv
 from activesteer.rigs.kc.tables import CHANNELS, OF_THE_AXLE, TESTS
 from activesteer.units import UNIT_NAMES, alike, find_unit
 
@@ -211,8 +212,8 @@ def _numbers(head: str, values: Any, source: Source) -> Array:
         numbers = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as reason:
         raise source.fail((head,), "holds something that is no number") from reason
-    if numbers.ndim != 1 or not (np.abs(numbers) <= MAX_NUMBER).all():
-        raise source.fail((head,), f"must be a list of finite numbers up to {MAX_NUMBER:g}")
+    if numbers.ndim != 1 or not (np.abs(numbers) <= limits.MAX_NUMBER).all():
+        raise source.fail((head,), f"must be a list of finite numbers up to {limits.MAX_NUMBER:g}")
     return numbers
 
 

@@ -15,14 +15,10 @@ from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from typing import Final
 
+from activesteer import limits
 from activesteer.files import read_bytes, shown_path
 from activesteer.plugins import Kind
 
-MAX_FMU_BYTES: Final = 256_000_000
-"""Largest FMU file."""
-_MAX_UNPACKED_BYTES: Final = 1_000_000_000
-_MAX_MEMBERS: Final = 20_000
-_MAX_DESCRIPTION_BYTES: Final = 32_000_000
 _BLOCK_BYTES: Final = 1 << 20
 _DAMAGED: Final = (zipfile.BadZipFile, zlib.error, OSError, EOFError, NotImplementedError, RuntimeError)
 DESCRIPTION: Final = "modelDescription.xml"
@@ -53,8 +49,9 @@ class Archive:
             ActiveSteerError: of the kind's type: the file cannot be read, is no archive, or is hostile or too large.
         """
         self.path = path
+        self._error = kind.error
         self._fail = functools.partial(kind.fail, path.name)
-        self._data = read_bytes(path, kind.error, MAX_FMU_BYTES)
+        self._data = read_bytes(path, kind.error, limits.MAX_FMU_BYTES)
         self.key = hashlib.sha256(self._data).hexdigest()
         try:
             with zipfile.ZipFile(io.BytesIO(self._data)) as archive:
@@ -70,9 +67,8 @@ class Archive:
     def _check(self, archive: zipfile.ZipFile) -> None:
         members = archive.infolist()
         total = sum(member.file_size for member in members)
-        if len(members) > _MAX_MEMBERS or total > _MAX_UNPACKED_BYTES:
-            most = f"{_MAX_MEMBERS} files and {_MAX_UNPACKED_BYTES} bytes"
-            raise self._fail(f"unpacks to {len(members)} files and {total} bytes; at most {most} are allowed", total)
+        limits.check_count(len(members), limits.MAX_FMU_MEMBERS, "files", self._error, file=self.path.name)
+        limits.check_count(total, limits.MAX_FMU_UNPACKED_BYTES, "unpacked bytes", self._error, file=self.path.name)
         for member in members:
             name = PurePosixPath(member.filename)
             kind = stat.S_IFMT(member.external_attr >> 16)
@@ -81,8 +77,8 @@ class Archive:
                 raise self._fail(f"holds {member.filename!r}, which is outside of the FMU or no plain file")
         if DESCRIPTION not in archive.namelist():
             raise self._fail(f"{shown_path(self.path)} is not an FMU: it has no {DESCRIPTION}")
-        if archive.getinfo(DESCRIPTION).file_size > _MAX_DESCRIPTION_BYTES:
-            raise self._fail(f"its {DESCRIPTION} is longer than {_MAX_DESCRIPTION_BYTES} bytes")
+        size = archive.getinfo(DESCRIPTION).file_size
+        limits.check_count(size, limits.MAX_FMU_DESCRIPTION_BYTES, "bytes", self._error, file=DESCRIPTION)
 
     def kept(self, most_bytes: int) -> dict[str, bytes]:
         """Return what a recording keeps of the FMU: the file, or the description and the digest of a larger one."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from activesteer import limits
 from activesteer.coupling.fmu.archive import BINARIES, DESCRIPTION, Archive
 from activesteer.errors import not_installed, shown
 from activesteer.plugins import Kind
@@ -19,8 +20,6 @@ _FORMATS: Final = {
 }  # fmt: skip
 """Numeric type of FMI -> format of `struct`; Boolean and Enumeration depend on the version."""
 _HERTZ: Final = re.compile(r"k?Hz|rev.*|r/.*|rpm")
-_MAX_SIZE: Final = 1000
-"""Largest number of elements of an array."""
 
 
 class Variable(NamedTuple):
@@ -152,7 +151,7 @@ def _variable(variable: Any, description: Any) -> Variable | None:
     unit_name = variable.unit or (declared and declared.unit) or None
     base = next((unit.baseUnit for unit in description.unitDefinitions if unit.name == unit_name), None)
     return Variable(
-        variable.name, variable.valueReference, kind, form, min(size, _MAX_SIZE + 1),
+        variable.name, variable.valueReference, kind, form, min(size, limits.MAX_FMU_ELEMENTS + 1),
         _number(variable.start), _declared_unit(unit_name, base), unit_name,
         _number(variable.min, -math.inf), _number(variable.max, math.inf),
     )  # fmt: skip

@@ -12,7 +12,7 @@ from scipy.special import ndtr, ndtri
 
 from activesteer.config import Source
 from activesteer.errors import nearest_names, shown
-from activesteer.files import MAX_NUMBER
+from activesteer.limits import MAX_NUMBER
 
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """Kinds of factors; a factor's table has exactly one of these keys."""

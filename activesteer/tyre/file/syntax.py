@@ -7,10 +7,10 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from activesteer import limits
 from activesteer.errors import TyreFileError
-from activesteer.files import MAX_NUMBER, read_bytes
+from activesteer.files import read_bytes
 
-MAX_BYTES = 4_000_000
 """Size of the largest file that is read; real ones have some tens of kilobytes."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d{1,4})?\Z")
@@ -58,7 +58,7 @@ def read_text(path: Path) -> str:
     Raises:
         TyreFileError: the file cannot be read, or is not a text of the size of a tyre file.
     """
-    raw = read_bytes(path, TyreFileError, MAX_BYTES)
+    raw = read_bytes(path, TyreFileError, limits.MAX_TYRE_BYTES)
     return raw.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
 
 
@@ -98,7 +98,7 @@ def parse(text: str, source: str) -> Syntax:
 
     Raises:
         TyreFileError: a line is neither a section, `KEY = value`, a row of numbers, a `{heading}` nor a comment; or a
-            value is above `MAX_NUMBER`.
+            value is not finite or above `limits.MAX_NUMBER`.
     """
     section = ""
     entries: list[Entry] = []
@@ -120,11 +120,8 @@ def parse(text: str, source: str) -> Syntax:
                 what = repr(key[:60]) if entries else "this"
                 raise TyreFileError(f"{what} is not a key, expected KEY = value", file=source, line=count)
             value = _value(rest)
-            if isinstance(value, float) and abs(value) > MAX_NUMBER:
-                raise TyreFileError(
-                    f"is {value:g}; the largest number allowed in a file is {MAX_NUMBER:g}", file=source, line=count,
-                    key=key, value=value, allowed=MAX_NUMBER,
-                )  # fmt: skip
+            if isinstance(value, float):
+                limits.check_number(value, TyreFileError, file=source, line=count, key=key)
             entries.append(Entry(section, key.upper(), value, count))
             continue
         row = [number(word) for word in line.replace(",", " ").split()]

@@ -11,7 +11,8 @@ import numpy as np
 
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names, shown
-from activesteer.files import MAX_CSV_BYTES, is_file, is_folder, read_text, shown_path
+from activesteer.files import is_file, is_folder, read_text, shown_path
+from activesteer.limits import MAX_CSV_BYTES
 from activesteer.resources import models_dir
 
 Table = dict[str, Array]

@@ -132,22 +132,12 @@ def test_too_many_rows_are_refused_before_one_is_read(tmp_path, monkeypatch, nam
     path = written_by(name, tmp_path / f"a.{name}")
     read = csv_columns if name == "csv" else foreign_files.READERS[f".{name}"]
     assert len(read(path)) in (1, 2)
-    monkeypatch.setattr("activesteer.measured.column.MAX_ROWS", len(TIME_S) - 1)
+    monkeypatch.setattr("activesteer.limits.MAX_ROWS", len(TIME_S) - 1)
     for reader in ("pyarrow.csv.read_csv", "scipy.io.loadmat", "pyarrow.parquet.ParquetFile.read"):
         monkeypatch.setattr(reader, lambda *_, **__: pytest.fail("read"))
     rows = len(TIME_S) + (name == "csv")  # the line of names counts
     with raises(RecordingError, value=rows, allowed=len(TIME_S) - 1):
         read(path)
-
-
-def test_a_matlab_file_that_grows_beyond_the_limit_is_refused_before_it_is_loaded(tmp_path, monkeypatch):
-    path = tmp_path / "a.mat"
-    savemat(path, {"run": {"x": np.zeros(1_000_000)}}, do_compression=True)
-    assert path.stat().st_size < 10_000
-    monkeypatch.setattr("activesteer.measured.foreign_files.MAX_BYTES", 4_000_000)
-    monkeypatch.setattr("scipy.io.loadmat", lambda *_, **__: pytest.fail("loaded"))
-    with raises(RecordingError, allowed=4_000_000):
-        foreign_files.READERS[".mat"](path)
 
 
 def test_a_parquet_column_of_texts_is_not_read(tmp_path, monkeypatch):

@@ -220,9 +220,9 @@ def test_an_archive_cannot_write_outside_of_its_folder_or_fill_the_disk(fmus, tm
         fmu = changed(fmus / "yaw_damper_fmi2.fmu", tmp_path / "x.fmu", added=[(info, "/etc")])
         with pytest.raises(ControllerError, match="outside of the FMU"):
             find_controller(fmu)
-    monkeypatch.setattr("activesteer.coupling.fmu.archive._MAX_UNPACKED_BYTES", 10_000)
+    monkeypatch.setattr("activesteer.limits.MAX_FMU_UNPACKED_BYTES", 10_000)
     fmu = changed(fmus / "yaw_damper_fmi2.fmu", tmp_path / "x.fmu", added=[("resources/zeros", bytes(100_000))])
-    with pytest.raises(ControllerError, match="unpacks to"):
+    with pytest.raises(ControllerError, match="unpacked bytes, at most 10000"):
         find_controller(fmu)
     (tmp_path / "x.fmu").write_bytes((fmus / "yaw_damper_fmi2.fmu").read_bytes()[:-100])
     with pytest.raises(ControllerError, match="is not an FMU"):

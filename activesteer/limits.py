@@ -1,0 +1,133 @@
+"""Limits of files from outside: size, count, depth and numbers; docs/limits.md says what they guarantee.
+
+Every reader checks with these limits and functions before it uses what a file holds, so that a small file can fill
+neither memory nor time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from activesteer.errors import ActiveSteerError, shown
+
+MAX_NUMBER: Final = 1e12
+"""Largest absolute value of a number in a file, in any unit. A larger number is meaningless for a car and may
+overflow."""
+
+# Text files and folders of them.
+MAX_TEXT_BYTES: Final = 2_000_000
+"""Default limit of a text file; files of the package have about 20 kB."""
+MAX_CSV_BYTES: Final = 10_000_000
+"""Limit of a CSV; an hour of samples every 10 ms has 8 MB."""
+MAX_TOML_DEPTH: Final = 32
+MAX_TOML_LETTERS: Final = 1000
+"""Longest text of a TOML file."""
+MAX_TYRE_BYTES: Final = 4_000_000
+
+# OpenCRG.
+MAX_CRG_BYTES: Final = 20_000_000
+MAX_CRG_POINTS: Final = 4_000_000
+MAX_CRG_COLUMNS: Final = 10_000
+MAX_CRG_FILES: Final = 4
+"""Files that refer to each other."""
+
+# FMU.
+MAX_FMU_BYTES: Final = 256_000_000
+MAX_FMU_UNPACKED_BYTES: Final = 1_000_000_000
+MAX_FMU_MEMBERS: Final = 20_000
+MAX_FMU_DESCRIPTION_BYTES: Final = 32_000_000
+MAX_FMU_ELEMENTS: Final = 1000
+"""Largest number of elements of an array."""
+
+# Measured data: CSV, MDF, Parquet, MATLAB; all but CSV are read by a child process of limited memory.
+MAX_MEASURED_BYTES: Final = 2**30
+MAX_READER_BYTES: Final = 2**32
+"""Memory of the child: a file of the largest size, and its numbers in several copies."""
+MAX_READER_S: Final = 120.0
+"""Time for opening a file and for reading a column; a column of the largest length takes some seconds."""
+
+# Recordings.
+MAX_ROWS: Final = 20_000_000
+"""Largest number of rows: five and a half hours at 1 ms, 160 MB in memory per channel."""
+MAX_CHANNELS: Final = 10_000
+"""Largest number of channels; a car has about 150."""
+MAX_FILE_BYTES: Final = 2**35
+"""Largest size of a file; 20 million rows have about 15 GB. A sparse file of any size could take forever to read."""
+MAX_CHUNK_BYTES: Final = 2**26
+"""Largest size of a chunk, compressed or not; one second of a car is 1 MB."""
+MAX_EXPANSION: Final = 200
+"""Largest expansion of a chunk by decompression. The writer leaves a chunk uncompressed if it would exceed this ratio.
+Driving gives 2 to 4, standing still about 50."""
+MAX_OTHER_BYTES: Final = 2**28
+"""Largest size of all attachments, schemas and metadata together; models with meshes have about 50 MB."""
+MAX_OTHER_RECORDS: Final = 20_000
+"""Largest number of attachments, schemas, topics and metadata records together."""
+MAX_FOREIGN_MESSAGES: Final = 100_000
+"""Largest number of messages in topics of other tools in a chunk."""
+MAX_BODIES: Final = 1000
+"""Largest number of bodies with poses; a car has about 30."""
+MAX_PARTS: Final = 100_000
+"""Largest number of parts of a scene; a car has about 60."""
+MAX_EVENTS: Final = 10_000
+MAX_EVENT_LETTERS: Final = 2000
+MAX_DESCRIPTION_LETTERS: Final = 1000
+"""Longest description of a channel."""
+MAX_NAME_LETTERS: Final = 5000
+"""Longest name of an entry or a controller; a controller name contains a path of up to 4096 letters."""
+MAX_METADATA_LETTERS: Final = 100_000
+MAX_METADATA_DEPTH: Final = 16
+MAX_METADATA_ENTRIES: Final = 20_000
+"""Largest number of named values in all tables of the metadata; a run has about 150."""
+MAX_METADATA_ELEMENTS: Final = 5_000_000
+"""Largest number of values in all lists of the metadata: a path with a point per centimetre for 20 km."""
+MAX_LIST_ELEMENTS: Final = 1_000_000
+"""Largest number of values in one list of a road or course."""
+
+
+def check_count(count: int, most: int, what: str, error: type[ActiveSteerError], **place: Any) -> None:
+    """Refuse more than `most`.
+
+    Args:
+        count: Number of things, or size.
+        most: What is allowed.
+        what: The things, in the plural.
+        error: Class of the error.
+        place: `file`, `line` and `key` of the error.
+    """
+    if count > most:
+        raise error(f"has {count} {what}, at most {most} are allowed", value=count, allowed=most, **place)
+
+
+def check_number(value: float, error: type[ActiveSteerError], *, text: Any = None, **place: Any) -> None:
+    """Refuse a number that is not finite or above `MAX_NUMBER`.
+
+    Args:
+        value: The number.
+        error: Class of the error.
+        text: The number as the file has it.
+        place: `file`, `line` and `key` of the error.
+    """
+    given = value if text is None else text
+    if not math.isfinite(value):
+        raise error(f"{shown(given)} is not a finite number", value=given, **place)
+    if abs(value) > MAX_NUMBER:
+        raise error(
+            f"is {value:g}; the largest number allowed in a file is {MAX_NUMBER:g}",
+            value=given, allowed=MAX_NUMBER, **place,
+        )  # fmt: skip
+
+
+def too_large(values: Any, *, infinite: bool = False) -> Any:
+    """Return which values are above `MAX_NUMBER`; nan is a missing value, infinity may be that of a diverged run."""
+    size = np.abs(values)
+    return (size > MAX_NUMBER) & (size < np.inf) if infinite else size > MAX_NUMBER
+
+
+def check_numbers(values: Any, error: type[ActiveSteerError], *, infinite: bool = False, **place: Any) -> None:
+    """Refuse values above `MAX_NUMBER`; see `too_large`."""
+    wrong = too_large(values, infinite=infinite)
+    if wrong.any():
+        check_number(float(np.asarray(values)[wrong].flat[0]), error, **place)
