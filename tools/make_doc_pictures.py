@@ -26,7 +26,6 @@ from activesteer.analysis.figures import BY_KIND, style, time_histories, time_pa
 from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.analysis.linear_plots import driver_loops_figure
-from activesteer.display_units import DisplayUnit, Quantity, quantity_of
 from activesteer.plotting import Heat, Picture, draw, new_figure
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
@@ -40,6 +39,7 @@ from activesteer.studies.paper.envelope import envelope
 from activesteer.studies.paper.envelope_figure import envelope_figure
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
+from activesteer.units import DisplayUnit, Quantity, quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

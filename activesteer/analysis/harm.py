@@ -16,8 +16,8 @@ from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from activesteer.analysis.loss_of_control import Metrics, has_spun
-from activesteer.display_units import DisplayUnit
 from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP
+from activesteer.units import DisplayUnit, display_unit
 
 FREE_SIDE_M: Final = 0.6
 """Path error that is no harm, where no lanes limit the path [m]: a car 1.8 m wide in a lane of 3.0 m. Chosen."""
@@ -103,8 +103,8 @@ def _lost(metrics: Metrics) -> float:
     return float(has_spun(metrics) or undefined or (_of(metrics, CONES_MISSED) or 0.0) != 0.0)
 
 
-_M, _DEG, _COUNT = DisplayUnit("m", 1.0), DisplayUnit("deg", 1.0 / _DEGREE), DisplayUnit("", 1.0)
-_DEGPS: Final = DisplayUnit("deg/s", 1.0 / _DEGREE)
+_M, _DEG, _DEGPS = display_unit("path_m"), display_unit("heading_rad"), display_unit("yaw_rate_radps")
+_COUNT: Final = DisplayUnit("", 1.0)
 MEASURES: Final[dict[str, Measure]] = {
     "lane": Measure(
         "largest distance of the body beyond its lane", _M, 0.05, lambda m: _beyond(_of(m, LANE_OVERSTEP), 0.0)

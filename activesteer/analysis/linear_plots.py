@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, Array, run_looks
-from activesteer.display_units import quantity_of
 from activesteer.errors import ParameterError
 from activesteer.plotting import Curve, Panel, Picture, draw, save
+from activesteer.units import quantity_of
 
 if TYPE_CHECKING:
     import control

@@ -4,28 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 import typing
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 from activesteer.config.source import Source
-from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ActiveSteerError, nearest_names
-
-_EDGE_UNITS: Final = {
-    "_deg": ("_rad", math.pi / 180.0),
-    "_degps": ("_radps", math.pi / 180.0),
-    "_kmh": ("_mps", 1.0 / 3.6),
-    "_g": ("_mps2", GRAVITY_MPS2),
-}
-"""Suffix of a key in a file -> suffix of the field that it fills, and factor."""
+from activesteer.units import EDGE_UNITS
 
 
 def spellings(name: str) -> list[str]:
     """Return the keys that fill a field: its name, and the name in a display unit; `class` fills `class_`."""
     name = name.removesuffix("_")
-    edges = [name[: -len(si)] + edge for edge, (si, _) in _EDGE_UNITS.items() if name.endswith(si)]
+    edges = [name[: -len(si)] + edge for edge, (si, _) in EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]
 
 
@@ -40,7 +31,7 @@ def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, flo
     for name in (key, f"{key}_"):
         if name in fields:
             return name, 1.0
-    for edge, (si, factor) in _EDGE_UNITS.items():
+    for edge, (si, factor) in EDGE_UNITS.items():
         if key.endswith(edge) and key[: -len(edge)] + si in fields:
             return key[: -len(edge)] + si, factor
     return None, 1.0

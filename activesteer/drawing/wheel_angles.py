@@ -12,9 +12,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from activesteer.conventions import CORNERS, Array
-from activesteer.display_units import quantity_of
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint
+from activesteer.units import quantity_of
 
 CHANNELS: Final = tuple(f"{corner}_steer_rad" for corner in CORNERS)
 RADIUS_M: Final = 1.2

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
 from activesteer.analysis.series import rms
 from activesteer.conventions import Array
-from activesteer.display_units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.measured.alignment import time_shift
 from activesteer.measured.motion import at_sensor
 from activesteer.measured.noise import FILTERS, allowance, filter_table, smooth
 from activesteer.recording import Recording
+from activesteer.units import quantity_of
 
 STANDARDS: Final = {
     "iso19364": "ISO 19364: cross plots over the lateral acceleration",

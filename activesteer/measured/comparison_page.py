@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Final
 
 from activesteer.conventions import RUN_COLOURS, Array
-from activesteer.display_units import quantity_of
 from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
 from activesteer.pages import Page, Section, Table, failed, passed
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.units import quantity_of
 
 _EDGE: Final = "#9bbbd4"
 

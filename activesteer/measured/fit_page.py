@@ -10,12 +10,12 @@ from markupsafe import Markup
 
 from activesteer.config import toml_value
 from activesteer.conventions import RUN_COLOURS
-from activesteer.display_units import parameter_title, quantity_of
 from activesteer.errors import StudyError
 from activesteer.files import json_text, make_folder, write_text
 from activesteer.measured.fit_result import Compared, Fit, rests_on
 from activesteer.pages import Page, Section, Table, render_page
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.units import parameter_title, quantity_of
 
 
 def write_fit(found: Fit, name: str, folder: Path) -> list[Path]:

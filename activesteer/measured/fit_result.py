@@ -7,8 +7,8 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.series import rms
 from activesteer.conventions import Array
-from activesteer.display_units import quantity_of
 from activesteer.measured.intervals import LEVEL
+from activesteer.units import quantity_of
 
 _ALIKE: Final = 0.95
 """Correlation of two parameters above which a note is given."""

@@ -9,7 +9,6 @@ import numpy as np
 from markupsafe import Markup
 
 from activesteer.conventions import RUN_COLOURS
-from activesteer.display_units import quantity_of, typeset
 from activesteer.measured.circle import CircleValidation
 from activesteer.measured.comparison import words
 from activesteer.measured.comparison_page import picture
@@ -19,6 +18,7 @@ from activesteer.measured.folder import Band, MeasuredValidation, Part
 from activesteer.measured.folder_file import STEERING
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.units import quantity_of, typeset
 
 _HEAD: Final = ["run", "window", "quantity", "rms of the residual", "tolerance", "share inside", ""]
 _BAND_COLOUR: Final = "#b3a369"

@@ -19,13 +19,12 @@ from activesteer.measured.map_file import ChannelMap, MeasurementMap, read_map
 from activesteer.measured.motion import moved_car, with_motion
 from activesteer.measured.names import (
     TURNED_IN_SAE,
-    UNITS,
     Known,
     before_bracket,
     is_time,
     known_column,
-    si_of,
     split_unit,
+    written_unit,
 )
 from activesteer.measured.plausibility import suspicions
 from activesteer.measured.resampling import Samples, gaps, resampled, samples
@@ -35,12 +34,9 @@ from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.signals import Channel
 from activesteer.simulation.appearance import scene_of
+from activesteer.units import UNIT_NAMES, alike, find_unit, unit_of
 from activesteer.version import __version__
 
-_OWN_UNITS: Final = {
-    "_radps": "rad/s", "_rad": "rad", "_mps2": "m/s2", "_mps": "m/s", "_Nm": "Nm", "_N": "N", "_Pa": "Pa", "_m": "m",
-    "_s": "s",
-}  # fmt: skip
 _MOST_REPEATED: Final = 5
 """Number of repeated column names that are listed."""
 
@@ -202,7 +198,8 @@ def _by_name(files: _Files, table: Mapping[str, Channel], notes: list[str]) -> d
         known = known_column(column.name, names, channels)
         if known is None:
             if (base := before_bracket(column.name)) and known_column(base, names, channels) is not None:
-                notes.append(f"{shown(column.name)} is left out: its unit is unknown; known are {', '.join(UNITS)}")
+                known_units = ", ".join(UNIT_NAMES)
+                notes.append(f"{shown(column.name)} is left out: its unit is unknown; known are {known_units}")
             continue
         if known.channel in sources:
             first = sources[known.channel].column.name
@@ -230,7 +227,7 @@ def _by_name(files: _Files, table: Mapping[str, Channel], notes: list[str]) -> d
 def _si_unit(name: str, table: Mapping[str, Channel]) -> str:
     if name in table:
         return table[name].unit
-    return next((unit for ending, unit in _OWN_UNITS.items() if name.endswith(ending)), "")
+    return unit_of(name)
 
 
 def _own_time(source: _Source) -> Array | None:
@@ -261,10 +258,10 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
             raise RecordingError(f"{what}: {words}; name it in a map: time = NAME", file=path.name)
         column = times[0]
     unit = chosen.time_unit or column.unit or known_time_unit(column.name)
-    found = si_of(unit)
-    if found is None or found[0] != "s":
+    found = written_unit(unit)
+    if found is None or not alike(found, find_unit("s")):
         raise RecordingError(f"the time has the unit {shown(unit)}; known are s, ms, us", file=path.name, value=unit)
-    return _plausible(column.read()[0] * found[1], "s", column.name, path)
+    return _plausible(column.read()[0] * found.factor, "s", column.name, path)
 
 
 def known_time_unit(name: str) -> str:
@@ -276,14 +273,14 @@ def known_time_unit(name: str) -> str:
 def _signal(name: str, wanted: str, source: _Source, shared: Array | None, chosen: MeasurementMap) -> Samples:
     """Return the samples of a channel, in SI units and with the signs of ISO 8855."""
     column, known, given, path = source
-    found = si_of(known.unit)
-    if found is None or found[0] != wanted:
+    found = written_unit(known.unit)
+    if found is None or not alike(found, find_unit(wanted)):
         raise RecordingError(
             f"{name} is in {wanted or 'pure numbers'}, and {shown(column.name)} in {shown(known.unit)}; "
-            f"known units are {', '.join(UNITS)}",
+            f"known units are {', '.join(UNIT_NAMES)}",
             file=path.name,
             value=known.unit,
-            allowed=UNITS,
+            allowed=UNIT_NAMES,
         )
     values, own = column.read()
     time_s = own if own is not None else shared
@@ -307,7 +304,7 @@ def _signal(name: str, wanted: str, source: _Source, shared: Array | None, chose
                     f"{column.name} starts at {time_s[0]:g} s, after zero_until_s", key=f"channels.{name}.zero_until_s"
                 )
             values = values - values[early].mean()
-    return Samples(time_s, _plausible(values * (known.sign * found[1]), wanted, column.name, path))
+    return Samples(time_s, _plausible(values * (known.sign * found.factor), wanted, column.name, path))
 
 
 def _plausible(values: Array, unit: str, column: str, path: Path) -> Array:

@@ -2,32 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection
 from typing import Final, NamedTuple
 
 from activesteer.config import field_in_unit
-from activesteer.conventions import GRAVITY_MPS2
-
-_DEG: Final = math.radians(1.0)
-_UNITS: Final = {
-    "rad": ("rad", 1.0), "deg": ("rad", _DEG), "°": ("rad", _DEG), "degree": ("rad", _DEG), "degrees": ("rad", _DEG),
-    "grad": ("rad", _DEG), "grad/s": ("rad/s", _DEG),
-    "deg/sec": ("rad/s", _DEG), "rad/s": ("rad/s", 1.0), "radps": ("rad/s", 1.0), "deg/s": ("rad/s", _DEG),
-    "°/s": ("rad/s", _DEG), "degps": ("rad/s", _DEG), "dps": ("rad/s", _DEG), "rpm": ("rad/s", math.pi / 30.0),
-    "1/min": ("rad/s", math.pi / 30.0),
-    "u/min": ("rad/s", math.pi / 30.0), "m/s/s": ("m/s2", 1.0),
-    "m/s": ("m/s", 1.0), "mps": ("m/s", 1.0), "km/h": ("m/s", 1.0 / 3.6),
-    "kmh": ("m/s", 1.0 / 3.6), "kph": ("m/s", 1.0 / 3.6), "mph": ("m/s", 0.44704), "m/s2": ("m/s2", 1.0),
-    "m/s^2": ("m/s2", 1.0), "m/s²": ("m/s2", 1.0), "mps2": ("m/s2", 1.0), "g": ("m/s2", GRAVITY_MPS2),
-    "m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6),
-    "n": ("N", 1.0), "kn": ("N", 1e3), "nm": ("Nm", 1.0), "n m": ("Nm", 1.0), "pa": ("Pa", 1.0), "bar": ("Pa", 1e5),
-    "mpa": ("Pa", 1e6), "%": ("", 0.01), "": ("", 1.0), "-": ("", 1.0), "1": ("", 1.0),
-}  # fmt: skip
-"""Unit in a file, in lower case -> SI unit and factor. `grad` is the German degree."""
-UNITS: Final = tuple(unit for unit in _UNITS if unit not in ("", "-", "1"))
-"""Known units."""
+from activesteer.units import Unit, find_unit
 
 TIME_WORDS: Final = frozenset({"time", "times", "t", "zeit", "timestamp", "timestamps", "tstamp", "tstart"})
 
@@ -102,16 +82,15 @@ _EXPORTERS: Final[tuple[tuple[str, dict[str, Known]], ...]] = (
 """Name that identifies an exporter, and the names that it writes."""
 
 
-def si_of(unit: str) -> tuple[str, float] | None:
-    """Return the SI unit of a unit in a file, and the factor to it; None if the unit is unknown."""
-    text = unit.strip().strip("[]()").strip()
-    return _UNITS.get(text.lower().replace("**", "^"))
+def written_unit(unit: str) -> Unit | None:
+    """Return a unit as a file writes it; None if it is unknown."""
+    return find_unit(unit.strip().strip("[]()").strip().replace("**", "^"), any_case=True)
 
 
 def split_unit(name: str) -> tuple[str, str]:
     """Split a name and the unit in brackets behind it."""
     found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
-    return (found[1], found[2]) if found and si_of(found[2]) else (name, "")
+    return (found[1], found[2]) if found and written_unit(found[2]) else (name, "")
 
 
 def before_bracket(name: str) -> str:

@@ -9,14 +9,18 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.conventions import Array
+from activesteer.units import known_unit
 
 _ALIKE: Final = 0.7
 """Correlation above which two signals belong to the same motion."""
 _MISTAKES: Final = {
-    "yaw_rate_radps": (math.degrees(1.0), "deg/s", "rad/s"),
-    "speed_mps": (3.6, "km/h", "m/s"),
-    "ay_mps2": (1.0 / GRAVITY_MPS2, "g", "m/s2"),
+    name: (known_unit(right).factor / known_unit(wrong).factor, wrong, right)
+    for name, wrong, right in (
+        ("yaw_rate_radps", "deg/s", "rad/s"),
+        ("speed_mps", "km/h", "m/s"),
+        ("ay_mps2", "g", "m/s2"),
+    )
 }
 """Channel -> factor of the error if the first unit was taken for the second."""
 _NEAR: Final = math.log(1.5)

@@ -10,10 +10,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
-from activesteer.display_units import parameter_title, typeset
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, write_text
 from activesteer.pages.model import Page, Section, Table, Text, failed, passed
+from activesteer.units import parameter_title, typeset
 from activesteer.version import __version__
 
 

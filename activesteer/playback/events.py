@@ -9,10 +9,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from activesteer.display_units import display_unit
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 from activesteer.recording.events import events_of
+from activesteer.units import display_unit
 
 _LIMIT: Final = "_saturated"
 _SHORTEST_S: Final = 0.05

@@ -12,10 +12,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from activesteer.conventions import CORNERS
-from activesteer.display_units import quantity_of
 from activesteer.drawing.colours import bytes_of
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
+from activesteer.units import quantity_of
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
 """Number of plots on a page -> number of tick labels that fit on one axis in a window of 1280 x 800."""

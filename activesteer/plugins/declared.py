@@ -10,8 +10,8 @@ from collections.abc import Collection, Mapping
 from typing import Any, Final, NamedTuple
 
 from activesteer.config import Range, Source, convert, field_in_unit, spellings
-from activesteer.display_units import unit_of
 from activesteer.errors import nearest_names, shown
+from activesteer.units import unit_of
 
 SETUP: Final = "setup"
 """Name of the argument that gets the properties of the car."""

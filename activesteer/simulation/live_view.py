@@ -11,13 +11,13 @@ from contextlib import AbstractContextManager
 from typing import Any, Final, NamedTuple, Protocol
 
 from activesteer.conventions import run_looks
-from activesteer.display_units import quantity_of
 from activesteer.drawing.direction_of_motion import SLOWEST_MPS
 from activesteer.errors import PlaybackError
 from activesteer.maneuver import Maneuver
 from activesteer.road.footprint import Footprint
 from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.units import quantity_of
 from activesteer.video import Car, RenderScene
 from activesteer.video.cameras import CUTAWAY
 from activesteer.video.gauges import MIN_SPEED_MPS

@@ -8,12 +8,12 @@ from typing import Final
 from markupsafe import Markup
 
 from activesteer.conventions import run_looks
-from activesteer.display_units import parameter_title, typeset
 from activesteer.drawing.colours import bytes_of
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Panel, Picture, as_svg, draw
 from activesteer.standards.examination import Examination
 from activesteer.standards.standard import Findings
+from activesteer.units import parameter_title, typeset
 
 _WIDE, _THIN = 3.6, 1.0
 """Widths of the first and of the second curve of a controller [pt]; the two sides of a car may coincide."""

@@ -10,13 +10,13 @@ import numpy as np
 
 from activesteer.analysis.hysteresis import loop, slope_at_zero
 from activesteer.conventions import CURVE_STEP_S, Array
-from activesteer.display_units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import axis_label, cell
 from activesteer.standards.standard import Findings, Ground, NoResult, Run, Standard
 from activesteer.standards.steering_angle import steering_wheel_at
+from activesteer.units import quantity_of
 
 SPEED_KMH: Final = 100.0
 """Speed [km/h]."""

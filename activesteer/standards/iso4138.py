@@ -9,12 +9,12 @@ import numpy as np
 
 from activesteer.analysis.handling import CarGeometry, evaluate
 from activesteer.conventions import Array
-from activesteer.display_units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.metric_table import metric
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import axis_label, metrics_table
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
+from activesteer.units import quantity_of
 
 RADIUS_M: Final = 100.0
 """Radius of the first method [m]."""

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from activesteer.display_units import quantity_of
 from activesteer.metric_table import metric
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel
+from activesteer.units import quantity_of
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:

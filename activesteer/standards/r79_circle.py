@@ -8,13 +8,13 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.display_units import display_unit
 from activesteer.errors import SimulationDiverged
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
 from activesteer.studies.paper.fault_situations import FIGURES
+from activesteer.units import display_unit
 
 
 class Effort(NamedTuple):

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 
 from activesteer.conventions import CURVE_STEP_S, Array
-from activesteer.display_units import quantity_of
 from activesteer.errors import ManeuverError, RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Picture
 from activesteer.resources import DEFAULT_DRIVER
+from activesteer.units import quantity_of
 
 if TYPE_CHECKING:
     from activesteer.scenario import FileOrTable, Scenario

@@ -11,9 +11,9 @@ import numpy as np
 from numba import types
 
 from activesteer.compilation import compiled_call, inlined
-from activesteer.display_units import ESTIMATED
 from activesteer.native_messages import native_type, store_numbers
 from activesteer.signals import ActuatorCommand, Channel, DriverCommand, Estimate, Number, numbers_of
+from activesteer.units import ESTIMATED
 
 
 def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:

@@ -10,6 +10,7 @@ from activesteer.brakes.parameters import Brakes
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.units import known_unit
 from activesteer.vehicle.electric_drive import Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind
@@ -18,7 +19,7 @@ from activesteer.vehicle_builder.kc_fit import MeasuredAxle, measured_axle
 from activesteer.vehicle_builder.kc_tables import KcTables
 from activesteer.vehicle_builder.levers import mount
 from activesteer.vehicle_builder.steering_geometry import rack_limit_m, rack_sign
-from activesteer.vehicle_builder.table import UNITS, AxleTable, CarTable, LinkTable
+from activesteer.vehicle_builder.table import AxleTable, CarTable, LinkTable
 from activesteer.vehicle_builder.top_mounts import top_mount
 
 DEFAULT_TYRE: Final = "compact_205_55R16.tir"
@@ -321,7 +322,7 @@ def check_origin(car: Car, given: CarTable) -> None:
     """
     centre, radius = car.front.wheel_centre_m, car.front.radius_m
     if abs(centre[0]) > 0.05 or not 0.75 * radius < centre[2] < 1.15 * radius:
-        off = np.array([centre[0], 0.0, centre[2] - 0.94 * radius]) / UNITS[given.units]
+        off = np.array([centre[0], 0.0, centre[2] - 0.94 * radius]) / known_unit(given.units).factor
         say = ", ".join(f"{value:.4g}" for value in np.array(given.origin) + off)
         raise ParameterError(
             f"is at x {centre[0]:.3f} m, {centre[2]:.3f} m above the origin; vehicle coordinates begin on the road "

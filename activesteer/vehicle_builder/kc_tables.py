@@ -25,7 +25,8 @@ from activesteer.config import Source, read_toml
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.files import MAX_NUMBER, csv_number, is_file, is_folder, read_csv
-from activesteer.rigs.kc.tables import CHANNELS, OF_THE_AXLE, TESTS, UNITS
+from activesteer.rigs.kc.tables import CHANNELS, OF_THE_AXLE, TESTS
+from activesteer.units import UNIT_NAMES, alike, find_unit
 
 _HEAD: Final = re.compile(r"(?P<name>[\w ]+?)\s*\[\s*(?P<unit>[\w/]+)\s*\]")
 _SIDES: Final = ("left", "right")
@@ -228,12 +229,13 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
     if bare == channel and bare not in OF_THE_AXLE:
         raise ParameterError(f"which wheel? write left_{bare} or right_{bare}", file=file.name, key=head)
     unit, _ = CHANNELS[bare]
-    if UNITS.get(match["unit"], ("", 0.0))[0] != unit:
-        known = [name for name, (si, _) in UNITS.items() if si == unit]
+    found = find_unit("arcmin" if match["unit"] == "min" else match["unit"])
+    if found is None or not alike(found, find_unit(unit)):
+        known = [name for name in UNIT_NAMES if alike(find_unit(name), find_unit(unit))]
         raise ParameterError(
             f"{match['unit']!r} is no unit of {bare}; known are {', '.join(known)}", file=file.name, key=head
         )
-    return channel, UNITS[match["unit"]][1]
+    return channel, found.factor
 
 
 def _complete_rack(columns: dict[str, Array], file: Path) -> float | None:

@@ -16,6 +16,7 @@ from activesteer.config import Range, Source, build, read_toml
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import read_csv
 from activesteer.sensors.parameters import Sensors
+from activesteer.units import known_unit
 from activesteer.vehicle.electric_drive import Battery, Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle.rear_actuator import RearActuator
@@ -26,8 +27,8 @@ Positive = Annotated[float, Range(1e-9)]
 NotNegative = Annotated[float, Range(0.0)]
 Point = tuple[float, ...]
 
-UNITS: Final = {"m": 1.0, "mm": 1e-3}
-"""Units of the points, and their factors to metres."""
+UNITS: Final = ("m", "mm")
+"""Units of the points."""
 
 
 @dataclass(frozen=True)
@@ -300,7 +301,7 @@ def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = N
 
 def in_vehicle_axes(table: CarTable) -> CarTable:
     """Return the table with all points in metres and vehicle coordinates, origin on the road below the front axle."""
-    factor = UNITS[table.units]
+    factor = known_unit(table.units).factor
 
     def moved(point: Point) -> Point:
         return tuple(factor * (value - origin) for value, origin in zip(point, table.origin, strict=True))

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from activesteer.display_units import quantity_of
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.colours import bytes_of
 from activesteer.recording import Recording
 from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.units import quantity_of
 from activesteer.video.lettering import GREY, LEGIBLE, PANEL, WHITE, Colour, font, text_scale, write
 
 _YELLOW: Final = (255, 205, 70, 255)

@@ -13,9 +13,9 @@ from activesteer.analysis.figures import style, time_panels
 from activesteer.analysis.figures.style import DESIRED, LATERAL, ROLL, SIDESLIP, YAW_RATE, DrawnRun
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RUN_COLOURS, RUN_DASHES, Array, RunLook
-from activesteer.display_units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure, save
+from activesteer.units import quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

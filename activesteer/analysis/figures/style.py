@@ -17,9 +17,9 @@ from activesteer.analysis.loss_of_control import LOST_SIDESLIP_RAD
 from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RunLook, run_looks
-from activesteer.display_units import Quantity, quantity_of
 from activesteer.errors import ParameterError
 from activesteer.plotting import plain_axis
+from activesteer.units import Quantity, quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -24,8 +24,8 @@ from activesteer.analysis.figures.style import (
     present,
 )
 from activesteer.analysis.source import RecordingLike
-from activesteer.display_units import Quantity
 from activesteer.plotting import new_figure
+from activesteer.units import Quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

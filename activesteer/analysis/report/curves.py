@@ -16,11 +16,11 @@ from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS, Array
-from activesteer.display_units import ESTIMATED, MEASURED, Quantity, quantity_of
 from activesteer.drawing import wheel_angles
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M, Course
+from activesteer.units import ESTIMATED, MEASURED, Quantity, quantity_of
 
 RATE_HZ: Final = 200.0
 """Most samples of a signal per second; the car's own motion ends below 20 Hz."""

@@ -6,8 +6,8 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from activesteer.display_units import display_unit, typeset
 from activesteer.recording import Recording
+from activesteer.units import display_unit, typeset
 
 
 class Row(NamedTuple):

@@ -24,13 +24,13 @@ from activesteer.analysis.report.tables import (
     verdict_counts,
 )
 from activesteer.analysis.tables import notes
-from activesteer.display_units import typeset
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.pages import render
 from activesteer.recording import Recording
 from activesteer.recording.events import events_of
 from activesteer.theory.proportions import percent
+from activesteer.units import typeset
 
 TITLE: Final = "activesteer report"
 _VERDICT_CLASS: Final = {

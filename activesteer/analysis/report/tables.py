@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
 from activesteer.analysis.loss_of_control import LOST, shown
 from activesteer.analysis.report.groups import Group, Run, entry
-from activesteer.display_units import parameter_label, typeset
 from activesteer.metric_table import recorded_metric
+from activesteer.units import parameter_label, typeset
 
 
 class Cell(NamedTuple):

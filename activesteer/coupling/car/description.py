@@ -8,15 +8,9 @@ from typing import Final
 from xml.sax.saxutils import quoteattr
 
 from activesteer.coupling.car.variables import INPUT, OUTPUT, PARAMETER, Variable
+from activesteer.units import find_unit
 from activesteer.version import __version__
 
-_BASES: Final = {
-    "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "m/s2": {"m": 1, "s": -2}, "rad": {"rad": 1}, "rad/s": {"rad": 1, "s": -1},
-    "rad/s2": {"rad": 1, "s": -2}, "N": {"kg": 1, "m": 1, "s": -2}, "Nm": {"kg": 1, "m": 2, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2}, "kg": {"kg": 1}, "s": {"s": 1}, "W": {"kg": 1, "m": 2, "s": -3},
-    "J": {"kg": 1, "m": 2, "s": -2}, "1/m": {"m": -1},
-}  # fmt: skip
-"""Unit -> exponents of its base units."""
 _ABOUT: Final = (
     "Multibody car in MuJoCo; SI and radians; axes and signs of ISO 8855: x forward, y left, z up, left positive"
 )
@@ -67,8 +61,10 @@ def model_description(
     )
 
 
-def _base(unit: str) -> str:
-    exponents = " ".join(f"{base}='{exponent}'" for base, exponent in _BASES[unit].items()) if unit in _BASES else ""
+def _base(name: str) -> str:
+    unit = find_unit(name)
+    given = zip(("kg", "m", "s", "rad"), unit.dimension if unit else (), strict=False)
+    exponents = " ".join(f"{base}='{exponent}'" for base, exponent in given if exponent)
     return f"<BaseUnit {exponents}/>" if exponents else ""
 
 

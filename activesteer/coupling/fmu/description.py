@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from activesteer.coupling.fmu.archive import BINARIES, DESCRIPTION, Archive
-from activesteer.coupling.fmu.units import Unit, declared_unit
 from activesteer.errors import not_installed, shown
 from activesteer.plugins import Kind
+from activesteer.units import Unit, find_unit, known_unit
 
 _FORMATS: Final = {
     "Real": "d", "Float64": "d", "Float32": "f", "Integer": "i", "Int8": "b", "UInt8": "B", "Int16": "h", "UInt16": "H",
     "Int32": "i", "UInt32": "I", "Int64": "q", "UInt64": "Q",
 }  # fmt: skip
 """Numeric type of FMI -> format of `struct`; Boolean and Enumeration depend on the version."""
+_HERTZ: Final = re.compile(r"k?Hz|rev.*|r/.*|rpm")
 _MAX_SIZE: Final = 1000
 """Largest number of elements of an array."""
 
@@ -151,7 +153,7 @@ def _variable(variable: Any, description: Any) -> Variable | None:
     base = next((unit.baseUnit for unit in description.unitDefinitions if unit.name == unit_name), None)
     return Variable(
         variable.name, variable.valueReference, kind, form, min(size, _MAX_SIZE + 1),
-        _number(variable.start), declared_unit(unit_name, base), unit_name,
+        _number(variable.start), _declared_unit(unit_name, base), unit_name,
         _number(variable.min, -math.inf), _number(variable.max, math.inf),
     )  # fmt: skip
 
@@ -185,3 +187,15 @@ def _library(archive: Archive, identifier: str, kind: Kind) -> str:
     raise kind.fail(
         archive.path.name, f"has no binary for Linux on x86-64 ({BINARIES[0]}{identifier}.so); {there}", None, BINARIES
     )
+
+
+def _declared_unit(name: str | None, base: Any) -> Unit | None:
+    """Return a unit as an FMU declares it, by its base unit as FMPy reads it; None if nobody knows the unit."""
+    if name is None or base is None:
+        return find_unit(name) if name else None
+    others = any(getattr(base, other) for other in ("A", "K", "mol", "cd"))
+    if others or not (math.isfinite(base.factor) and base.factor and math.isfinite(base.offset)):
+        return Unit(name, math.nan, (99, 99, 99, 99))
+    # Tools declare frequencies by the base unit 1/s, which as an angular speed is one radian per second.
+    turn = known_unit("Hz").factor if _HERTZ.fullmatch(name) and base.rad == 0 and base.s == -1 else 1.0
+    return Unit(name, turn * base.factor, (base.kg, base.m, base.s, base.rad), base.offset)

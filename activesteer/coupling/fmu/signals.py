@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Final, NamedTuple, get_args, get_origin, get_type_hints
 
 from activesteer.config import Source
 from activesteer.conventions import CORNERS
 from activesteer.coupling.fmu.description import Variable
-from activesteer.coupling.fmu.units import known_units, named_unit, stem_of_signal, unit_of_signal
 from activesteer.errors import nearest_names, shown
 from activesteer.signals import PerWheel
+from activesteer.units import UNIT_NAMES, find_unit, split_ending
 
 _NO_SIGNAL: Final = "none"
 """Signal of a map for a variable that is left alone."""
@@ -65,7 +64,7 @@ class Signals(NamedTuple):
 
     def full(self, name: str) -> str | None:
         """Return the name of a signal that is given with or without its unit; None if there is none."""
-        known = (other for other in self.places if other == name or stem_of_signal(other) == name)
+        known = (other for other in self.places if other == name or split_ending(other)[0] == name)
         return next(known, None)
 
 
@@ -147,9 +146,9 @@ def _entry(name: str, entry: Any, signals: Signals, source: Source) -> str:
         near = nearest_names(wanted, signals.places)
         problem = f"{signals.words} has no signal {shown(wanted)}; {near}"
         raise source.fail((name, "signal"), problem, wanted, list(signals.places))
-    if (unit := entry.get("unit")) is not None and named_unit(unit) is None:
-        problem = f"{shown(unit)} is no known unit; {nearest_names(unit, known_units())}"
-        raise source.fail((name, "unit"), problem, unit, known_units())
+    if (unit := entry.get("unit")) is not None and find_unit(unit) is None:
+        problem = f"{shown(unit)} is no known unit; {nearest_names(unit, UNIT_NAMES)}"
+        raise source.fail((name, "unit"), problem, unit, UNIT_NAMES)
     return wanted
 
 
@@ -158,17 +157,16 @@ def _link(
     fail: Callable[..., Exception],
 ) -> Link:  # fmt: skip
     bare = signal.partition("[")[0]
-    ours = named_unit(unit_of_signal(bare))
-    assert ours is not None
-    unit = named_unit(unit_name) if entry and "unit" in entry and unit_name else variable.unit
+    ours = split_ending(bare)[1]
+    unit = find_unit(unit_name) if entry and "unit" in entry and unit_name else variable.unit
     if unit is None:
         if unit_name is not None:
             problem = f"{name} has the unit {shown(unit_name)}, which its description does not define"
             raise fail((name,), f'{problem}; give it in a map: {name} = {{ unit = "deg/s" }}', unit_name)
         unit = ours
-    if unit.dimension != ours.dimension or math.isnan(unit.factor):
-        problem = f"{name} is in {unit_name}, but {signal} is in {unit_of_signal(bare)}; these cannot be converted"
-        raise fail((name,), problem, unit_name, unit_of_signal(bare))
+    if unit.dimension[:3] != ours.dimension[:3]:  # angles count as numbers
+        problem = f"{name} is in {unit_name}, but {signal} is in {ours.name or '1'}; these cannot be converted"
+        raise fail((name,), problem, unit_name, ours.name)
     if len(places) != variable.size:
         problem = f"{name} has {variable.size} elements, but {signal} has {len(places)}"
         raise fail((name,), problem, variable.size, len(places))

@@ -19,6 +19,7 @@ from activesteer.errors import ParameterError
 from activesteer.files import make_folder, write_text
 from activesteer.rigs.kc.result import KcResult
 from activesteer.rigs.kc.sweep import INWARDS, Sweep
+from activesteer.units import known_unit
 
 Mirror = Literal["alike", "opposed"]
 
@@ -70,19 +71,6 @@ TESTS: Final = {
 }  # fmt: skip
 """Tests by name; AXLE_NAME.csv is the file of a test."""
 
-UNITS: Final = {
-    "mm": ("m", 1e-3),
-    "cm": ("m", 1e-2),
-    "m": ("m", 1.0),
-    "deg": ("rad", np.pi / 180.0),
-    "min": ("rad", np.pi / 10800.0),
-    "rad": ("rad", 1.0),
-    "N": ("N", 1.0),
-    "kN": ("N", 1e3),
-    "Nm": ("Nm", 1.0),
-    "kNm": ("Nm", 1e3),
-}
-"""Unit of a column -> SI unit, factor."""
 CHANNELS: Final = {
     "travel": ("m", "mm"), "rack": ("m", "mm"), "force": ("N", "N"), "moment": ("Nm", "Nm"),
     "steering_wheel": ("rad", "deg"), "toe": ("rad", "deg"), "camber": ("rad", "deg"), "caster": ("rad", "deg"),
@@ -144,6 +132,6 @@ def _csv(remark: str, columns: dict[str, Array]) -> str:
     for name, column in columns.items():
         _, unit = CHANNELS[name.removeprefix("left_").removeprefix("right_")]
         heads.append(f"{name} [{unit}]")
-        values.append(column / UNITS[unit][1])
+        values.append(column / known_unit(unit).factor)
     rows = [",".join(f"{value:.8g}" for value in row) for row in np.array(values).T]
     return "\n".join([f"# {remark}", ",".join(heads), *rows, ""])

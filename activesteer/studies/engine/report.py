@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from activesteer.controllers import find_controller
 from activesteer.conventions import Array, run_looks
-from activesteer.display_units import parameter_label
 from activesteer.driver import find_driver
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import write_text
@@ -27,6 +26,7 @@ from activesteer.studies.engine.run_task import CURVE
 from activesteer.studies.engine.sensitivity import MAX_SAMPLES, indices
 from activesteer.studies.engine.store import Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.units import parameter_label
 
 _SHOWN_ROWS: Final = 3000
 """Most runs whose points the page holds; counts and means are over all runs."""

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import pyarrow as pa
 
-from activesteer.display_units import unit_of
 from activesteer.studies.engine.run_task import CURVE, Row
+from activesteer.units import unit_of
 
 IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")
 """Columns that identify the run of a row; the factors follow them."""

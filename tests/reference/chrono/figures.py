@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.display_units import quantity_of
 from activesteer.plotting import Area, Curve, Panel, Picture
+from activesteer.units import quantity_of
 from tests.reference.chrono.kinematics import Curves
 from tests.reference.chrono.our_runs import QUANTITIES, RMS_TOLERANCE, traces
 from tests.reference.chrono.reference import Table

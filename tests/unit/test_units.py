@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from activesteer.display_units import parameter_title, quantity_of
 from activesteer.metric_table import METRICS
+from activesteer.units import parameter_title, quantity_of
 
 
 def test_the_channel_of_a_corner_is_shown_as_that_of_any_other():
