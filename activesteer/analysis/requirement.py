@@ -64,11 +64,6 @@ class Condition(NamedTuple):
             return 0.0
         return max(1e-6, self.margin / (self.margin - 1.0)) if math.isfinite(self.margin) else 1.0
 
-    @property
-    def negated(self) -> Condition:
-        """The opposite condition."""
-        return Condition(-self.margin, not self.strict)
-
 
 def at_most(value: float, limit: float, scale: float | None = None, *, strict: bool = False) -> Condition:
     """Return the condition that a value is at most a limit, or below it; an undefined value (nan) breaks it.
@@ -174,8 +169,8 @@ class Expression:
                 if len(parts) != 1 if name == "abs" else len(parts) < 2:
                     raise self._fail(f"{name} has {len(parts)} arguments")
                 return lambda runs: function([part(runs) for part in parts])
-            words = [word.id if isinstance(word, ast.Name) else _text_of(word) for word in node.args]
-            if len(words) in (1, 2) and None not in words:
+            words = [word.id if isinstance(word, ast.Name) else getattr(word, "value", None) for word in node.args]
+            if len(words) in (1, 2) and all(isinstance(word, str) for word in words):
                 return self._metric(name, *map(str, words))
         raise self._fail(f"{ast.unparse(node)} is no number, metric(controller), sum, product, min, max or abs")
 
@@ -251,10 +246,6 @@ class Requirement(Expression):
 
 def _value_of(name: str, run: Run) -> _Number:
     return lambda runs: math.nan if (value := runs[run].get(name)) is None else value
-
-
-def _text_of(node: ast.expr) -> str | None:
-    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
 
 
 def _ratio(one: float, other: float) -> float:

@@ -104,7 +104,7 @@ def _kept(runs: SystemRuns, statement: Statement, system: str) -> Claim:
     values = {
         f"{run}_{metric}": runs.metrics[run][metric] for metric in (*RATIOS, SIDESLIP) for run in ("none", system)
     }
-    breaks = min(_keeps(runs, "none")).negated
+    breaks = Condition(-min(_keeps(runs, "none")).margin, strict=True)
     lowers = runs.lowers(system, SIDESLIP, 1.0, SIDESLIP_RAD)
     return runs.judge(statement, [*_keeps(runs, system), breaks, *lowers], values)
 

@@ -87,10 +87,9 @@ def read_table(study: StudyFile) -> TuneTable:
     if study.case_list is not None or not study.factors:
         raise source.fail(("factors",), "a search needs factors")
     ranged = [factor.key for factor in study.factors if not factor.values]
-    if table.sampler == "grid" and table.seeds:
-        raise source.fail((TABLE, "seeds"), "a grid has no seeds; leave them out")
-    if table.sampler == "grid" and ranged:
-        raise source.fail((TABLE, "sampler"), f"grid needs a grid or a choice of every factor; {ranged[0]} has a range")
+    if table.sampler == "grid" and (ranged or table.seeds):
+        problem = f"{ranged[0]} has a range" if ranged else "leave the seeds out"
+        raise source.fail((TABLE, "sampler"), f"grid tries each combination of grids and choices; {problem}")
     factors = {factor.key: factor for factor in study.factors}
     for number, seed in enumerate(table.seeds):
         for key, value in seed.items():

@@ -193,24 +193,17 @@ def _searches(
     for name in maneuvers or ():
         if name not in labels:
             raise ParameterError(nearest_names(name, labels), key="--maneuver", value=name, allowed=tuple(labels))
-    requirement = Requirement(table.violate, Names(None, [""], ANY), study.source, (TABLE, Goal.VIOLATE))
-    named = dict.fromkeys(run.controller for _, run in requirement.metrics if run.controller != ANY)
     found = []
     for name, maneuver in itertools.product(controllers or study.controllers, maneuvers or labels):
         own = label_of(name)
-        one = replace(
-            study,
-            metrics=(),
-            controllers=(name, *(other for other in named if label_of(other) != own)),
-            maneuvers=(labels[maneuver],),
-            factors=tuple(
-                replace(factor, maneuvers=())
-                for factor in study.factors
-                if not factor.maneuvers or maneuver in factor.maneuvers
-            ),
-        )
-        if not one.factors:
+        names = Names(None, [maneuver], own)
+        runs = [run for _, run in Requirement(table.violate, names, study.source, (TABLE, Goal.VIOLATE)).metrics]
+        driven = (name, *dict.fromkeys(run.controller for run in runs if label_of(run.controller) != own))
+        factors = [factor for factor in study.factors if not factor.maneuvers or maneuver in factor.maneuvers]
+        if not factors:
             raise study.source.fail(("factors",), f"none of them varies in {maneuver}; a search needs factors")
+        varied = tuple(replace(factor, maneuvers=()) for factor in factors)
+        one = replace(study, metrics=(), controllers=driven, maneuvers=(labels[maneuver],), factors=varied)
         below = folder / f"{file_word(own)}-{file_word(maneuver)}"
         found.append(_Search(one, table, make_folder(below, StudyError), own, maneuver))
     return found

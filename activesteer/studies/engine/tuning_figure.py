@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from scipy.stats import spearmanr
+from scipy.stats import rankdata
 
 from activesteer.files import file_word
 from activesteer.plotting import Curve, Panel, Picture, draw, save
@@ -93,4 +93,6 @@ def _label(key: str, texts: Sequence[str]) -> str:
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     """Return the magnitude of Spearman's rank correlation; 0 for a constant."""
-    return 0.0 if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0 else abs(float(spearmanr(x, y).statistic))
+    if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return 0.0
+    return abs(float(np.corrcoef(rankdata(x), rankdata(y))[0, 1]))

@@ -186,6 +186,7 @@ def test_a_metric_that_only_the_examined_run_lacks_is_a_violation(
         (changed(GAINS, sampler="cma_es"), "tune.sampler", "nsga2"),
         (changed(GAINS, seeds=[{"factors.mass": 1.0}]), "tune.seeds.0.factors.mass", WHEEL),
         (changed(GAINS, seeds=[{WHEEL: 31.0}]), f"tune.seeds.0.{WHEEL}", "30.0"),
+        (changed(WORST, violate="harm(controller, slalom) <= 1"), "tune.violate", "short"),
         (changed(STATEMENTS, satisfy={"S1": "claim(S1)"}), "tune.satisfy.S1", "claims = true"),
         (changed(GAINS, objectives=[{"name": "a", "terms": []}]), "tune.objectives", "[tune.minimise]"),
         (changed(GAINS, constraints=[{"metric": "ay", "low": 1.0}]), "tune.constraints", "[tune.constraints]"),
