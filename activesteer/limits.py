@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-import numpy as np
-
 from activesteer.errors import ActiveSteerError, shown
 
 MAX_NUMBER: Final = 1e12
@@ -122,12 +120,12 @@ def check_number(value: float, error: type[ActiveSteerError], *, text: Any = Non
 
 def too_large(values: Any, *, infinite: bool = False) -> Any:
     """Return which values are above `MAX_NUMBER`; nan is a missing value, infinity may be that of a diverged run."""
-    size = np.abs(values)
-    return (size > MAX_NUMBER) & (size < np.inf) if infinite else size > MAX_NUMBER
+    size = abs(values)
+    return (size > MAX_NUMBER) & (size < math.inf) if infinite else size > MAX_NUMBER
 
 
 def check_numbers(values: Any, error: type[ActiveSteerError], *, infinite: bool = False, **place: Any) -> None:
     """Refuse values above `MAX_NUMBER`; see `too_large`."""
     wrong = too_large(values, infinite=infinite)
     if wrong.any():
-        check_number(float(np.asarray(values)[wrong].flat[0]), error, **place)
+        check_number(float(values[wrong].flat[0]), error, **place)

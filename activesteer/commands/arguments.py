@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.config import parse_value, read_toml
 from activesteer.errors import MAX_SHOWN, ParameterError, nearest_names
 from activesteer.resources import DEFAULT_DRIVER
 
@@ -264,6 +263,8 @@ def scenario_of(options: argparse.Namespace) -> Scenario:
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return the parameters that `--overrides` and `--set` replace."""
+    from activesteer.config import read_toml
+
     values = dict(given or {})
     for path in options.override_files:
         table, source = read_toml(path)
@@ -281,6 +282,8 @@ def pairs(texts: Sequence[str], option: str, example: str, given: Mapping[str, A
 
     A value is written as in TOML; any other value is a text.
     """
+    from activesteer.config import parse_value
+
     values = dict(given or {})
     for text in texts:
         key, sign, value = (part.strip() for part in text.partition("="))

@@ -7,12 +7,14 @@ import re
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from activesteer.commands.arguments import add_cutaway, add_output, add_pace, add_recording
 from activesteer.commands.progress import ProgressBar
-from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError
+
+_CORNERS: Final = ("fl", "fr", "rl", "rr")
+"""As in `activesteer.conventions`, which takes too long to import for `--help`."""
 
 
 def add_to(commands: Any) -> None:
@@ -27,7 +29,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--camera", default="chase", choices=("chase", "top", "wheel"), help="camera position (default: chase)"
     )
-    parser.add_argument("--corner", choices=CORNERS, help="wheel for the camera `wheel` (default: fl)")
+    parser.add_argument("--corner", choices=_CORNERS, help="wheel for the camera `wheel` (default: fl)")
     parser.add_argument(
         "--compare", type=Path, action="append", default=[], metavar="OTHER.mcap",
         help="also show the car of another recording; may be repeated",
@@ -74,7 +76,7 @@ def _video(options: argparse.Namespace) -> int:
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
     settings = Settings(
         options.camera,
-        options.corner or CORNERS[0],
+        options.corner or _CORNERS[0],
         options.size,
         rate,
         options.speed,

@@ -171,7 +171,8 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
             raise RecordingError(f"metric name {name!r:.{_SHOWN}}: letters, digits and '_', a letter first")
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, which is no number", key=name, value=value)
-        limits.check_numbers(float(value), RecordingError, infinite=True, key=name)
+        if limits.too_large(float(value), infinite=True):
+            limits.check_number(float(value), RecordingError, key=name)
 
 
 def check_names(names: Sequence[Any], what: str, maximum: int) -> None:

@@ -24,6 +24,7 @@ from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
+from activesteer.standards.r79_circle import FIGURES
 from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.studies.engine.workers import Workers
 
@@ -39,12 +40,6 @@ AY_MPS2: Final = 1.0
 """Largest change of the lateral acceleration [m/s2]."""
 LANE_M: Final = 3.5
 """Width of the lane, in whose middle the car is [m]; its edge is the largest lateral offset after 1 s."""
-FIGURES: Final = (
-    "yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m",
-    "steering_correction_rad", "fault_tolerant_time_s",
-)  # fmt: skip
-"""Values of a fault: largest changes with hands fixed; offset across the path, left positive, with hands fixed and with
-the driver; largest change of the driver's steering wheel angle; tolerated time, None if no limit is exceeded."""
 _ENTRY_S: Final = 2.0
 _BEGIN_S: Final = _ENTRY_S + 2.5
 """Time at which the fault begins, in the steady circle [s]."""

@@ -11,7 +11,6 @@ import numpy as np
 from activesteer.errors import SimulationDiverged
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.fault_circle import FIGURES
 from activesteer.standards.page_parts import cell, time_panels
 from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
 from activesteer.units import display_unit
@@ -42,6 +41,12 @@ SPEED_KMH: Final = 10.0
 """Speed of the spiral [km/h]."""
 RIM_RADIUS_M: Final = 0.185
 """Nominal radius of the steering wheel [m]: an assumption (diameter 370 mm); vehicle files have none."""
+FIGURES: Final = (
+    "yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m",
+    "steering_correction_rad", "fault_tolerant_time_s",
+)  # fmt: skip
+"""Values of a fault: largest changes with hands fixed; offset across the path, left positive, with hands fixed and with
+the driver; largest change of the driver's steering wheel angle; tolerated time, None if no limit is exceeded."""
 _TURNED_S: Final = 3.0
 """Time in which the steering wheel reaches the Ackermann angle of the radius [s]; the limit is a third longer."""
 _BEGIN_S: Final = 0.5

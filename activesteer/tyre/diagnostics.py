@@ -164,7 +164,7 @@ def _levels(params: TyreParameters) -> Iterator[tuple[str, str]]:
     if params["QDZ1"] != 0.0 and not TRAIL_RANGE_M[0] <= trail <= TRAIL_RANGE_M[1]:
         yield f"pneumatic trail {1000 * trail:.0f} mm at the nominal load", "5 to 80 mm are usual"
     sigma = float(at.relaxation_length_y_m)
-    if not RELAXATION_RANGE_M[0] <= sigma <= RELAXATION_RANGE_M[1]:
+    if params.conventions.relaxation and not RELAXATION_RANGE_M[0] <= sigma <= RELAXATION_RANGE_M[1]:
         yield f"lateral relaxation length {sigma:.2f} m at the nominal load", "one to three contact lengths are usual"
     loads = np.linspace(max(params["FZMIN"], 0.1 * nominal), params["FZMAX"], 60)
     over = MagicFormula(params).evaluate(loads, 0.0, 0.0)

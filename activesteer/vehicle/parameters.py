@@ -215,6 +215,10 @@ class Factors:
     """Factor on the forces of the dampers' curves."""
     tyre_friction: Annotated[float, Range(0.1, 2.0)] = 1.0
     """Factor on the tyres' LMUX and LMUY."""
+    front_tyre_friction: Annotated[float, Range(0.1, 2.0)] = 1.0
+    """Additional factor on LMUX and LMUY of the front tyres."""
+    rear_tyre_friction: Annotated[float, Range(0.1, 2.0)] = 1.0
+    """Additional factor on LMUX and LMUY of the rear tyres, as with other tyres on one axle."""
     tyre_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
     """Factor on the tyres' LKY."""
     front_cornering_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
@@ -230,14 +234,17 @@ class Factors:
 
     def on_tyres(self, front: TyreParameters, rear: TyreParameters) -> tuple[TyreParameters, TyreParameters]:
         """Return the tyres of both axles with their scale factors multiplied; unchanged if all factors are 1."""
-        stiffnesses = self.front_cornering_stiffness, self.rear_cornering_stiffness
-        fitted = self._on_tyre(front, stiffnesses[0])
-        return fitted, fitted if rear is front and len({*stiffnesses}) == 1 else self._on_tyre(rear, stiffnesses[1])
+        axles = (
+            (self.front_cornering_stiffness, self.front_tyre_friction),
+            (self.rear_cornering_stiffness, self.rear_tyre_friction),
+        )
+        fitted = self._on_tyre(front, *axles[0])
+        return fitted, fitted if rear is front and axles[0] == axles[1] else self._on_tyre(rear, *axles[1])
 
-    def _on_tyre(self, tyre: TyreParameters, cornering_stiffness: float) -> TyreParameters:
+    def _on_tyre(self, tyre: TyreParameters, cornering_stiffness: float, friction: float) -> TyreParameters:
         scales = {
-            "LMUX": self.tyre_friction,
-            "LMUY": self.tyre_friction,
+            "LMUX": self.tyre_friction * friction,
+            "LMUY": self.tyre_friction * friction,
             "LKX": self.tyre_slip_stiffness,
             "LKY": self.tyre_cornering_stiffness * cornering_stiffness,
             "LCZ": self.tyre_vertical_stiffness,

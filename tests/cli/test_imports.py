@@ -51,6 +51,12 @@ def test_help_list_and_info_need_neither_engine_nor_compiler(recording):
     assert done.returncode == 0, done.stderr
 
 
+def test_help_needs_no_numpy(recording):
+    """It takes longer to import than everything else of the command line."""
+    done = call(recording.parent, {"numpy", "pyarrow", "tomllib"}, "--help", "--version")
+    assert done.returncode == 0, done.stderr
+
+
 def test_what_needs_no_viewer_works_without_rerun(recording):
     refused = {"rerun", "rerun_sdk", "rerun_cli"}
     run = "run straight_line --set duration_s=0.3 --set settle_s=0 -o again.mcap"

@@ -45,7 +45,7 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import prepared
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.channels.car_motion import ROCKS_BACK_MPS, STANDSTILL_MPS
+from activesteer.vehicle.channels.car_motion import FULL_SIDESLIP_MPS, ROCKS_BACK_MPS, STANDSTILL_MPS
 from activesteer.vehicle.channels.corners import design_heights_m
 from activesteer.vehicle.channels.raw_rows import RawRows
 from activesteer.vehicle.command_row import BRAKES, CARRIED_OUT, COMMANDS
@@ -286,7 +286,7 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         "AT_ACCELERATION": sensor_columns(model, "cg_accelerometer").start,
         "AT_RATES": sensor_columns(model, "cg_gyro").start,
         "AT_SUPERPOSITION": sensor_columns(model, "superposition_angle").start, "STANDSTILL_MPS": STANDSTILL_MPS,
-        "ROCKS_BACK_MPS": ROCKS_BACK_MPS,
+        "ROCKS_BACK_MPS": ROCKS_BACK_MPS, "FULL_SIDESLIP_MPS": FULL_SIDESLIP_MPS,
         "MOTION_SPEED": n_measurement + Motion._fields.index("speed_mps"), "RESULT_X": n_measurement,
         "IN_GEAR": place["gear"], "IN_DRIVE": place["drive_torque_demand_Nm"], "IN_ROAD_MU": place["road_mu"],
         "IN_TORQUES_SET": place["wheel_torques_set"], "IN_DRIVES": place["fl_drive_torque_Nm"],

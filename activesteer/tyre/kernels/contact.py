@@ -32,7 +32,7 @@ from typing import Final, NamedTuple
 from activesteer.compilation import compiled
 from activesteer.tyre.kernels.limits import limit_flags
 from activesteer.tyre.kernels.magic_formula import slip_stiffnesses, steady_state
-from activesteer.tyre.kernels.relaxation import relaxation_lengths
+from activesteer.tyre.kernels.relaxation import MIN_RELAXATION_LENGTH_M, relaxation_lengths
 from activesteer.tyre.kernels.vertical import (
     bottoming_force,
     contact_patch,
@@ -41,8 +41,6 @@ from activesteer.tyre.kernels.vertical import (
     vertical_force_loaded,
 )
 
-_MIN_RELAXATION_LENGTH_M: Final = 0.02
-"""About the length of a tread block; it keeps the slip defined when the load vanishes."""
 _LIFTED_DECAY_PER_S: Final = 20.0
 """Decay rate of the deflection of a lifted tyre [1/s]: a carcass rings down within some tenths of a second."""
 _SLIDING_TO_LINEAR: Final = 3.0
@@ -145,8 +143,8 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     if p.RELAXATION_OFF != 0.0:
         sigma_x *= fraction
         sigma_y *= fraction
-    sigma_x = max(sigma_x, _MIN_RELAXATION_LENGTH_M)
-    sigma_y = max(sigma_y, _MIN_RELAXATION_LENGTH_M)
+    sigma_x = max(sigma_x, MIN_RELAXATION_LENGTH_M)
+    sigma_y = max(sigma_y, MIN_RELAXATION_LENGTH_M)
     sliding_x = abs(vsx) / limit_x
     sliding_y = abs(vsy) / limit_y
     held = 1.0
@@ -165,7 +163,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     rate_x -= u * (1.0 - 1.0 / held) / timestep_s
     rate_y = (vsy - carry_y * v / held / sigma_y) * _mean_decay(timestep_s * carry_y / sigma_y)
     rate_y -= v * (1.0 - 1.0 / held) / timestep_s
-    half_length = max(0.5 * contact_patch(p, fz, pressure_Pa)[0], _MIN_RELAXATION_LENGTH_M)
+    half_length = max(0.5 * contact_patch(p, fz, pressure_Pa)[0], MIN_RELAXATION_LENGTH_M)
     carry_z = max(speed, abs(turn) * half_length / _SLIDING_TWIST_RAD)
     rate_z = (turn - carry_z * w / half_length) * _mean_decay(timestep_s * carry_z / half_length)
     kappa = (u + timestep_s * rate_x) / sigma_x + damping_slip_x

@@ -7,9 +7,24 @@ Source: Besselink, Schmeitz, Pacejka 2010, equations 17 to 19 (MF 6.x); Pacejka,
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from activesteer.compilation import compiled
 from activesteer.tyre.kernels.pure_slip import cornering_stiffness, longitudinal_stiffness
+
+MIN_RELAXATION_LENGTH_M: Final = 0.02
+"""About the length of a tread block; it keeps the slip defined when the load vanishes."""
+
+
+@compiled
+def rolling_relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
+    """Return the relaxation lengths of a rolling tyre as the contact uses them [m]; arguments as `relaxation_lengths`.
+
+    A tyre whose file or vehicle says that slip builds up at once has those of a tread block.
+    """
+    if p.RELAXATION_OFF != 0.0:
+        return MIN_RELAXATION_LENGTH_M, MIN_RELAXATION_LENGTH_M
+    return relaxation_lengths(p, fz_N, gamma_rad, pressure_Pa)
 
 
 @compiled

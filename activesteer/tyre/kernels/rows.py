@@ -5,7 +5,7 @@ from __future__ import annotations
 from activesteer.compilation import compiled
 from activesteer.tyre.kernels.limits import limit_flags
 from activesteer.tyre.kernels.magic_formula import SteadyState, steady_state
-from activesteer.tyre.kernels.relaxation import relaxation_lengths
+from activesteer.tyre.kernels.relaxation import rolling_relaxation_lengths
 from activesteer.tyre.kernels.turn_slip import rolling_speed
 from activesteer.tyre.kernels.vertical import contact_patch, deflection_under_load, free_radius
 
@@ -52,7 +52,7 @@ def rolling_rows(tyre, inputs, forces, rolling) -> None:
         fz, kappa, gamma, pressure = inputs[i, 0], inputs[i, 1], inputs[i, 3], inputs[i, 4]
         omega, radius = rolling_speed(p, fz, kappa, pressure, inputs[i, 5])
         deflection = deflection_under_load(p, fz, omega, pressure, forces[i, 0], forces[i, 1], gamma)
-        rolling[i, 0], rolling[i, 1] = relaxation_lengths(p, fz, gamma, pressure)
+        rolling[i, 0], rolling[i, 1] = rolling_relaxation_lengths(p, fz, gamma, pressure)
         rolling[i, 2] = radius
         rolling[i, 3] = max(free_radius(p, omega) - deflection, 0.0)
         rolling[i, 4] = deflection

@@ -11,8 +11,8 @@ import pytest
 
 from activesteer.files import json_text
 from activesteer.standards.examination import examine
-from activesteer.standards.fault_circle import CIRCLES, FIGURES
-from activesteer.standards.r79_circle import EFFORTS, RIM_RADIUS_M, STANDARD, reached
+from activesteer.standards.fault_circle import CIRCLES
+from activesteer.standards.r79_circle import EFFORTS, FIGURES, RIM_RADIUS_M, STANDARD, reached
 from activesteer.standards.standard import Run
 from tests.unit.standards.grounds import WrittenGround
 from tests.unit.standards.signals import run_of, times

@@ -97,3 +97,11 @@ def test_the_trail_is_related_to_the_scaled_load(tyre: TyreParameters) -> None:
 def test_what_does_not_exist_is_refused(key: str, value: object) -> None:
     with raises(ParameterError, key=key, value=value):
         TyreConventions(**{key: value})  # type: ignore[arg-type]
+
+
+def test_without_relaxation_the_evaluation_has_the_length_that_the_contact_has(tyre: TyreParameters) -> None:
+    """An estimator that reads the evaluation would expect a lag of 0.9 m which this tyre does not have."""
+    with_it, without = forces(tyre), forces(tyre, relaxation=False)
+    assert with_it.relaxation_length_y_m > 0.3
+    assert without.relaxation_length_y_m == without.relaxation_length_x_m == pytest.approx(0.02)
+    assert without.fy_N == with_it.fy_N

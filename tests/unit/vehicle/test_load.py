@@ -150,6 +150,11 @@ def test_factors_reach_springs_bars_dampers_and_tyres() -> None:
     axles = {"factors.tyre_cornering_stiffness": 1.1, "factors.rear_cornering_stiffness": 0.9}
     stiffnesses = [tyre["LKY"] / standard["LKY"] for tyre in load_car(overrides=axles).tyres]
     assert stiffnesses == pytest.approx([1.1, 1.1 * 0.9])
+    worn = {"factors.tyre_friction": 0.9, "factors.rear_tyre_friction": 0.8}
+    frictions = [
+        (tyre["LMUX"] / standard["LMUX"], tyre["LMUY"] / standard["LMUY"]) for tyre in load_car(overrides=worn).tyres
+    ]
+    assert frictions == [pytest.approx((0.9, 0.9)), pytest.approx((0.72, 0.72))]
 
 
 def test_damper_factor_multiplies_the_force_of_a_damper() -> None:

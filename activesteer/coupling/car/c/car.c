@@ -137,7 +137,10 @@ static void derive(as_car *c) {
     m[23] = 0.5 * (m[11] + m[12]);
     m[24] = 0.5 * (s[AT_REAR[0]] + s[AT_REAR[1]]);
     m[25] = s[AT_SUPERPOSITION] / STEERING_RATIO;
-    m[10] = m[5] > (m[3] < 0.0 ? ROCKS_BACK_MPS : STANDSTILL_MPS) ? atan2(m[4], m[3]) : 0.0;
+    /* Forwards the angle fades with the speed, backwards it is there or not; see car_motion.py. */
+    double fading = (m[5] - STANDSTILL_MPS) / (FULL_SIDESLIP_MPS - STANDSTILL_MPS);
+    if (m[3] < 0.0) fading = m[5] > ROCKS_BACK_MPS ? 1.0 : 0.0;
+    m[10] = fmin(fmax(fading, 0.0), 1.0) * atan2(m[4], m[3]);
 }
 
 /* Couple the engine to the driven wheels in a gear, or free them; see WheelSet.engage. */
