@@ -86,7 +86,7 @@ def test_a_misplaced_or_misspelt_word_is_answered_with_the_right_one(capsys, wor
         (["study", "population"], ["-o DIR is needed"]),
         (["fit", "population"], ["population.toml: fit"]),
         (["linearise", "--loop", "controller", "-c", "none", "--speed-kmh", "80"], ["-c", "no loop"]),
-        (["reproduce", "-c", "none", "-c", "asr"], ["'asr'", "'ars'"]),
+        (["study", "envelope", "-o", "envelope", "-c", "asr"], ["'asr'", "'ars'"]),
         (["compare", "bmw_m8", "--samples", "5"], ["--samples", "bmw_m8"]),
         (["compare", "tesla_model_s", "--filter", "none"], ["--filter", "a folder"]),
         (["compare", "a.mcap", "b.mcap", "--jobs", "1"], ["--jobs", "recordings"]),
