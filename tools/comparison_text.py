@@ -35,15 +35,6 @@ def population_targets(found: Population) -> list[Target]:
     return verdicts
 
 
-def comparison_json(found: Population) -> dict[str, Any]:
-    """Return JSON values of a comparison, with its totals and targets."""
-    return {
-        **found.to_json(),
-        "totals": [found.total(name).to_json() for name in found.controllers],
-        "targets": [target._asdict() for target in population_targets(found)],
-    }
-
-
 def comparison_text(found: Population) -> str:
     """Return the harm, the proportions and the targets of a comparison as text."""
     lines = [

@@ -28,7 +28,6 @@ from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.dependence import strongest
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
 from activesteer.studies.engine.run_command import run_command
 from activesteer.studies.engine.run_identity import versions
 from activesteer.studies.engine.run_task import CLAIM, CURVE, Row
@@ -182,8 +181,6 @@ class Population:
         claims: In the order of the paper; none for a comparison of controllers.
         systems: Effects, scenario by scenario, in the order of the controllers.
         failed: Number of incomplete runs; each counts as lost.
-        table: Median of every metric over the samples: `scenario`, `controller`, `metric`, `value`. Empty for a
-            population with claims, and not stored.
         worst: The runs with the most harm, of each controller.
     """
 
@@ -194,7 +191,6 @@ class Population:
     claims: tuple[ClaimProportion, ...]
     systems: tuple[SystemEffect, ...]
     failed: int = 0
-    table: tuple[Mapping[str, Any], ...] = ()
     worst: tuple[WorstRun, ...] = ()
 
     def of(self, claim: str) -> ClaimProportion | None:
@@ -231,7 +227,6 @@ class Population:
             read: dict[str, Any] = {
                 "claims": read_claims(table),
                 "systems": tuple(SystemEffect.from_json(effect) for effect in table["systems"]),
-                "table": tuple(table["table"]),
                 "worst": tuple(map(WorstRun.from_json, table.get("worst", ()))),
             }
             known = {**table, **read}
@@ -349,7 +344,6 @@ def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()
         claims=tuple(_proportion(claim.id, claim.passed, without, planned.factors) for claim in nominal),
         systems=tuple(_effects(rows, systems)),
         failed=sum(row["status"] != "ok" for row in rows),
-        table=() if planned.claims else tuple(_medians(rows, planned)),
         worst=() if planned.claims else tuple(_worst(rows, planned, systems)),
     )
 
@@ -474,16 +468,3 @@ def _worst(rows: Sequence[Row], planned: StudyFile, systems: Sequence[str]) -> I
 def _metrics_of(scenario: str, rows: Sequence[Row]) -> list[str]:
     driven = [row for row in rows if row["maneuver"] == scenario]
     return [name for name in (driven[0] if driven else ()) if any(row[name] is not None for row in driven)]
-
-
-def _medians(rows: Sequence[Row], planned: StudyFile) -> Iterator[dict[str, Any]]:
-    about = {*IDENTITY, *OUTCOME, *planned.keys}
-    metrics = [name for name in (rows[0] if rows else ()) if name not in about]
-    for scenario in dict.fromkeys(row["maneuver"] for row in rows):
-        for controller in dict.fromkeys(row["controller"] for row in rows):
-            own = [row for row in rows if row["maneuver"] == scenario and row["controller"] == controller]
-            for name in metrics:
-                values = [row[name] for row in own if row[name] is not None and math.isfinite(row[name])]
-                if values:
-                    median = float(np.median(values))
-                    yield {"scenario": scenario, "controller": controller, "metric": name, "value": median}

@@ -205,7 +205,7 @@ def store_summary(found: Population, name: str) -> Path:
         StudyError: the file cannot be written.
     """
     folder = make_folder(studies_dir() / name, StudyError)
-    text = json.dumps(replace(found, table=()).to_json(), indent=1)
+    text = json.dumps(replace(found).to_json(), indent=1)
     return write_text(folder / SUMMARY, f"{text}\n", StudyError)
 
 

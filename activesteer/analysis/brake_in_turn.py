@@ -93,7 +93,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
         "yaw_rate_deviation_after_1000ms_radps": side * yaw_rate_then - speed_then / radius_m,
         "path_deviation_after_1000ms_m": math.hypot(x_then - middle_x, y_then - middle_y) - radius_m,
         "yaw_rate_peak_abs_radps": float(np.abs(recording["yaw_rate_radps"][begin:]).max()),
-        "sideslip_peak_abs_rad": float(np.abs(counted_sideslip(recording, begin)).max()),
+        "sideslip_peak_abs_rad": float(np.abs(counted_sideslip(recording, slice(begin, None))).max()),
         "speed_end_mps": float(recording["speed_mps"][-1]),
     }
 

@@ -119,9 +119,10 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
         values[f"{name}_rms_{unit}"] = rms(channel)
     if course.last_gate_x_m is not None:
         for name, unit in OSCILLATING:
-            channel = counted_sideslip(recording) if name == "sideslip" else recording[f"{name}_{unit}"]
-            values[f"{name}_gates_rms_{unit}"] = rms(channel[windows.gates])
-            values[f"{name}_after_gates_rms_{unit}"] = rms(channel[windows.after])
+            for key, part in (("gates", windows.gates), ("after_gates", windows.after)):
+                is_angle = name == "sideslip"
+                channel = counted_sideslip(recording, part) if is_angle else recording[f"{name}_{unit}"][part]
+                values[f"{name}_{key}_rms_{unit}"] = rms(channel)
     wheel = recording["steering_wheel_rad"]
     for name, unit in (("yaw_rate", "radps"), ("ay", "mps2")):
         follower = recording[f"{name}_{unit}"][windows.approach]

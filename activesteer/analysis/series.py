@@ -24,6 +24,8 @@ ANGLES_COUNT_ABOVE_MPS: Final = 10.0 / 3.6
 """Speed above which angles between velocities count in metrics [m/s]. A car that brakes to rest swings on its tyres,
 and its sideslip angle then says nothing about its path."""
 
+_ALL: Final = slice(None)
+
 PEAK_MARGIN: Final = 0.005
 """Fraction above the steady-state value below which a maximum is no peak."""
 
@@ -48,19 +50,17 @@ class StepResponse(NamedTuple):
     notes: tuple[str, ...]
 
 
-def counted_sideslip(recording: RecordingLike, start: int = 0) -> Array:
-    """Return the sideslip angle [rad], with 0 where the car is not faster than `ANGLES_COUNT_ABOVE_MPS`.
+def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
+    """Return the sideslip angles [rad] in a part of a run, while the car is faster than `ANGLES_COUNT_ABOVE_MPS`.
 
-    Args:
-        recording: The run; without a speed, as in measured data, all samples count.
-        start: First sample.
+    Without a speed, as in measured data, all samples count. If none counts, there is one sample of 0.
     """
-    sideslip_rad = np.asarray(recording["sideslip_rad"], dtype=np.float64)[start:]
+    sideslip_rad = np.asarray(recording["sideslip_rad"], dtype=np.float64)[part]
     try:
-        speed_mps = recording["speed_mps"][start:]
+        slow = recording["speed_mps"][part] <= ANGLES_COUNT_ABOVE_MPS
     except RecordingError:
         return sideslip_rad
-    return np.where(speed_mps <= ANGLES_COUNT_ABOVE_MPS, 0.0, sideslip_rad)
+    return np.zeros(1) if slow.size and slow.all() else sideslip_rad[~slow]
 
 
 def smooth(values: Array, timestep_s: float) -> Array:

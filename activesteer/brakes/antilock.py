@@ -15,8 +15,8 @@ whose limit exceeds the driver's demand is OFF. A front wheel that a controller 
 `intervention_slip`: a tyre at a large slip angle takes brake force only with a large slip (van Zanten 2000).
 
 At low speed the tyre builds up force slowly (relaxation length over speed), so that a wheel swings on it, and neither
-its deceleration nor a small slip tell of locking. There HOLD keeps the pressure just below the last limit, and only a
-large slip releases the wheel. At standstill, rising pressures hand the car over to the driver.
+its deceleration nor a small slip tell of locking. There HOLD keeps the mean friction torque of the cycles before, and
+only a large slip releases the wheel. At standstill, rising pressures hand the car over to the driver.
 
 Source of the cycle by wheel deceleration: Bosch, Automotive Handbook, chapter on ABS; Pasillas-Lepine (2006), Hybrid
 modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Fractions, thresholds and rates
@@ -45,9 +45,9 @@ _SETTLES_S: Final = 0.08
 _KEPT: Final = 0.9
 """Friction torque of a wheel that is released again so soon, as a fraction of the previous one."""
 _MEAN_S: Final = 0.5
-"""Time constant of the mean friction torque of a wheel in cycles [s]: some of them."""
+"""Time constant of the mean friction torque of a wheel [s]; a cycle lasts some 0.1 s."""
 _HELD_LESS: Final = 0.95
-"""Held pressure after a release, as a fraction of the previous one."""
+"""Held torque after a release, as a fraction of the one before."""
 _IMPATIENCE_S: Final = 0.25
 """Time in which the rate of BUILD increases by its initial value [s]."""
 
@@ -115,14 +115,23 @@ def _follow_mean(setup, state, wheel, slow):
 
 
 @inlined
+def _hand_over(setup, state, wheel):
+    """Raise a limit that is below the highest pressure because the car has become faster again after a hand-over."""
+    highest = setup.full_pedal_pressure_Pa
+    state.limit_Pa[wheel] = min(state.limit_Pa[wheel] + setup.hand_over_Paps * setup.interval_s, highest)
+
+
+@inlined
 def _rolls_slowly(setup, state, wheel, locking, gain):
-    """Advance a wheel that is not released at low speed."""
+    """Advance a wheel in OFF or HOLD at low speed."""
     if locking and gain < _REGAINS_mps2:
         state.mean_Nm[wheel] *= _HELD_LESS
         _release(setup, state, wheel)
     elif state.phase[wheel] == HOLD:
         rate = setup.hold_rise_per_s * state.mean_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
         state.limit_Pa[wheel] += rate * setup.interval_s
+    else:
+        _hand_over(setup, state, wheel)
 
 
 @inlined
@@ -161,9 +170,7 @@ def _wheel(setup, state, wheel, car_mps2, fed_Pa):
         if (gain < -threshold and slip > minimum) or (slip > largest_slip and gain < _REGAINS_mps2):
             _release(setup, state, wheel)
         elif phase == OFF:
-            # The limit is below the highest pressure if the car has become faster again after a hand-over.
-            highest = setup.full_pedal_pressure_Pa
-            state.limit_Pa[wheel] = min(state.limit_Pa[wheel] + setup.hand_over_Paps * setup.interval_s, highest)
+            _hand_over(setup, state, wheel)
         else:
             faster = 1.0 + state.phase_s[wheel] / _IMPATIENCE_S
             rate = setup.build_per_s * faster * state.borne_Nm[wheel] / per_pressure

@@ -27,14 +27,12 @@ SUCCESSORS: Final = {
     "fault-map": "study fault_map -o DIR` or `activesteer test r79-circle",
     "match": "tune STUDY",
     "falsify": "tune STUDY -c CONTROLLER",
+    "reproduce --population": "study population -o DIR` or `activesteer study comparison -o DIR",
+    **dict.fromkeys(
+        ("reproduce -c", "reproduce --controller", "reproduce --controllers"), "study side_by_side -o DIR -c CONTROLLER"
+    ),
 }
-"""Removed command -> what does its work now."""
-_SUCCESSOR_OPTIONS: Final = {
-    "--population": "`activesteer study population -o DIR` checks the claims in other cars, `activesteer study "
-    "comparison -o DIR -c CONTROLLER` compares controllers",
-    "--controllers": "`activesteer study side_by_side -o DIR -c CONTROLLER` compares controllers",
-}
-"""Removed option of `reproduce` -> what does its work now."""
+"""Removed command, or command and option -> what does its work now."""
 
 
 class Commands:
@@ -105,8 +103,8 @@ class Commands:
         """Correction of an unknown argument."""
         known = list(parser._option_string_actions)
         option = unknown.partition("=")[0]
-        if parser.prog.endswith("reproduce") and option in ("-c", "--controller", *_SUCCESSOR_OPTIONS):
-            return _SUCCESSOR_OPTIONS.get(option, _SUCCESSOR_OPTIONS["--controllers"])
+        if successor := SUCCESSORS.get(f"{parser.prog.split()[-1]} {option}"):
+            return f"use `activesteer {successor}`"
         if option in known:
             return f"put {option} after the command: activesteer {next(w for w in words if w[0] != '-')} {option}"
         if close := difflib.get_close_matches(option, known, 1, 0.7):

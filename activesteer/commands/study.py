@@ -50,9 +50,11 @@ def _study(options: argparse.Namespace) -> int:
         "controllers": options.controller, "vehicles": options.vehicle, "driver": options.driver,
         "overrides": overrides_of(options), "samples": options.samples,
     }  # fmt: skip
-    changes = {key: value for key, value in changes.items() if value}
+    changes = {key: value for key, value in changes.items() if value not in (None, {})}
     if changes and given.is_dir():
         raise StudyError(f"{given} holds a study, which keeps its {' and '.join(changes)}; give a study file instead")
+    if changes and (options.status or options.report):
+        raise StudyError(f"--status and --report drive nothing, so they take no {' and '.join(changes)}")
     folder = options.output or (given if given.is_dir() else None)
     if folder is None:
         read_study(options.study)

@@ -23,8 +23,9 @@ class Event(NamedTuple):
 
     Attributes:
         time_s: Time at which the next step began [s].
-        kind: `set` for a changed key, `fail` for a fault, `phase` for a phase of the manoeuvre.
-        what: The change (`road.mu = 0.3`), the fault (`rear:stuck`) or the name of the phase.
+        kind: `set` for a changed key, `fail` for a fault, `phase` for a phase of the manoeuvre, `note` for a limit of
+            accuracy.
+        what: The change (`road.mu = 0.3`), the fault (`rear:stuck`), the name of the phase, or the limit in words.
     """
 
     time_s: float

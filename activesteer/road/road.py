@@ -226,8 +226,13 @@ class Road:
         """Way of contact on the uneven surface."""
         if self.contact != "auto":
             return self.contact
-        smooth = not self._is_gridded and all(obstacle.is_smooth for obstacle in self.obstacle)
+        smooth = not (self._is_gridded or self.is_steep)
         return "single_point" if smooth else "enveloping"
+
+    @property
+    def is_steep(self) -> bool:
+        """True if an obstacle bends the road within the contact patch, as a cleat or a kerb does."""
+        return not all(obstacle.is_smooth for obstacle in self.obstacle)
 
     def laid(self, course: Course | None) -> Road:
         """Return the road as the car drives on it: with the path of the course if it follows that path.

@@ -40,6 +40,12 @@ MAX_KEPT_VALUES: Final = 2**25
 """Most values of a run with a file that stay in memory: 256 MiB, about three minutes. The values of a longer run are
 read from the file when needed, so that memory does not grow with the run."""
 _GIVEN: Final = "Simulation.step was given"
+_COARSE_S: Final = 5e-4
+"""Step from which longitudinal tyre forces on short obstacles are coarse [s]: they move by 10 % in a millisecond."""
+_COARSE: Final = (
+    "steps are long for a short obstacle: longitudinal tyre forces on it may be off by a tenth of their range, "
+    "on a stiff tyre by more; timestep_s=0.00025 is finer"
+)
 
 
 class SavedState(NamedTuple):
@@ -127,6 +133,8 @@ class Simulation:
         self._link = None if udp is None else self._linked(UdpPort(udp) if isinstance(udp, int) else udp)
         self._failure: BaseException | None = None
         self._writer: McapWriter | None = None
+        if timestep_s >= _COARSE_S and self.scenario.maneuver.ground.is_steep:
+            self._note("note", _COARSE)
 
     @cached_property
     def _recorder(self) -> Recorder:
@@ -492,6 +500,8 @@ class Simulation:
         if self.loop.step_count or self._writer is not None:
             raise RecordingError("a run is recorded to one file, from its first step", key="path", value=path)
         with self.context.writer(path) as self._writer:
+            if self.events:
+                self._writer.write_events(self.events)
             keep = self.steps * len(self.context.channels) <= MAX_KEPT_VALUES
             recorder = Recorder(self.loop.vehicle, self.steps, self._writer, keep=keep, interval_s=self._block_s)
             self._recorder = recorder

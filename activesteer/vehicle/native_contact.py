@@ -56,8 +56,6 @@ _FINE_M: Final = 0.0004
 _GRID_M: Final = 0.002
 """The same for a grid, whose slopes are a tenth of a step's [m]."""
 
-_STEP_PLACES: Final = 4
-"""Places of a step at which a tyre feels an obstacle; 2 mm apart at 30 km/h and 1 ms."""
 _LEAST_RATE: Final = 1e-3
 """Sine of the least angle between a wheel's heading and the edge of a step at which it rolls over that edge."""
 
@@ -211,51 +209,6 @@ def contact_plane(
         ahead_s, ahead_d,
     )  # fmt: skip
     return 0.5 * (front + rear), (front - rear) / cam.distance_m, sideways, (front_slope - rear_slope) / cam.distance_m
-
-
-@compiled
-def mean_contact_plane(
-    surface, numbers, obstacles, cam, along, across, cos, sin, stretch, heading_x, heading_y, free_radius, travel_m
-):
-    """Return the mean of `contact_plane` over the way that a wheel rolls in a step, half of it ahead.
-
-    A cam meets the corner of an obstacle at an instant within the step. The plane at the step's beginning alone would
-    make forces depend on where the steps fall, by a tenth of a cleat's longitudinal force at 1 ms.
-
-    Args:
-        surface: As for `contact_plane`, and so the next eleven arguments.
-        numbers: Its numbers.
-        obstacles: Its obstacles.
-        cam: The `CAM` of the wheel.
-        along: Distance along the road of the place below the wheel [m].
-        across: Its distance to the left of the middle [m].
-        cos: Cosine of the road's direction against world x.
-        sin: Its sine.
-        stretch: Distance along the road's middle per distance along the road at this place.
-        heading_x: Heading of the wheel in the world, a horizontal unit vector.
-        heading_y: Its y component.
-        free_radius: Free radius of the tyre [m].
-        travel_m: Way of the wheel along its heading in the step [m].
-    """
-    first, last, _ = near_obstacles(obstacles, along, across)
-    if first >= last or surface.contact == SINGLE_POINT:
-        return contact_plane(
-            surface, numbers, obstacles, cam, along, across, cos, sin, stretch, heading_x, heading_y, free_radius
-        )
-    ahead_s = (heading_x * cos + heading_y * sin) * stretch
-    ahead_d = heading_y * cos - heading_x * sin
-    z, forward, sideways, bend = 0.0, 0.0, 0.0, 0.0
-    for part in range(_STEP_PLACES):
-        way = ((part + 0.5) / _STEP_PLACES - 0.5) * travel_m
-        one_z, one_forward, one_sideways, one_bend = contact_plane(
-            surface, numbers, obstacles, cam, along + way * ahead_s, across + way * ahead_d, cos, sin, stretch,
-            heading_x, heading_y, free_radius,
-        )  # fmt: skip
-        z += one_z / _STEP_PLACES
-        forward += one_forward / _STEP_PLACES
-        sideways += one_sideways / _STEP_PLACES
-        bend += one_bend / _STEP_PLACES
-    return z, forward, sideways, bend
 
 
 @compiled

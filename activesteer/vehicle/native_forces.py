@@ -27,7 +27,7 @@ from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
 from activesteer.vehicle.native_actuators import brake_rate, drive_rate, dry_friction_rate, servo_rate
-from activesteer.vehicle.native_contact import CAM, mean_contact_plane, plane_axes, spin_on_bend
+from activesteer.vehicle.native_contact import CAM, contact_plane, plane_axes, spin_on_bend
 from activesteer.vehicle.native_curve_axle import add_curve_axle_forces
 from activesteer.vehicle.native_screws import screw_rate
 
@@ -158,10 +158,9 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
         along, across, cos, sin, curvature = _place_on_road(block, header, contact_x, contact_y)
         if uneven:
             stretch = 1.0 / max(1.0 - curvature * across, _LEAST_STRETCH)
-            road_z, forward, sideways, bend = mean_contact_plane(
-                surface, heights, obstacles, cams[index], along, across, cos, sin, stretch, hx, hy, p.UNLOADED_RADIUS,
-                (vx * hx + vy * hy) * timestep_s,
-            )  # fmt: skip
+            road_z, forward, sideways, bend = contact_plane(
+                surface, heights, obstacles, cams[index], along, across, cos, sin, stretch, hx, hy, p.UNLOADED_RADIUS
+            )
             axes = plane_axes(forward, sideways, hx, hy)
             height = _across(
                 axes, 0, xpos[3 * body] - contact_x, xpos[3 * body + 1] - contact_y, xpos[3 * body + 2] - road_z

@@ -150,3 +150,19 @@ def test_an_input_without_effect_on_the_rest_is_refused() -> None:
     simulation.advance(1000)
     with raises(ManeuverError, key="steer.start_s"):
         simulation.set("steer.start_s", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("maneuver", "timestep_s", "noted"), [("cleat", 1e-3, 1), ("cleat", 2.5e-4, 0), ("straight_line", 1e-3, 0)]
+)
+def test_a_run_over_a_short_obstacle_with_long_steps_says_so(maneuver, timestep_s, noted) -> None:
+    simulation = Simulation(maneuver, timestep_s=timestep_s, overrides={"duration_s": 0.1, "settle_s": 0.1})
+    assert [event.kind for event in simulation.events] == ["note"] * noted
+
+
+def test_an_event_before_the_file_stands_in_the_file(tmp_path: Path) -> None:
+    simulation = step_steer()
+    simulation.set("road.mu", 0.3)
+    with simulation.recorded_to(tmp_path / "a.mcap"):
+        simulation.advance(10)
+    assert events_of(Recording.open(tmp_path / "a.mcap").metadata) == [(0.0, "set", "road.mu = 0.3")]

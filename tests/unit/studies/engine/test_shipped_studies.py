@@ -32,6 +32,12 @@ def test_fewer_samples_and_faults_as_texts() -> None:
 def test_a_folder_keeps_its_study_and_removed_options_name_their_successor(tmp_path, capsys) -> None:
     assert main(["study", str(tmp_path), "-c", "ars"]) == 1
     assert "give a study file instead" in capsys.readouterr().err
+    for words, told in (
+        (["study", "population", "-o", "p", "--samples", "0"], "0"),
+        (["study", "population", "--status", "-c", "ars"], "drive nothing"),
+    ):
+        assert main(words) != 0
+        assert told in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main(["reproduce", "--population", "3"])
     assert "activesteer study population" in capsys.readouterr().err
