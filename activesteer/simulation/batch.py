@@ -283,9 +283,10 @@ class Batch:
                 step = int(records["step"][car])
                 if left[car] and not slow[car]:
                     # Faults that begin or end now change the model.
-                    stretch = next(self.loops[car].faults.stretches(step, step + int(left[car])))
-                    count, watched = stretch.last - stretch.first, stretch.step != self.loops[car].vehicle.step
-                    natively[car], in_python[car] = (0, count) if watched else (count, 0)
+                    faults = self.loops[car].faults
+                    faults.act(step)
+                    count = min(int(left[car]), faults.next_change(step) - step)
+                    natively[car], in_python[car] = (0, count) if faults.angle_fails else (count, 0)
             if drivers is None:
                 for car in np.flatnonzero((natively > 0) & (records["step"] >= self._table_ends)).tolist():
                     if not self._tabulate(car):

@@ -269,13 +269,14 @@ class ClosedLoop(Uncopyable):
         with engine_warnings_held():
             vehicle.record_on(None if recorder is None else recorder.tape)
             try:
-                for first, last, step_car, angle_fails in self.faults.stretches(
-                    self.step_count, self.step_count + steps
-                ):
-                    stretch = range(first, last)
-                    unit = told_by_sensor(steering, vehicle.parameters.steering.ratio) if angle_fails else steering
-                    native = step_car == vehicle.step and unit is self.controller and driving is self.driver
-                    native = native and sequence is None
+                end = self.step_count + steps
+                while self.step_count < end:
+                    self.faults.act(self.step_count)
+                    stretch = range(self.step_count, min(end, self.faults.next_change(self.step_count)))
+                    unit = steering
+                    if self.faults.angle_fails:
+                        unit = told_by_sensor(steering, vehicle.parameters.steering.ratio)
+                    native = unit is self.controller and driving is self.driver and sequence is None
                     for block in _pieces(stretch) if recorder is None else recorder.blocks(stretch):
                         if native and self._drive_natively(block, setpoint_at):
                             continue
@@ -286,7 +287,7 @@ class ClosedLoop(Uncopyable):
                             setpoint = setpoint_at(step * timestep_s)
                             driver_command = driving.step(setpoint, measurement, motion)
                             actuator_command = unit.step(driver_command, measurement)
-                            measurement, motion = step_car(driver_command, actuator_command)
+                            measurement, motion = vehicle.step(driver_command, actuator_command)
                         self.step_count, self.commands = block.stop, (driver_command, actuator_command)
                         self.measurement, self.motion = measurement, motion
                     self._take_over()

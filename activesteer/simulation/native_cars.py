@@ -148,16 +148,14 @@ class NativeCars:
         self._blocks: list[NDArray[Any] | None] = [None] * count
         for index, loop in enumerate(loops):
             drive: Any = loop.driver_setup.drive  # the vehicle's own
-            bound = {"drive_fractions": drive.fractions, "drive_numbers": drive.numbers, **loop.vehicle.bound()}
-            for name, value in bound.items():
-                self.cars[name][index] = value
+            self.cars["drive_fractions"][index], self.cars["drive_numbers"][index] = drive.fractions, drive.numbers
+            self.cars["bindings"][index] = loop.vehicle.address
 
     def load(self, index: int) -> None:
         """Copy the state of a loop into its record; its native driver and controller act, other commands hold."""
         loop, cars = self._loops[index], self.cars
         estimate = loop.vehicle.rows.estimate
         cars["estimate"][index] = estimate.ctypes.data if estimate.size else 0
-        cars["gear"][index] = loop.vehicle.gear
         cars["step"][index] = loop.step_count
         self.measurements[index], self.motions[index] = numbers_in(loop.measurement), loop.motion
         self.driver_commands[index], self.actuator_commands[index] = map(numbers_in, loop.commands)
@@ -191,7 +189,6 @@ class NativeCars:
     def store(self, index: int) -> None:
         """Copy the record of a car back into its loop."""
         loop, cars = self._loops[index], self.cars
-        loop.vehicle.gear = float(cars["gear"][index])
         step = loop.step_count = int(cars["step"][index])
         loop.measurement = message_of(Measurement, self.measurements[index].tolist())
         loop.motion = message_of(Motion, self.motions[index].tolist())

@@ -23,7 +23,7 @@ from activesteer.native_memory import array_of, f64_pointer, pointer_to, word_po
 from activesteer.native_messages import load_numbers, native_type, store_numbers
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_of, widths_of
 from activesteer.vehicle import native_step
-from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits, engine_speed
+from activesteer.vehicle.powertrain import drive_limits, engine_speed
 
 ANGLE, CURVATURE, PATH = range(3)
 """Kinds of a setpoint: steering wheel angle, curvature, path."""
@@ -50,11 +50,6 @@ CAR: Final = np.dtype(
         np.record,
         [
             ("bindings", np.intp),
-            ("gear", np.float64),
-            ("gear_address", np.intp),
-            ("armature", np.intp, (4,)),
-            ("free_kgm2", np.float64, (4,)),
-            ("engaged_kgm2", np.float64, (4,)),
             ("drive_fractions", np.float64, (4,)),
             ("drive_numbers", np.float64, (4,)),
             ("driver_kind", np.intp),
@@ -168,15 +163,6 @@ def _control(car, measured, driver, command):
 
 
 @inlined
-def _engage(car, gear):
-    """Couple the engine to the wheels, or free them, as `Vehicle` does between two steps."""
-    car.gear = gear
-    f64_pointer(car.gear_address)[0] = gear
-    for wheel in range(4):
-        f64_pointer(car.armature[wheel])[0] = car.free_kgm2[wheel] if gear == CLUTCH_OPEN else car.engaged_kgm2[wheel]
-
-
-@inlined
 def _torques(car, row, ctrl, drives, brakes):
     torques: Any = carray(_torques_pointer(car.torques), (car.n_setpoints,))[row]
     for wheel in range(4):
@@ -211,9 +197,6 @@ def drive_cars(cars, first, last, step_address):
                 torques_set = setpoints[row].torques_set != 0
             if car.controller_kind != 0:
                 _control(car, measured, driver, f64_pointer(car.actuator_command))
-            gear = float(CLUTCH_OPEN) if torques_set else driver[_GEAR]
-            if gear != car.gear:
-                _engage(car, gear)
             if torques_set:
                 _torques(car, row, f64_pointer(bindings.ctrl), bindings.drives, bindings.brakes)
             sane, measurement, moving = _step(

@@ -66,7 +66,6 @@ class Vehicle(Uncopyable):
         electric: Motors and battery, as views to read; a fault changes `motors`.
         sensors: Sensors between the truth and the measurement; None for ideal sensors.
         wheels: The wheels in the engine.
-        gear: Present gear; compiled code that engages a gear sets it.
     """
 
     def __init__(
@@ -145,7 +144,7 @@ class Vehicle(Uncopyable):
         self._hands = model.actuator("steering_wheel").id
         self._velocimeter = data.sensor("cg_velocimeter").data
         self._gyro = data.sensor("cg_gyro").data
-        self.gear: float = CLUTCH_OPEN
+        self._faults: NDArray[Any] | None = None
 
     def _place(self) -> None:
         """Put the car into static equilibrium at the origin of the world, heading along x."""
@@ -236,12 +235,10 @@ class Vehicle(Uncopyable):
                 write_estimate(self._estimate_memory, 0, *estimate)
             if (added := actuator_command.wheel_torque_demand_Nm) is not NO_TORQUES:
                 self.wheels.check_driven(added)
-            torques = driver_command.wheel_torques
-            gear = driver_command.gear if torques is None else CLUTCH_OPEN
-            if gear != self.gear:
-                self._engage(gear)
-            if torques is not None:
+            if (torques := driver_command.wheel_torques) is not None:
                 self.wheels.apply(torques)
+            else:
+                check_gear(driver_command.gear)
             sane, measurement, motion = native_step.step(
                 self._address, driver_command, actuator_command, torques is not None
             )
@@ -261,26 +258,15 @@ class Vehicle(Uncopyable):
             raise ParameterError(f"is {shown(tape)}; a Tape is needed", key="tape", value=tape)
         self._tape, self._tape_address[0] = tape, 0 if tape is None else tape.address
 
-    def _engage(self, gear: Any) -> None:
-        if gear not in _GEARS:
-            raise ValueError(f"gear {gear!r} is not one of {_GEARS}")
-        self.gear = self._forces["gear"] = gear
-        self.wheels.engage(gear)
+    @property
+    def address(self) -> int:
+        """Address of the record by which compiled code steps this car; the car must outlive it."""
+        return self._address
 
-    def bound(self) -> dict[str, Any]:
-        """Return what compiled code needs to step this car and to change its gear, by the names of `native_loop.CAR`.
-
-        The addresses are those of this car's memory, which must outlive them.
-        """
-        armature, wheels = self.model.dof_armature, self.wheels
-        return {
-            "bindings": self._address,
-            "gear": self.gear,
-            "gear_address": self._forces["gear"].ctypes.data,
-            "armature": [armature.ctypes.data + dof * armature.strides[0] for dof in wheels.spins],
-            "free_kgm2": wheels.armatures_kgm2(CLUTCH_OPEN),
-            "engaged_kgm2": wheels.armatures_kgm2(1),
-        }
+    @property
+    def gear(self) -> float:
+        """Present gear."""
+        return float(self._forces["gear"][0])
 
     def replay(self, inputs: NDArray[np.float64]) -> None:
         """Advance the engine alone by several steps in one native call, without commands, checks or recording.
@@ -411,7 +397,7 @@ class Vehicle(Uncopyable):
         for part in memory:
             part[:] = state[size : size + part.size]
             size += part.size
-        self._engage(state[-1])
+        native_step.engage(self._address, float(state[-1]))
 
     def _memory(self) -> list[NDArray[np.float64]]:
         """Memory apart from the engine's state: brakes, motors, sensors, estimate, the engine's present sensor data."""
@@ -481,10 +467,10 @@ class Vehicle(Uncopyable):
             if self.sensors is not None:
                 self.sensors.reset(self.truth()[0])
 
-    def note_measurement(self, measurement: Measurement) -> None:
-        """Pass the measurement of faulty sensors to the brakes, and to the recording if it holds measurements."""
-        if self.sensors is not None:
-            self.sensors.say(measurement)
+    def act_in_every_step(self, faults: NDArray[Any] | None) -> None:
+        """Let these records of `native_faults.FAULT` act in every step; None for no faults."""
+        self._faults, count = faults, 0 if faults is None else len(faults)
+        self._bindings["n_faults"], self._bindings["faults"] = count, 0 if faults is None else faults.ctypes.data
 
     def note_faults(self, count: int) -> None:
         """Record this number of active faults from now on."""
@@ -513,6 +499,12 @@ def _changeable(part: mujoco.MjModel | mujoco.MjOption) -> list[str]:
     """Names of the numbers of a model, or of its options, that can change at run time."""
     kinds = (np.ndarray, int, float) if isinstance(part, mujoco.MjOption) else (np.ndarray,)
     return [name for name in dir(part) if not name.startswith("_") and isinstance(getattr(part, name), kinds)]
+
+
+def check_gear(gear: Any) -> None:
+    """Raise a `ValueError` for a gear that the car does not have."""
+    if gear not in _GEARS:
+        raise ValueError(f"gear {gear!r} is not one of {_GEARS}")
 
 
 def _refused(driver_command: object, actuator_command: object, reason: Exception | None = None) -> ActiveSteerError:

@@ -6,40 +6,27 @@ more. Only a sensor's fault, and a delay, act in every step. A car without fault
 
 from __future__ import annotations
 
-import copy
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
-from typing import Any, Final, NamedTuple
+from collections.abc import Sequence
+from typing import Any, Final
 
 import mujoco
+import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
 from activesteer.faults import ACTUATORS, ANGLE_SENSOR, MOTOR, SENSORS, Fault
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
+from activesteer.vehicle import native_faults as native
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.motor_records import FULL_TORQUE_NM, HEALTHY
 from activesteer.vehicle.named_parts import find
 
-Step = Callable[[DriverCommand, ActuatorCommand], tuple[Measurement, Motion]]
+_NEVER: Final = 2**62
 _STOPS: Final = {"left": "high", "right": "low"}
-
-
-class Stretch(NamedTuple):
-    """Steps between which no fault begins or ends.
-
-    Attributes:
-        first: The first step.
-        last: The step after the last one.
-        step: Function that steps the car.
-        angle_fails: True if the steering angle sensor fails.
-    """
-
-    first: int
-    last: int
-    step: Step
-    angle_fails: bool = False
+_SENSOR_KINDS: Final = {
+    "stuck": native.STUCK, "delayed": native.DELAYED, "offset": native.OFFSET, "runaway": native.RUNAWAY,
+    "reversed": native.REVERSED, "dropout": native.DROPOUT,
+}  # fmt: skip
 
 
 class Faults:
@@ -60,7 +47,7 @@ class Faults:
         vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
         for fault in faults:
             if fault.part in SENSORS:
-                self._acting.append(_SensorFault(fault, vehicle.timestep_s))
+                self._acting.append(_SensorFault(fault, vehicle))
             else:
                 members = ACTUATORS[fault.part].members
                 if fault.part in ("rear_left", "rear_right") and vehicle.parameters.rear_actuator.is_central:
@@ -68,26 +55,20 @@ class Faults:
                     raise ManeuverError(f"{fault.part!r} {problem}", key="part", value=fault.part, allowed=["rear"])
                 kind = _MotorFault if fault.part.startswith(MOTOR) else _ActuatorFault
                 self._acting += [kind(fault, name, vehicle) for name in members]
+        self._records = np.zeros(len(self._acting), native.FAULT)
+        for acting, record in zip(self._acting, self._records, strict=True):
+            acting.bind(record)
+        vehicle.act_in_every_step(self._records)
 
-    def stretches(self, first: int, last: int) -> Iterator[Stretch]:
-        """Divide a range of steps where a fault begins or ends.
+    def next_change(self, step: int) -> int:
+        """Return the first step after this one at which a fault begins or ends."""
+        changes = (change for acting in self._acting for change in (acting.listens, acting.begins, acting.ends))
+        return min((change for change in changes if change > step), default=_NEVER)
 
-        Args:
-            first: First step, counted from the start of the recording.
-            last: Step after the last one.
-
-        Yields:
-            The stretches; the faults of a stretch are in the model before it is yielded.
-        """
-        if not self._acting:
-            yield Stretch(first, last, self._vehicle.step)
-            return
-        changes = {step for acting in self._acting for step in (acting.listens, acting.begins, acting.ends)}
-        for begin, end in pairwise(sorted({first, last, *(step for step in changes if first < step < last)})):
-            self.act(begin)
-            watching = [a for a in self._acting if a.watches and a.listens <= begin < a.ends]
-            angle_fails = any(a.fault.part == ANGLE_SENSOR and a.begins <= begin for a in watching)
-            yield Stretch(begin, end, self._watched(watching, begin) if watching else self._vehicle.step, angle_fails)
+    @property
+    def angle_fails(self) -> bool:
+        """True if the steering angle sensor fails now."""
+        return any(acting.fault.part == ANGLE_SENSOR and acting.state == native.ACTS for acting in self._acting)
 
     def act(self, step: int) -> None:
         """Activate the faults of a step in the model, and remove the others."""
@@ -95,6 +76,7 @@ class Faults:
             acting.release()
             if step == acting.ends:
                 acting.recover()
+            acting.turn(step)
         active = [acting for acting in self._acting if acting.begins <= step < acting.ends]
         for acting in active:
             acting.engage()
@@ -105,39 +87,21 @@ class Faults:
         for acting in self._acting:
             acting.release()
         self._vehicle.note_faults(0)
+        self._vehicle.act_in_every_step(None)
 
     def take_memory_of(self, other: Faults) -> None:
         """Take over the memory of faults that stand first here too, and so go on."""
         for acting, before in zip(self._acting, other._acting, strict=False):
-            acting.memory = before.memory
+            acting.memory[:] = before.memory
 
-    def save_state(self) -> list[Any]:
+    def save_state(self) -> list[Array]:
         """Return the memory of the faults."""
-        return copy.deepcopy([acting.memory for acting in self._acting])
+        return [acting.memory.copy() for acting in self._acting]
 
-    def restore_state(self, state: list[Any]) -> None:
+    def restore_state(self, state: list[Array]) -> None:
         """Restore a saved state."""
-        for acting, memory in zip(self._acting, copy.deepcopy(state), strict=True):
-            acting.memory = memory
-
-    def _watched(self, watching: Sequence[_Acting], begin: int) -> Step:
-        vehicle = self._vehicle
-        delays = [acting for acting in watching if isinstance(acting, _DemandFault)]
-        sensors = [(acting, acting.begins <= begin) for acting in watching if isinstance(acting, _SensorFault)]
-
-        def step(driver_command: DriverCommand, actuator_command: ActuatorCommand) -> tuple[Measurement, Motion]:
-            for delay in delays:
-                delay.before_step()
-            measurement, motion = vehicle.step(driver_command, actuator_command)
-            for delay in delays:
-                delay.after_step()
-            for sensor, active in sensors:
-                measurement = sensor.read(measurement, active=active)
-            if sensors:
-                vehicle.note_measurement(measurement)
-            return measurement, motion
-
-        return step
+        for acting, memory in zip(self._acting, state, strict=True):
+            acting.memory[:] = memory
 
 
 class _Acting:
@@ -148,18 +112,36 @@ class _Acting:
         begins: Step at which it begins; `ends`: step from which the part works again.
         delay: Steps by which it delays demands or readings.
         listens: Step from which on it must know the demands.
-        watches: Whether it acts in every step.
-        memory: The last demands for a delay, or the demand at which a brake sticks.
+        memory: The last demands for a delay, or the demand at which a brake sticks; see `native_faults`.
     """
 
     def __init__(self, fault: Fault, timestep_s: float) -> None:
         self.fault = fault
-        self.begins, never = round(fault.start_s / timestep_s), 2**62
-        self.ends = never if fault.end_s is None else max(self.begins + 1, round(fault.end_s / timestep_s))
-        self.watches = fault.delay_s is not None
+        self.begins = round(fault.start_s / timestep_s)
+        self.ends = _NEVER if fault.end_s is None else max(self.begins + 1, round(fault.end_s / timestep_s))
+        self._watches = fault.delay_s is not None
         self.delay = round((fault.delay_s or 0.0) / timestep_s)
         self.listens = self.begins - self.delay
-        self.memory: deque[float] = deque(maxlen=max(1, self.delay))
+        self.memory = native.memory_of(max(1, self.delay))
+
+    @property
+    def _capacity(self) -> int:
+        return self.memory.size - 2
+
+    @property
+    def state(self) -> int:
+        """What compiled code does with the fault now; see `native_faults`."""
+        return int(self._own["state"])
+
+    def bind(self, record: Any) -> None:
+        """Describe the fault in its record for compiled code."""
+        self._own = record
+        record["memory"], record["capacity"] = self.memory.ctypes.data, self._capacity
+
+    def turn(self, step: int) -> None:
+        """Let the fault listen or act in every step from this one on, if it does so."""
+        listens = self._watches and self.listens <= step < self.ends
+        self._own["state"] = (native.ACTS if self.begins <= step else native.LISTENS) if listens else native.IDLE
 
     def engage(self) -> None:
         """Activate the fault in the model, if it acts there."""
@@ -175,18 +157,13 @@ class _DemandFault(_Acting):
     """A fault of a part that follows a demand."""
 
     _record: NDArray[Any]
+    _demand: NDArray[Any]
 
-    def _demand(self) -> float:
-        raise NotImplementedError
-
-    def before_step(self) -> None:
-        """Give the part the delayed demand."""
-        if self._record["scale"] == 0.0:
-            self._record["offset"] = self.memory[0] if self.memory else self._demand()
-
-    def after_step(self) -> None:
-        """Keep the demand."""
-        self.memory.append(self._demand())
+    def bind(self, record: Any) -> None:
+        """Describe the fault in its record for compiled code."""
+        super().bind(record)
+        record["kind"] = native.DEMAND
+        record["place"], record["offset"] = self._demand.ctypes.data, self._record["offset"].ctypes.data
 
 
 class _ActuatorFault(_DemandFault):
@@ -202,12 +179,9 @@ class _ActuatorFault(_DemandFault):
         self._screw = vehicle.actuators.screw(self._index)
         self._healthy_screw = tuple(part.copy() for part in self._screw)
         self._data = vehicle.data
-        self._ctrl = vehicle.data.ctrl
+        self._demand = vehicle.data.ctrl[self._index : self._index + 1]
         ratio = vehicle.parameters.steering.ratio if ACTUATORS[fault.part].by_ratio else 1.0
         self._offset = fault.size * ratio
-
-    def _demand(self) -> float:
-        return float(self._ctrl[self._index])
 
     def engage(self) -> None:
         """Activate the fault."""
@@ -218,9 +192,9 @@ class _ActuatorFault(_DemandFault):
             # The nut is off its thread and moves freely between the end stops.
             self._screw[0]["backlash_m"] = 4.0 * self._screw[1]["stop_m"]
         elif kind == "stuck" and ACTUATORS[self.fault.part].has_torque:
-            if not self.memory:
-                self.memory.append(self._demand())
-            record["scale"], record["offset"] = 0.0, self.memory[0]
+            if not self.memory[0]:
+                native.keep(self.memory, self._capacity, float(self._demand[0]))
+            record["scale"], record["offset"] = 0.0, native.oldest(self.memory, self._capacity)
         elif kind == "stuck":
             # Without a rate the servo holds its present angle, with its stiffness and its strength.
             record["rate_limit"] = 0.0
@@ -260,10 +234,7 @@ class _MotorFault(_DemandFault):
         super().__init__(fault, vehicle.timestep_s)
         number = places.index(place)
         self._record = vehicle.electric.motors[number : number + 1]
-        self._state = vehicle.electric.states[number : number + 1]
-
-    def _demand(self) -> float:
-        return float(self._state["demand_Nm"][0])
+        self._demand = vehicle.electric.states[number : number + 1]["demand_Nm"]
 
     def engage(self) -> None:
         """Activate the fault."""
@@ -285,35 +256,15 @@ class _MotorFault(_DemandFault):
 class _SensorFault(_Acting):
     """A fault of one signal, which changes nothing in the car."""
 
-    def __init__(self, fault: Fault, timestep_s: float) -> None:
-        super().__init__(fault, timestep_s)
-        self.watches = True
-        self._sensor = SENSORS[fault.part]
-        self._place = Measurement._fields.index(self._sensor.field)
+    def __init__(self, fault: Fault, vehicle: Vehicle) -> None:
+        super().__init__(fault, vehicle.timestep_s)
+        self._watches = True
         # A stuck sensor needs its last reading.
         self.listens = self.begins - max(1, self.delay)
-        self.memory = deque(maxlen=self.delay + 1 if self.delay else 1)
+        self.memory = native.memory_of(self.delay + 1 if self.delay else 1)
 
-    def read(self, measurement: Measurement, *, active: bool) -> Measurement:
-        """Return the faulty reading for a true one."""
-        whole: Any = measurement[self._place]
-        index = self._sensor.wheel
-        good = whole if index is None else whole[index]
-        if not (active and self.fault.kind == "stuck" and self.memory):
-            self.memory.append(good)
-        if not active:
-            return measurement
-        read = self._reading(good)
-        if index is not None:
-            read = (*whole[:index], read, *whole[index + 1 :])
-        return measurement._replace(**{self._sensor.field: read})
-
-    def _reading(self, good: float) -> float:
-        kind = self.fault.kind
-        if kind in ("stuck", "delayed"):
-            return self.memory[0]
-        if kind == "offset":
-            return good + self.fault.size
-        if kind == "runaway":
-            return self.fault.size
-        return -good if kind == "reversed" else 0.0
+    def bind(self, record: Any) -> None:
+        """Describe the fault in its record for compiled code."""
+        super().bind(record)
+        record["kind"], record["place"] = _SENSOR_KINDS[self.fault.kind], list(SENSORS).index(self.fault.part)
+        record["amount"] = self.fault.size

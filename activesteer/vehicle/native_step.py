@@ -16,7 +16,7 @@ from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
 from activesteer.native_memory import f64_pointer, pointer_to
-from activesteer.native_messages import native_type
+from activesteer.native_messages import load_numbers, native_type
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import Measurement, Motion
@@ -30,6 +30,7 @@ from activesteer.vehicle.command_row import (
     TORQUES,
     write_commands,
 )
+from activesteer.vehicle.native_faults import give_late, keep_demands, misread
 from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
 from activesteer.vehicle.native_motors import step_motors
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
@@ -142,6 +143,15 @@ def _record(bindings, tape):
 
 
 @inlined
+def _engage(bindings, gear):
+    """Couple the engine to the wheels, or free them."""
+    f64_pointer(bindings.gear)[0] = gear
+    for wheel in range(_N_WHEELS):
+        carried = bindings.free_kgm2[wheel] if gear == CLUTCH_OPEN else bindings.engaged_kgm2[wheel]
+        f64_pointer(bindings.armature[wheel])[0] = carried
+
+
+@inlined
 def _with_grip(setup, state, wheel, torque_Nm):
     """Return the demand at a motor's wheel as traction control leaves it: less for a wheel that spins or locks."""
     if setup.tcs == 0.0 or torque_Nm == 0.0:
@@ -167,27 +177,20 @@ def sense(bindings_address):
     return _sense(carray(_bindings_pointer(bindings_address), (1,))[0])
 
 
+@compiled_call(types.void, types.intp, types.float64)
+def engage(bindings_address, gear):
+    """Couple the engine to the wheels, or free them, between two steps."""
+    _engage(carray(_bindings_pointer(bindings_address), (1,))[0], gear)
+
+
 @inlined
-def carry_out(bindings_address, driver_command, actuator_command, torques_set):
-    """Carry out the commands, advance the engine by one step, record it and read the sensors.
-
-    The commands stay in the first recorded array after the engine's. The step is recorded on the tape of the bindings,
-    unless the state is not sane.
-
-    Args:
-        bindings_address: Address of a `STEP_BINDINGS`.
-        driver_command: A `DriverCommand`.
-        actuator_command: An `ActuatorCommand`.
-        torques_set: Whether drive and brakes have their inputs already; drive torque demands and the pedal then have
-            no effect.
-
-    Returns:
-        Whether the state is sane, and the fields of `Measurement` and of `Motion`.
-    """
-    bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
-    commands_address = bindings.sources[_ENGINE_ARRAYS]
-    write_commands(commands_address, driver_command, actuator_command)
+def _set_inputs(bindings, commands_address, torques_set):
+    """Write the inputs of all actuators of the engine; see `carry_out`."""
     commands = carray(_command_pointer(commands_address), (1,))[0]
+    gear = float(CLUTCH_OPEN) if torques_set else commands.gear
+    if gear != f64_pointer(bindings.gear)[0]:
+        _engage(bindings, gear)
+    give_late(bindings.faults, bindings.n_faults)
     brake_torques_Nm = carray(f64_pointer(commands_address), (BRAKES + _N_WHEELS,))[BRAKES:]
     ctrl = f64_pointer(bindings.ctrl)
     ctrl[bindings.steering_wheel] = commands.steering_wheel_demand_rad
@@ -229,7 +232,31 @@ def carry_out(bindings_address, driver_command, actuator_command, torques_set):
             bindings.motors, bindings.n_motors, bindings.battery, bindings.electric_state, ctrl, bindings.drives,
             carray(f64_pointer(bindings.qvel), (bindings.n_dofs,)), bindings.spins, bindings.timestep_s, torques_set,
         )  # fmt: skip
+
+
+@inlined
+def carry_out(bindings_address, driver_command, actuator_command, torques_set):
+    """Carry out the commands, advance the engine by one step, record it and read the sensors.
+
+    The commands stay in the first recorded array after the engine's. The step is recorded on the tape of the bindings,
+    unless the state is not sane.
+
+    Args:
+        bindings_address: Address of a `STEP_BINDINGS`.
+        driver_command: A `DriverCommand`.
+        actuator_command: An `ActuatorCommand`.
+        torques_set: Whether drive and brakes have their inputs already; drive torque demands and the pedal then have
+            no effect.
+
+    Returns:
+        Whether the state is sane, and the fields of `Measurement` and of `Motion`.
+    """
+    bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
+    commands_address = bindings.sources[_ENGINE_ARRAYS]
+    write_commands(commands_address, driver_command, actuator_command)
+    _set_inputs(bindings, commands_address, torques_set)
     advance(carray(implicit_plan_pointer(bindings.implicit), (1,))[0])
+    keep_demands(bindings.faults, bindings.n_faults)
     sane, truth, motion = _sense(bindings)
     if bindings.tape != 0 and sane:
         _record(bindings, carray(_tape_pointer(bindings.tape), (1,))[0])
@@ -237,7 +264,11 @@ def carry_out(bindings_address, driver_command, actuator_command, torques_set):
         return sane, truth, motion
     chains = carray(_chain_pointer(bindings.sensors), (bindings.n_sensors,))
     memory = carray(f64_pointer(bindings.sensor_memory), (bindings.sensor_memory_size,))
-    return sane, measured(chains, memory, bindings.wheel_radii_m, bindings.timestep_s, truth), motion
+    read = measured(chains, memory, bindings.wheel_radii_m, bindings.timestep_s, truth)
+    if bindings.n_faults != 0:
+        misread(bindings.faults, bindings.n_faults, memory)
+        read = read[:1] + load_numbers(memory.ctypes.data, read[1:])
+    return sane, read, motion
 
 
 @compiled_call(_SENSED, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND, types.boolean)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS
 from activesteer.native_records import numbers_type
 from activesteer.sensors.block import SensorBlock
+from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.raw_rows import RawRows
 from activesteer.vehicle.engine_layout import engine_layout
 from activesteer.vehicle.motor_records import ElectricDrive
@@ -34,6 +35,8 @@ class Wheels(NamedTuple):
         drive_fractions: Fraction of the driver's demand that each wheel gets.
         driven_by: `ENGINE`, `MOTOR` or `NOTHING` for each wheel.
         spins: Their degrees of freedom of rotation.
+        free_kgm2: Inertia that each wheel carries beside its own with the clutch open.
+        engaged_kgm2: The same in a gear.
     """
 
     drives: Sequence[int]
@@ -41,6 +44,8 @@ class Wheels(NamedTuple):
     drive_fractions: Sequence[float]
     driven_by: Sequence[int]
     spins: Sequence[int]
+    free_kgm2: Sequence[float]
+    engaged_kgm2: Sequence[float]
 
 
 _INPUTS: Final = {
@@ -57,7 +62,8 @@ _SENSORS: Final = {
 """Name of a sensor in the step -> its name in the model; bound by its first place in `sensordata`."""
 _ADDRESSES: Final = (
     "implicit", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "positions", "quaternions",
-    "n_bodies", "brake_setup", "brake_state", "tape", "n_motors", "motors", "battery", "electric_state",
+    "n_bodies", "brake_setup", "brake_state", "tape", "n_motors", "motors", "battery", "electric_state", "gear",
+    "n_faults", "faults",
 )  # fmt: skip
 STEP_BINDINGS: Final = np.dtype(
     (
@@ -65,8 +71,8 @@ STEP_BINDINGS: Final = np.dtype(
         [
             *((name, np.intp) for name in (*_ADDRESSES, *_INPUTS, *_SENSORS)),
             ("ratio", np.float64),
-            *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes", "driven_by", "spins")),
-            ("drive_fractions", np.float64, (_N_WHEELS,)),
+            *((name, np.intp, (_N_WHEELS,)) for name in ("drives", "brakes", "driven_by", "spins", "armature")),
+            *((name, np.float64, (_N_WHEELS,)) for name in ("drive_fractions", "free_kgm2", "engaged_kgm2")),
             *((name, np.intp) for name in ("n_sensors", "sensors", "sensor_memory", "sensor_memory_size")),
             ("timestep_s", np.float64),
             ("wheel_radii_m", np.float64, (_N_WHEELS,)),
@@ -145,6 +151,7 @@ def bind_step(
         "motors": electric.motors.ctypes.data,
         "battery": electric.battery.ctypes.data,
         "electric_state": electric.state.ctypes.data,
+        "gear": fb.header_of(model)["gear"].ctypes.data,
         **{name: find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) for name, actuator in _INPUTS.items()},
         **{name: sensor_columns(model, sensor).start for name, sensor in _SENSORS.items()},
     }
@@ -152,6 +159,8 @@ def bind_step(
         bindings[name] = value
     for name, value in values.items():
         bindings[name] = value
+    armature = model.dof_armature
+    bindings["armature"] = [armature.ctypes.data + dof * armature.strides[0] for dof in wheels.spins]
     bindings["ratio"] = ratio
     bindings["timestep_s"] = model.opt.timestep
     read_through(bindings, sensors)

@@ -16,7 +16,6 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.parameters import VehicleParameters
-from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.vehicle.step_bindings import ENGINE, MOTOR, NOTHING, Wheels
 
 _CALIBRATED_AT_MPS: Final = 20.0
@@ -42,31 +41,24 @@ class WheelSet:
             return [find(model, kind, corner + ending) for corner in CORNERS]
 
         self._model, self._data, self._ctrl = model, data, data.ctrl
-        self._engine_kgm2 = [parameters.powertrain.inertia_kgm2 * part for part in parameters.engine_fractions]
         driven_by = [
             MOTOR if parameters.motors.at(corner) else ENGINE if fraction > 0.0 else NOTHING
             for corner, fraction in zip(CORNERS, parameters.engine_fractions, strict=True)
         ]
         self._driven = [corner for corner, source in zip(CORNERS, driven_by, strict=True) if source != NOTHING]
         self.spins: list[int] = model.jnt_dofadr[found(mujoco.mjtObj.mjOBJ_JOINT, "_spin")].tolist()
+        engine_kgm2 = parameters.powertrain.inertia_kgm2
+        free_kgm2: list[float] = model.dof_armature[self.spins].tolist()
         self.torques = Wheels(
             found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_drive"),
             found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_brake"),
             parameters.powertrain.wheel_fractions,
             driven_by,
             self.spins,
+            free_kgm2,
+            [own + engine_kgm2 * part for own, part in zip(free_kgm2, parameters.engine_fractions, strict=True)],
         )
         self._bodies = found(mujoco.mjtObj.mjOBJ_BODY, "_wheel")
-        self._armature_kgm2: list[float] = model.dof_armature[self.spins].tolist()
-
-    def engage(self, gear: float) -> None:
-        """Couple the engine to the driven wheels, each of which then carries its part of the inertia, or free them."""
-        self._model.dof_armature[self.spins] = self.armatures_kgm2(gear)
-
-    def armatures_kgm2(self, gear: float) -> list[float]:
-        """Return the inertia that each wheel carries in a gear beside its own."""
-        pairs = zip(self._armature_kgm2, self._engine_kgm2, strict=True)
-        return [own + (0.0 if gear == CLUTCH_OPEN else engine) for own, engine in pairs]
 
     def check_driven(self, torques_Nm: Sequence[float]) -> None:
         """Check that no torque is demanded of a wheel without a drive.

@@ -50,7 +50,6 @@ from activesteer.vehicle.channels.corners import design_heights_m
 from activesteer.vehicle.channels.raw_rows import RawRows
 from activesteer.vehicle.command_row import BRAKES, CARRIED_OUT, COMMANDS
 from activesteer.vehicle.named_parts import sensor_columns
-from activesteer.vehicle.powertrain import CLUTCH_OPEN
 from activesteer.version import __version__
 
 _SOURCES: Final = Path(__file__).parent / "c"
@@ -315,8 +314,6 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         "COMMAND_INPUTS": ("int", [COMMANDS.index(name) for name in CARRIED_OUT]),
         "SPIN_DOFS": ("int", torques.spins), "DRIVE_CONTROLS": ("int", torques.drives),
         "BRAKE_CONTROLS": ("int", torques.brakes),
-        "FREE_ARMATURE": ("double", vehicle.wheels.armatures_kgm2(CLUTCH_OPEN)),
-        "GEAR_ARMATURE": ("double", vehicle.wheels.armatures_kgm2(1.0)),
         "WHEEL_MU": ("int", [wheels + wheel * stride + offset(fb.WHEEL, "mu") // 8 for wheel in range(4)]),
         "TYRES": ("int", [tyres + wheel * (TYRE_RECORD.itemsize // 8) for wheel in range(4)]),
         "TORQUE_PER_PRESSURE": ("double", setup["torque_per_pressure_NmpPa"]),

@@ -143,13 +143,6 @@ static void derive(as_car *c) {
     m[10] = fmin(fmax(fading, 0.0), 1.0) * atan2(m[4], m[3]);
 }
 
-/* Couple the engine to the driven wheels in a gear, or free them; see WheelSet.engage. */
-static void engage(as_car *c, double gear) {
-    c->block[HEADER_GEAR] = gear;
-    for (int wheel = 0; wheel < 4; wheel++)
-        c->model->dof_armature[SPIN_DOFS[wheel]] = gear == 0.0 ? FREE_ARMATURE[wheel] : GEAR_ARMATURE[wheel];
-}
-
 static void set_friction(as_car *c, double mu) {
     for (int wheel = 0; wheel < 4; wheel++) c->block[WHEEL_MU[wheel]] = mu;
 }
@@ -250,7 +243,7 @@ static void exchange(as_car *c, double *state, int save) {
     c->steps = (int64_t)state[0];
     c->failed = state[1] != 0.0;
     for (int w = 0; w < mjNWARNING; w++) c->data->warning[w].number = c->data->warning[w].lastinfo = 0;
-    engage(c, c->values[IN_TORQUES_SET] != 0.0 ? 0.0 : c->values[IN_GEAR]);
+    c->block[HEADER_GEAR] = NAN; /* no gear of a command: the next step engages its own */
     set_friction(c, c->values[IN_ROAD_MU]);
     for (int part = 0; part < N_PARTS; part++) apply_fault(c, part);
     derive(c);
@@ -390,8 +383,6 @@ static int step(as_car *c) {
         commands[COMMAND_BRAKES + wheel] += u[IN_PRESSURES + wheel] * TORQUE_PER_PRESSURE[wheel];
     follow_faults(c);
     int torques_set = u[IN_TORQUES_SET] != 0.0;
-    double gear = torques_set ? 0.0 : u[IN_GEAR];
-    if (c->block[HEADER_GEAR] != gear) engage(c, gear);
     for (int wheel = 0; torques_set && wheel < 4; wheel++) {
         c->data->ctrl[DRIVE_CONTROLS[wheel]] = u[IN_DRIVES + wheel];
         c->data->ctrl[BRAKE_CONTROLS[wheel]] = u[IN_BRAKES + wheel];
