@@ -469,8 +469,9 @@ class Vehicle(Uncopyable):
 
     def act_in_every_step(self, faults: NDArray[Any] | None) -> None:
         """Let these records of `native_faults.FAULT` act in every step; None for no faults."""
-        self._faults, count = faults, 0 if faults is None else len(faults)
-        self._bindings["n_faults"], self._bindings["faults"] = count, 0 if faults is None else faults.ctypes.data
+        acting = None if faults is None or not faults.size else faults
+        self._faults, self._bindings["n_faults"] = acting, 0 if acting is None else acting.size
+        self._bindings["faults"] = 0 if acting is None else acting.ctypes.data
 
     def note_faults(self, count: int) -> None:
         """Record this number of active faults from now on."""
