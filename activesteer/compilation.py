@@ -98,7 +98,7 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
 
 
 def compiled_call(
-    result: types.Type, *arguments: types.Type, others_run: bool = True
+    result: types.Type, *arguments: types.Type, others_run: bool = True, about: tuple[str, Path] | None = None
 ) -> Callable[[Callable[..., Any]], Any]:
     """Decorator: compile a function now to native code with one signature.
 
@@ -108,6 +108,7 @@ def compiled_call(
         result: Type of the result.
         arguments: Types of the arguments; what is passed is converted.
         others_run: Let other threads run during the call; this costs more than a small function does.
+        about: Name and file of what a function made by another function is about, to tell the kept code apart.
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
@@ -115,7 +116,7 @@ def compiled_call(
         dispatcher: Any = njit(error_model="numpy", nogil=others_run)(function)
         if not hasattr(dispatcher, "enable_caching"):
             return dispatcher
-        dispatcher._cache = _cache_of(function)
+        dispatcher._cache = _cache_of(function, about)
         entry = dispatcher.compile(result(*arguments))
         (code,) = dispatcher.overloads.values()
         _ADDRESSES[entry] = code.library.get_pointer_to_function(code.fndesc.llvm_func_name)
@@ -157,11 +158,19 @@ def call_at(result: types.Type, *arguments: types.Type) -> Any:
 class _ContentCache(FunctionCache):
     """numba's cache of one function, under a name with the content key of all its sources."""
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], about: tuple[str, Path] | None = None) -> None:
         super().__init__(function)
         self._stem = self._impl.filename_base
         key = content_key(Path(inspect.getfile(function)))
+        self._is_named = about is not None
+        if about is not None:
+            self._stem += f"-{about[0]}"
+            key = hashlib.sha256((key + content_key(about[1])).encode()).hexdigest()
         self._cache_file = IndexDataCacheFile(self._cache_path, f"{self._stem}-{key[:16]}", key)
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        # What a function with a name of its own refers to differs between processes; name and content stand for it.
+        return (sig, codegen.magic_tuple()) if self._is_named else super()._index_key(sig, codegen)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         found = super().load_overload(sig, target_context)
@@ -179,9 +188,9 @@ class _ContentCache(FunctionCache):
                     file.unlink(missing_ok=True)
 
 
-def _cache_of(function: Callable[..., Any]) -> Any:
+def _cache_of(function: Callable[..., Any], about: tuple[str, Path] | None = None) -> Any:
     try:
-        return _ContentCache(function)
+        return _ContentCache(function, about)
     except (RuntimeError, OSError):
         # numba found no folder that can be written, or there are no sources.
         _say_uncached()

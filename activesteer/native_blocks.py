@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from array import array
-from typing import TYPE_CHECKING, Any, Final, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Final, get_origin, get_type_hints
 
 import numpy as np
 
@@ -30,6 +30,19 @@ class NativeBlock:
     `Table`, whose numbers Python reads faster one by one; see `table`.
     """
 
+    _written_step: ClassVar[Any] = None
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Remember the method `step` as it is written."""
+        super().__init_subclass__(**given)
+        cls._written_step = getattr(cls, "step", None)
+
+    @property
+    def is_watched(self) -> bool:
+        """True if somebody has replaced the method `step`, for example to watch it; compiled code then stays away."""
+        kind: Any = type(self)
+        return "step" in vars(self) or kind.step is not kind._written_step
+
 
 def table(numbers: Table) -> Table:
     """Return a block's numbers; compiled code makes an array of the record of their memory (`native_memory`)."""
@@ -38,7 +51,7 @@ def table(numbers: Table) -> Table:
 
 @functools.cache
 def _members(kind: type[NativeBlock]) -> dict[str, Any]:
-    return get_type_hints(kind)
+    return {name: hint for name, hint in get_type_hints(kind).items() if get_origin(hint) is not ClassVar}
 
 
 @functools.cache

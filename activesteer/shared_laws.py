@@ -22,3 +22,16 @@ def shared(function: _Function) -> _Function:
     """
     MARKED.append(function)
     return function
+
+
+def law_of(kind: type[Any]) -> Callable[[_Function], _Function]:
+    """Decorator: make a function of block, command and measurement the shared law of a kind of controller.
+
+    It returns the first fields of an `ActuatorCommand`, and compiled code then carries the controller out.
+    """
+
+    def decorate(function: _Function) -> _Function:
+        kind.law = staticmethod(function)
+        return shared(function)
+
+    return decorate

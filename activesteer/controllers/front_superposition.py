@@ -6,7 +6,7 @@ from activesteer.controllers.corrector import Corrector, corrected, cut_off, rea
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
 from activesteer.native_blocks import NativeBlock
-from activesteer.shared_laws import shared
+from activesteer.shared_laws import law_of
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
 
@@ -41,24 +41,21 @@ class FrontSuperposition(NativeBlock):
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the angle to add at the front wheels."""
-        return steering(
-            *front_superposition(
-                self, command.front_steer_demand_rad, measurement.speed_mps, measurement.yaw_rate_radps
-            )
-        )
+        return steering(*front_superposition(self, command, measurement))
 
 
-@shared
+@law_of(FrontSuperposition)
 def front_superposition(
-    block: FrontSuperposition, front_steer_rad: float, speed_mps: float, yaw_rate_radps: float
+    block: FrontSuperposition, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
     """Law of `FrontSuperposition.step`; returns the first fields of an `ActuatorCommand`."""
-    desired = desired_yaw_rate(block._desired, front_steer_rad, speed_mps)
+    speed_mps = measurement.speed_mps
+    desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, speed_mps)
     if speed_mps < MIN_SPEED_MPS:
         reset(block._corrector)
         block._saturated = 0
         return 0.0, 0.0, desired, 0.0, 0.0, False
-    feedback = corrected(block._corrector, desired - yaw_rate_radps, block._saturated)
+    feedback = corrected(block._corrector, desired - measurement.yaw_rate_radps, block._saturated)
     correction = -rear_direction(feedback) * abs(feedback)
     angle, block._saturated = cut_off(correction, block._limit_rad)
     return 0.0, angle, desired, 0.0, correction, block._saturated != 0

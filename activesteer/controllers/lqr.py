@@ -103,6 +103,7 @@ class Lqr(NativeBlock):
 
     interval_s = 0.005
     reads = ("lqr", "servos", "estimator")
+    compiled_in = "activesteer.controllers.native_lqr"
     gains = LqrParameters
     derived = ("_schedule", "_superposition_works", "_rear_works")
     _estimator: Estimator

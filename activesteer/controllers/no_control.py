@@ -5,7 +5,7 @@ from __future__ import annotations
 from activesteer.controllers.desired_yaw_rate import DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.native_blocks import NativeBlock
-from activesteer.shared_laws import shared
+from activesteer.shared_laws import law_of
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
 
@@ -28,12 +28,13 @@ class NoControl(NativeBlock):
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return no angles; the desired yaw rate is recorded."""
-        return steering(*no_control(self, command.front_steer_demand_rad, measurement.speed_mps, 0.0))
+        return steering(*no_control(self, command, measurement))
 
 
-@shared
+@law_of(NoControl)
 def no_control(
-    block: NoControl, front_steer_rad: float, speed_mps: float, _yaw_rate_radps: float
+    block: NoControl, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
     """Law of `NoControl.step`; returns the first fields of an `ActuatorCommand`."""
-    return 0.0, 0.0, desired_yaw_rate(block._desired, front_steer_rad, speed_mps), 0.0, 0.0, False
+    desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, measurement.speed_mps)
+    return 0.0, 0.0, desired, 0.0, 0.0, False

@@ -8,7 +8,7 @@ from activesteer.controllers.corrector import Corrector, corrected, cut_off, rea
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters
 from activesteer.native_blocks import NativeBlock
-from activesteer.shared_laws import shared
+from activesteer.shared_laws import law_of, shared
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack, rear_prediction
 
@@ -103,16 +103,15 @@ class RearSteer(NativeBlock):
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the demanded rear angle and its parts."""
-        return steering(
-            *rear_steer(self, command.front_steer_demand_rad, measurement.speed_mps, measurement.yaw_rate_radps)
-        )
+        return steering(*rear_steer(self, command, measurement))
 
 
-@shared
+@law_of(RearSteer)
 def rear_steer(
-    block: RearSteer, front_steer_rad: float, speed_mps: float, yaw_rate_radps: float
+    block: RearSteer, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
     """Law of `RearSteer.step`; returns the first fields of an `ActuatorCommand`."""
+    front_steer_rad, speed_mps = command.front_steer_demand_rad, measurement.speed_mps
     desired = desired_yaw_rate(block._desired, front_steer_rad, speed_mps)
     if speed_mps < MIN_SPEED_MPS:
         reset(block._corrector)
@@ -120,7 +119,7 @@ def rear_steer(
         return 0.0, 0.0, desired, 0.0, 0.0, False
     prediction = block._prediction_gain * predicted(block._prediction, front_steer_rad, speed_mps)
     # The rear wheels turn against the angle of the corrector, so the limit changes its sign too.
-    feedback = corrected(block._corrector, desired - yaw_rate_radps, -block._saturated)
+    feedback = corrected(block._corrector, desired - measurement.yaw_rate_radps, -block._saturated)
     correction = rear_direction(feedback) * abs(feedback)
     angle, block._saturated = cut_off(prediction + correction, block._limit_rad)
     return angle, 0.0, desired, prediction, correction, block._saturated != 0

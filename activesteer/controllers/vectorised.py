@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numba import from_dtype, types
+from numba import types
 
 from activesteer.compilation import compiled_call
 from activesteer.controllers.find import find_controller
-from activesteer.controllers.law_interface import N_HELD, N_STEERING
-from activesteer.controllers.native_laws import LAWS, UNIT, decide, put
+from activesteer.controllers.law_interface import N_COMMAND, N_HELD
+from activesteer.controllers.native_laws import call_law, law_address
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import Array
+from activesteer.native_blocks import record_type, values
 from activesteer.signals import (
     ActuatorCommand,
     DriverCommand,
@@ -24,8 +25,7 @@ from activesteer.signals import (
     numbers_of,
 )
 
-_UNIT: Final = np.dtype((np.record, UNIT))
-_ROW, _ROWS = types.Array(types.float64, 1, "A"), types.Array(types.float64, 2, "C")
+_ROWS: Final = types.Array(types.float64, 2, "C")
 
 
 class Vectorised:
@@ -50,10 +50,10 @@ class Vectorised:
         """
         self.n, plugin = len(setups), find_controller(controller)
         self._blocks = [plugin.make(setup) for setup in setups]
-        self._law = LAWS.index(type(self._blocks[0])) if type(self._blocks[0]) in LAWS else 0
-        self._units, self._held = np.zeros(self.n, _UNIT), np.zeros((self.n, N_HELD))
+        self._law, self._held = law_address(self._blocks[0]), np.zeros((self.n, N_HELD))
         if self._law:
-            self._called = [put(self._units, car, self._law, block) for car, block in enumerate(self._blocks)]
+            kind = record_type(type(self._blocks[0]))
+            self._records = np.array([values(block) for block in self._blocks], kind)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> Any:
         """Return the commands of all cars: an `ActuatorCommand` of arrays, without estimates.
@@ -63,12 +63,12 @@ class Vectorised:
             measurement: Measurements; each field has shape (n,), for the wheels (n, 4).
         """
         rows, seen = np.zeros((self.n, len(numbers_of(ActuatorCommand)))), rows_of(measurement)
+        said = rows_of(command)
         if self._law:
-            drivers: list[Any] = [command.front_steer_demand_rad, command.brake_pedal]
-            _carry_out(self._law, self._units, seen, *drivers, self._held)
-            rows[:, :N_STEERING] = self._held[:, :N_STEERING]
+            records = self._records
+            _carry_out(self._law, records.ctypes.data, records.strides[0], said, seen, self._held)
+            rows[:] = self._held[:, :N_COMMAND]
         else:
-            said = rows_of(command)
             for row, block, one, other in zip(rows, self._blocks, said.tolist(), seen.tolist(), strict=True):
                 row[:] = numbers_in(block.step(message_of(DriverCommand, one), message_of(Measurement, other)))
         return arrays_of(ActuatorCommand, rows)
@@ -79,8 +79,9 @@ def rows_of(message: tuple[Any, ...]) -> Array:
     return np.column_stack([part for part in message if part is not None])
 
 
-@compiled_call(types.void, types.intp, types.Array(from_dtype(_UNIT), 1, "C"), _ROWS, _ROW, _ROW, _ROWS)
-def _carry_out(law, units, measurements, front_rad, brake_pedal, held):
-    """Carry out a law of `LAWS` for each car."""
-    for car in range(len(units)):
-        decide(units[car], law, measurements[car].ctypes.data, front_rad[car], brake_pedal[car], held[car].ctypes.data)
+@compiled_call(types.void, types.intp, types.intp, types.intp, _ROWS, _ROWS, _ROWS)
+def _carry_out(law, blocks, distance, commands, measurements, held):
+    """Carry out a law for each car; the blocks have a distance in bytes."""
+    for car in range(len(held)):
+        command, measurement = commands[car].ctypes.data, measurements[car].ctypes.data
+        call_law(law, (blocks + distance * car, command, measurement, held[car].ctypes.data))

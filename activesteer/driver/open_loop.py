@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from activesteer.driver.base import DriverSetup
 from activesteer.driver.speed_hold import SpeedHold, drive_torque, take_foot_off
 from activesteer.errors import ManeuverError
 from activesteer.native_blocks import NativeBlock
 from activesteer.shared_laws import shared
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, new_message
+
+NO_RACK: Final = "the steering wheel of this car drives no rack; give steering_wheel_rad"
 
 
 class OpenLoopDriver(NativeBlock):
@@ -59,9 +63,7 @@ class OpenLoopDriver(NativeBlock):
         if setpoint.rack_demand_m is None:
             return self.turn(setpoint.steering_wheel_demand_rad, setpoint, measurement)
         if self._rack_per_steering_wheel_m is None:
-            raise ManeuverError(
-                "the steering wheel of this car drives no rack; give steering_wheel_rad", key="steering.rack_m"
-            )
+            raise ManeuverError(NO_RACK, key="steering.rack_m")
         return self.turn(setpoint.rack_demand_m / self._rack_per_steering_wheel_m, setpoint, measurement)
 
     def turn(self, angle: float, setpoint: Setpoint, measurement: Measurement) -> DriverCommand:

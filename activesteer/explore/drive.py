@@ -22,7 +22,6 @@ from activesteer.road.course import CONE_RADIUS_M
 from activesteer.road.footprint import Footprint
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
-from activesteer.simulation.control_unit import control_unit
 from activesteer.simulation.live_view import Pacer
 from activesteer.simulation.simulation import Simulation
 
@@ -174,7 +173,7 @@ class Drive:
         if message.controller:
             self._folder.check_controller(message.controller)
             loop, name = self._simulation.loop, self._folder.located(message.controller)
-            _, loop.controller = control_unit(name, self._simulation.scenario, loop.vehicle)
+            loop.replace_controller(name)
             self._names["controller"] = message.controller
         if message.hold is not UNSET:
             self._driver.hold_mps = max(self._simulation.motion.speed_mps, 0.0) if message.hold else None

@@ -195,9 +195,8 @@ class Episodes:
         return self._active % self._cars
 
     def loop(self, episode: int) -> Any:
-        """Return the closed loop of the car that drives in an episode, up to date."""
+        """Return the closed loop of the car that drives in an episode."""
         car = int(self._active[episode])
-        self.batch.sync([car])
         return self.batch.loops[car]
 
     def step(self, actions: ArrayLike, episodes: Sequence[int] | NDArray[Any] | None = None) -> Outcome:

@@ -30,18 +30,14 @@ from activesteer.signals import (
     numbers_of,
     widths_of,
 )
-from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState, OneAtATime
-from activesteer.simulation.native_cars import NativeCars, SetpointTable, has_law, law_of, tabulate
-from activesteer.simulation.native_loop import GIVEN, HUMAN, N_STEERING, STEP_ADDRESS, drive_cars
+from activesteer.simulation.closed_loop import ClosedLoop, LoopState, OneAtATime
+from activesteer.simulation.native_cars import NativeCars
+from activesteer.simulation.native_loop import STEP_ADDRESS, drive_cars
 from activesteer.simulation.preparation import prepared
 from activesteer.vehicle import engine_warnings_held
 
 MAX_CARS: Final = 100_000
 """Most cars of a batch."""
-_WINDOW: Final = 250
-"""Steps whose setpoints are tabulated at a time."""
-_MAX_TABLES: Final = 64
-"""Tables that are kept for cars that share a manoeuvre."""
 _LEAST_STEPS: Final = 40
 """Car-steps below which a second thread costs more than it saves."""
 _MOST: Final = 1e12
@@ -62,12 +58,12 @@ class Batch:
     All inputs and outputs are arrays whose first axis is the car. The trajectory of each car is equal to the last bit
     to that of a `Simulation` with the same inputs, for any number of cars and threads.
 
-    The package's driver with any manoeuvre, held commands, and the controllers `none`, `ars`, `afs` and `lqr` run in
-    native code. Every other driver or controller, and a car with a faulty sensor, is driven in Python, car by car.
+    The package's driver, held commands, and the controllers `none`, `ars`, `afs` and `lqr` run in native code on all
+    threads. Every other driver or controller is called in Python, car by car.
 
     Attributes:
         scenarios: Manoeuvre, car and driver of each car.
-        loops: The closed loops; read them after `sync`.
+        loops: The closed loops.
         threads: Number of threads.
         failures: Number of each car that has diverged -> its error. The car stands still until it is reset.
 
@@ -155,18 +151,10 @@ class Batch:
         self._in_use = OneAtATime()
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
         self._native = NativeCars(self.loops)
-        for car in range(len(self)):
-            self._native.load(car)
-        # The objects of a loop are behind its record after it has been driven natively.
-        self._behind = np.zeros(len(self), dtype=bool)
+        for car, loop in enumerate(self.loops):
+            loop.join(self._native, car)
         self._last = np.array([loop.steps for loop in self.loops])
-        self._laws = np.array([law_of(loop.controller) for loop in self.loops])
         self._ratios = np.array([loop.driver_setup.steering_ratio for loop in self.loops])
-        self._faulty = [car for car, scenario in enumerate(self.scenarios) if scenario.maneuver.fault]
-        self._human = np.array([has_law(loop.driver) for loop in self.loops])
-        # The first step behind the table of setpoints that a car has, and the tables of cars that share a manoeuvre.
-        self._table_ends = np.zeros(len(self), dtype=np.intp)
-        self._tables: dict[tuple[int, int], SetpointTable | None] = {}
 
     def __len__(self) -> int:
         """Number of cars."""
@@ -264,42 +252,17 @@ class Batch:
         return self.measurement
 
     def _drive(self, left: NDArray[np.intp], drivers: Array | None, controllers: Array | None) -> None:
-        native, records, moving = self._native, self._native.cars, left > 0
-        records["driver_kind"][moving] = GIVEN if drivers is not None else HUMAN
-        records["controller_kind"][moving] = 0 if controllers is not None else self._laws[moving]
+        native, moving = self._native, left > 0
         if drivers is not None:
-            native.driver_commands[moving] = drivers[moving]
+            native.rows[DriverCommand][moving] = drivers[moving]
+            native.cars["torques_set"][moving] = False
         if controllers is not None:
-            native.actuator_commands[moving] = controllers[moving]
-        else:
-            native.actuator_commands[np.ix_(moving, np.arange(N_STEERING, native.actuator_commands.shape[1]))] = 0.0
-        slow = np.zeros(len(self), dtype=bool) if STEP_ADDRESS else np.ones(len(self), dtype=bool)
-        slow |= ~self._human & (drivers is None)
-        slow |= (self._laws == 0) & (controllers is None)
-        while left.any():
-            natively = np.where(slow, 0, left)
-            in_python = np.where(slow, left, 0)
-            for car in self._faulty:
-                step = int(records["step"][car])
-                if left[car] and not slow[car]:
-                    # Faults that begin or end now change the model.
-                    faults = self.loops[car].faults
-                    faults.act(step)
-                    count = min(int(left[car]), faults.next_change(step) - step)
-                    natively[car], in_python[car] = (0, count) if faults.angle_fails else (count, 0)
-            if drivers is None:
-                for car in np.flatnonzero((natively > 0) & (records["step"] >= self._table_ends)).tolist():
-                    if not self._tabulate(car):
-                        slow[car] = True
-                        natively[car], in_python[car] = 0, left[car]
-                natively = np.minimum(natively, np.maximum(self._table_ends - records["step"], 0))
-            for car in np.flatnonzero(in_python).tolist():
-                self._drive_in_python(car, int(in_python[car]), drivers is not None, controllers is not None)
-            records["left"] = natively
-            self._behind |= natively > 0
-            self.failures |= native.drive(self._call)
-            left = left - natively - in_python
-            left[list(self.failures)] = 0
+            native.rows[ActuatorCommand][moving] = controllers[moving]
+        for car in np.flatnonzero(moving & native.stale).tolist():
+            self.loops[car].vehicle.follow_model()
+        self.failures |= native.drive(
+            left, drivers_given=drivers is not None, controllers_given=controllers is not None, call=self._call
+        )
 
     def _call(self, records: NDArray[Any]) -> None:
         """Drive all cars natively, divided among the threads by their steps."""
@@ -314,51 +277,6 @@ class Batch:
                 futures.append(self._pool.submit(drive_cars, records, first, last, STEP_ADDRESS))
         for future in futures:
             future.result()
-
-    def _tabulate(self, car: int) -> bool:
-        """Give a car the setpoints of its next steps; False if compiled code cannot follow them."""
-        loop, window = self.loops[car], int(self._native.cars["step"][car]) // _WINDOW
-        key = id(loop.maneuver), window
-        if key not in self._tables:
-            while len(self._tables) >= _MAX_TABLES:
-                del self._tables[next(iter(self._tables))]
-            times = (step * self._timestep_s for step in range(window * _WINDOW, (window + 1) * _WINDOW))
-            setpoints = [loop.maneuver.setpoint(time_s) for time_s in times]
-            self._tables[key] = tabulate(setpoints, loop.driver_setup.rack_per_steering_wheel_m)
-        table = self._tables[key]
-        if table is None:
-            return False
-        self._native.follow(car, table, window * _WINDOW)
-        self._table_ends[car] = (window + 1) * _WINDOW
-        return True
-
-    def _drive_in_python(self, car: int, steps: int, driver_given: bool, controller_given: bool) -> None:
-        self.sync([car])
-        loop = self.loops[car]
-        driver_command, actuator_command = loop.commands
-        driver = Given(driver_command) if driver_given else None
-        controller = Given(actuator_command) if controller_given else None
-        try:
-            loop.drive(steps, driver=driver, controller=controller)
-        except SimulationDiverged as error:
-            self.failures[car] = error
-        self._load(car)
-
-    def _load(self, car: int) -> None:
-        self._native.load(car)
-        self.loops[car].vehicle.follow_model()
-        self._behind[car], self._table_ends[car] = False, 0
-
-    def sync(self, cars: ArrayLike | None = None) -> None:
-        """Bring the loops of some cars up to date, so that `loops` can be read. Do not change their state.
-
-        Args:
-            cars: Numbers of the cars, or a mask; by default all.
-        """
-        for car in np.flatnonzero(self._mask(cars)).tolist():
-            if self._behind[car]:
-                self._native.store(car)
-                self._behind[car] = False
 
     def vectorised(self, controller: Any, interval_s: float | None = None) -> Vectorised:
         """Make a controller of all cars, to call with `driver_command` and `measurement`.
@@ -380,7 +298,6 @@ class Batch:
             cars: Numbers of the cars, or a mask; by default all.
         """
         with self._in_use:
-            self.sync(cars)
             return [self.loops[car].save_state() for car in np.flatnonzero(self._mask(cars)).tolist()]
 
     def restore_state(self, states: Sequence[LoopState], cars: ArrayLike | None = None) -> None:
@@ -401,7 +318,6 @@ class Batch:
                 with _named(car):
                     self.loops[car].restore_state(state)
                 self.failures.pop(car, None)
-                self._load(car)
 
     def reset(self, cars: ArrayLike | None = None) -> Any:
         """Bring some cars back to the start of their manoeuvre, and return the measurement of all.
@@ -418,7 +334,6 @@ class Batch:
         return self._rebuilt(*self._portable())
 
     def _portable(self) -> tuple[Any, ...]:
-        self.sync()
         states = [loop.save_state() for loop in self.loops]
         models = [loop.vehicle.model for loop in self.loops]
         return self.scenarios, self._controller, self._timestep_s, self.threads, states, models, dict(self.failures)

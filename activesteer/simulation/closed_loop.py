@@ -1,37 +1,39 @@
-"""The closed loop: maneuver -> driver -> controller -> vehicle -> recorder, once every millisecond."""
+"""The closed loop of one car: its blocks, its state, and what changes on the way; `native_loop` drives it."""
 
 from __future__ import annotations
 
 import copy
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Source
-from activesteer.controllers import Controller, find_controller
-from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.controllers import find_controller
+from activesteer.controllers.law_interface import N_HELD
+from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import Driver
 from activesteer.errors import ManeuverError, ParameterError, shown
 from activesteer.faults import Fault, check_faults
+from activesteer.maneuver import Maneuver
 from activesteer.maneuver.phases import seen_of
 from activesteer.scenario import Scenario
 from activesteer.scenario.changing import changed
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
-from activesteer.simulation.control_unit import ControlUnit, control_unit, told_by_sensor
-from activesteer.simulation.native_cars import NativeCars, has_law, is_own, law_of, tabulate
-from activesteer.simulation.native_loop import STEP_ADDRESS
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint, numbers_in
+from activesteer.simulation.control_unit import control_unit
+from activesteer.simulation.native_cars import NativeCars
+from activesteer.simulation.native_loop import GIVEN, PYTHON
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.retuning import retuned
 from activesteer.vehicle import Uncopyable, engine_warnings_held
 from activesteer.vehicle.faults import Faults
 
-_PIECE: Final = 1000
-"""Most steps of a native call."""
+Given = tuple[DriverCommand | None, ActuatorCommand | None]
+"""Commands that replace driver and controller."""
+_NOTHING_GIVEN: Final[Given] = (None, None)
 
 
 class LoopState(NamedTuple):
@@ -39,9 +41,12 @@ class LoopState(NamedTuple):
 
     engine: NDArray[np.float64]
     faults: tuple[Fault, ...]
-    fault_memories: list[Any]
+    fault_memories: list[Array]
     driver: Any
     controller: Any
+    calls: int
+    held: Array
+    bus: Array
     measurement: Measurement
     motion: Motion
     commands: tuple[DriverCommand, ActuatorCommand]
@@ -49,16 +54,6 @@ class LoopState(NamedTuple):
     changes: tuple[tuple[str, Any, float], ...]
     sequence: Any
     inputs: str
-
-
-class Given(NamedTuple):
-    """A driver or controller that repeats one command."""
-
-    command: Any
-
-    def step(self, *_: Any, **__: Any) -> Any:
-        """Return the command."""
-        return self.command
 
 
 class OneAtATime:
@@ -91,18 +86,15 @@ class ClosedLoop(Uncopyable):
     Attributes:
         scenario: Manoeuvre, car and driver, with the changes made on the way.
         changes: Keys changed on the way and their values, and the times of the changes [s].
-        maneuver: Source of the setpoints.
         sequence: Phases of the manoeuvre in this run; None without phases.
-        driver: The driver.
-        controller: The active steering, inside a control unit if it needs one.
+        blocks: Driver and controller; a native one is behind its record while it is driven, see `driver`.
+        unit: How the loop calls the controller.
         vehicle: The car.
         faults: Faults of its actuators and sensors; see `fail`.
         driver_setup: Properties of the car that a driver may know.
         controller_setup: Properties of the car that a controller may know.
-        measurement: Present signals of the sensors.
-        motion: Present position and motion of the car.
-        commands: Last commands of driver and controller.
-        step_count: Steps of the manoeuvre driven so far.
+        settling: Setpoint while the car settles.
+        recorder: Recorder of the present steps.
         in_use: Context that refuses a second caller while the loop is driven.
     """
 
@@ -129,30 +121,132 @@ class ClosedLoop(Uncopyable):
             SimulationDiverged: the car does not settle.
         """
         self.scenario, self._plugin, self.sequence = scenario, find_controller(controller), None
-        self._behind = False  # whether the objects are behind the record, see `_take_over`
         self._start, self.changes = scenario, ()
-        self.maneuver = maneuver = scenario.maneuver
+        self._maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.ground, timestep_s)
         vehicle.limit_hands(scenario.driver.parameters.steering_torque_limit_Nm)
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
-        self.driver: Driver = scenario.driver.plugin.make(self.driver_setup)
-        self.controller_setup, self.controller = control_unit(self._plugin, scenario, vehicle)
+        driver: Driver = scenario.driver.plugin.make(self.driver_setup)
+        self.controller_setup, self.unit, block = control_unit(self._plugin, scenario, timestep_s)
+        self.blocks = driver, block
+        self.recorder: Recorder | None = None
         self.in_use = OneAtATime()
-        settling, steps = maneuver.settling_setpoint(), round(maneuver.settle_s / timestep_s)
-        self.measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
-        self.motion, self.step_count = vehicle.motion(), 0
-        self.commands = DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()
+        self._cars, self._car = NativeCars([self]), 0
+        steps = round(maneuver.settle_s / timestep_s)
+        measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
+        self._place(measurement, vehicle.motion(), (DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()), 0)
         self.faults, self._fault_list = Faults(vehicle), ()
-        self.drive(0 if settled else steps, setpoint_at=lambda _: settling)
-        if (estimate := (settled or self).commands[1].estimate) is not None:
+        self.settling: Setpoint | None = maneuver.settling_setpoint()
+        self.drive(0 if settled else steps)
+        self.settling = None
+        commands = self.commands
+        if (estimate := (settled.commands if settled else commands)[1].estimate) is not None:
             vehicle.record_estimate(estimate)
         vehicle.rebase()
         self.fail(maneuver.fault)
         self.sequence = maneuver.sequence()
-        self.measurement = self.measurement._replace(time_s=0.0)
-        self.motion, self.step_count = vehicle.motion(), 0
+        self._place(self.measurement._replace(time_s=0.0), vehicle.motion(), commands, 0)
         if settled:
             self.restore_state(settled)
+
+    def _place(
+        self, measurement: Measurement, motion: Motion, commands: tuple[DriverCommand, ActuatorCommand], step: int
+    ) -> None:
+        """Set the present signals and the number of steps."""
+        self._store()
+        cars, car = self._cars, self._car
+        cars.rows[Measurement][car], cars.rows[Motion][car] = numbers_in(measurement), motion
+        cars.give_driver_command(car, commands[0])
+        cars.rows[ActuatorCommand][car] = numbers_in(commands[1])
+        cars.cars["step"][car] = step
+        cars.cars["controller_kind"][car] = GIVEN if commands[1].estimate is None else PYTHON
+
+    def join(self, cars: NativeCars, car: int) -> None:
+        """Become one of several cars that are driven together."""
+        cars.adopt(car, self._cars, self._car)
+        self._cars, self._car = cars, car
+
+    def _store(self) -> None:
+        self._cars.store(self._car)
+
+    @property
+    def driver(self) -> Any:
+        """The driver; a new one takes over from the next step on."""
+        self._store()
+        return self.blocks[0]
+
+    @driver.setter
+    def driver(self, driver: Any) -> None:
+        self._store()
+        self.blocks = driver, self.blocks[1]
+
+    @property
+    def controller(self) -> Any:
+        """The controller; a new one takes over from the next step on, with the control unit of the former one."""
+        self._store()
+        return self.blocks[1]
+
+    @controller.setter
+    def controller(self, controller: Any) -> None:
+        self._store()
+        self.blocks = self.blocks[0], controller
+
+    def replace_controller(self, controller: Any) -> None:
+        """Let another controller take over, with a control unit of its own; see `activesteer.plugins.find`.
+
+        Raises:
+            ControllerError: there is no such controller, or it cannot be created.
+        """
+        self._plugin = find_controller(controller)
+        self.controller_setup, self.unit, self.controller = control_unit(
+            self._plugin, self.scenario, self.vehicle.timestep_s
+        )
+        self._cars.connect(self._car)
+
+    @property
+    def maneuver(self) -> Maneuver:
+        """Source of the setpoints."""
+        return self._maneuver
+
+    @maneuver.setter
+    def maneuver(self, maneuver: Maneuver) -> None:
+        self._store()
+        self._maneuver = maneuver
+
+    @property
+    def foresees(self) -> bool:
+        """True if the next setpoints are known before the car gets there."""
+        return self.sequence is None
+
+    def setpoint_at(self, step: int) -> Setpoint:
+        """Return the setpoint of a step; with phases, of the present one only."""
+        if self.settling is not None:
+            return self.settling
+        time_s = step * self.vehicle.timestep_s
+        if self.sequence is None:
+            return self._maneuver.setpoint(time_s)
+        truth = self.measurement if self.vehicle.sensors is None else self.vehicle.truth()[0]
+        return self.sequence.setpoint(time_s, seen_of(truth, self.motion, self.vehicle.roll_rate_radps))
+
+    @property
+    def measurement(self) -> Measurement:
+        """Present signals of the sensors."""
+        return self._cars.measurement(self._car)
+
+    @property
+    def motion(self) -> Motion:
+        """Present position and motion of the car."""
+        return self._cars.motion(self._car)
+
+    @property
+    def commands(self) -> tuple[DriverCommand, ActuatorCommand]:
+        """Last commands of driver and controller."""
+        return self._cars.commands(self._car)
+
+    @property
+    def step_count(self) -> int:
+        """Steps of the manoeuvre driven so far."""
+        return int(self._cars.cars["step"][self._car])
 
     @property
     def steps(self) -> int:
@@ -177,6 +271,7 @@ class ClosedLoop(Uncopyable):
         self.faults, self._fault_list = Faults(self.vehicle, faults), tuple(faults)
         if before is not None:
             self.faults.take_memory_of(before)
+        self._store()
 
     def change(self, key: str, value: Any) -> None:
         """Change a key of the manoeuvre, its road, the controller or the driver, from the next step on.
@@ -190,8 +285,8 @@ class ClosedLoop(Uncopyable):
         time_s = self.step_count * self.vehicle.timestep_s
         part, after = changed(self.scenario, key, value, self._plugin, time_s)
         if part == "controller":
-            _, old = control_unit(self._plugin, self.scenario, self.vehicle)
-            self.controller_setup, new = control_unit(self._plugin, after, self.vehicle)
+            _, _, old = control_unit(self._plugin, self.scenario, self.vehicle.timestep_s)
+            self.controller_setup, _, new = control_unit(self._plugin, after, self.vehicle.timestep_s)
             self.controller = retuned(self.controller, old, new)
         elif part == "driver":
             make, who = after.driver.plugin.make, after.driver
@@ -221,21 +316,13 @@ class ClosedLoop(Uncopyable):
         """Drive the manoeuvre to its end; see `advance`."""
         self.advance(self.steps - self.step_count, recorder)
 
-    def advance(
-        self,
-        steps: int,
-        recorder: Recorder | None = None,
-        *,
-        driver: Driver | None = None,
-        controller: Controller | None = None,
-    ) -> None:
+    def advance(self, steps: int, recorder: Recorder | None = None, given: Given = _NOTHING_GIVEN) -> None:
         """Drive some steps.
 
         Args:
             steps: Number of steps.
             recorder: Recorder of every step.
-            driver: Driver of these steps; by default the loop's own.
-            controller: Controller of these steps; by default the loop's own.
+            given: Commands that replace driver and controller in all of these steps, or None.
 
         Raises:
             ControllerError: the controller failed.
@@ -244,97 +331,47 @@ class ClosedLoop(Uncopyable):
             SimulationDiverged: the state became non-finite, or the engine raised a warning.
         """
         with self.in_use:
-            self.drive(steps, recorder, driver, controller)
+            self.drive(steps, recorder, given)
 
-    def drive(
-        self,
-        steps: int,
-        recorder: Recorder | None = None,
-        driver: Driver | None = None,
-        controller: Controller | None = None,
-        setpoint_at: Callable[[float], Setpoint] | None = None,
-    ) -> None:
-        """Drive some steps inside `in_use`, with the manoeuvre's setpoints by default; see `advance`."""
-        vehicle, timestep_s = self.vehicle, self.vehicle.timestep_s
-        driving: Driver = driver or self.driver
-        steering: Controller = controller or self.controller
-        sequence: Any = self.sequence if setpoint_at is None else None
-
-        def of_phase(time_s: float) -> Setpoint:
-            truth = measurement if vehicle.sensors is None else vehicle.truth()[0]
-            return sequence.setpoint(time_s, seen_of(truth, motion, vehicle.roll_rate_radps))
-
-        setpoint_at = setpoint_at or (self.maneuver.setpoint if sequence is None else of_phase)
+    def drive(self, steps: int, recorder: Recorder | None = None, given: Given = _NOTHING_GIVEN) -> None:
+        """Drive some steps inside `in_use`; see `advance`."""
+        vehicle, cars, car = self.vehicle, self._cars, self._car
+        driver_command, actuator_command = given
+        if driver_command is not None:
+            cars.give_driver_command(car, driver_command)
+        if actuator_command is not None:
+            cars.give_actuator_command(car, actuator_command)
+        left = np.zeros(len(cars.cars), dtype=np.intp)
+        left[car] = steps
+        self.recorder = recorder
         vehicle.follow_model()
         with engine_warnings_held():
             vehicle.record_on(None if recorder is None else recorder.tape)
             try:
-                end = self.step_count + steps
-                while self.step_count < end:
-                    self.faults.act(self.step_count)
-                    stretch = range(self.step_count, min(end, self.faults.next_change(self.step_count)))
-                    unit = steering
-                    if self.faults.angle_fails:
-                        unit = told_by_sensor(steering, vehicle.parameters.steering.ratio)
-                    native = unit is self.controller and driving is self.driver and sequence is None
-                    for block in _pieces(stretch) if recorder is None else recorder.blocks(stretch):
-                        if native and self._drive_natively(block, setpoint_at):
-                            continue
-                        self._take_over()
-                        driver_command, actuator_command = self.commands
-                        measurement, motion = self.measurement, self.motion
-                        for step in block:
-                            setpoint = setpoint_at(step * timestep_s)
-                            driver_command = driving.step(setpoint, measurement, motion)
-                            actuator_command = unit.step(driver_command, measurement)
-                            measurement, motion = vehicle.step(driver_command, actuator_command)
-                        self.step_count, self.commands = block.stop, (driver_command, actuator_command)
-                        self.measurement, self.motion = measurement, motion
-                    self._take_over()
+                failed = cars.drive(
+                    left, drivers_given=driver_command is not None, controllers_given=actuator_command is not None
+                )
             finally:
-                self._take_over()
                 vehicle.record_on(None)
-
-    @cached_property
-    def _native(self) -> NativeCars:
-        return NativeCars([self])
-
-    def _take_over(self) -> None:
-        """Bring driver, controller and loop up to date after native calls."""
-        if self._behind:
-            self._native.store(0)
-            self._behind = False
-
-    def _drive_natively(self, block: range, setpoint_at: Callable[[float], Setpoint]) -> bool:
-        """Drive a block of steps in one native call; see `native_loop`.
-
-        Returns:
-            False, and nothing is driven, if driver, controller or setpoints have no native form.
-        """
-        if not (STEP_ADDRESS and is_own(self.vehicle) and has_law(self.driver) and law_of(self.controller)):
-            return False
-        timestep_s, native = self.vehicle.timestep_s, self._native
-        setpoints = [setpoint_at(step * timestep_s) for step in block]
-        table = tabulate(setpoints, self.driver_setup.rack_per_steering_wheel_m)
-        if table is None:
-            return False
-        if not self._behind:
-            native.load(0)
-            self._behind = True
-        native.follow(0, table, block.start)
-        native.cars["left"] = len(block)
-        for error in native.drive().values():
+                self.recorder = None
+        for error in failed.values():
             raise error
-        return True
+        if recorder is not None:
+            recorder.make_room()
 
     def save_state(self) -> LoopState:
         """Return the state from which the loop continues bit-identically."""
+        driver, controller = self.driver, self.controller
+        cars, car = self._cars, self._car
         return LoopState(
             self.vehicle.save_state(),
             self._fault_list,
             self.faults.save_state(),
-            copy.deepcopy(self.driver),
-            copy.deepcopy(self.controller),
+            copy.deepcopy(driver),
+            copy.deepcopy(controller),
+            int(cars.cars["calls"][car]),
+            cars.cars["held"][car].copy(),
+            cars.buses[car].copy(),
             self.measurement,
             self.motion,
             self.commands,
@@ -353,7 +390,7 @@ class ClosedLoop(Uncopyable):
         Raises:
             ParameterError: `state` is something else.
         """
-        if not isinstance(state, LoopState) or not _is_sound(state):
+        if not isinstance(state, LoopState) or not _is_sound(state, self._cars.buses[self._car].shape):
             raise ParameterError(f"is {shown(state)}; a state of this loop is needed", key="state", value=state)
         if state.inputs != self._start.digest:
             raise ParameterError("was saved by a simulation with other inputs", key="state")
@@ -361,26 +398,19 @@ class ClosedLoop(Uncopyable):
             self._adopt(self._changed_by(state.changes))
             self.changes, who = state.changes, self.scenario.driver
             self.driver_setup = replace(self.driver_setup, parameters=who.parameters, own=who.own)
-            self.controller_setup, _ = control_unit(self._plugin, self.scenario, self.vehicle)
+            self.controller_setup, _, _ = control_unit(self._plugin, self.scenario, self.vehicle.timestep_s)
         if state.faults != self._fault_list:
             self.fail(state.faults)
         self.vehicle.restore_state(state.engine)
         self.faults.restore_state(state.fault_memories)
         self.driver, self.controller = copy.deepcopy(state.driver), copy.deepcopy(state.controller)
-        if isinstance(self.controller, ControlUnit):
-            self.controller.read_truth_of(self.vehicle)
-        self.measurement, self.motion = state.measurement, state.motion
-        self.commands, self.step_count = state.commands, state.step
+        cars, car = self._cars, self._car
+        cars.cars["calls"][car], cars.cars["held"][car], cars.buses[car][:] = state.calls, state.held, state.bus
+        self._place(state.measurement, state.motion, state.commands, state.step)
         self.sequence = copy.deepcopy(state.sequence)
 
 
-def _pieces(stretch: range) -> Iterator[range]:
-    """Divide steps into pieces whose setpoints need little memory."""
-    for first in range(0, len(stretch), _PIECE):
-        yield stretch[first : first + _PIECE]
-
-
-def _is_sound(state: LoopState) -> bool:
+def _is_sound(state: LoopState, bus: tuple[int, ...]) -> bool:
     """Return whether the parts of a state have the right types; the vehicle checks its own part."""
     commands = state.commands if isinstance(state.commands, tuple) else ()
     return (
@@ -388,6 +418,9 @@ def _is_sound(state: LoopState) -> bool:
         and all(isinstance(fault, Fault) for fault in state.faults)
         and isinstance(state.fault_memories, list)
         and all(callable(getattr(block, "step", None)) for block in (state.driver, state.controller))
+        and isinstance(state.calls, int)
+        and all(isinstance(part, np.ndarray) for part in (state.held, state.bus))
+        and (state.held.shape, state.bus.shape) == ((N_HELD,), bus)
         and isinstance(state.measurement, Measurement)
         and isinstance(state.motion, Motion)
         and [type(command) for command in commands] == [DriverCommand, ActuatorCommand]

@@ -2,98 +2,30 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, NamedTuple
 
-from activesteer.controllers import Controller, ControllerParameters, ControllerSetup, find_controller
+from activesteer.controllers import Controller, ControllerParameters, ControllerSetup
 from activesteer.errors import ParameterError
 from activesteer.plugins import Plugin
 from activesteer.scenario import Scenario
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, new_message
-from activesteer.vehicle import Vehicle
-
-_STEERING_WHEEL: Final = DriverCommand._fields.index("steering_wheel_demand_rad")
-_FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 
 
-class ControlUnit:
-    """A controller that is called at its own rate, and whose held command arrives after the delay of the bus."""
+class ControlUnit(NamedTuple):
+    """How the loop calls a controller.
 
-    def __init__(
-        self,
-        inner: Any,
-        every: int,
-        delay: int,
-        *,
-        steering_ratio: float | None = None,
-        truth: Callable[[], tuple[Measurement, Motion]] | None = None,
-    ) -> None:
-        """Connect a controller to its bus.
+    Attributes:
+        every: Steps of the simulation between two calls.
+        delay: Steps that a command takes to arrive.
+        steering_ratio: Overall ratio by which the controller converts the angle of the steering angle sensor into the
+            driver's demand; 0 if it is told the demand itself.
+        uses_truth: Whether the controller gets the true measurement instead of the sensors' signals, and the motion as
+            a third argument.
+    """
 
-        Args:
-            inner: The controller.
-            every: Steps of the simulation between two calls.
-            delay: Steps that a command takes to arrive.
-            steering_ratio: If given, the controller reads the driver's demand from the steering angle sensor; this
-                overall ratio converts it to the road wheels.
-            truth: If given, the controller gets this true measurement instead of the sensors' signals, and the motion
-                as a third argument.
-        """
-        self.inner = inner
-        self._every, self._steps = every, 0
-        self._steering_ratio = steering_ratio
-        self._truth = truth
-        self._held = ActuatorCommand()
-        self._on_bus: deque[ActuatorCommand] = deque([self._held] * delay, maxlen=delay + 1)
-
-    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return the command that reaches the actuators now."""
-        if self._steps % self._every == 0:
-            if self._truth is not None:
-                self._held = self.inner.step(command, *self._truth())
-            else:
-                self._held = self.inner.step(self._seen(command, measurement), measurement)
-        self._steps += 1
-        self._on_bus.append(self._held)
-        return self._on_bus[0]
-
-    def memory(self) -> tuple[int, int, float, ActuatorCommand, list[ActuatorCommand]]:
-        """Return steps between two calls, steps so far, steering ratio or 0, held command, commands on the bus."""
-        return self._every, self._steps, self._steering_ratio or 0.0, self._held, list(self._on_bus)
-
-    def put_memory(self, steps: int, held: ActuatorCommand, on_bus: list[ActuatorCommand]) -> None:
-        """Take over steps so far, the held command and the commands on the bus; see `memory`."""
-        self._steps, self._held = steps, held
-        self._on_bus.clear()
-        self._on_bus.extend(on_bus)
-
-    @property
-    def uses_truth(self) -> bool:
-        """Flag of a controller that gets the truth instead of the sensors' signals."""
-        return self._truth is not None
-
-    def read_truth_of(self, vehicle: Vehicle) -> None:
-        """Read the truth, if the controller uses it, from this car."""
-        if self._truth is not None:
-            self._truth = vehicle.truth
-
-    def __getstate__(self) -> dict[str, Any]:
-        """The state without the car; a copy gets its car by `read_truth_of`."""
-        return {**self.__dict__, "_truth": None if self._truth is None else _no_truth}
-
-    def _seen(self, command: DriverCommand, measurement: Measurement) -> DriverCommand:
-        if self._steering_ratio is None:
-            return command
-        # `_replace` would cost more than all else here.
-        seen: list[Any] = [*command]
-        seen[_STEERING_WHEEL] = angle = measurement.steering_wheel_rad
-        seen[_FRONT_STEER] = angle / self._steering_ratio
-        return new_message(DriverCommand, seen)
-
-
-def _no_truth() -> tuple[Measurement, Motion]:
-    raise AssertionError("a copied control unit has no car yet")
+    every: int
+    delay: int
+    steering_ratio: float
+    uses_truth: bool
 
 
 def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> float:
@@ -116,43 +48,32 @@ def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: flo
     return _steps("controllers.interval_s", given if given is not None else own, timestep_s, 1) * timestep_s
 
 
-def control_unit(controller: Any, scenario: Scenario, vehicle: Vehicle) -> tuple[ControllerSetup, Controller]:
-    """Create a controller as the loop calls it in every step.
+def control_unit(
+    plugin: Plugin, scenario: Scenario, timestep_s: float
+) -> tuple[ControllerSetup, ControlUnit, Controller]:
+    """Create a controller and its control unit.
 
     Args:
-        controller: The controller; see `activesteer.plugins.find`.
+        plugin: The controller.
         scenario: Manoeuvre and car.
-        vehicle: The car in the engine.
+        timestep_s: Step of the simulation [s].
 
     Returns:
-        The properties of the car that the controller may know; and the controller. It is inside a control unit unless
-        it works in every step, without delay, and on the driver's own demand.
+        The properties of the car that the controller may know, its control unit, and the controller.
 
     Raises:
         ParameterError: its interval or the delay of the bus is not a whole number of steps.
-        ControllerError: there is no such controller, or it cannot be created.
+        ControllerError: it cannot be created.
     """
-    plugin, car, timestep_s = find_controller(controller), scenario.car.config, vehicle.timestep_s
+    car = scenario.car.config
     setup = scenario.controller_setup(interval_s(plugin, car.controllers, timestep_s))
-    every = round(setup.timestep_s / timestep_s)
-    delay = _steps("controllers.bus_delay_s", car.controllers.bus_delay_s, timestep_s, 0)
-    ratio = None if car.sensors.steering_wheel.is_ideal else car.steering.ratio
-    block = plugin.make(setup)
-    if every == 1 and delay == 0 and ratio is None and not plugin.uses_truth:
-        return setup, block
-    truth = vehicle.truth if plugin.uses_truth else None
-    return setup, ControlUnit(block, every, delay, steering_ratio=ratio, truth=truth)
-
-
-def told_by_sensor(controller: Any, steering_ratio: float) -> ControlUnit:
-    """Wrap a controller so that it reads the driver's demand from the steering angle sensor.
-
-    Args:
-        controller: As `control_unit` returns it; it keeps its memory.
-        steering_ratio: Overall steering ratio.
-    """
-    by_truth = isinstance(controller, ControlUnit) and controller.uses_truth
-    return ControlUnit(controller, 1, 0, steering_ratio=None if by_truth else steering_ratio)
+    unit = ControlUnit(
+        round(setup.timestep_s / timestep_s),
+        _steps("controllers.bus_delay_s", car.controllers.bus_delay_s, timestep_s, 0),
+        0.0 if car.sensors.steering_wheel.is_ideal or plugin.uses_truth else car.steering.ratio,
+        plugin.uses_truth,
+    )
+    return setup, unit, plugin.make(setup)
 
 
 def about(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> dict[str, Any]:

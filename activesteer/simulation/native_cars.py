@@ -1,136 +1,78 @@
-"""Closed loops as records that one native call drives: see `native_loop`."""
+"""Cars with their loops: the records that `native_loop` drives, and what Python does where it stops."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.controllers.law_interface import N_HELD, N_STEERING
-from activesteer.controllers.native_laws import LAWS, fetch, put
+from activesteer.controllers.law_interface import N_COMMAND, N_HELD
+from activesteer.controllers.native_laws import law_address
 from activesteer.conventions import Array
 from activesteer.driver.human import HumanDriver
+from activesteer.driver.native_driver import SetpointTable, setpoint_row, tabulate
 from activesteer.errors import SimulationDiverged
-from activesteer.native_blocks import take, values
+from activesteer.native_blocks import record_type, take, values
 from activesteer.road.path_search import PathSearch
 from activesteer.signals import (
+    NO_TORQUES,
     ActuatorCommand,
     DriverCommand,
     Estimate,
     Measurement,
     Motion,
-    Setpoint,
     WheelTorques,
     message_of,
-    numbers_in,
+    nested_of,
+    new_message,
     numbers_of,
-    steering,
 )
-from activesteer.simulation import native_loop
-from activesteer.simulation.control_unit import ControlUnit
 from activesteer.simulation.native_loop import (
-    ANGLE,
+    AT_CHANGE,
     CAR,
-    CURVATURE,
+    CONTROL,
+    DRIVE,
     GIVEN,
-    HUMAN,
     INSANE,
-    PATH,
-    SETPOINT,
-    TORQUES,
+    NATIVE,
+    NEEDS_CONTROLLER,
+    NEEDS_DRIVER,
+    NEEDS_GAINS,
+    NEEDS_SETPOINTS,
+    PASS_ON,
+    PYTHON,
+    STEP_ADDRESS,
+    TAPE_FULL,
+    drive_cars,
 )
-from activesteer.vehicle import Vehicle
+from activesteer.vehicle.car import check_gear
+from activesteer.vehicle.command_row import write_command
+from activesteer.vehicle.wheel_set import torque_numbers
 
-if TYPE_CHECKING:
-    from activesteer.road.path import Path
-
+_WINDOW: Final = 250
+"""Steps whose setpoints are tabulated at a time."""
+_MAX_TABLES: Final = 64
+"""Tables that are kept for cars that share a manoeuvre."""
+_NEVER: Final = 2**62
 _SPEED: Final = Motion._fields.index("speed_mps")
-
-_STEPS: Final = {kind: kind.step for kind in (Vehicle, HumanDriver, *LAWS[1:]) if kind is not None}
-
-
-class SetpointTable(NamedTuple):
-    """Setpoints of successive steps for compiled code; the last one holds on.
-
-    Attributes:
-        rows: Records of `SETPOINT`.
-        torques: Records of `TORQUES`, or empty.
-        path: The path of all steps.
-    """
-
-    rows: NDArray[Any]
-    torques: NDArray[Any]
-    path: Path | None
-
-
-def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | None) -> SetpointTable | None:
-    """Return setpoints as a table; None if compiled code cannot follow them.
-
-    Args:
-        setpoints: Setpoints of successive steps.
-        rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None without a rack.
-    """
-    count = len(setpoints)
-    while count > 1 and setpoints[count - 1] is setpoints[count - 2]:
-        count -= 1
-    rows, torques, path = [], [], setpoints[0].path
-    for angle, speed, pedal, holds, curvature, rack, wheels, own_path, parking in setpoints[:count]:
-        kind, turn = ANGLE, angle
-        if own_path is not None:
-            kind = PATH
-        elif curvature is not None:
-            kind = CURVATURE
-        elif rack is not None:
-            if rack_per_steering_wheel_m is None:
-                return None
-            turn = rack / rack_per_steering_wheel_m
-        if own_path is not path:
-            return None
-        rows.append((turn, speed, pedal, parking, curvature or 0.0, kind, holds, wheels is not None))
-        if wheels is not None:
-            torques.append((*wheels,))
-    if torques and len(torques) != count:
-        return None
-    return SetpointTable(np.array(rows, SETPOINT), np.array(torques, TORQUES), path)
-
-
-def law_of(controller: Any) -> int:
-    """Return the place of a controller in `LAWS`; 0 if compiled code cannot carry it out."""
-    if type(controller) is ControlUnit and not controller.uses_truth:
-        controller = controller.inner
-    return LAWS.index(type(controller)) if type(controller) in LAWS and is_own(controller) else 0
-
-
-def has_law(driver: Any) -> bool:
-    """Return whether compiled code can carry out a driver."""
-    return type(driver) is HumanDriver and is_own(driver)
-
-
-def is_own(block: Any) -> bool:
-    """Return whether nobody has replaced the method of a block, for example to watch it."""
-    return "step" not in vars(block) and type(block).step is _STEPS[type(block)]
 
 
 class NativeCars:
-    """The loops of some cars with the same step, driven by one native call.
+    """The loops of some cars with the same step, driven together.
 
-    While they are driven, the state of driver, controller and loop is in the records. `load` brings it there from the
-    objects, `store` brings it back.
+    While they are driven, the state of drivers, controllers and buses is in the records. `load` brings it there from
+    the objects, `store` brings it back.
 
     Attributes:
         cars: Records of `CAR`.
-        driver_commands: Numbers of the last commands of the drivers, shape (n, numbers).
-        actuator_commands: Numbers of the last commands of the controllers, shape (n, numbers).
-        measurements: Numbers of the present measurements, shape (n, numbers).
-        motions: Present motions, shape (n, 6).
-        rows: These four by the kind of their message.
+        rows: Kind of message -> its numbers, shape (n, numbers): last commands, present measurements and motions.
+        buses: Decisions on the bus of each controller, shape (delay + 1, `N_HELD`).
     """
 
     def __init__(self, loops: Sequence[Any]) -> None:
-        """Bind the cars.
+        """Bind cars that stand before their first step.
 
         Args:
             loops: The loops.
@@ -142,149 +84,282 @@ class NativeCars:
         for name, kind in (*kinds, ("motion", Motion)):
             self.rows[kind] = row = np.zeros((count, len(numbers_of(kind))))
             self.cars[name] = row.ctypes.data + row.strides[0] * np.arange(count)
-        self.driver_commands, self.actuator_commands, self.measurements, self.motions = self.rows.values()
-        self._tables: list[SetpointTable | None] = [None] * count
-        self._buses: list[Array] = [np.zeros((0, 0))] * count
+        self.buses: list[Array] = [np.zeros((0, N_HELD))] * count
         self._blocks: list[NDArray[Any] | None] = [None] * count
+        self._tables: list[SetpointTable | None] = [None] * count
+        self._shared: dict[tuple[int, int, float | None], tuple[Any, SetpointTable]] = {}
+        self._loaded = np.zeros(count, dtype=bool)
+        self._driver_kinds, self._controller_kinds = np.full(count, PYTHON), np.full(count, PYTHON)
+        # Views and addresses of what Python uses in every step.
+        self._status, self._step, self._stage, self._last, self._first, self._ratio, self._set = (
+            self.cars[name] for name in ("status", "step", "stage", "last", "first", "steering_ratio", "torques_set")
+        )
+        self._held, self._seen = self.cars["held"], self.cars["seen"]
+        self._held_at = [self._held[index : index + 1].ctypes.data for index in range(count)]
+        self._driver_at, self._actuator_at = (
+            self.cars[name].tolist() for name in ("driver_command", "actuator_command")
+        )
+        self._driver_rows, self._measured, self._motions = (
+            self.rows[kind].view(np.dtype(nested_of(kind)))[:, 0] for kind in (DriverCommand, Measurement, Motion)
+        )
+        self._acts: dict[int, Callable[[int], None]] = {
+            AT_CHANGE: self._change_faults,
+            TAPE_FULL: self._make_room,
+            NEEDS_SETPOINTS: self._tabulate,
+            NEEDS_GAINS: self._prepare,
+            NEEDS_DRIVER: self._ask_driver,
+            NEEDS_CONTROLLER: self._ask_controller,
+            INSANE: self._check,
+        }
         for index, loop in enumerate(loops):
             drive: Any = loop.driver_setup.drive  # the vehicle's own
             self.cars["drive_fractions"][index], self.cars["drive_numbers"][index] = drive.fractions, drive.numbers
             self.cars["bindings"][index] = loop.vehicle.address
+            self.connect(index)
+
+    @property
+    def stale(self) -> NDArray[np.bool_]:
+        """True for each car whose record is behind its objects."""
+        return ~self._loaded
+
+    def connect(self, index: int) -> None:
+        """Connect a new controller of a car with its bus, on which nothing is yet."""
+        unit = self._loops[index].unit
+        self.buses[index] = bus = np.zeros((unit.delay + 1, N_HELD))
+        self.cars["bus"][index] = bus.ctypes.data, bus.size
+        self.cars["every"][index], self.cars["on_bus"][index] = unit.every, unit.delay
+        self.cars["calls"][index], self._held[index] = 0, 0.0
+        self._loaded[index] = False
+
+    def adopt(self, index: int, other: NativeCars, place: int) -> None:
+        """Take over a car from other records, with all its state."""
+        rows = ("driver_command", "actuator_command", "measurement", "motion")
+        own = {name: int(self.cars[name][index]) for name in rows}
+        self.cars[index] = other.cars[place]
+        for name, address in own.items():
+            self.cars[name][index] = address
+        for kind, row in self.rows.items():
+            row[index] = other.rows[kind][place]
+        for name in ("buses", "_blocks", "_tables", "_loaded", "_driver_kinds", "_controller_kinds"):
+            getattr(self, name)[index] = getattr(other, name)[place]
 
     def load(self, index: int) -> None:
-        """Copy the state of a loop into its record; its native driver and controller act, other commands hold."""
+        """Copy driver and controller of a car into its record."""
         loop, cars = self._loops[index], self.cars
+        driver, controller = loop.blocks
+        self._driver_kinds[index] = self._controller_kinds[index] = PYTHON
+        if type(driver) is HumanDriver and not driver.is_watched:
+            self._driver_kinds[index] = NATIVE
+            cars["driver"][index] = values(driver)
+        if not loop.unit.uses_truth and (law := law_address(controller)):
+            self._controller_kinds[index] = NATIVE
+            self._blocks[index] = block = np.array([values(controller)], record_type(type(controller)))
+            cars["law"][index], cars["block"][index] = law, block.ctypes.data
         estimate = loop.vehicle.rows.estimate
         cars["estimate"][index] = estimate.ctypes.data if estimate.size else 0
-        cars["step"][index] = loop.step_count
-        self.measurements[index], self.motions[index] = numbers_in(loop.measurement), loop.motion
-        self.driver_commands[index], self.actuator_commands[index] = map(numbers_in, loop.commands)
-        cars["driver_kind"][index] = GIVEN
-        if has_law(loop.driver):
-            cars["driver_kind"][index] = HUMAN
-            cars["driver"][index] = values(loop.driver)  # type: ignore[arg-type]
-        cars["controller_kind"][index] = law = law_of(loop.controller)
-        if law:
-            self._load_unit(index, law, loop.controller)
-
-    def _load_unit(self, index: int, law: int, controller: Any) -> None:
-        every, calls, ratio, held, on_bus = 1, 0, 0.0, ActuatorCommand(), []
-        if isinstance(controller, ControlUnit):
-            every, calls, ratio, held, on_bus = controller.memory()
-            controller = controller.inner
-        cars, delay = self.cars, max(len(on_bus) - 1, 0) if calls else len(on_bus)
-        self._blocks[index] = block = put(cars, index, law, controller)
-        numbers = N_STEERING if block is None else N_HELD
-        bus = self._buses[index] = np.zeros((delay + 1, numbers))
-        for back, command in enumerate(reversed(on_bus), 1):
-            bus[(calls - back) % (delay + 1)] = _numbers(command)[:numbers]
-        unit = {
-            "every": every, "calls": calls, "on_bus": delay, "bus": (bus.ctypes.data, bus.size),
-            "numbers": numbers, "held": _numbers(held), "steering_ratio": ratio,
-        }  # fmt: skip
-        for name, value in unit.items():
-            cars[name][index] = value
-        self.actuator_commands[index, N_STEERING:] = 0.0
+        # Faults that act are found again before the next step, and setpoints are looked up.
+        cars["next_change"][index], cars["last"][index], self._tables[index] = self._step[index], 0, None
+        self._stage[index] = DRIVE
+        self._loaded[index] = True
 
     def store(self, index: int) -> None:
-        """Copy the record of a car back into its loop."""
-        loop, cars = self._loops[index], self.cars
-        step = loop.step_count = int(cars["step"][index])
-        loop.measurement = message_of(Measurement, self.measurements[index].tolist())
-        loop.motion = message_of(Motion, self.motions[index].tolist())
-        driver_command = message_of(DriverCommand, self.driver_commands[index].tolist())
-        if has_law(loop.driver):
-            take(loop.driver, cars["driver"][index].item())  # type: ignore[arg-type]
-            if cars["driver_kind"][index] == HUMAN:
-                driver_command = driver_command._replace(wheel_torques=self._torques_of(index, step - 1))
-        command = message_of(ActuatorCommand, self.actuator_commands[index].tolist())
-        if law := law_of(loop.controller):
-            controller, calls, bus = loop.controller, int(cars["calls"][index]), self._buses[index]
-            on_bus = [_command(bus[(calls - back) % len(bus)]) for back in range(len(bus), 0, -1)]
-            if isinstance(controller, ControlUnit):
-                held = _command(cars["held"][index][: bus.shape[1]])
-                controller.put_memory(calls, held, on_bus if calls else on_bus[1:])
-                controller = controller.inner
-            fetch(cars, index, law, controller, self._blocks[index])
-            if cars["controller_kind"][index]:
-                command = command._replace(estimate=on_bus[0].estimate)
-        loop.commands = driver_command, command
+        """Copy the record of a car back into its driver and controller, which may be changed before the next step."""
+        if self._loaded[index]:
+            self._loaded[index] = False
+            loop = self._loops[index]
+            if self._driver_kinds[index] == NATIVE:
+                take(loop.blocks[0], self.cars["driver"][index].item())
+            if (block := self._blocks[index]) is not None and self._controller_kinds[index] == NATIVE:
+                take(loop.blocks[1], block[0].item())
 
-    def follow(self, index: int, table: SetpointTable, first: int) -> None:
-        """Give the driver of a car its setpoints.
+    def drive(
+        self,
+        left: NDArray[np.intp],
+        *,
+        drivers_given: bool = False,
+        controllers_given: bool = False,
+        call: Callable[[NDArray[Any]], None] | None = None,
+    ) -> dict[int, SimulationDiverged]:
+        """Drive each car for a number of steps.
 
         Args:
-            index: Number of the car.
-            table: The setpoints.
-            first: Step of the first one.
-        """
-        if self._tables[index] is not table:
-            self._tables[index] = table
-            given: dict[str, Any] = {
-                "setpoints": table.rows.ctypes.data,
-                "n_setpoints": len(table.rows),
-                "torques": table.torques.ctypes.data,
-            }
-            if table.path is not None:
-                spacing_m, xs, ys, *headings = PathSearch(table.path).line
-                given |= {"spacing_m": spacing_m, "headings_rad": headings}
-                given |= {"path_x_m": (xs.ctypes.data, xs.size), "path_y_m": (ys.ctypes.data, ys.size)}
-            for name, value in given.items():
-                self.cars[name][index] = value
-        self.cars["first"][index] = first
-
-    def drive(self, call: Callable[[NDArray[Any]], None] | None = None) -> dict[int, SimulationDiverged]:
-        """Drive each car for the number of steps in `left`.
-
-        Args:
+            left: Numbers of steps.
+            drivers_given: Whether the present commands of the drivers hold; the drivers are not called then.
+            controllers_given: The same for the controllers.
             call: The native call for all cars; by default in this thread.
 
         Returns:
             Number of each car that has diverged -> its error.
         """
-        cars, failed = self.cars, {}
+        cars, failed, moving = self.cars, {}, left > 0
+        for index in np.flatnonzero(moving & ~self._loaded).tolist():
+            self.load(index)
+        cars["driver_kind"][moving] = GIVEN if drivers_given else self._driver_kinds[moving]
+        cars["controller_kind"][moving] = GIVEN if controllers_given else self._controller_kinds[moving]
+        cars["left"] = left
         while True:
-            if call is None:
-                native_loop.drive_cars(cars, 0, len(cars), native_loop.STEP_ADDRESS)
-            else:
-                call(cars)
-            stopped = np.flatnonzero(cars["status"]).tolist() if len(cars) > 1 else [0] if cars["status"][0] else []
-            if not stopped:
+            try:
+                (call or self._in_this_thread)(cars)
+            except SimulationDiverged as error:
+                failed[0], cars["left"] = error, 0
+                return failed
+            if not (stopped := np.flatnonzero(self._status).tolist()):
                 return failed
             for index in stopped:
                 try:
-                    if cars["status"][index] == INSANE:
-                        self._loops[index].vehicle.check()
-                    else:
-                        self._prepare(index)
+                    self._acts[self._status.item(index)](index)
                 except SimulationDiverged as error:
                     failed[index] = error
                     cars["left"][index] = 0
 
+    def _in_this_thread(self, cars: NDArray[Any]) -> None:
+        """Drive the cars, and let Python act without a detour if there is only one."""
+        drive_cars(cars, 0, len(cars), STEP_ADDRESS)
+        if len(cars) == 1:
+            reason_of, acts = self._status.item, self._acts
+            while reason := reason_of(0):
+                acts[reason](0)
+                drive_cars(cars, 0, 1, STEP_ADDRESS)
+
+    def measurement(self, index: int) -> Measurement:
+        """Return the present measurement of a car."""
+        return new_message(Measurement, self._measured.item(index))
+
+    def motion(self, index: int) -> Motion:
+        """Return the present motion of a car."""
+        return new_message(Motion, self._motions.item(index))
+
+    def commands(self, index: int) -> tuple[DriverCommand, ActuatorCommand]:
+        """Return the last commands of driver and controller."""
+        driver = self._driver_command(index, self._driver_rows.item(index))
+        command = message_of(ActuatorCommand, self.rows[ActuatorCommand][index].tolist())
+        arrived = self.buses[index][int(self.cars["calls"][index]) % len(self.buses[index])]
+        if self.cars["controller_kind"][index] != GIVEN and arrived[-1]:
+            command = command._replace(estimate=Estimate(*arrived[N_COMMAND:-1].tolist()))
+        return driver, command
+
+    def give_driver_command(self, index: int, command: Any) -> None:
+        """Let a car have a command of its driver.
+
+        Raises:
+            ParameterError: it is not a complete `DriverCommand`.
+        """
+        write_command(DriverCommand, self._driver_at[index], command)
+        torques = command.wheel_torques
+        self._set[index] = torques is not None
+        if torques is None:
+            check_gear(command.gear)
+        else:
+            self.cars["torques_Nm"][index] = torque_numbers(torques)
+
+    def give_actuator_command(self, index: int, command: Any) -> None:
+        """Let a car have a command that reaches its actuators at once.
+
+        Raises:
+            ParameterError: it is not a complete `ActuatorCommand`, or the car has no drive for it.
+        """
+        write_command(ActuatorCommand, self._actuator_at[index], command)
+        self._check_driven(index, command)
+        if command.estimate is not None:
+            self._loops[index].vehicle.note_estimate(command.estimate)
+
+    def _check_driven(self, index: int, command: ActuatorCommand) -> None:
+        if command.wheel_torque_demand_Nm is not NO_TORQUES:
+            self._loops[index].vehicle.wheels.check_driven(command.wheel_torque_demand_Nm)
+
+    def _driver_command(self, index: int, numbers: Sequence[float]) -> DriverCommand:
+        angle, drive, pedal, saturated, gear, front, parking = numbers
+        torques = None
+        if self._set.item(index):
+            every = self.cars["torques_Nm"][index].tolist()
+            torques = WheelTorques(tuple(every[:4]), tuple(every[4:]))
+        return new_message(DriverCommand, (angle, drive, pedal, saturated != 0.0, torques, int(gear), front, parking))
+
+    def _change_faults(self, index: int) -> None:
+        """Let the faults of a step begin and end."""
+        loop, step = self._loops[index], int(self._step[index])
+        loop.faults.act(step)
+        self.cars["next_change"][index] = loop.faults.next_change(step)
+        ratio = loop.unit.steering_ratio
+        if loop.faults.angle_fails and not loop.unit.uses_truth:
+            ratio = loop.vehicle.parameters.steering.ratio
+        self.cars["steering_ratio"][index] = ratio
+
+    def _make_room(self, index: int) -> None:
+        self._loops[index].recorder.make_room()
+
+    def _tabulate(self, index: int) -> None:
+        """Give the driver of a car the setpoints of its next steps."""
+        loop, step = self._loops[index], self._step.item(index)
+        rack = loop.driver_setup.rack_per_steering_wheel_m
+        if loop.settling is not None:
+            table, first = tabulate([loop.settling], rack)._replace(steps=_NEVER), 0
+        elif not loop.foresees:
+            setpoint, table = loop.setpoint_at(step), self._tables[index]
+            if table is None or table.path is not setpoint.path or len(table.rows) > 1:
+                self._follow(index, tabulate([setpoint], rack), step)
+            else:
+                table.rows[0] = setpoint_row(setpoint, rack)
+                self._first[index], self._last[index] = step, step + 1
+            return
+        else:
+            first = step // _WINDOW * _WINDOW
+            key = id(loop.maneuver), first, rack
+            maneuver, table = self._shared.get(key, (None, None))
+            if table is None or maneuver is not loop.maneuver:
+                while len(self._shared) >= _MAX_TABLES:
+                    del self._shared[next(iter(self._shared))]
+                table = self._tabulated(loop, first, rack)
+                self._shared[key] = loop.maneuver, table
+            if step >= first + table.steps:  # the path changes on the way
+                table, first = self._tabulated(loop, step, rack), step
+        self._follow(index, table, first)
+
+    def _tabulated(self, loop: Any, first: int, rack_m: float | None) -> SetpointTable:
+        return tabulate([loop.setpoint_at(first + place) for place in range(_WINDOW)], rack_m)
+
+    def _follow(self, index: int, table: SetpointTable, first: int) -> None:
+        given: dict[str, Any] = {
+            "setpoints": table.rows.ctypes.data, "n_setpoints": len(table.rows), "first": first,
+            "last": first + table.steps,
+        }  # fmt: skip
+        for name, value in given.items():
+            self.cars[name][index] = value
+        before, self._tables[index] = self._tables[index], table
+        if table.path is not None and (before is None or before.path is not table.path):
+            spacing_m, xs, ys, *headings = PathSearch(table.path).line
+            line = spacing_m, (xs.ctypes.data, xs.size), (ys.ctypes.data, ys.size), headings
+            self.cars["path"][index] = line
+
     def _prepare(self, index: int) -> None:
         """Compute the gains of a driver for the present speed."""
-        driver: Any = self._loops[index].driver
-        speed_mps = float(self.motions[index, _SPEED])
+        driver: Any = self._loops[index].blocks[0]
+        speed_mps = float(self.rows[Motion][index, _SPEED])
         self.cars["driver"]["_path"]["_row_size"][index] = driver.prepare(speed_mps)
 
-    def _torques_of(self, index: int, step: int) -> WheelTorques | None:
-        table = self._tables[index]
-        if table is None or not len(table.torques):
-            return None
-        row = table.torques[min(step - int(self.cars["first"][index]), len(table.rows) - 1)].tolist()
-        drive, brake = map(tuple, row)
-        return WheelTorques(drive, brake)
+    def _ask_driver(self, index: int) -> None:
+        """Call a driver in Python."""
+        loop = self._loops[index]
+        setpoint = loop.setpoint_at(self._step.item(index))
+        self.give_driver_command(index, loop.blocks[0].step(setpoint, self.measurement(index), self.motion(index)))
+        self._stage[index] = CONTROL
 
+    def _ask_controller(self, index: int) -> None:
+        """Call a controller in Python, and hold its decision."""
+        loop = self._loops[index]
+        told = self._driver_rows.item(index) if self._ratio.item(index) == 0.0 else self._seen[index].tolist()
+        driver_command = self._driver_command(index, told)
+        if loop.unit.uses_truth:
+            command = loop.blocks[1].step(driver_command, *loop.vehicle.truth())
+        else:
+            command = loop.blocks[1].step(driver_command, self.measurement(index))
+        write_command(ActuatorCommand, self._held_at[index], command)
+        self._check_driven(index, command)
+        if command.estimate is not None:
+            self._held[index, N_COMMAND:-1], self._held[index, -1] = command.estimate, 1.0
+        elif self._held.item(index, -1):
+            self._held[index, -1] = 0.0
+        self._stage[index] = PASS_ON
 
-def _numbers(command: ActuatorCommand) -> Array:
-    """Return the numbers of a command and of its estimate, shape (`N_HELD`,); nan without an estimate."""
-    estimate = command.estimate or [math.nan] * (N_HELD - N_STEERING)
-    return np.array([*command[:N_STEERING], *estimate])
-
-
-def _command(numbers: Array) -> ActuatorCommand:
-    """Return a command from its numbers; see `_numbers`."""
-    row = numbers.tolist()
-    estimate = Estimate(*row[N_STEERING:]) if len(row) > N_STEERING and not math.isnan(row[N_STEERING]) else None
-    rear, front, desired, prediction, correction, saturated = row[:N_STEERING]
-    return steering(rear, front, desired, prediction, correction, bool(saturated), estimate)
+    def _check(self, index: int) -> None:
+        self._loops[index].vehicle.check()

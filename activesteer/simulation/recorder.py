@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple, Self
 
@@ -115,21 +114,21 @@ class Recorder(Uncopyable):
         """Number of recorded rows. A row holds the values at the start of its step."""
         return int(self._tape["rows"][0])
 
-    def blocks(self, steps: range) -> Iterator[range]:
-        """Divide steps where the tape is full; take its rows there, and flush full blocks.
+    @property
+    def room(self) -> int:
+        """Number of rows for which the tape has room."""
+        return int(self._tape["room"][0])
 
-        Args:
-            steps: Steps that the vehicle is going to record.
+    def make_room(self) -> None:
+        """Take the rows from the tape, and flush a full block.
+
+        Raises:
+            SimulationDiverged: see `flush`.
         """
-        while steps:
-            part = steps[: int(self._tape["room"][0])]
-            assert part, "more steps than were announced"
-            yield part
-            steps = steps[len(part) :]
-            if self.rows - self._flushed == self._block_rows:
-                self.flush()
-            elif not self._tape["room"][0]:
-                self._take()
+        if self.rows - self._flushed == self._block_rows:
+            self.flush()
+        elif not self._tape["room"][0]:
+            self._take()
 
     def _rewind(self) -> None:
         """Direct the next row to the start of the tape, and the next pose behind the kept ones."""

@@ -243,31 +243,31 @@ class Simulation:
         if steps > left:
             end = f"{self.scenario.maneuver.name} ends at {self.scenario.maneuver.duration_s:g} s (duration_s)"
             raise ManeuverError(f"{end}; {steps} more steps were requested, {left} are left", value=steps, allowed=left)
-        driver = controller = None
         if driver_command is not None:
-            driver = Given(DRIVER.checked(driver_command, "", loop.driver_setup, _GIVEN))
+            driver_command = DRIVER.checked(driver_command, "", loop.driver_setup, _GIVEN)
         if actuator_command is not None:
-            controller = Given(CONTROLLER.checked(actuator_command, "", loop.controller_setup, _GIVEN))
+            actuator_command = CONTROLLER.checked(actuator_command, "", loop.controller_setup, _GIVEN)
+        given = driver_command, actuator_command
         with self._watched():
             if self._pacer is None and self._link is None:
-                self._drive(int(steps), driver, controller)
+                self._drive(int(steps), given)
             else:
-                self._drive_by_the_clock(int(steps), driver, controller)
+                self._drive_by_the_clock(int(steps), given)
             if self.done:
                 self._recorder.flush()
         return loop.measurement
 
-    def _drive(self, steps: int, driver: Given | None, controller: Given | None) -> None:
+    def _drive(self, steps: int, given: Given) -> None:
         rows = self._recorder.rows
         try:
-            self.loop.drive(steps, self._recorder, driver, controller)
+            self.loop.drive(steps, self._recorder, given)
         finally:
             self._note_phases()
-            for word, given in (("driver", driver), ("controller", controller)):
-                if given is not None:
+            for word, command in zip(("driver", "controller"), given, strict=True):
+                if command is not None:
                     self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
 
-    def _drive_by_the_clock(self, steps: int, driver: Given | None, controller: Given | None) -> None:
+    def _drive_by_the_clock(self, steps: int, given: Given) -> None:
         """Drive steps one by one, each at its instant and with the commands that have arrived until then."""
         pacer, link, loop = self._pacer, self._link, self.loop
         collects = gc.isenabled()
@@ -277,14 +277,10 @@ class Simulation:
                 if pacer is not None:
                     pacer.await_step()
                 if link is None:
-                    self._drive(1, driver, controller)
+                    self._drive(1, given)
                     continue
-                given = link.commands()
-                self._drive(
-                    1,
-                    driver or (None if given.driver is None else Given(given.driver)),
-                    controller or (None if given.controller is None else Given(given.controller)),
-                )
+                heard = link.commands()
+                self._drive(1, (given[0] or heard.driver, given[1] or heard.controller))
                 link.tell(loop.step_count, loop.measurement, loop.motion)
         finally:
             if collects:

@@ -160,8 +160,8 @@ class _FaultRuns:
         lead = min(round(_BEGIN_S / self.timestep_s), round(lead_s / self.timestep_s) + 10)
         loop.advance(round(_BEGIN_S / self.timestep_s) - lead)
         self._start, self._lead = loop.save_state(), lead
-        driver = _RecordingDriver(loop.driver)
-        self.in_order = self._driven(driver)
+        loop.driver = driver = _RecordingDriver(loop.driver)
+        self.in_order = self._driven()
         self._commands = driver.commands
 
     def hands_fixed(self, fault: Fault) -> _Signals:
@@ -175,12 +175,14 @@ class _FaultRuns:
         loop.restore_state(self._start)
         ends = None if fault.end_s is None else _BEGIN_S + fault.end_s
         loop.fail((replace(fault, start_s=_BEGIN_S, end_s=ends),))
-        return self._driven(driver)
+        if driver is not None:
+            loop.driver = driver
+        return self._driven()
 
-    def _driven(self, driver: Any) -> _Signals:
+    def _driven(self) -> _Signals:
         loop = self.loop
         recorder = Recorder(loop.vehicle, loop.steps - loop.step_count)
-        loop.advance(loop.steps - loop.step_count, recorder, driver=driver)
+        loop.advance(loop.steps - loop.step_count, recorder)
         names = [channel.name for channel in recorder.channels]
         values = recorder.result()[1][self._lead :]
         return _Signals(*(values[:, names.index(name)].copy() for name in _Signals._fields))

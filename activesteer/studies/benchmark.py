@@ -179,7 +179,9 @@ def _closed_loop(
     recorders = [Recorder(loop.vehicle, loop.steps) for loop in loops]
 
     def drive(loop: ClosedLoop, recorder: Recorder) -> None:
-        loop.advance(loop.steps, recorder, controller=given)
+        if given is not None:
+            loop.controller = given
+        loop.advance(loop.steps, recorder)
 
     def run() -> None:
         if threads:
@@ -239,12 +241,12 @@ def _blocks(scenario: Scenario) -> dict[str, float]:
     }
     recorder = Recorder(vehicle, _CALLS)
     vehicle.record_on(recorder.tape)
-    parts = recorder.blocks(range(_CALLS))
     while recorder.rows < _CALLS:
         start = time.perf_counter()
-        part = next(parts)
+        recorder.make_room()
         found["recorder_us"] += (time.perf_counter() - start) / _CALLS * 1e6
-        found["vehicle_us"] += _per_call_us(vehicle.step, len(part), command, steer) * len(part) / _CALLS
+        steps = min(recorder.room, _CALLS - recorder.rows)
+        found["vehicle_us"] += _per_call_us(vehicle.step, steps, command, steer) * steps / _CALLS
     found["recorder_us"] += _per_call_us(recorder.flush, 1) / _CALLS
     return found
 

@@ -231,8 +231,8 @@ class Vehicle(Uncopyable):
         ):
             raise _refused(driver_command, actuator_command)
         try:
-            if self._estimate_memory is not None and (estimate := actuator_command.estimate) is not None:
-                write_estimate(self._estimate_memory, 0, *estimate)
+            if actuator_command.estimate is not None:
+                self.note_estimate(actuator_command.estimate)
             if (added := actuator_command.wheel_torque_demand_Nm) is not NO_TORQUES:
                 self.wheels.check_driven(added)
             if (torques := driver_command.wheel_torques) is not None:
@@ -375,6 +375,11 @@ class Vehicle(Uncopyable):
         self._estimate_memory = self.rows.estimate.data
         record_from(self._bindings, self.rows.live())
         self.channels.add_estimate()
+
+    def note_estimate(self, estimate: Estimate) -> None:
+        """Record an estimate from the next step on, if estimates are recorded; see `record_estimate`."""
+        if self._estimate_memory is not None:
+            write_estimate(self._estimate_memory, 0, *estimate)
 
     def save_state(self) -> NDArray[np.float64]:
         """Return the state of engine, brakes, motors, sensors and gear, from which a run continues bit-identically."""

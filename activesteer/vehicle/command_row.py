@@ -11,6 +11,7 @@ import numpy as np
 from numba import types
 
 from activesteer.compilation import compiled_call, inlined
+from activesteer.errors import ParameterError, shown
 from activesteer.native_messages import native_type, store_numbers
 from activesteer.signals import ActuatorCommand, Channel, DriverCommand, Estimate, Number, numbers_of
 from activesteer.units import ESTIMATED
@@ -81,6 +82,43 @@ def write_commands(address, driver_command, actuator_command):
     """
     store_numbers(address, driver_command)
     store_numbers(address + _SIZE_DRIVER, actuator_command)
+
+
+@compiled_call(types.void, types.intp, DRIVER_COMMAND, others_run=False)
+def _write_driver_command(address, command):
+    store_numbers(address, command)
+
+
+@compiled_call(types.void, types.intp, ACTUATOR_COMMAND, others_run=False)
+def _write_actuator_command(address, command):
+    store_numbers(address, command)
+
+
+_WRITERS: Final[dict[type[Any], tuple[Any, str, int]]] = {
+    DriverCommand: (_write_driver_command, "driver_command", len(DriverCommand._fields)),
+    ActuatorCommand: (_write_actuator_command, "actuator_command", len(ActuatorCommand._fields)),
+}
+
+
+def write_command(kind: type[Any], address: int, command: Any) -> None:
+    """Write the numbers of a command that comes from Python.
+
+    Args:
+        kind: `DriverCommand` or `ActuatorCommand`.
+        address: Address of the numbers.
+        command: The command.
+
+    Raises:
+        ParameterError: it is not exactly such a message, or holds something that is not a number.
+    """
+    write, key, count = _WRITERS[kind]
+    # Native code reads a fixed number of fields; an incomplete message would end the process.
+    if type(command) is not kind or len(command) != count:
+        raise ParameterError(f"is {shown(command)}; a complete {kind.__name__} is needed", key=key, value=command)
+    try:
+        write(address, command)
+    except Exception as reason:
+        raise ParameterError(f"cannot carry out {shown(command)}: {reason}", key=key, value=command) from reason
 
 
 @compiled_call(types.void, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND)

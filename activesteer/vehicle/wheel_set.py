@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import CORNERS, Array
-from activesteer.errors import ParameterError
+from activesteer.errors import ParameterError, shown
 from activesteer.signals import WheelTorques
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -77,10 +77,8 @@ class WheelSet:
 
     def apply(self, torques: WheelTorques) -> None:
         """Set the torques of single wheels, at once and without the limits of the engine."""
-        if len(torques.drive_Nm) != len(CORNERS) or len(torques.brake_Nm) != len(CORNERS):
-            raise ValueError(f"{torques!r}: four torques each are needed")
-        self._ctrl[self.torques.drives] = torques.drive_Nm
-        self._ctrl[self.torques.brakes] = torques.brake_Nm
+        numbers = torque_numbers(torques)
+        self._ctrl[self.torques.drives], self._ctrl[self.torques.brakes] = numbers[:4], numbers[4:]
 
     def heights_m(self) -> Array:
         """Return the heights of the wheels' centres, shape (4,) [m]: roughly their rolling radii."""
@@ -103,3 +101,18 @@ class WheelSet:
         mass_matrix = np.zeros((self._model.nv, self._model.nv))
         mujoco.mj_fullM(self._model, self._data, mass_matrix)
         return mass_matrix.diagonal()[self.spins].tolist()
+
+
+def torque_numbers(torques: WheelTorques) -> tuple[float, ...]:
+    """Return the drive torques and the brake torques of the wheels [N m].
+
+    Raises:
+        ParameterError: they are not four numbers each.
+    """
+    try:
+        numbers = (*map(float, torques.drive_Nm), *map(float, torques.brake_Nm))
+    except (AttributeError, TypeError, ValueError) as reason:
+        raise ParameterError(f"are {shown(torques)}: {reason}", key="wheel_torques", value=torques) from reason
+    if len(numbers) != 2 * len(CORNERS) or len(torques.drive_Nm) != len(CORNERS):
+        raise ParameterError(f"are {shown(torques)}; four each are needed", key="wheel_torques", value=torques)
+    return numbers

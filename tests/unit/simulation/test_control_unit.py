@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -14,11 +13,9 @@ from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.control_unit import ControlUnit
 from tests.physics.runs import STEP_DEG, assert_goes_on_from_its_state
 from tests.raising import raises
 
-SENSED = Measurement(0.0, 20.0, 0.1, 2.0, 0.0, 0.32, 0.0, 0.0, (60.0, 60.0, 60.0, 60.0))
 STEP = {"steer.steering_wheel_deg": STEP_DEG}
 
 
@@ -36,8 +33,22 @@ class Counting:
         return ActuatorCommand(rear_steer_demand_rad=1e-4 * self.calls)
 
 
-def _asked(unit: ControlUnit, steps: int) -> list[int]:
-    return [round(1e4 * unit.step(DriverCommand(), SENSED).rear_steer_demand_rad) for _ in range(steps)]
+class Sees:
+    """A controller that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.seen: list[Any] = []
+
+    def step(self, *seen: Any) -> ActuatorCommand:
+        self.seen.append(seen)
+        return ActuatorCommand()
+
+
+def driven(controller: Any, steps: int, **overrides: Any) -> tuple[ClosedLoop, Any]:
+    """Return a loop after some steps without settling, and its controller."""
+    loop = ClosedLoop(resolve("step_steer", overrides={**STEP, "settle_s": 0.0, **overrides}), controller)
+    loop.advance(steps)
+    return loop, loop.controller.inner
 
 
 @pytest.mark.parametrize(
@@ -50,30 +61,34 @@ def _asked(unit: ControlUnit, steps: int) -> list[int]:
     ],
 )
 def test_command_is_held_between_calls_and_comes_out_behind_the_bus(every: int, delay: int, asked: list[int]) -> None:
-    assert _asked(ControlUnit(Counting(), every, delay), 7) == asked
-
-
-def test_a_copy_goes_on_by_itself_as_the_original_does() -> None:
-    unit = ControlUnit(Counting(), 2, 3)
-    _asked(unit, 5)
-    other = copy.deepcopy(unit)
-    assert _asked(unit, 6) == _asked(other, 6)
-    assert unit.inner is not other.inner
+    unit = {"controllers.interval_s": 0.001 * every, "controllers.bus_delay_s": 0.001 * delay}
+    loop, _ = driven(Counting, 0, **unit)
+    found = []
+    for _ in asked:
+        loop.advance(1)
+        found.append(round(1e4 * loop.commands[1].rear_steer_demand_rad))
+    assert found == asked
 
 
 def test_driver_s_demand_is_known_through_the_steering_angle_sensor() -> None:
-    unit = ControlUnit(Counting(), 1, 0, steering_ratio=16.0)
-    unit.step(DriverCommand(0.5, brake_pedal=0.2, front_steer_demand_rad=0.03), SENSED)
-    command, measurement = unit.inner.seen
-    assert (command.steering_wheel_demand_rad, command.front_steer_demand_rad) == (0.32, 0.02)
-    assert (command.brake_pedal, measurement) == (0.2, SENSED)
+    noisy = {"sensors.steering_wheel.delay_s": 0.01}
+    loop, controller = driven(Sees, 600, **noisy)
+    command, measurement = controller.seen[-1]
+    ratio = loop.vehicle.parameters.steering.ratio
+    assert command.steering_wheel_demand_rad == measurement.steering_wheel_rad != 0.0
+    assert command.front_steer_demand_rad == measurement.steering_wheel_rad / ratio
+    assert loop.commands[0].steering_wheel_demand_rad != command.steering_wheel_demand_rad
 
 
 def test_a_controller_that_asks_for_it_gets_the_truth() -> None:
-    truth = SENSED._replace(yaw_rate_radps=0.2), Motion(0.0, 0.0, 0.0, 20.0, 0.5, 0.2)
-    unit = ControlUnit(Counting(), 1, 0, truth=lambda: truth)
-    unit.step(DriverCommand(), SENSED)
-    assert tuple(unit.inner.seen[1:]) == truth
+    class Knows(Sees):
+        uses_truth = True
+
+    _, controller = driven(Knows, 600, **{"sensors.preset": "production"})
+    command, measurement, motion = controller.seen[-1]
+    assert isinstance(motion, Motion)
+    assert measurement.yaw_rate_radps == motion.yaw_rate_radps
+    assert command.steering_wheel_demand_rad == pytest.approx(np.radians(STEP_DEG))
 
 
 class SlowCounting(Counting):

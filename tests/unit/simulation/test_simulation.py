@@ -163,7 +163,7 @@ def test_what_is_seen_from_outside() -> None:
     assert simulation.measurement.time_s == 0.0
     steps: Any = np.int64(1600)
     measurement = simulation.advance(steps)
-    assert measurement is simulation.measurement
+    assert measurement == simulation.measurement
     assert simulation.time_s == 0.8
     assert measurement.time_s == pytest.approx(0.8)
     assert simulation.motion.speed_mps == pytest.approx(80 / 3.6, rel=0.02)
