@@ -155,14 +155,16 @@ def _watch(options: argparse.Namespace) -> int:
 
 def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Namespace) -> Any:
     """Drive and record one controller, and return the recording."""
-    from activesteer.coupling.udp import UdpPort
+    from activesteer.coupling.udp import UdpLink, UdpPort
     from activesteer.simulation.runner import run_scenario
 
     name, quiet = f"{scenario.maneuver.name} {controller.label}", options.json
-    udp = None if options.udp is None else UdpPort.read(options.udp, options.udp_timeout, options.udp_reaction)
+    link = None
+    if options.udp is not None:
+        link = UdpLink(UdpPort.read(options.udp, options.udp_timeout, options.udp_reaction))
     with ProgressBar(name, quiet=quiet) as progress:
         recording = run_scenario(
-            scenario, controller, path=path, progress=progress, realtime=options.realtime, udp=udp
+            scenario, controller, path=path, progress=progress, realtime=options.realtime, link=link
         )  # fmt: skip
     if not quiet:
         for words in _clock_words(recording.metadata):

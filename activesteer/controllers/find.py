@@ -12,7 +12,6 @@ from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.registry import IN_EXAMPLES, WITHOUT_FILE
 from activesteer.controllers.variant import read_variant
-from activesteer.coupling.fmu import find_fmu, is_fmu
 from activesteer.errors import ControllerError, shown
 from activesteer.plugins import Declared, Kind, Plugin, declared_in, find
 from activesteer.resources import list_controller_variants
@@ -127,7 +126,7 @@ def find_controller(given: Any) -> Plugin:
         return Plugin(CONTROLLER, variant.name, variant.name, variant, variant.gains, variant.files, ours=True)
     if isinstance(given, str) and given in IN_EXAMPLES:
         raise ControllerError(f"{given!r} is an example now; use -c {IN_EXAMPLES[given]}", value=given)
-    return find_fmu(given, CONTROLLER) if is_fmu(given) else find(given, CONTROLLER)
+    return find(given, CONTROLLER)
 
 
 def is_variant(given: Any) -> bool:

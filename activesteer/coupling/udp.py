@@ -62,36 +62,37 @@ class UdpPort(NamedTuple):
             ) from None  # fmt: skip
 
 
-class Commands(NamedTuple):
-    """Commands in use; None where the run's own block decides."""
-
-    driver: DriverCommand | None = None
-    controller: ActuatorCommand | None = None
+Commands = tuple[DriverCommand | None, ActuatorCommand | None]
+"""Commands in use; None where the run's own block decides."""
+_NOTHING: Final[Commands] = (None, None)
 
 
 class UdpLink:
-    """An open port.
+    """An open port, the `link` of a `Simulation`.
 
     Attributes:
+        name: Key of the report in the recording.
         report: Numbers of messages for the recording.
     """
 
-    def __init__(self, port: UdpPort, checks: tuple[Callable[[Any], Any], Callable[[Any], Any]]) -> None:
+    name = "udp"
+
+    def __init__(self, port: UdpPort | int) -> None:
         """Open the port.
 
         Args:
-            port: Address and reaction.
-            checks: Checks of a driver command and of an actuator command; they raise an error for a wrong one.
+            port: Address and reaction; a number is a port of this machine.
 
         Raises:
             ParameterError: the port cannot be opened, or a value is wrong.
         """
+        port = UdpPort(port) if isinstance(port, int) else port
         if not 0 <= port.port < 2**16 or not 0.001 <= port.timeout_s <= 60.0 or port.reaction not in REACTIONS:
             problem = (
                 f"a port from 0 to 65535, a timeout from 0.001 to 60 s and one of {', '.join(REACTIONS)} is needed"
             )
             raise ParameterError(f"is {tuple(port)}; {problem}", key="udp", value=port)
-        self.port, self._checks = port, checks
+        self.port, self._checks = port, (_refuse, _refuse)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((port.host, port.port))
@@ -102,7 +103,7 @@ class UdpLink:
         self._sender: Any = None
         self._sequence: int | None = None
         self._received_s = -float("inf")
-        self._now = Commands()
+        self._now = _NOTHING
         self.report = {"received": 0, "used": 0, "lost": 0, "late": 0, "refused": 0, "timeouts": 0}
         self._timed_out = True
 
@@ -110,6 +111,10 @@ class UdpLink:
     def address(self) -> tuple[str, int]:
         """Address and port that the run listens on."""
         return self._socket.getsockname()
+
+    def connect(self, checks: tuple[Callable[[Any], Any], Callable[[Any], Any]]) -> None:
+        """Accept commands that pass these checks of a driver command and of an actuator command."""
+        self._checks = checks
 
     def close(self) -> None:
         """Close the port."""
@@ -136,7 +141,7 @@ class UdpLink:
                 problem = f"no command for {self.port.timeout_s:g} s on port {self.address[1]}"
                 raise ManeuverError(f"{problem}; the run ends, as the reaction 'stop' asks for", key="udp")
             if self.port.reaction == "release":
-                self._now = Commands()
+                self._now = _NOTHING
         return self._now
 
     def _take(self, data: bytes, sender: Any) -> None:
@@ -171,7 +176,7 @@ class UdpLink:
         report["lost"] += ahead - 1
         report["used"] += 1
         self._sender, self._sequence, self._received_s = sender, sequence, time.perf_counter()
-        self._timed_out, self._now = False, Commands(driver, controller)
+        self._timed_out, self._now = False, (driver, controller)
 
     def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:
         """Send the state after a step to the sender of the commands."""
@@ -184,3 +189,7 @@ class UdpLink:
             self._socket.sendto(STATE.pack(*head, *numbers, 0.0, 0.0), self._sender)
         except OSError:  # a full buffer, or nobody there: the next state is sent again
             return
+
+
+def _refuse(command: Any) -> Any:
+    raise ParameterError("no run is connected", key="udp", value=command)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.config import Range
-from activesteer.coupling.fmu import find_fmu, is_fmu
 from activesteer.driver.base import DriverSetup
 from activesteer.driver.human import HumanDriver
 from activesteer.driver.parameters import DriverParameters
@@ -81,7 +80,7 @@ def find_driver(given: Any) -> Plugin:
         DriverError: there is no such driver.
     """
     if not is_driver_file(given):
-        return find_fmu(given, DRIVER) if is_fmu(given) else find(given, DRIVER)
+        return find(given, DRIVER)
     name = str(given.get("name", "driver")) if isinstance(given, Mapping) else Path(given).stem
     return Plugin(DRIVER, name, name, HumanDriver, {}, {}, ours=True)
 

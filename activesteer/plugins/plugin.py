@@ -16,6 +16,7 @@ from activesteer.config import Source, field_in_unit
 from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.plugins.declared import SETUP, Declared, declared_by, has_argument, read_values, takes_any
 from activesteer.plugins.file import from_file, is_user_module
+from activesteer.plugins.formats import format_of
 from activesteer.plugins.kind import Kind, in_one_line
 
 _PLAIN: Final = (bool, int, float, str)
@@ -215,6 +216,8 @@ def find(given: Any, kind: Kind) -> Plugin:
         return given
     if isinstance(given, os.PathLike):
         given = os.fspath(given)
+    if (found_format := format_of(given)) is not None:
+        return found_format.load()(given, kind)
     if isinstance(given, str):
         if given in kind.built_in:
             return Plugin(kind, given, given, kind.built_in[given], {}, {}, ours=True)

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.coupling.udp import UdpPort
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario
-from activesteer.simulation.simulation import Simulation
+from activesteer.simulation.simulation import Link, Simulation
 
 
 def simulate(
@@ -64,7 +63,7 @@ def run_scenario(
     timestep_s: float = DEFAULT_TIMESTEP_S,
     progress: Callable[[float], None] | None = None,
     realtime: bool | float = False,
-    udp: UdpPort | int | None = None,
+    link: Link | None = None,
 ) -> Recording:
     """Run a scenario; if a path is given, write the recording during the run.
 
@@ -75,7 +74,7 @@ def run_scenario(
         timestep_s: Step of the simulation [s].
         progress: Function that is called about every simulated second with the completed fraction, 0 to 1.
         realtime: Whether to pace the steps to the clock, and how fast; see `Simulation`.
-        udp: Port on which another process gives commands; see `Simulation`.
+        link: Link to another process that gives commands; see `Simulation`.
 
     Returns:
         The recording, with metrics. A run that cannot be evaluated, for example because it is too short, has no
@@ -85,7 +84,7 @@ def run_scenario(
     Raises:
         ActiveSteerError: the run failed. The rows recorded until then are in the file, and in the error's `recording`.
     """
-    simulation = Simulation(scenario, controller, timestep_s=timestep_s, realtime=realtime, udp=udp)
+    simulation = Simulation(scenario, controller, timestep_s=timestep_s, realtime=realtime, link=link)
     return _driven(simulation, path, progress)
 
 

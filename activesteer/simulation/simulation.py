@@ -5,12 +5,12 @@ from __future__ import annotations
 import gc
 import json
 import weakref
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from numbers import Integral
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Protocol, Self
 
 import mujoco
 
@@ -18,7 +18,6 @@ from activesteer.analysis.metrics import metrics
 from activesteer.config import Source, build
 from activesteer.controllers import CONTROLLER, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
-from activesteer.coupling.udp import UdpLink, UdpPort
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
 from activesteer.faults import Fault, fault_table
@@ -46,6 +45,31 @@ _COARSE: Final = (
     "steps are long for a short obstacle: longitudinal tyre forces on it may be off by a tenth of their range, "
     "on a stiff tyre by more; timestep_s=0.00025 is finer"
 )
+
+
+class Link(Protocol):
+    """Another process that gives commands."""
+
+    name: str
+    """Key of the report in the recording."""
+    report: dict[str, int]
+    """Numbers of messages for the recording."""
+
+    def connect(self, checks: tuple[Callable[[Any], Any], Callable[[Any], Any]]) -> None:
+        """Take the checks of a driver command and of an actuator command, which raise an error for a wrong one."""
+        ...
+
+    def commands(self) -> Given:
+        """Return the commands for the next step; None where the run's own block decides."""
+        ...
+
+    def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:
+        """Send the state after a step."""
+        ...
+
+    def close(self) -> None:
+        """End the link."""
+        ...
 
 
 class SavedState(NamedTuple):
@@ -99,7 +123,7 @@ class Simulation:
         driver: Any = DEFAULT_DRIVER,
         timestep_s: float = DEFAULT_TIMESTEP_S,
         realtime: bool | float = False,
-        udp: UdpPort | int | None = None,
+        link: Link | None = None,
     ) -> None:
         """Build the car and let it settle, with the arguments of `simulate`.
 
@@ -111,7 +135,7 @@ class Simulation:
             driver: Name, path or table of a driver, or your own code.
             timestep_s: Step of engine, driver and controller [s].
             realtime: Whether each step begins at its instant by the clock; a number is the pace, 2 for twice as fast.
-            udp: Port on which another process gives commands; a number is a port of this machine.
+            link: Link to another process that gives commands, such as `activesteer.coupling.udp.UdpLink(5005)`.
 
         Raises:
             ActiveSteerError: an input is wrong, or the car does not settle.
@@ -130,7 +154,9 @@ class Simulation:
         self._given: dict[str, int] = {}
         self.events: tuple[Event, ...] = ()
         self._pacer = None if realtime is False else Pacer(1.0 if realtime is True else realtime, timestep_s)
-        self._link = None if udp is None else self._linked(UdpPort(udp) if isinstance(udp, int) else udp)
+        self._link = link
+        if link is not None:
+            self._connect(link)
         self._failure: BaseException | None = None
         self._writer: McapWriter | None = None
         if timestep_s >= _COARSE_S and self.scenario.maneuver.ground.is_steep:
@@ -144,23 +170,17 @@ class Simulation:
     def _block_s(self) -> float | None:
         return None if self._pacer is None and self._link is None else PACED_BLOCK_INTERVAL_S
 
-    def _linked(self, port: UdpPort) -> UdpLink:
+    def _connect(self, link: Link) -> None:
         loop = self.loop
 
         def of_driver(command: DriverCommand) -> DriverCommand:
-            return DRIVER.checked(command, "", loop.driver_setup, "UDP gave")
+            return DRIVER.checked(command, "", loop.driver_setup, f"{link.name} gave")
 
         def of_controller(command: ActuatorCommand) -> ActuatorCommand:
-            return CONTROLLER.checked(command, "", loop.controller_setup, "UDP gave")
+            return CONTROLLER.checked(command, "", loop.controller_setup, f"{link.name} gave")
 
-        link = UdpLink(port, (of_driver, of_controller))
+        link.connect((of_driver, of_controller))
         weakref.finalize(self, link.close)
-        return link
-
-    @property
-    def udp_address(self) -> tuple[str, int] | None:
-        """Address and port on which another process gives commands; None without one."""
-        return None if self._link is None else self._link.address
 
     @property
     def steps(self) -> int:
@@ -280,7 +300,7 @@ class Simulation:
                     self._drive(1, given)
                     continue
                 heard = link.commands()
-                self._drive(1, (given[0] or heard.driver, given[1] or heard.controller))
+                self._drive(1, (given[0] or heard[0], given[1] or heard[1]))
                 link.tell(loop.step_count, loop.measurement, loop.motion)
         finally:
             if collects:
@@ -469,7 +489,7 @@ class Simulation:
         if self._pacer is not None:
             recording.metadata["realtime"] = self._pacer.report()
         if self._link is not None:
-            recording.metadata["udp"] = dict(self._link.report)
+            recording.metadata[self._link.name] = dict(self._link.report)
         if self.events:
             recording.metadata["events"] = tables_of(self.events)
         if failure is not None:

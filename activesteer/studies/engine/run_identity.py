@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import activesteer
 from activesteer.controllers import find_controller, is_variant, read_variant
-from activesteer.coupling.fmu import is_fmu
 from activesteer.plugins.file import source_of
+from activesteer.plugins.formats import format_of
 from activesteer.scenario import Scenario, describe
 from activesteer.version import __version__
 
@@ -72,8 +72,8 @@ def files_digest(scenario: Scenario) -> str:
 def controller_digest(controller: str) -> str:
     """Return the hash of a controller: its name, its parameters, and the source of a user's own controller."""
     path, _, name = controller.partition(":")
-    if is_fmu(controller):
-        source: Any = {"fmu": find_controller(controller).origin.files}
+    if format_of(controller) is not None:
+        source: Any = {"fmu": find_controller(controller).files}
     else:
         source = read_variant(controller).files if is_variant(controller) else source_of(controller)
     return digest({"name": f"{Path(path).name}:{name}", "source": source})

@@ -9,12 +9,13 @@ import struct
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from activesteer import Simulation
-from activesteer.coupling.udp import COMMAND, STATE, UdpPort
+from activesteer.coupling.udp import COMMAND, STATE, UdpLink, UdpPort
 from activesteer.errors import ManeuverError, ParameterError
 
 SHORT = {"duration_s": 0.2, "settle_s": 0.1}
@@ -34,7 +35,14 @@ def command(sequence: int, flags: int = 3, wheel_rad: float = 0.1, rear_rad: flo
 
 
 def linked(reaction: str = "release", timeout_s: float = 60.0) -> Simulation:
-    return Simulation("straight_line", overrides=SHORT, udp=UdpPort(0, timeout_s=timeout_s, reaction=reaction))
+    return Simulation(
+        "straight_line", overrides=SHORT, link=UdpLink(UdpPort(0, timeout_s=timeout_s, reaction=reaction))
+    )
+
+
+def address_of(simulation: Simulation) -> tuple[str, int]:
+    link: Any = simulation._link
+    return link.address
 
 
 def test_a_paced_run_is_the_same_and_reports_its_clock() -> None:
@@ -52,9 +60,8 @@ def test_a_paced_run_is_the_same_and_reports_its_clock() -> None:
 
 def test_commands_act_and_the_state_comes_back(client: socket.socket) -> None:
     simulation = linked()
-    assert simulation.udp_address is not None
-    assert simulation.udp_address[0] == "127.0.0.1"
-    client.sendto(command(7), simulation.udp_address)
+    assert address_of(simulation)[0] == "127.0.0.1"
+    client.sendto(command(7), address_of(simulation))
     simulation.advance(100)
     states = [STATE.unpack(client.recv(STATE.size)) for _ in range(100)]
     assert [state[:4] for state in states[::99]] == [(b"ASS1", 7, 0, 1), (b"ASS1", 7, 0, 100)]
@@ -68,8 +75,7 @@ def test_commands_act_and_the_state_comes_back(client: socket.socket) -> None:
 
 def test_only_newer_sound_messages_of_one_sender_count(client: socket.socket) -> None:
     simulation = linked()
-    address = simulation.udp_address
-    assert address is not None
+    address = address_of(simulation)
     messages = [
         command(5), command(5, rear_rad=0.02), command(4, rear_rad=0.02), b"ASC1", command(6, rear_rad=math.nan),
         command(6, rear_rad=3.0), command(6, flags=64), command(9, flags=2, rear_rad=0.015), b"x" * COMMAND.size,
@@ -90,8 +96,7 @@ def test_only_newer_sound_messages_of_one_sender_count(client: socket.socket) ->
 @pytest.mark.parametrize(("reaction", "rear_rad"), [("release", 0.0), ("hold", 0.01)])
 def test_after_the_timeout_the_reaction_follows(client: socket.socket, reaction: str, rear_rad: float) -> None:
     simulation = linked(reaction, 0.001)
-    assert simulation.udp_address is not None
-    client.sendto(command(1), simulation.udp_address)
+    client.sendto(command(1), address_of(simulation))
     simulation.step()
     assert simulation.recording()["rear_steer_demand_rad"][0] == 0.01
     simulation._link._received_s = -math.inf  # type: ignore[union-attr]
@@ -103,8 +108,7 @@ def test_after_the_timeout_the_reaction_follows(client: socket.socket, reaction:
 
 def test_the_reaction_stop_ends_the_run_and_keeps_its_rows(client: socket.socket) -> None:
     simulation = linked("stop", 0.5)
-    assert simulation.udp_address is not None
-    client.sendto(command(1), simulation.udp_address)
+    client.sendto(command(1), address_of(simulation))
     simulation.step()
     simulation._link._received_s = -math.inf  # type: ignore[union-attr]
     with pytest.raises(ManeuverError, match=r"no command for 0\.5 s"):
@@ -117,7 +121,7 @@ def test_what_is_no_port_is_refused(text: str) -> None:
     with pytest.raises(ParameterError, match="port"):
         UdpPort.read(text, 0.1, "hold")
     with pytest.raises(ParameterError, match="65535"):
-        Simulation("straight_line", overrides=SHORT, udp=70000)
+        Simulation("straight_line", overrides=SHORT, link=UdpLink(70000))
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
