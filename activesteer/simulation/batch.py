@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -120,33 +120,46 @@ class Batch:
             raise ParameterError(
                 "a Scenario already includes vehicle, driver and overrides", key="vehicle, overrides, driver"
             )
-        self.scenarios = inputs or [
-            scenario for scenario in self._resolved(maneuver, vehicle, each_overrides(overrides, n), driver)
-        ]
-        self._build({})
+        self.scenarios = inputs or self._resolved(maneuver, vehicle, each_overrides(overrides, n), driver)
+        self._build()
 
     def _resolved(
         self, maneuver: Any, vehicle: Any, overrides: Sequence[Mapping[str, Any]], driver: Any
-    ) -> Iterator[Scenario]:
-        known: dict[str, Scenario] = {}
-        for car, changes in enumerate(overrides):
-            key = repr(sorted(changes.items()))
-            if key not in known:
-                with _named(car):
-                    known[key] = prepared(
-                        resolve(maneuver, vehicle, changes, driver, [self._controller]), self._timestep_s
-                    )
-            yield known[key]
+    ) -> list[Scenario]:
+        """Return the scenario of each car, the same one for the same overrides."""
 
-    def _build(self, starts: dict[int, LoopState]) -> None:
-        """Build the loops, from the settled states of the scenarios that are known already."""
-        self._starts, self.loops = starts, []
-        for car, scenario in enumerate(self.scenarios):
+        def of(car: int) -> Scenario:
+            scenario = resolve(maneuver, vehicle, overrides[car], driver, [self._controller])
+            return prepared(scenario, self._timestep_s)
+
+        keys = [repr(sorted(changes.items())) for changes in overrides]
+        known = self._of_different_cars(of, keys)
+        return [known[key] for key in keys]
+
+    def _of_different_cars(self, function: Callable[[int], Any], keys: Sequence[Any]) -> dict[Any, Any]:
+        """Call a function with the first car of each key, on all threads, and return its results by key."""
+
+        def call(car: int) -> Any:
             with _named(car):
-                loop = ClosedLoop(scenario, self._controller, self._timestep_s, settled=starts.get(id(scenario)))
-            if id(scenario) not in starts:
-                starts[id(scenario)] = loop.save_state()
-            self.loops.append(loop)
+                return function(car)
+
+        first = {key: car for car, key in reversed([*enumerate(keys)])}
+        with engine_warnings_held(), ThreadPoolExecutor(self.threads) as pool:
+            return dict(zip(first, pool.map(call, first.values()), strict=True))
+
+    def _build(self) -> None:
+        """Build the loops; of cars with the same scenario, only the first one settles."""
+
+        def settled(car: int) -> ClosedLoop:
+            return ClosedLoop(self.scenarios[car], self._controller, self._timestep_s)
+
+        first = self._of_different_cars(settled, [id(scenario) for scenario in self.scenarios])
+        self._starts = {key: loop.save_state() for key, loop in first.items()}
+        self.loops = []
+        for scenario in self.scenarios:
+            loop = first.pop(id(scenario), None)
+            start = self._starts[id(scenario)]
+            self.loops.append(loop or ClosedLoop(scenario, self._controller, self._timestep_s, settled=start))
         self.failures = {}
         self._in_use = OneAtATime()
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
@@ -349,7 +362,7 @@ class Batch:
             timestep_s,
             threads,
         )
-        other._build({})
+        other._build()
         for loop, model in zip(other.loops, models, strict=True):
             loop.vehicle.adopt_model(model)
         other.restore_state(states)

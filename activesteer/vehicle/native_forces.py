@@ -11,6 +11,7 @@ scalar product of its motion axis (`cdof`, about the centre of mass of the tree)
 from __future__ import annotations
 
 import math
+import threading
 from typing import Any, Final
 
 import mujoco
@@ -363,6 +364,7 @@ def _no_clock():
 
 
 _installed: list[Any] = []
+_installing: Final = threading.Lock()
 """The callbacks as the engine sees them; kept for the life of the process, since the engine holds bare pointers."""
 
 
@@ -372,6 +374,11 @@ def install_native_forces() -> None:
     Raises:
         ModelError: another part of the program has replaced them by its own callback.
     """
+    with _installing:
+        _install()
+
+
+def _install() -> None:
     slots = (
         ("mjcb_passive", mujoco.get_mjcb_passive(), mujoco.set_mjcb_passive),
         ("mjcb_act_dyn", mujoco.get_mjcb_act_dyn(), mujoco.set_mjcb_act_dyn),

@@ -15,7 +15,7 @@ from activesteer.driver import HumanDriver
 from activesteer.errors import SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
-from activesteer.signals import Measurement, Motion
+from activesteer.signals import DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.runner import run_scenario
 from activesteer.vehicle import Vehicle
@@ -54,21 +54,23 @@ def spoil(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Vehicle], None
     """Corrupt the state of the next run at one instant, after the manoeuvre has started."""
 
     def install(change: Callable[[Vehicle], None]) -> None:
-        step, rebase = Vehicle.step, Vehicle.rebase
-        under_way: list[bool] = []
+        step, rebase = HumanDriver.step, Vehicle.rebase
+        under_way: list[Vehicle] = []
 
         def started(vehicle: Vehicle) -> None:
             rebase(vehicle)
-            under_way.append(True)
+            under_way.append(vehicle)
 
-        def spoiled(vehicle: Vehicle, *inputs: Any) -> tuple[Measurement, Motion]:
-            if under_way and abs(vehicle.data.time - SPOILED_S) < 0.5 * vehicle.timestep_s:
-                change(vehicle)
-                under_way.clear()
-            return step(vehicle, *inputs)
+        def spoiled(driver: HumanDriver, *inputs: Any) -> DriverCommand:
+            for vehicle in under_way:
+                if abs(vehicle.data.time - SPOILED_S) < 0.5 * vehicle.timestep_s:
+                    change(vehicle)
+                    under_way.clear()
+                    break
+            return step(driver, *inputs)
 
         monkeypatch.setattr(Vehicle, "rebase", started)
-        monkeypatch.setattr(Vehicle, "step", spoiled)
+        monkeypatch.setattr(HumanDriver, "step", spoiled)
 
     return install
 
