@@ -18,6 +18,7 @@ from activesteer.controllers.vectorised import Vectorised
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import DRIVER
 from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, shown
+from activesteer.faults import Fault
 from activesteer.plugins import Kind
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
@@ -290,6 +291,41 @@ class Batch:
                 futures.append(self._pool.submit(drive_cars, records, first, last, STEP_ADDRESS))
         for future in futures:
             future.result()
+
+    def set(self, key: str, value: Any, cars: ArrayLike | None = None) -> None:
+        """Change a key of some cars from the next step on; see `Simulation.set`.
+
+        Args:
+            key: Dotted key, as in `overrides`.
+            value: New value in the unit of the key; or an array, with a value for each of all cars.
+            cars: Numbers of the cars, or a mask; by default all.
+
+        Raises:
+            ParameterError: there is no such key, it cannot change during a run, or an array has another length.
+            ManeuverError: a value of the manoeuvre is wrong or has no effect. A note names the car; those before it
+                are changed.
+        """
+        values = [changes[key] for changes in each_overrides({key: value}, len(self))]
+        with self._in_use:
+            for car in np.flatnonzero(self._mask(cars)).tolist():
+                with _named(car):
+                    self.loops[car].change(key, values[car])
+
+    def fail(self, fault: str | Fault, cars: ArrayLike | None = None) -> None:
+        """Set a fault in some cars, beside those that act already; see `Simulation.fail`.
+
+        Args:
+            fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.
+            cars: Numbers of the cars, or a mask; by default all.
+
+        Raises:
+            ParameterError: the text has another form.
+            ManeuverError: a car has no such part, the part has a fault at this time, or the time is past.
+        """
+        with self._in_use:
+            for car in np.flatnonzero(self._mask(cars)).tolist():
+                with _named(car):
+                    self.loops[car].add_fault(fault)
 
     def vectorised(self, controller: Any, interval_s: float | None = None) -> Vectorised:
         """Make a controller of all cars, to call with `driver_command` and `measurement`.

@@ -11,13 +11,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.config import Source
+from activesteer.config import Source, build
 from activesteer.controllers import find_controller
 from activesteer.controllers.law_interface import N_HELD
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import Driver
 from activesteer.errors import ManeuverError, ParameterError, shown
-from activesteer.faults import Fault, check_faults
+from activesteer.faults import Fault, check_faults, fault_table
 from activesteer.maneuver import Maneuver
 from activesteer.maneuver.phases import seen_of
 from activesteer.scenario import Scenario
@@ -272,6 +272,20 @@ class ClosedLoop(Uncopyable):
         if before is not None:
             self.faults.take_memory_of(before)
         self._store()
+
+    def add_fault(self, fault: str | Fault) -> str:
+        """Set a fault, beside those that act already, and return it in words; see `Simulation.fail`."""
+        now_s = self.step_count * self.vehicle.timestep_s
+        if isinstance(fault, str):
+            start_s = None if "@" in fault else now_s
+            fault = build(Fault, fault_table(fault, start_s), Source("", error=ManeuverError))
+        if not isinstance(fault, Fault):
+            raise ParameterError(f"is {shown(fault)}; a fault or its text is needed", key="fault", value=fault)
+        if fault.start_s < now_s - 1e-9:
+            raise ManeuverError(f"is {fault.start_s:g} s; the run is at {now_s:g} s", key="start_s")
+        self.fail([fault], more=True)
+        later = "" if fault.start_s <= now_s + 1e-9 and fault.end_s is None else f"@{fault.start_s:g}"
+        return f"{fault.name}{later}{'' if fault.end_s is None else f'-{fault.end_s:g}'}"
 
     def change(self, key: str, value: Any) -> None:
         """Change a key of the manoeuvre, its road, the controller or the driver, from the next step on.

@@ -15,12 +15,11 @@ from typing import Any, Final, NamedTuple, Protocol, Self
 import mujoco
 
 from activesteer.analysis.metrics import metrics
-from activesteer.config import Source, build
 from activesteer.controllers import CONTROLLER, find_controller
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
-from activesteer.faults import Fault, fault_table
+from activesteer.faults import Fault
 from activesteer.limits import MAX_EVENTS
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording
@@ -355,16 +354,7 @@ class Simulation:
         """
         with self.loop.in_use:
             self._check_going_on()
-            if isinstance(fault, str):
-                start_s = None if "@" in fault else self.time_s
-                fault = build(Fault, fault_table(fault, start_s), Source("", error=ManeuverError))
-            if not isinstance(fault, Fault):
-                raise ParameterError(f"is {shown(fault)}; a fault or its text is needed", key="fault", value=fault)
-            if fault.start_s < self.time_s - 1e-9:
-                raise ManeuverError(f"is {fault.start_s:g} s; the run is at {self.time_s:g} s", key="start_s")
-            self.loop.fail([fault], more=True)
-            later = "" if fault.start_s <= self.time_s + 1e-9 and fault.end_s is None else f"@{fault.start_s:g}"
-            self._note("fail", f"{fault.name}{later}{'' if fault.end_s is None else f'-{fault.end_s:g}'}")
+            self._note("fail", self.loop.add_fault(fault))
 
     def _note(self, kind: str, what: str, time_s: float | None = None) -> None:
         if len(self.events) >= MAX_EVENTS:

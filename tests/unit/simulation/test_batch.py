@@ -221,3 +221,23 @@ def test_a_state_of_another_road_is_refused() -> None:
     with raises(ParameterError, key="state"):
         wet.restore_state(dry.save_state())
     wet.restore_state(wet.save_state())
+
+
+def test_friction_and_faults_change_on_the_way_in_some_cars() -> None:
+    batch = Batch("step_steer", 3, "ars")
+    alone = [Simulation("step_steer", "ars") for _ in range(3)]
+    for each in (batch, *alone):
+        each.advance(700)
+    batch.set("road.mu", np.array([0.5, 0.6, 0.7]), cars=[0, 2])
+    batch.fail("rear:stuck", cars=[1])
+    alone[0].set("road.mu", 0.5)
+    alone[2].set("road.mu", 0.7)
+    alone[1].fail("rear:stuck")
+    for each in (batch, *alone):
+        each.advance(400)
+    assert [row(batch, car) for car in range(3)] == [numbers(each) for each in alone]
+    batch.reset()
+    batch.advance(1100)
+    assert row(batch, 0) == row(batch, 1) == row(batch, 2)
+    with raises(ParameterError, key="road.mew"):
+        batch.set("road.mew", 0.5)
