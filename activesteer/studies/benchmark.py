@@ -70,6 +70,7 @@ def bench(rounds: int = ROUNDS) -> dict[str, float]:
             "path_following_step_us": lambda: _closed_loop(along_path),
             "with_file_step_us": lambda: _with_file(scenario, Path(folder) / "bench.mcap"),
             "sedan_step_us": lambda: _closed_loop(sedan),
+            "own_controller_us": lambda: _closed_loop(scenario, _Nothing),
             "estimator_lqr_us": lambda: _closed_loop(sensed, "lqr"),
             "production_step_us": lambda: _closed_loop(sensed),
             "sensors_and_brakes_us": DrivenStop().step_us,
@@ -84,6 +85,7 @@ def bench(rounds: int = ROUNDS) -> dict[str, float]:
     if "given_us" in best:
         best["integrated_us"] -= best.pop("given_us")
     best["estimator_lqr_us"] -= best["production_step_us"]
+    best["own_controller_us"] -= best["closed_loop_step_us"]
     step_us = 1e6 * driven.vehicle.timestep_s
     for stage in ("closed_loop", "path_following", "with_file"):
         engine = "path_engine" if stage == "path_following" else "engine"
@@ -161,6 +163,13 @@ def _asked(scenario: Scenario, controller: str) -> list[ActuatorCommand]:
     return asked
 
 
+class _Nothing:
+    """Controller of a user who does nothing."""
+
+    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
+        return ActuatorCommand()
+
+
 class _Given:
     """Controller that replays commands."""
 
@@ -172,7 +181,7 @@ class _Given:
 
 
 def _closed_loop(
-    scenario: Scenario, controller: str = _CONTROLLER, given: _Given | None = None, threads: int = 0
+    scenario: Scenario, controller: Any = _CONTROLLER, given: _Given | None = None, threads: int = 0
 ) -> float:
     """Return the time per step of a run, or of several together, each in a thread of its own [us]."""
     loops = [ClosedLoop(scenario, controller) for _ in range(max(threads, 1))]

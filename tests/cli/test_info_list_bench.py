@@ -128,7 +128,7 @@ def test_info_of_something_else_is_an_error(call, tmp_path, data, told):
     assert str(path) in answer.err
 
 
-DIFFERENCES = {"estimator_lqr_us", "integrated_us"}
+DIFFERENCES = {"estimator_lqr_us", "integrated_us", "own_controller_us"}
 
 
 def test_bench_has_the_promised_keys_and_ratios(call, monkeypatch):
