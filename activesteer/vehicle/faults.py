@@ -16,13 +16,18 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
 from activesteer.faults import ACTUATORS, ANGLE_SENSOR, MOTOR, SENSORS, Fault
+from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_faults as native
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.motor_records import FULL_TORQUE_NM, HEALTHY
 from activesteer.vehicle.named_parts import find
 
 _NEVER: Final = 2**62
-_STOPS: Final = {"left": "high", "right": "low"}
+_SAVE: Final = -1
+_ACTUATOR_KINDS: Final = {
+    "stuck": native.STICKS, "runaway": native.RUNS_LEFT, "float": native.FLOATS, "offset": native.WORKS,
+    "reversed": native.REVERSES, "dropout": native.DROPS_OUT, "delayed": native.DROPS_OUT,
+}  # fmt: skip
 _SENSOR_KINDS: Final = {
     "stuck": native.STUCK, "delayed": native.DELAYED, "offset": native.OFFSET, "runaway": native.RUNAWAY,
     "reversed": native.REVERSED, "dropout": native.DROPOUT,
@@ -166,60 +171,72 @@ class _DemandFault(_Acting):
         record["place"], record["offset"] = self._demand.ctypes.data, self._record["offset"].ctypes.data
 
 
+def part_of(vehicle: Vehicle, part: str, name: str) -> NDArray[Any]:
+    """Return one of the actuators of a part as compiled code takes it, a `native_faults.PART` of shape (1,).
+
+    Args:
+        vehicle: The car.
+        part: A part of `ACTUATORS`.
+        name: One of its members.
+    """
+    model, about, record = vehicle.model, ACTUATORS[part], np.zeros(1, native.PART)
+    index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+    block = fb.header_of(model).ctypes.data
+    screw = vehicle.actuators.screw(index)
+
+    def place(view: NDArray[Any]) -> int:
+        return (view.ctypes.data - block) // 8
+
+    record["actuator"], record["record"] = index, place(vehicle.actuators.of(index))
+    record["has_torque"] = about.has_torque
+    record["act"] = model.actuator_actadr[index]
+    record["qpos"] = model.jnt_qposadr[model.actuator_trnid[index, 0]]
+    record["ratio"] = vehicle.parameters.steering.ratio if about.by_ratio else 1.0
+    if screw:
+        record["seized"] = place(screw[-1]["seized"])
+    if len(screw) == 2:
+        record["backlash"], record["free_m"] = place(screw[0]["backlash_m"]), 4.0 * screw[1]["stop_m"][0]
+    return record
+
+
 class _ActuatorFault(_DemandFault):
     """A fault of one of the engine's actuators."""
 
     def __init__(self, fault: Fault, name: str, vehicle: Vehicle) -> None:
         super().__init__(fault, vehicle.timestep_s)
-        model = self._model = vehicle.model
-        self._index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-        self._record = vehicle.actuators.of(self._index)
-        parts = self._record, model.actuator_gainprm[self._index], model.actuator_biasprm[self._index]
-        self._healthy = tuple(part.copy() for part in parts)
-        self._screw = vehicle.actuators.screw(self._index)
-        self._healthy_screw = tuple(part.copy() for part in self._screw)
-        self._data = vehicle.data
-        self._demand = vehicle.data.ctrl[self._index : self._index + 1]
-        ratio = vehicle.parameters.steering.ratio if ACTUATORS[fault.part].by_ratio else 1.0
-        self._offset = fault.size * ratio
+        self._model, self._data = vehicle.model, vehicle.data
+        self._part = part_of(vehicle, fault.part, name)
+        index = self._part["actuator"][0]
+        self._record = vehicle.actuators.of(index)
+        self._demand = vehicle.data.ctrl[index : index + 1]
+        self._healthy = np.zeros(native.N_HEALTH)
+        self._kind = native.RUNS_RIGHT if fault.side == "right" else _ACTUATOR_KINDS[fault.kind]
+        self._set(_SAVE)
+
+    def _set(self, kind: int, offset: float = 0.0, held: float = 0.0) -> None:
+        model = self._model
+        native.fault_of(
+            self._part.ctypes.data, fb.header_of(model).ctypes.data, model.actuator_gainprm.ctypes.data,
+            model.actuator_biasprm.ctypes.data, self._healthy.ctypes.data, kind, offset, held,
+        )  # fmt: skip
 
     def engage(self) -> None:
         """Activate the fault."""
-        record, kind = self._record, self.fault.kind
-        if self._screw and kind == "stuck":
-            self._screw[-1]["seized"] = 1.0
-        elif len(self._screw) == 2 and kind == "float":
-            # The nut is off its thread and moves freely between the end stops.
-            self._screw[0]["backlash_m"] = 4.0 * self._screw[1]["stop_m"]
-        elif kind == "stuck" and ACTUATORS[self.fault.part].has_torque:
+        held = 0.0
+        if self._kind == native.STICKS:
             if not self.memory[0]:
                 native.keep(self.memory, self._capacity, float(self._demand[0]))
-            record["scale"], record["offset"] = 0.0, native.oldest(self.memory, self._capacity)
-        elif kind == "stuck":
-            # Without a rate the servo holds its present angle, with its stiffness and its strength.
-            record["rate_limit"] = 0.0
-        elif kind == "float":
-            self._model.actuator_gainprm[self._index] = self._model.actuator_biasprm[self._index] = 0.0
-        elif kind == "reversed":
-            record["scale"] = -1.0
-        elif kind == "offset":
-            record["offset"] = self._offset
-        else:
-            stop = record[_STOPS[self.fault.side or "left"]]
-            record["scale"], record["offset"] = 0.0, stop if kind == "runaway" else 0.0
+            held = native.oldest(self.memory, self._capacity)
+        self._set(self._kind, self.fault.size if self.fault.kind == "offset" else 0.0, held)
 
     def release(self) -> None:
         """Restore the actuator as built."""
-        index = self._index
-        self._record[:], self._model.actuator_gainprm[index], self._model.actuator_biasprm[index] = self._healthy
-        for part, healthy in zip(self._screw, self._healthy_screw, strict=True):
-            part[:] = healthy
+        self._set(native.WORKS)
 
     def recover(self) -> None:
         """Start a servo that was free at its present angle; it returns to its demand with its own lag and rate."""
-        if self.fault.kind == "float" and not self._screw:
-            angle = self._data.qpos[self._model.jnt_qposadr[self._model.actuator_trnid[self._index, 0]]]
-            self._data.act[self._model.actuator_actadr[self._index]] = angle
+        if self._kind == native.FLOATS and not self._part["seized"][0]:
+            self._data.act[self._part["act"][0]] = self._data.qpos[self._part["qpos"][0]]
 
 
 class _MotorFault(_DemandFault):

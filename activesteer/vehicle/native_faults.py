@@ -1,15 +1,17 @@
-"""Faults that act in every step, in compiled code: demands that come late, and wrong readings of sensors."""
+"""Faults in compiled code: of actuators, demands that come late, and wrong readings of sensors."""
 
 from __future__ import annotations
 
 from typing import Final
 
+import mujoco
 import numpy as np
-from numba import carray, from_dtype
+from numba import carray, from_dtype, types
 
-from activesteer.compilation import inlined
+from activesteer.compilation import compiled_call, inlined
 from activesteer.native_memory import f64_pointer, pointer_to
 from activesteer.native_records import numbers_type
+from activesteer.vehicle import force_block as fb
 
 IDLE, LISTENS, ACTS = range(3)
 """States of a fault: nothing to do; it keeps what it will need; it acts."""
@@ -84,3 +86,107 @@ def misread(address, count, outputs):
             elif fault.kind == REVERSED:
                 reading = -good
             outputs[fault.place] = reading
+
+
+WORKS, STICKS, RUNS_LEFT, RUNS_RIGHT, FLOATS, REVERSES, DROPS_OUT = range(7)
+"""Kinds of an actuator's fault, as an exported car takes them; one that works can have an offset."""
+PART: Final = numbers_type(
+    "ratio", "free_m", words=("variable", "actuator", "record", "has_torque", "act", "qpos", "seized", "backlash")
+)
+"""An actuator that can fail: place of its input in an exported car, places in the engine of the actuator, of its
+activation and of its joint, and places in the force block of its record, of the flag of a seized screw and of its play;
+0 without a screw. `ratio`: its angle over that of the road wheel; `free_m`: play of a nut off its thread."""
+N_HEALTH: Final = 5 + mujoco.mjNGAIN + mujoco.mjNBIAS
+"""Numbers of an actuator that faults change."""
+_SCALE, _OFFSET, _RATE, _LOW, _HIGH = (
+    fb.ACTUATOR.fields[name][1] // 8  # type: ignore[index]
+    for name in ("scale", "offset", "rate_limit", "low", "high")
+)
+_part_pointer: Final = pointer_to(from_dtype(PART))
+_N_GAIN, _N_BIAS = mujoco.mjNGAIN, mujoco.mjNBIAS
+
+
+@inlined
+def exchange_health(part, block, gain, bias, healthy, save):
+    """Save the numbers of a part that faults change, or restore them."""
+    places = (part.record + _SCALE, part.record + _OFFSET, part.record + _RATE, part.seized, part.backlash)
+    for index in range(len(places)):
+        if save:
+            healthy[index] = block[places[index]]
+        else:
+            block[places[index]] = healthy[index]
+    for number in range(_N_GAIN):
+        place = part.actuator * _N_GAIN + number
+        if save:
+            healthy[5 + number] = gain[place]
+        else:
+            gain[place] = healthy[5 + number]
+    for number in range(_N_BIAS):
+        place = part.actuator * _N_BIAS + number
+        if save:
+            healthy[5 + _N_GAIN + number] = bias[place]
+        else:
+            bias[place] = healthy[5 + _N_GAIN + number]
+
+
+@inlined
+def fail_part(part, block, gain, bias, healthy, kind, offset, held):
+    """Write a fault of an actuator into the model, in place of what was there.
+
+    Args:
+        part: A `PART`.
+        block: The force block.
+        gain: Gains of all actuators.
+        bias: Their biases.
+        healthy: Its healthy numbers; see `exchange_health`.
+        kind: Kind of the fault.
+        offset: Offset of the demand of a part that works, at the road wheel [rad] or as a torque [N m].
+        held: Torque at which a brake sticks [N m].
+    """
+    exchange_health(part, block, gain, bias, healthy, False)
+    record = part.record
+    if kind == WORKS:
+        if offset != 0.0:
+            block[record + _OFFSET] = offset * part.ratio
+    elif kind == STICKS:
+        if part.seized != 0:
+            block[part.seized] = 1.0
+        elif part.has_torque != 0:
+            block[record + _SCALE], block[record + _OFFSET] = 0.0, held
+        else:
+            # Without a rate the servo holds its present angle, with its stiffness and its strength.
+            block[record + _RATE] = 0.0
+    elif kind == FLOATS and part.backlash != 0:
+        # The nut is off its thread and moves freely between the end stops.
+        block[part.backlash] = part.free_m
+    elif kind == FLOATS:
+        for number in range(_N_GAIN):
+            gain[part.actuator * _N_GAIN + number] = 0.0
+        for number in range(_N_BIAS):
+            bias[part.actuator * _N_BIAS + number] = 0.0
+    elif kind == REVERSES:
+        block[record + _SCALE] = -1.0
+    else:
+        stop = block[record + (_HIGH if kind == RUNS_LEFT else _LOW)]
+        block[record + _SCALE], block[record + _OFFSET] = 0.0, 0.0 if kind == DROPS_OUT else stop
+
+
+@inlined
+def set_fault(part, block, gain, bias, healthy, kind, offset, held):
+    """Carry out `fail_part` by addresses; a negative kind saves the healthy numbers instead."""
+    own = carray(_part_pointer(part), (1,))[0]
+    numbers = f64_pointer(block), f64_pointer(gain), f64_pointer(bias), f64_pointer(healthy)
+    if kind < 0:
+        exchange_health(own, numbers[0], numbers[1], numbers[2], numbers[3], True)
+    else:
+        fail_part(own, numbers[0], numbers[1], numbers[2], numbers[3], kind, offset, held)
+
+
+SET_FAULT: Final = (*(types.intp,) * 6, types.float64, types.float64)
+"""Arguments of `set_fault`."""
+
+
+@compiled_call(types.void, *SET_FAULT)
+def fault_of(part, block, gain, bias, healthy, kind, offset, held):
+    """Call `set_fault` from Python."""
+    set_fault(part, block, gain, bias, healthy, kind, offset, held)

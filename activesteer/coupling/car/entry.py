@@ -1,14 +1,24 @@
-"""The step of the car as a C function: commands and results as consecutive numbers."""
+"""C functions of an exported car: its step, the channels that are computed from a row, and the faults of actuators.
+
+They contain the kernels of a simulation; the C code around them holds no law of its own.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
-from numba import types
+from numba import carray, from_dtype, types
 
 from activesteer.compilation import compiled_callback
+from activesteer.coupling.car.variables import PLACE_GROUPS, PLACES
+from activesteer.native_memory import f64_pointer, pointer_to, word_pointer
 from activesteer.native_messages import load_numbers, store_numbers
 from activesteer.signals import ActuatorCommand, DriverCommand, numbers_of, widths_of
+from activesteer.vehicle.channels.car_motion import angle_sides, in_the_road_plane, sideslip_share
+from activesteer.vehicle.channels.native_channels import axial_force, is_limited, record_of
+from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, RawRows
+from activesteer.vehicle.native_faults import SET_FAULT, set_fault
 from activesteer.vehicle.native_step import carry_out
 
 _BYTES: Final = 8
@@ -39,3 +49,74 @@ def car_step(bindings, commands, torques_set, out):
     actuator = load_numbers(commands + _DRIVER_BYTES, _ACTUATOR)
     sane, measurement, motion = carry_out(bindings, driver, actuator, torques_set != 0)
     store_numbers(out, (1.0 if sane else 0.0, measurement, motion))
+
+
+_ORIENTATION, _VELOCITY, _ACCELERATION, _RATES, _AXES, _HEIGHTS, _REAR, _SUPERPOSITION = (
+    PLACES.index(names[0]) for names in PLACE_GROUPS
+)
+_SENSORS, _LENGTH, _SPEED, _CTRL, _ACT, _FORCE = (
+    RawRows._fields.index(name)
+    for name in ("sensordata", "ten_length", "ten_velocity", "ctrl", "act", "actuator_force")
+)
+_force_pointer: Final = pointer_to(from_dtype(record_of(AxialForce)))
+_limit_pointer: Final = pointer_to(from_dtype(record_of(Actuator)))
+
+
+@compiled_callback(types.void, *(types.intp,) * 10)
+def derive(rows, places, design, gravity, forces, n_forces, limits, n_limits, numbers, motion):
+    """Compute the channels of the last row that are not copies.
+
+    Args:
+        rows: Address of the addresses of the arrays of `RawRows`.
+        places: Address of the places of sensors (`variables.PLACES`), machine words.
+        design: Address of the heights of the four wheels in the design position [m], and of the steering ratio.
+        gravity: Address of the gravitational acceleration in the world [m/s2].
+        forces: Address of the laws of axial forces (`AxialForce`).
+        n_forces: Their number.
+        limits: Address of the limits of actuators (`Actuator`).
+        n_limits: Their number.
+        numbers: Address of the forces [N] and of the flags of the limits, to write.
+        motion: Address of the numbers of `variables.MOTION`, to write.
+    """
+    row = word_pointer(rows)
+    out = f64_pointer(numbers)
+    length, speed = f64_pointer(row[_LENGTH]), f64_pointer(row[_SPEED])
+    for index in range(n_forces):
+        law = carray(_force_pointer(forces), (n_forces,))[index]
+        out[index] = axial_force(
+            length[law.tendon], speed[law.tendon], law.low_m, law.high_m,
+            law.stiffness_Npm, law.second_Npm2, law.third_Npm3, law.damping_Nspm,
+        )  # fmt: skip
+    commands, activations, torques = f64_pointer(row[_CTRL]), f64_pointer(row[_ACT]), f64_pointer(row[_FORCE])
+    for index in range(n_limits):
+        limit = carray(_limit_pointer(limits), (n_limits,))[index]
+        out[n_forces + index] = is_limited(
+            limit, commands[limit.control], activations[limit.activation], torques[limit.control]
+        )
+    s, at, m = f64_pointer(row[_SENSORS]), word_pointer(places), f64_pointer(motion)
+    turned, moves, feels, turns = at[_ORIENTATION], at[_VELOCITY], at[_ACCELERATION], at[_RATES]
+    yaw_up, yaw_on, roll_up, roll_on, sine = angle_sides(s[turned], s[turned + 1], s[turned + 2], s[turned + 3])
+    yaw, roll, pitch = math.atan2(yaw_up, yaw_on), math.atan2(roll_up, roll_on), math.asin(sine)
+    vx, vy, ax, ay, az, yaw_rate = in_the_road_plane(
+        s[moves], s[moves + 1], s[feels], s[feels + 1], s[feels + 2], s[turns + 1], s[turns + 2],
+        math.sin(yaw), math.sin(roll), math.sin(pitch), math.cos(yaw), math.cos(roll), math.cos(pitch),
+        f64_pointer(gravity),
+    )  # fmt: skip
+    along = math.hypot(s[moves], s[moves + 1])
+    m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8], m[9] = yaw, roll, pitch, vx, vy, along, yaw_rate, ax, ay, az
+    m[10] = sideslip_share(along, vx) * math.atan2(vy, vx)
+    heights = f64_pointer(design)
+    for wheel in range(4):
+        axis = at[_AXES + wheel]
+        m[11 + wheel] = math.atan2(-s[axis], s[axis + 1])
+        m[15 + wheel] = math.asin(s[axis + 2])
+        m[19 + wheel] = s[at[_HEIGHTS + wheel]] - heights[wheel]
+    m[23] = 0.5 * (m[11] + m[12])
+    m[24] = 0.5 * (s[at[_REAR]] + s[at[_REAR + 1]])
+    m[25] = s[at[_SUPERPOSITION]] / heights[4]
+
+
+@compiled_callback(types.void, *SET_FAULT)
+def fault(part, block, gain, bias, healthy, kind, offset, held):
+    """Write a fault of an actuator into the model; see `native_faults.set_fault`."""
+    set_fault(part, block, gain, bias, healthy, kind, offset, held)

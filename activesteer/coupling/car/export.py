@@ -18,7 +18,6 @@ import mujoco
 import numpy as np
 
 from activesteer.brakes.records import BRAKE_SETUP
-from activesteer.conventions import CORNERS
 from activesteer.coupling.car.description import model_description
 from activesteer.coupling.car.objects import car_code
 from activesteer.coupling.car.relocation import Memory, native_memory
@@ -27,6 +26,7 @@ from activesteer.coupling.car.variables import (
     MOTION,
     OUTPUT,
     PARAMETER,
+    PLACES,
     SEEDS,
     Laws,
     Variable,
@@ -45,11 +45,11 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import prepared
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.channels.car_motion import FULL_SIDESLIP_MPS, ROCKS_BACK_MPS, STANDSTILL_MPS
 from activesteer.vehicle.channels.corners import design_heights_m
-from activesteer.vehicle.channels.raw_rows import RawRows
 from activesteer.vehicle.command_row import BRAKES, CARRIED_OUT, COMMANDS
+from activesteer.vehicle.faults import part_of
 from activesteer.vehicle.named_parts import sensor_columns
+from activesteer.vehicle.native_faults import N_HEALTH
 from activesteer.version import __version__
 
 _SOURCES: Final = Path(__file__).parent / "c"
@@ -58,10 +58,6 @@ _SETTLING_S: Final = 3.0
 """Time in which a car with changed parameters settles [s]."""
 _KEPT: Final = ("electric_state", "sensor_memory")
 """Parts of the memory that change in a step, beside the arrays of a recorded row."""
-_READ: Final = ("sensordata", "ten_length", "ten_velocity", "ctrl", "act", "actuator_force")
-"""Arrays that car.c reads by name."""
-_RECORD: Final = {"SCALE": "scale", "OFFSET": "offset", "RATE": "rate_limit", "LOW": "low", "HIGH": "high"}
-"""Fields of an actuator's record that faults change or read."""
 _OPTIONS: Final = (
     "-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-march=x86-64-v3", "-Wall",
     "-Wno-unused-parameter",
@@ -209,26 +205,12 @@ def _state(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable]) -> n
 
 def _parts(loop: ClosedLoop, names: Sequence[str]) -> list[tuple[int | float, ...]]:
     """Return the actuators that can fail as car.c takes them."""
-    vehicle, model = loop.vehicle, loop.vehicle.model
-    first = model.numeric_data.ctypes.data + 8 * int(model.numeric_data[-fb.TRAILER_SIZE])
     rows: list[tuple[int | float, ...]] = []
-
-    def place(record: Any, field: str) -> int:
-        return (record[field].ctypes.data - first) // 8
-
     for part in faulty_parts(loop):
-        about = ACTUATORS[part]
-        for name in about.members:
-            index = model.actuator(name).id
-            joint, screw = model.actuator_trnid[index, 0], vehicle.actuators.screw(index)
-            linked = len(screw) == 2
-            rows.append((
-                names.index(f"{part}_fault"), index, place(vehicle.actuators.of(index), "kind"), int(about.has_torque),
-                int(model.actuator_actadr[index]), int(model.jnt_qposadr[joint]),
-                place(screw[-1], "seized") if screw else 0, place(screw[0], "backlash_m") if linked else 0,
-                float(vehicle.parameters.steering.ratio) if about.by_ratio else 1.0,
-                4.0 * float(screw[1]["stop_m"][0]) if linked else 0.0,
-            ))  # fmt: skip
+        for name in ACTUATORS[part].members:
+            record = part_of(loop.vehicle, part, name)
+            record["variable"] = names.index(f"{part}_fault")
+            rows.append(record[0].item())
     return rows
 
 
@@ -244,6 +226,11 @@ def _seeds(loop: ClosedLoop) -> bytes:
             normal = np.random.default_rng(stream).standard_normal()
             table[seed, index] = normal, stream.generate_state(1, np.uint64)[0]
     return table.tobytes()
+
+
+def _sensor_places(model: mujoco.MjModel) -> list[int]:
+    """Return the places of the sensors of `PLACES` in the engine's sensor data."""
+    return [sensor_columns(model, name).start + (2 if name.endswith("_position") else 0) for name in PLACES]
 
 
 def _numbers(values: Any) -> str:
@@ -271,7 +258,6 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
     def offset(record: Any, field: str) -> int:
         return record.fields[field][1]
 
-    rows = {name: index for index, name in enumerate(RawRows._fields)}
     parts_that_fail = _parts(loop, names)
     constants: dict[str, Any] = {
         "TIMESTEP_S": vehicle.timestep_s, "STEERING_RATIO": vehicle.parameters.steering.ratio,
@@ -279,13 +265,6 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         "N_VARIABLES": len(variables), "N_RESULT": len(result) - 1, "N_FORCES": len(laws.forces),
         "N_LIMITS": len(laws.limits), "N_MOTION": len(MOTION), "N_TARGETS": len(memory.targets),
         "N_RELOCATIONS": len(memory.relocations), "N_COMMANDS": len(COMMANDS), "N_COMMAND_INPUTS": len(CARRIED_OUT),
-        **{f"ROW_{name}": rows[name] for name in _READ},
-        "AT_ORIENTATION": sensor_columns(model, "chassis_orientation").start,
-        "AT_VELOCITY": sensor_columns(model, "cg_velocity").start,
-        "AT_ACCELERATION": sensor_columns(model, "cg_accelerometer").start,
-        "AT_RATES": sensor_columns(model, "cg_gyro").start,
-        "AT_SUPERPOSITION": sensor_columns(model, "superposition_angle").start, "STANDSTILL_MPS": STANDSTILL_MPS,
-        "ROCKS_BACK_MPS": ROCKS_BACK_MPS, "FULL_SIDESLIP_MPS": FULL_SIDESLIP_MPS,
         "MOTION_SPEED": n_measurement + Motion._fields.index("speed_mps"), "RESULT_X": n_measurement,
         "IN_GEAR": place["gear"], "IN_DRIVE": place["drive_torque_demand_Nm"], "IN_ROAD_MU": place["road_mu"],
         "IN_TORQUES_SET": place["wheel_torques_set"], "IN_DRIVES": place["fl_drive_torque_Nm"],
@@ -300,8 +279,7 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         "PLACE_BINDINGS": memory.places["bindings"], "PLACE_SENSORS": memory.places.get("sensors", 0),
         "N_SENSORS": 0 if sensors is None else len(sensors.chains), "SENSOR_BYTES": CHAIN.itemsize,
         "SENSOR_BIAS": offset(CHAIN, "bias"), "SENSOR_KEY": offset(CHAIN, "key"),
-        "N_PARTS": len(parts_that_fail),
-        **{f"RECORD_{word}": offset(fb.ACTUATOR, field) // 8 for word, field in _RECORD.items()},
+        "N_PARTS": len(parts_that_fail), "N_HEALTH": N_HEALTH,
         **{f"TYRE_{name}": offset(TYRE_RECORD, name) // 8 for name in ("LMUX", "LMUY", "LKY", "LKX")},
         "CHASSIS": chassis, "CG_SITE": model.site("cg").id, "SETTLING_STEPS": round(_SETTLING_S / vehicle.timestep_s),
     }  # fmt: skip
@@ -318,10 +296,8 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         "TYRES": ("int", [tyres + wheel * (TYRE_RECORD.itemsize // 8) for wheel in range(4)]),
         "TORQUE_PER_PRESSURE": ("double", setup["torque_per_pressure_NmpPa"]),
         "RADIUS_M": ("double", setup["rolling_radius_m"]),
-        "AT_AXES": ("int", [sensor_columns(model, f"{corner}_wheel_axis").start for corner in CORNERS]),
-        "AT_HEIGHTS": ("int", [sensor_columns(model, f"{corner}_wheel_position").stop - 1 for corner in CORNERS]),
-        "AT_REAR": ("int", [sensor_columns(model, f"{corner}_steer_angle").start for corner in CORNERS[2:]]),
-        "DESIGN_HEIGHTS_M": ("double", design_heights_m(model)),
+        "SENSOR_PLACES": ("int64_t", _sensor_places(model)),
+        "DESIGN": ("double", [*design_heights_m(model), vehicle.parameters.steering.ratio]),
         "BIAS_RMS": ("double", [0.0] if sensors is None else sensors.bias_rms),
     }  # fmt: skip
     lines = [f"#define {name} {value if isinstance(value, int) else _real(value)}" for name, value in constants.items()]

@@ -27,17 +27,20 @@ class Code(NamedTuple):
 
 
 def car_code() -> dict[str, Code]:
-    """Return the code of the step (`step`) and of the callbacks (`passive`, `act_dyn`, `sensor`).
+    """Return the code of `step`, `derive` and `fault` (`entry`), and of the callbacks `passive`, `act_dyn`, `sensor`.
 
     Raises:
         ModelError: this version of numba keeps its modules elsewhere.
     """
-    from activesteer.coupling.car.entry import car_step  # noqa: PLC0415 - compiles for half a minute at first use
+    # Compiles for half a minute at first use.
+    from activesteer.coupling.car.entry import car_step, derive, fault  # noqa: PLC0415
     from activesteer.vehicle.engine_layout import engine_layout  # noqa: PLC0415
     from activesteer.vehicle.native_forces import _make_callbacks  # noqa: PLC0415
 
     passive, act_dyn, sensor = _make_callbacks(engine_layout())
-    functions = {"step": car_step, "passive": passive, "act_dyn": act_dyn, "sensor": sensor}
+    functions = {
+        "step": car_step, "derive": derive, "fault": fault, "passive": passive, "act_dyn": act_dyn, "sensor": sensor,
+    }  # fmt: skip
     return {name: _code(name, function) for name, function in functions.items()}
 
 

@@ -28,6 +28,15 @@ MOTION: Final = (
 )  # fmt: skip
 """Channels that car.c computes, in its order; those with a sine may differ from a recording in the last digit."""
 
+PLACE_GROUPS: Final = (
+    ("chassis_orientation",), ("cg_velocity",), ("cg_accelerometer",), ("cg_gyro",),
+    tuple(f"{corner}_wheel_axis" for corner in CORNERS), tuple(f"{corner}_wheel_position" for corner in CORNERS),
+    ("rl_steer_angle", "rr_steer_angle"), ("superposition_angle",),
+)  # fmt: skip
+"""Sensors of the engine that these channels are computed from."""
+PLACES: Final = [name for names in PLACE_GROUPS for name in names]
+"""Their names, in the order in which car.c keeps their places; of a position, that of its height."""
+
 
 class Variable(NamedTuple):
     """A variable of an exported car.

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numba import types
 
-from activesteer.compilation import compiled_call
+from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import Array
 from activesteer.signals import Channel
 from activesteer.vehicle.channels.raw_rows import Column, sensor
@@ -80,35 +80,67 @@ def motion_inputs(model: mujoco.MjModel) -> tuple[Column, ...]:
 _ARRAY: Final = types.Array(types.float64, 2, "A")
 
 
+@inlined
+def angle_sides(w, x, y, z):
+    """Return opposite and adjacent side of yaw and of roll, and the sine of pitch (ISO 8855: yaw, pitch, roll)."""
+    sine = 2.0 * (w * y - x * z)
+    return (
+        2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+        -1.0 if sine < -1.0 else 1.0 if sine > 1.0 else sine,
+    )  # fmt: skip
+
+
+@inlined
+def in_the_road_plane(vx, vy, ax, ay, az, about_y, about_z, sin, sr, sp, cos, cr, cp, gravity_mps2):
+    """Return velocity (two), acceleration (three) and yaw rate from sines and cosines of yaw, roll and pitch."""
+    # An accelerometer measures the specific force. After rotation into the road plane, add gravity, which has a
+    # component in this plane on a grade or a bank.
+    along = cp * ax + sp * (sr * ay + cr * az) + gravity_mps2[0] * cos
+    across = cr * ay - sr * az - gravity_mps2[0] * sin
+    if gravity_mps2[1] != 0.0:  # a bank
+        along += gravity_mps2[1] * sin
+        across += gravity_mps2[1] * cos
+    return (
+        vx * cos + vy * sin, vy * cos - vx * sin, along, across, -sp * ax + cp * (sr * ay + cr * az) + gravity_mps2[2],
+        # Rate of the Euler angle about the road's normal, not about the body's z axis.
+        (sr * about_y + cr * about_z) / cp,
+    )  # fmt: skip
+
+
+@inlined
+def sideslip_share(speed, along):
+    """Return the fraction of the sideslip angle that is recorded at a speed and a velocity along the car [m/s]."""
+    if along < 0.0:
+        return 1.0 if speed > ROCKS_BACK_MPS else 0.0
+    return min(max((speed - STANDSTILL_MPS) / (FULL_SIDESLIP_MPS - STANDSTILL_MPS), 0.0), 1.0)
+
+
 @compiled_call(types.void, _ARRAY, _ARRAY)
-def _angle_sides(columns, out):
-    """Compute both sides of the tangent of yaw and roll, and the sine of pitch (ISO 8855: yaw, pitch, roll)."""
+def _all_angle_sides(columns, out):
+    """Write opposite sides, adjacent sides and sine of all rows."""
     for row in range(len(columns)):
-        w, x, y, z = columns[row, 0], columns[row, 1], columns[row, 2], columns[row, 3]
-        out[row, 0], out[row, 2] = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
-        out[row, 1], out[row, 3] = 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-        sine = 2.0 * (w * y - x * z)
-        out[row, 4] = -1.0 if sine < -1.0 else 1.0 if sine > 1.0 else sine
+        out[row, 0], out[row, 2], out[row, 1], out[row, 3], out[row, 4] = angle_sides(
+            columns[row, 0], columns[row, 1], columns[row, 2], columns[row, 3]
+        )
 
 
 @compiled_call(types.void, _ARRAY, _ARRAY, _ARRAY, types.Array(types.float64, 1, "C"), _ARRAY)
-def _in_the_road_plane(columns, sines, cosines, gravity_mps2, out):
-    """Compute velocity, acceleration and yaw rate from sines and cosines of yaw, roll and pitch."""
+def _all_in_the_road_plane(columns, sines, cosines, gravity_mps2, out):
     for row in range(len(columns)):
-        vx, vy, ax, ay, az = columns[row, 4], columns[row, 5], columns[row, 6], columns[row, 7], columns[row, 8]
-        sin, sr, sp = sines[row, 0], sines[row, 1], sines[row, 2]
-        cos, cr, cp = cosines[row, 0], cosines[row, 1], cosines[row, 2]
-        out[row, 0], out[row, 1] = vx * cos + vy * sin, vy * cos - vx * sin
-        # An accelerometer measures the specific force. After rotation into the road plane, add gravity, which has a
-        # component in this plane on a grade or a bank.
-        out[row, 2] = cp * ax + sp * (sr * ay + cr * az) + gravity_mps2[0] * cos
-        out[row, 3] = cr * ay - sr * az - gravity_mps2[0] * sin
-        out[row, 4] = -sp * ax + cp * (sr * ay + cr * az) + gravity_mps2[2]
-        if gravity_mps2[1] != 0.0:  # a bank
-            out[row, 2] += gravity_mps2[1] * sin
-            out[row, 3] += gravity_mps2[1] * cos
-        # Rate of the Euler angle about the road's normal, not about the body's z axis.
-        out[row, 5] = (sr * columns[row, 9] + cr * columns[row, 10]) / cp
+        out[row, 0], out[row, 1], out[row, 2], out[row, 3], out[row, 4], out[row, 5] = in_the_road_plane(
+            columns[row, 4], columns[row, 5], columns[row, 6], columns[row, 7], columns[row, 8], columns[row, 9],
+            columns[row, 10], sines[row, 0], sines[row, 1], sines[row, 2], cosines[row, 0], cosines[row, 1],
+            cosines[row, 2], gravity_mps2,
+        )  # fmt: skip
+
+
+_COLUMN: Final = types.Array(types.float64, 1, "A")
+
+
+@compiled_call(types.void, _COLUMN, _COLUMN, _COLUMN)
+def _all_sideslip_shares(speed, along, out):
+    for row in range(len(out)):
+        out[row] = sideslip_share(speed[row], along[row])
 
 
 class CarMotion:
@@ -125,7 +157,7 @@ class CarMotion:
             last_yaw_rad: Yaw angle of the row before the first one, from which the angle is unwrapped [rad].
         """
         sides, angles, turned = (np.empty((len(columns), count), order="F") for count in (5, 3, 6))
-        _angle_sides(columns, sides)
+        _all_angle_sides(columns, sides)
         np.arctan2(sides[:, :2], sides[:, 2:4], out=angles[:, :2])
         np.arcsin(sides[:, 4], out=angles[:, 2])
         self.yaw_rad, self.roll_rad, self.pitch_rad = angles.T
@@ -135,10 +167,9 @@ class CarMotion:
             self.yaw_rad += 0.0
         else:
             self.yaw_rad[:] = np.unwrap(np.concatenate(([last_yaw_rad], self.yaw_rad)))[1:]
-        _in_the_road_plane(columns, np.sin(angles), np.cos(angles), gravity_mps2, turned)
+        _all_in_the_road_plane(columns, np.sin(angles), np.cos(angles), gravity_mps2, turned)
         self.vx_mps, self.vy_mps, self.ax_mps2, self.ay_mps2, self.az_mps2, self.yaw_rate_radps = turned.T
         self.speed_mps = np.hypot(columns[:, 4], columns[:, 5])
-        backwards = self.vx_mps < 0.0
-        fading = np.clip((self.speed_mps - STANDSTILL_MPS) / (FULL_SIDESLIP_MPS - STANDSTILL_MPS), 0.0, 1.0)
-        fading = np.where(backwards, self.speed_mps > ROCKS_BACK_MPS, fading)
-        self.sideslip_rad = fading * np.arctan2(self.vy_mps, self.vx_mps)
+        shares = np.empty(len(columns))
+        _all_sideslip_shares(self.speed_mps, self.vx_mps, shares)
+        self.sideslip_rad = shares * np.arctan2(self.vy_mps, self.vx_mps)

@@ -61,6 +61,23 @@ def _copy_columns(rows, start, count, copies, out, largest):
 
 
 @inlined
+def axial_force(length, velocity, low, high, first, second, third, damping):
+    """Return the force of a tendon; see `AxialForce`."""
+    x = length - (low if length < low else high if length > high else length)
+    spring = x * (first + x * (second + x * third))
+    return spring + damping * velocity if damping != 0.0 else spring
+
+
+@inlined
+def is_limited(law, command, activation, force):
+    """Return 1 for an actuator at a limit of angle, rate or force, else 0; see `Actuator`."""
+    target = min(max(command, law.low_rad), law.high_rad)
+    rate = (target - activation) / law.lag_s
+    beyond = command < law.low_rad or command > law.high_rad or abs(rate) >= law.rate_radps
+    return 1.0 if beyond or force <= law.low_Nm or force >= law.high_Nm else 0.0
+
+
+@inlined
 def _axial_forces(rows, start, count, laws, out, largest):
     forces, places = laws
     lengths_m, velocities_mps = rows[_LENGTH], rows[_VELOCITY]
@@ -72,10 +89,9 @@ def _axial_forces(rows, start, count, laws, out, largest):
         low, high, damping = law.low_m, law.high_m, law.damping_Nspm
         first, second, third = law.stiffness_Npm, law.second_Npm2, law.third_Npm3
         for row in range(count):
-            length = length_m[row * length_step]
-            x = length - (low if length < low else high if length > high else length)
-            spring = x * (first + x * (second + x * third))
-            force = spring + damping * velocity_mps[row * velocity_step] if damping != 0.0 else spring
+            force = axial_force(
+                length_m[row * length_step], velocity_mps[row * velocity_step], low, high, first, second, third, damping
+            )
             target[row] = force
             good &= abs(force) <= largest
     return good
@@ -89,10 +105,7 @@ def _saturations(rows, start, count, laws, out):
         law, place = actuators[index], places[index]
         for row in range(start, start + count):
             command, force = commands[row, law.control], forces[row, law.control]
-            target = min(max(command, law.low_rad), law.high_rad)
-            rate = (target - activations[row, law.activation]) / law.lag_s
-            beyond = command < law.low_rad or command > law.high_rad or abs(rate) >= law.rate_radps
-            out[row, place] = 1.0 if beyond or force <= law.low_Nm or force >= law.high_Nm else 0.0
+            out[row, place] = is_limited(law, command, activations[row, law.activation], force)
 
 
 @inlined

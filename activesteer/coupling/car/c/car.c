@@ -28,7 +28,7 @@ typedef struct { int64_t place, kind, base, added; } Relocation;
 typedef struct { int64_t kind, base, added, size; } Target;
 typedef struct { int64_t tendon; double first, second, third, damping, low, high; } Force;
 typedef struct { int64_t control, activation; double lag, rate, low, high, low_torque, high_torque; } Limit;
-typedef struct { int64_t variable, actuator, record, has_torque, act, qpos, seized, backlash; double ratio, free_m; } Part;
+typedef struct { int64_t variable, actuator, record, has_torque, act, qpos, seized, backlash; double ratio, free_m; } Part; /* native_faults.PART */
 enum { WORKS, STUCK, RUNS_LEFT, RUNS_RIGHT, FLOATS, REVERSED, DROPS_OUT };
 enum { INPUT, OUTPUT, PARAMETER };
 enum { FROM_ROW = 16, FROM_RESULT, FROM_FORCE, FROM_LIMIT, FROM_MOTION, FROM_INPUT };
@@ -36,6 +36,8 @@ typedef struct { const char *name; int causality, from, column; double start, lo
 #include "data.h" /* generated: the tables and the constants of one car */
 
 extern void activesteer_step(intptr_t, intptr_t, intptr_t, intptr_t);
+extern void activesteer_derive(intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t);
+extern void activesteer_fault(intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, double, double);
 extern void activesteer_passive(const mjModel *, mjData *);
 extern double activesteer_act_dyn(const mjModel *, const mjData *, int);
 extern void activesteer_sensor(const mjModel *, mjData *, int);
@@ -67,11 +69,11 @@ struct as_car {
     double *row[N_TARGETS];              /* the arrays that a recorded row is copied from */
     double values[N_VARIABLES];          /* inputs and parameters */
     double result[1 + N_RESULT];         /* of the last step: sane, measurement, motion */
-    double force[N_FORCES + 1], limit[N_LIMITS + 1], motion[N_MOTION];
+    double computed[N_FORCES + N_LIMITS + 1], motion[N_MOTION];
     double *at[N_VARIABLES];             /* where each variable is read */
     double *block;                       /* parameters of the native forces, in the model */
     double fault[N_PARTS][3];            /* kind and offset that act, and the demand at which a brake sticks */
-    double healthy[N_PARTS][5 + mjNGAIN + mjNBIAS];
+    double healthy[N_PARTS][N_HEALTH];
     int64_t steps;
     int changed, modified, failed;       /* parameters wait for the start; the model is changed; the state is not sane */
     char message[256];
@@ -101,46 +103,8 @@ static char *address(as_car *c, int64_t kind, int64_t base, int64_t added) {
 
 /* Forces of springs and links, flags of the actuators, and motion, from the arrays of the last step. */
 static void derive(as_car *c) {
-    const double *length = c->row[ROW_ten_length], *speed = c->row[ROW_ten_velocity];
-    const double *ctrl = c->row[ROW_ctrl], *act = c->row[ROW_act], *torque = c->row[ROW_actuator_force];
-    for (int i = 0; i < N_FORCES; i++) {
-        const Force *f = FORCES + i;
-        double l = length[f->tendon], x = l - (l < f->low ? f->low : l > f->high ? f->high : l);
-        double spring = x * (f->first + x * (f->second + x * f->third));
-        c->force[i] = f->damping != 0.0 ? spring + f->damping * speed[f->tendon] : spring;
-    }
-    for (int i = 0; i < N_LIMITS; i++) {
-        const Limit *a = LIMITS + i;
-        double u = ctrl[a->control], target = fmin(fmax(u, a->low), a->high), t = torque[a->control];
-        double rate = (target - act[a->activation]) / a->lag;
-        c->limit[i] = u < a->low || u > a->high || fabs(rate) >= a->rate || t <= a->low_torque || t >= a->high_torque;
-    }
-    /* The motion in the axes of ISO 8855, as in vehicle/channels/car_motion.py; yaw within half a turn. */
-    const double *s = c->row[ROW_sensordata], *q = s + AT_ORIENTATION, *v = s + AT_VELOCITY, *a = s + AT_ACCELERATION;
-    double w = q[0], x = q[1], y = q[2], z = q[3], sine = 2.0 * (w * y - x * z), *m = c->motion;
-    double yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
-    double roll = atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y));
-    double pitch = asin(sine < -1.0 ? -1.0 : sine > 1.0 ? 1.0 : sine);
-    double sy = sin(yaw), cy = cos(yaw), sr = sin(roll), cr = cos(roll), sp = sin(pitch), cp = cos(pitch);
-    m[0] = yaw, m[1] = roll, m[2] = pitch;
-    m[3] = v[0] * cy + v[1] * sy, m[4] = v[1] * cy - v[0] * sy, m[5] = hypot(v[0], v[1]);
-    m[6] = (sr * s[AT_RATES + 1] + cr * s[AT_RATES + 2]) / cp;
-    m[7] = cp * a[0] + sp * (sr * a[1] + cr * a[2]) + c->model->opt.gravity[0] * cy;
-    m[8] = cr * a[1] - sr * a[2] - c->model->opt.gravity[0] * sy;
-    m[9] = -sp * a[0] + cp * (sr * a[1] + cr * a[2]) + c->model->opt.gravity[2];
-    for (int wheel = 0; wheel < 4; wheel++) {
-        const double *axis = s + AT_AXES[wheel];
-        m[11 + wheel] = atan2(-axis[0], axis[1]);
-        m[15 + wheel] = asin(axis[2]);
-        m[19 + wheel] = s[AT_HEIGHTS[wheel]] - DESIGN_HEIGHTS_M[wheel];
-    }
-    m[23] = 0.5 * (m[11] + m[12]);
-    m[24] = 0.5 * (s[AT_REAR[0]] + s[AT_REAR[1]]);
-    m[25] = s[AT_SUPERPOSITION] / STEERING_RATIO;
-    /* Forwards the angle fades with the speed, backwards it is there or not; see car_motion.py. */
-    double fading = (m[5] - STANDSTILL_MPS) / (FULL_SIDESLIP_MPS - STANDSTILL_MPS);
-    if (m[3] < 0.0) fading = m[5] > ROCKS_BACK_MPS ? 1.0 : 0.0;
-    m[10] = fmin(fmax(fading, 0.0), 1.0) * atan2(m[4], m[3]);
+    activesteer_derive((intptr_t)c->row, (intptr_t)SENSOR_PLACES, (intptr_t)DESIGN, (intptr_t)c->model->opt.gravity,
+                       (intptr_t)FORCES, N_FORCES, (intptr_t)LIMITS, N_LIMITS, (intptr_t)c->computed, (intptr_t)c->motion);
 }
 
 static void set_friction(as_car *c, double mu) {
@@ -152,43 +116,12 @@ static double *copy(double *state, double *mine, size_t size, int save) {
     return state + size;
 }
 
-/* Exchange the numbers of an actuator that faults change with those of its healthy state. */
-static void exchange_health(as_car *c, int part, int save) {
-    const Part *p = PARTS + part;
-    double *record = c->block + p->record, *healthy = c->healthy[part];
-    double *mine[] = {record + RECORD_SCALE, record + RECORD_OFFSET, record + RECORD_RATE, c->block + p->seized, c->block + p->backlash};
-    for (int i = 0; i < 5; i++) healthy = copy(healthy, mine[i], 1, save);
-    healthy = copy(healthy, c->model->actuator_gainprm + mjNGAIN * p->actuator, mjNGAIN, save);
-    copy(healthy, c->model->actuator_biasprm + mjNBIAS * p->actuator, mjNBIAS, save);
-}
-
-/* Write the fault of an actuator into the model, as vehicle/faults.py does. */
-static void apply_fault(as_car *c, int part) {
-    const Part *p = PARTS + part;
-    double *record = c->block + p->record, *fault = c->fault[part];
-    exchange_health(c, part, 0);
-    switch ((int)fault[0]) {
-    case WORKS:
-        if (fault[1] != 0.0) record[RECORD_OFFSET] = fault[1] * p->ratio;
-        break;
-    case STUCK:
-        if (p->seized) c->block[p->seized] = 1.0;
-        else if (p->has_torque) record[RECORD_SCALE] = 0.0, record[RECORD_OFFSET] = fault[2];
-        else record[RECORD_RATE] = 0.0;
-        break;
-    case FLOATS:
-        if (p->backlash) {
-            c->block[p->backlash] = p->free_m;
-            break;
-        }
-        mju_zero(c->model->actuator_gainprm + mjNGAIN * p->actuator, mjNGAIN);
-        mju_zero(c->model->actuator_biasprm + mjNBIAS * p->actuator, mjNBIAS);
-        break;
-    case REVERSED: record[RECORD_SCALE] = -1.0; break;
-    default:
-        record[RECORD_SCALE] = 0.0;
-        record[RECORD_OFFSET] = fault[0] == DROPS_OUT ? 0.0 : record[fault[0] == RUNS_LEFT ? RECORD_HIGH : RECORD_LOW];
-    }
+/* Write the fault of an actuator into the model, or save its healthy numbers. */
+enum { SAVE = -1 };
+static void apply_fault(as_car *c, int part, int save) {
+    const double *fault = c->fault[part];
+    activesteer_fault((intptr_t)(PARTS + part), (intptr_t)c->block, (intptr_t)c->model->actuator_gainprm,
+                      (intptr_t)c->model->actuator_biasprm, (intptr_t)c->healthy[part], save ? SAVE : (intptr_t)fault[0], fault[1], fault[2]);
 }
 
 /* Let the faults begin and end that the inputs have changed. */
@@ -204,7 +137,7 @@ static void follow_faults(as_car *c) {
         if (fault[0] == FLOATS && wanted[0] != FLOATS && !p->seized) c->data->act[p->act] = c->data->qpos[p->qpos];
         if (wanted[0] == STUCK && fault[0] != STUCK) fault[2] = c->data->ctrl[p->actuator];
         fault[0] = wanted[0], fault[1] = wanted[1];
-        apply_fault(c, part);
+        apply_fault(c, part, 0);
     }
     c->data->userdata[c->model->nuserdata - 1] = active;
 }
@@ -245,7 +178,7 @@ static void exchange(as_car *c, double *state, int save) {
     for (int w = 0; w < mjNWARNING; w++) c->data->warning[w].number = c->data->warning[w].lastinfo = 0;
     c->block[HEADER_GEAR] = NAN; /* no gear of a command: the next step engages its own */
     set_friction(c, c->values[IN_ROAD_MU]);
-    for (int part = 0; part < N_PARTS; part++) apply_fault(c, part);
+    for (int part = 0; part < N_PARTS; part++) apply_fault(c, part, 0);
     derive(c);
 }
 
@@ -268,8 +201,8 @@ static void place_memory(as_car *c) {
         const Variable *v = VARIABLES + i;
         switch (v->from) {
         case FROM_RESULT: c->at[i] = c->result + v->column; break;
-        case FROM_FORCE: c->at[i] = c->force + v->column; break;
-        case FROM_LIMIT: c->at[i] = c->limit + v->column; break;
+        case FROM_FORCE: c->at[i] = c->computed + v->column; break;
+        case FROM_LIMIT: c->at[i] = c->computed + N_FORCES + v->column; break;
         case FROM_MOTION: c->at[i] = c->motion + v->column; break;
         case FROM_INPUT: c->at[i] = c->values + i; break;
         default: c->at[i] = c->row[v->from] + v->column;
@@ -288,7 +221,7 @@ static int load(as_car *c) {
     c->modified = 0;
     if (!c->data) return refuse(c, "the model cannot be loaded");
     c->block = c->model->numeric_data + BLOCK_START;
-    for (int part = 0; part < N_PARTS; part++) exchange_health(c, part, 1);
+    for (int part = 0; part < N_PARTS; part++) apply_fault(c, part, 1);
     return mj_stateSize(c->model, mjSTATE_INTEGRATION) != STATE_SIZE ? refuse(c, "the model cannot be loaded") : 0;
 }
 
