@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from activesteer.studies.reproduction import Reproduction
 
 SETTINGS: Final = {"paper": "paper's setting", "human": "human driver"}
-"""As in `activesteer.analysis.claims.setting`, which takes too long to import for `--help`."""
+"""As in `activesteer.analysis.claims.stored`, which takes too long to import for `--help`."""
 
 
 def add_to(commands: Any) -> None:
@@ -110,7 +110,7 @@ def _json(result: Reproduction) -> dict[str, Any]:
 
 def _print_scenarios(result: Reproduction) -> None:
     """Print a line for each scenario: how many claims are reproduced, and the verdicts of all others."""
-    from activesteer.analysis.claims import Verdict
+    from activesteer.analysis.claims.scorecard import Verdict
 
     width = max(map(len, result.paths), default=0)
     for scenario in result.paths:
@@ -124,7 +124,7 @@ def _print_scenarios(result: Reproduction) -> None:
 
 
 def _judged(result: Reproduction, scenario: str) -> list[Judged]:
-    from activesteer.analysis.claims import SCENARIO_OF
+    from activesteer.analysis.claims.statements import SCENARIO_OF
 
     return [item for item in result.scorecard.judged if SCENARIO_OF[item.claim.id] == scenario]
 

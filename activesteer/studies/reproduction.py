@@ -12,17 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from activesteer.analysis.claims import (
-    HUMAN,
-    PAPER,
-    SCENARIOS,
-    SYSTEMS,
-    Claim,
-    Scorecard,
-    read_setting,
-    scorecard,
-)
-from activesteer.analysis.claims.setting import VEHICLE
+from activesteer.analysis.claims.judge import SYSTEMS, Claim
+from activesteer.analysis.claims.scorecard import Scorecard, scorecard
+from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.stored import HUMAN, PAPER, VEHICLE, read_setting
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.files import make_folder
 from activesteer.recording import Recording, check_target
@@ -79,7 +72,7 @@ def reproduce(
 
     With more than one job, the runs are made in newly started processes: a script that calls this function needs `if
     __name__ == "__main__":`. The recordings are SCENARIO-SYSTEM.mcap in the folder. The setting is `human` or `paper`,
-    see `activesteer.analysis.claims.setting`. A failed run stops no other run; `failures` names it.
+    see `activesteer.analysis.claims.stored`. A failed run stops no other run; `failures` names it.
     """
     if setting == PAPER and vehicle != VEHICLE:
         raise ParameterError(

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS, not_reproduced
+from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.stored import not_reproduced
 from activesteer.analysis.figures import BY_SCENARIO, OF_ANY_RUN
 from activesteer.cli import main
 from activesteer.commands.paper_figures import draw_all
