@@ -34,7 +34,7 @@ from activesteer.analysis.bands import TRACK, Band
 from activesteer.analysis.claims.judge import SYSTEMS, Claim, Kind
 from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.stored import PAPER, SUMMARY, read_setting
-from activesteer.commands.progress import RunCounter
+from activesteer.commands.terminal import RunCounter
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
 from activesteer.files import make_folder, replacing, write_text

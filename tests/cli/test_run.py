@@ -15,8 +15,8 @@ import activesteer
 from activesteer import Recording
 from activesteer.analysis.metrics import EVALUATIONS
 from activesteer.analysis.tables import comparison
-from activesteer.commands import run as run_command
-from activesteer.commands.output import BAD, coloured, painted
+from activesteer.commands import drive as run_command
+from activesteer.commands.terminal import BAD, coloured, painted
 from activesteer.metric_table import recorded_metric
 from activesteer.resources import find_vehicle
 from activesteer.version import __version__

@@ -13,7 +13,7 @@ from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.stored import not_reproduced
 from activesteer.analysis.figures import BY_SCENARIO, OF_ANY_RUN
 from activesteer.cli import main
-from activesteer.commands.paper_figures import draw_all
+from activesteer.commands.verify import draw_all
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.studies.reproduction import Reproduction, reproduce
