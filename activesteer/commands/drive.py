@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import threading
-import time
 import webbrowser
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -137,7 +135,7 @@ def _run(options: argparse.Namespace) -> int:
     scenario = prepared(scenario)
     if not options.replace:
         for controller, path in driving:
-            _check_settings(path, _settings(scenario, controller))
+            _check_settings(path, scenario, controller)
     recordings = {}
     for controller, path in driving:
         if (label := controller.label) not in failures:
@@ -176,8 +174,7 @@ def _watch(options: argparse.Namespace) -> int:
     scenario = scenario_of(options)
     check_gains(scenario.overrides, [controller])
 
-    from activesteer.commands.drive import watch
-    from activesteer.simulation.live_view import check_display
+    from activesteer.simulation.live_view import check_display, watch
 
     check_display()
     watch(prepared(scenario), controller, pace, cutaway=options.cutaway)
@@ -270,24 +267,18 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
     return paths
 
 
-def _settings(scenario: Any, controller: Plugin) -> dict[str, Any]:
-    """Return the settings of a run as its recording holds them."""
-    from activesteer.scenario import describe
-
-    values = controller.parameters_with(scenario.own)
-    return describe(scenario) | {"controller": controller.name, "controller_parameters": values}
-
-
-def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
+def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
     """Refuse to replace a recording of other settings."""
     from activesteer.errors import RecordingError
     from activesteer.recording import Recording
+    from activesteer.scenario import describe
 
     try:
         before = _flat(Recording.open(path, recover=True).metadata)
     except RecordingError:  # there is no recording
         return
-    now = _flat({key: value for key, value in settings.items() if key != "overrides"})
+    own = {"controller": controller.name, "controller_parameters": controller.parameters_with(scenario.own)}
+    now = _flat({key: value for key, value in (describe(scenario) | own).items() if key != "overrides"})
     other = sorted(key for key, value in now.items() if before.get(key, value) != value)
     if other:
         some = ", ".join(f"{key} {shown(before[key])}" for key in other[:3]) + (" ..." if len(other) > 3 else "")
@@ -310,7 +301,7 @@ def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
     """Draw all runs in one figure, and for a step steer the car without control beside its linear models."""
     from activesteer.analysis.figures import figure_2, figure_for
-    from activesteer.commands.verify import models_beside
+    from activesteer.studies.reproduction import models_beside
 
     name, kind = scenario.maneuver.name, scenario.maneuver.kind
     figures = [figure_for(kind)(recordings, folder / f"{name}{ending}") for ending in (".png", ".pdf")]
@@ -319,52 +310,6 @@ def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Pa
         models = models_beside(run)
         figures += [figure_2(run, folder / f"{name}-models{ending}", models) for ending in (".png", ".pdf")]
     return figures
-
-
-_LONGEST_CLOSING_S: Final = 5.0
-
-
-def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> None:
-    """Drive a scenario again and again in a window until it is closed; nothing is recorded."""
-    import mujoco.viewer
-
-    from activesteer.simulation.closed_loop import ClosedLoop
-    from activesteer.simulation.live_view import Keys, Pacer, drive, scene_for
-
-    simulation, keys = ClosedLoop(scenario, controller), Keys()
-    scene = scene_for(simulation, scenario.maneuver, controller, cutaway=cutaway)
-    with (
-        _threads_joined(),
-        mujoco.viewer.launch_passive(
-            scene.model, scene.data, show_left_ui=False, show_right_ui=False, key_callback=keys
-        ) as viewer,
-    ):
-        pacer = Pacer(speed)
-        while viewer.is_running():
-            driven = drive(simulation, scene, viewer, pacer, keys)
-            slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
-            if driven.finished:
-                print(
-                    f"{driven.simulated_s:.1f} s driven{slow}; R drives again, close the window to end", file=sys.stderr
-                )
-            elif not keys.restart:
-                print(f"closed at {driven.simulated_s:.1f} s{slow}", file=sys.stderr)
-            while driven.finished and viewer.is_running() and not keys.restart:
-                time.sleep(0.05)
-                viewer.sync()
-            pacer = Pacer(pacer.speed)
-            simulation = ClosedLoop(scenario, controller)
-
-
-@contextmanager
-def _threads_joined() -> Iterator[None]:
-    """Wait for the thread of the viewer at the end; without it, the shutdown of Python crashes."""
-    before = set(threading.enumerate())
-    try:
-        yield
-    finally:
-        for thread in set(threading.enumerate()) - before:
-            thread.join(_LONGEST_CLOSING_S)
 
 
 @command("explore", "change a run by sliders, or drive the car by hand, in a local page",

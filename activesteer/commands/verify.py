@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,11 +28,7 @@ from activesteer.errors import ParameterError
 from activesteer.files import write_json
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from activesteer.analysis.claims.scorecard import Judged
-    from activesteer.recording import Recording
     from activesteer.studies.reproduction import Reproduction
 
 command: Final = Group("verify")
@@ -54,18 +49,18 @@ SETTINGS: Final = {"paper": "paper's setting", "human": "human driver"}
 )  # fmt: skip
 def _settings(options: argparse.Namespace) -> int:
     """Drive the 15 runs in every setting asked for, and tell the verdicts."""
+    from activesteer.studies.reproduction import draw_figures, write_page
+
     settings = list(dict.fromkeys(options.settings or ["human"]))
     folders = {name: options.output / name if len(settings) > 1 else options.output for name in settings}
     results = _driven(options, folders)
     for result in results.values():
         for (scenario, system), problem in result.failures.items():
             print(f"{scenario} {system} failed: {problem}", file=sys.stderr)
-    report = _report(results.values(), options.output)
+    report = write_page(results.values(), options.output)
     figures: list[Path] = []
     if options.figures:
-        from activesteer.commands.verify import draw_all
-
-        figures = draw_all(results[settings[0]].recordings(), options.output / "figures", options.vehicle)
+        figures = draw_figures(results[settings[0]].recordings(), options.output / "figures", options.vehicle)
     status = max(result.exit_status for result in results.values())
     if options.json:
         tables = [_json(result) for result in results.values()]
@@ -168,67 +163,6 @@ def _print_settings(results: Mapping[str, Reproduction]) -> None:
         "population varies the setting with the human driver (mean share of the claims)."
     )
     print("\n".join(wrapped(words)))
-
-
-def _report(results: Iterable[Reproduction], folder: Path) -> Path | None:
-    """Write a page with all runs, including those that ended early; return None if no run made a step."""
-    from activesteer.analysis.report import write_report
-    from activesteer.errors import RecordingError
-    from activesteer.recording import Recording
-
-    recordings: dict[str, Recording] = {}
-    for result in results:
-        for scenario, systems in result.paths.items():
-            for system, path in systems.items():
-                with suppress(RecordingError):
-                    recording = Recording.open(path, recover=True)
-                    # A complete file of a run that failed now is left from an earlier call.
-                    if len(recording) and recording.metadata["complete"] is ((scenario, system) not in result.failures):
-                        recordings[str(path)] = recording
-    return write_report(recordings, folder / "report.html") if recordings else None
-
-
-def draw_all(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle: str) -> list[Path]:
-    """Draw all figures that these runs allow, and the figure of the suspension: PNG, SVG and PDF.
-
-    Args:
-        recordings: Scenario -> system -> recording.
-        folder: Folder for the figures.
-        vehicle: Name or path of the vehicle, for the rig and the linear models.
-    """
-    from activesteer.analysis.figures import FORMATS, figure_2
-    from activesteer.analysis.figures import draw_all as draw_runs
-    from activesteer.plotting import save
-    from activesteer.rigs import kinematics_compliance
-    from activesteer.rigs.kc import rear_camber_figure
-
-    files = draw_runs(recordings, folder)
-    camber = rear_camber_figure(kinematics_compliance(vehicle))
-    files += [save(camber, folder / f"figure_01_rear_camber{ending}") for ending in FORMATS]
-    if step_steers := recordings.get("step_steer"):
-        run = step_steers["none"]
-        models = models_beside(run)
-        files += [figure_2(run, folder / f"figure_02_step_steer_models{ending}", models) for ending in FORMATS]
-    return sorted(files)
-
-
-def models_beside(run: Recording) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """Return responses of linear models to the steering of a run: single track and, on a level road, the full car.
-
-    Returns:
-        Name of the model -> channel -> values over the time of the run.
-    """
-    from activesteer.controllers import SingleTrackParameters
-    from activesteer.studies.linear.identification import single_track_response
-    from activesteer.studies.linear.linearisation import linear_response, linearise
-
-    maneuver, vehicle = run.metadata["maneuver"], run.metadata["vehicle"]
-    single_track = SingleTrackParameters(**vehicle["single_track"])
-    models = {"single-track model": single_track_response(run, single_track, vehicle["steering"]["ratio"])}
-    if maneuver["road"]["grade"] == 0.0:
-        linear = linearise(vehicle, maneuver["speed_mps"], {"road.mu": maneuver["road"]["mu"]})
-        models["linear car"] = linear_response(run, linear)
-    return models
 
 
 @command("test", "test a car by a standard",
