@@ -26,6 +26,7 @@ from activesteer.commands.options import (
 from activesteer.commands.terminal import BAD, GOOD, ProgressBar, painted, print_entry, print_json, print_notes
 from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
 from activesteer.files import replacing, shown_path
+from activesteer.text_table import text_table
 
 if TYPE_CHECKING:
     from activesteer.recording import Recording
@@ -199,12 +200,15 @@ def _recordings(options: argparse.Namespace) -> int:
         later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"
         print(f"time shift of {file}: {later}")
     chosen = FILTERS[found.filtered]
-    print(f"filter of both sides: {'none' if chosen is None else chosen.words()}")
+    print_entry("filter of both sides: ", "none" if chosen is None else chosen.words())
     for problem in found.unfiltered:
-        print(f"not filtered: {problem}")
+        print_entry("not filtered: ", problem)
+    rows = [["", "rms", "tolerance", "inside", ""]]
     for each in found.quantities:
         label, residual, tolerance, share, _ = words(each)
-        print(f"  {label:24} rms {residual:>14}   {tolerance:>30}   {share:>7} {_verdict(each.inside)}")
+        value, _, unit = residual.partition(" ")
+        rows.append([f"{label}, {unit}", value, tolerance.replace(f" {unit}", ""), share, _verdict(each.inside)])
+    print("\n".join(text_table(rows, repeat=1, marks=["  "] * len(rows))))
     print(_verdict(found.inside))
     if options.output is not None:
         print(f"page: {options.output}")

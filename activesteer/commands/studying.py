@@ -41,6 +41,7 @@ from activesteer.commands.terminal import (
 from activesteer.errors import ParameterError, StudyError
 from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
+from activesteer.text_table import text_table
 
 if TYPE_CHECKING:
     from activesteer.measured.fitting import FitProgress
@@ -155,9 +156,9 @@ def _status(folder: Path, *, as_json: bool) -> int:
     at_work = "; a process is at work" if progress["running"] else ""
     print(f"{progress['done']} of {progress['total']} runs are done: {counts}{at_work}")
     for error, number in progress["errors"].items():
-        print(f"{number:6}  {error}")
+        print_entry(f"{number:6}  ", error, 8)
     for key in progress["without_effect"]:
-        print(f"without effect: {key} changes no metric of any run")
+        print_entry("without effect: ", f"{key} changes no metric of any run")
     return 0
 
 
@@ -298,9 +299,11 @@ def _fit(options: argparse.Namespace) -> int:
         print(f"{one.key:{width}}  {one.words}")
     for one, other, value in found.pairs(0.5):
         print(f"correlation {value:+.2f}  {one}, {other}")
+    rows = [["", "", "noise", "rms", "fitted", "independent"]]
     for recording, label, noise, before, after, samples, independent in (each.words() for each in found.compared):
-        print(f"  {recording}: {label:24} noise {noise:>12}   rms {before:>12} -> {after:>12}   "
-              f"{independent} of {samples} samples independent")  # fmt: skip
+        values = (text.partition(" ")[0] for text in (noise, before, after))
+        rows.append([recording, f"{label}, {noise.partition(' ')[2]}", *values, f"{independent} of {samples}"])
+    print("\n".join(text_table(rows, text=2, repeat=2, marks=["  "] * len(rows))))
     print(f"{found.rounds} rounds, {found.runs} runs; the remaining difference is {found.misfit:.3g} times the noise")
     for line in rests_on(found)[:1]:
         print_entry("", line, hanging=0)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from activesteer.files import json_text
+from activesteer.text_table import COLUMNS, WHOLE, text_table, wrapped_line
 
 if TYPE_CHECKING:
     from activesteer.studies.engine.study import StudyProgress
@@ -27,27 +28,17 @@ _COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": KNOWN}
 """Verdict -> colour."""
 _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
-_COLUMNS: Final = 80
-_WHOLE: Final[dict[str, Any]] = {"break_on_hyphens": False, "break_long_words": False, "replace_whitespace": False}
-"""Arguments of `textwrap` that keep words and columns as they are."""
-
 
 def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
     """Print a table of rows, a column for each key with its head; numbers have three digits."""
-    texts = {key: [row[key] for row in rows if isinstance(row[key], str)] for key in columns}
-    widths = {key: max(10, len(head), *map(len, texts[key])) for key, head in columns.items()}
-    print(" ".join(f"{head:>{widths[key]}}" for key, head in columns.items()))
-    for row in rows:
-        cells = ((row[key], width) for key, width in widths.items())
-        print(" ".join(f"{cell:>{w}}" if isinstance(cell, str) else f"{cell:{w}.3g}" for cell, w in cells))
+    cells = [[row[key] if isinstance(row[key], str) else f"{row[key]:.3g}" for key in columns] for row in rows]
+    print("\n".join(text_table([list(columns.values()), *cells], text=0, repeat=2, least=10, gap=1)))
 
 
 def wrapped(text: str) -> Iterator[str]:
     """Yield lines of 80 columns; the continuation of a longer line is indented four columns further than the line."""
     for line in text.splitlines():
-        indent = " " * (len(line) - len(line.lstrip()) + 4)
-        parts = textwrap.wrap(line, _COLUMNS, subsequent_indent=indent, **_WHOLE) if len(line) > _COLUMNS else [line]
-        yield coloured("\n".join(parts))
+        yield coloured("\n".join(wrapped_line(line)))
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:
@@ -63,7 +54,8 @@ def tell(options: argparse.Namespace, values: Any, lines: Iterable[str], figures
         print_json(values if figures is None else values | {"figures": [str(path) for path in figures]})
         return
     for line in lines:
-        print(line)
+        command = line.lstrip().startswith("activesteer ")  # to be copied
+        print("\n".join([line] if command else [part for one in line.split("\n") for part in wrapped_line(one)]))
     tell_files(options, figures or ())
 
 
@@ -136,7 +128,7 @@ def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = No
     The text may come from any file: control characters are printed as escape sequences.
     """
     plain = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
-    lines = textwrap.wrap(plain, _COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **_WHOLE)
+    lines = textwrap.wrap(plain, COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **WHOLE)
     print("\n".join(lines) or head.rstrip(), file=file)
 
 
