@@ -1,4 +1,4 @@
-"""Command line of the program; every command has a module in `commands`."""
+"""Command line of the program; the commands are in `commands`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from activesteer.commands.arguments import Commands
+    from activesteer.commands.options import CommandLine
     from activesteer.commands.stopping import StopSignals
 
 
@@ -55,10 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
     from contextlib import nullcontext
 
-    from activesteer.commands.output import log_to_terminal, stdout_for_json
+    from activesteer.commands.terminal import log_to_terminal, stdout_for_json
     from activesteer.errors import ActiveSteerError
 
-    stop.options = options = all_commands().parse(arguments)
+    stop.options = options = command_line().parse(arguments)
     try:
         with log_to_terminal(), stdout_for_json() if getattr(options, "json", False) else nullcontext():
             return options.action(options)
@@ -78,22 +78,11 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
         return 1
 
 
-def all_commands() -> Commands:
-    """Return all commands in the groups in which `--help` lists them."""
-    from importlib import import_module
-
-    from activesteer.commands.arguments import Commands
+def command_line() -> CommandLine:
+    """Return the command line with all commands, in the groups in which `--help` lists them."""
+    from activesteer.commands import car, drive, recordings, studying, verify
+    from activesteer.commands.options import CommandLine
     from activesteer.version import __version__
 
-    commands = Commands(f"activesteer {__version__}")
-    for title, modules in {
-        "drive": "listing run explore",
-        "recordings": "info report compare replay video import_",
-        "car": "vehicle tyre kc export",
-        "study": "study tune fit identify linearise",
-        "verify": "reproduce test bench",
-    }.items():
-        commands.begin_group(title)
-        for module in modules.split():
-            import_module(f"activesteer.commands.{module}").add_to(commands)
-    return commands
+    groups = [module.command for module in (drive, recordings, car, studying, verify)]
+    return CommandLine(f"activesteer {__version__}", groups)

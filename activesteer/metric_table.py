@@ -17,7 +17,7 @@ from activesteer.units import DisplayUnit, display_unit
 
 STEER_RAD: Final = math.radians(0.05)
 """Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to some 3 minutes of arc. A demand
-counts as `claims.action` says, so that noise cannot pass for it."""
+counts as `claims.judge` says, so that noise cannot pass for it."""
 SETTLED_SIDESLIP_RAD: Final = math.radians(0.05)
 """Difference of sideslip angles averaged over a second [rad]: half of the +-0.1 deg of an optical sensor."""
 SIDESLIP_RAD: Final = math.radians(0.1)

@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer import simulate
-from activesteer.analysis.claims import SCENARIOS
+from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.analysis.energy import METRICS as ENERGIES
 from activesteer.controllers import find_controller
 from activesteer.errors import ParameterError, SimulationDiverged

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from activesteer.analysis.claims import PAPER, SCENARIO_OF, STATEMENTS, Kind, not_reproduced, read_setting
-from activesteer.analysis.claims.population import Population as StoredPopulation
-from activesteer.analysis.claims.population import stored_population
+from activesteer.analysis.claims.judge import Kind
+from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.stored import PAPER, not_reproduced, read_setting, stored_population
+from activesteer.analysis.claims.stored import Population as StoredPopulation
 from activesteer.theory.proportions import percent
 from tools.make_setting import AROUND
 from tools.population_results import Population, read_population
@@ -42,7 +43,7 @@ def table() -> str:
             "|---|---|---|---|---|---|---|",
         ]
         for statement in STATEMENTS.values():
-            if statement.kind is kind:
+            if SCENARIOS[SCENARIO_OF[statement.id]].kind is kind:
                 nominal = NOT_REPRODUCED if statement.id in known else REPRODUCED
                 paper = FAILS if statement.id in fails else HOLDS
                 cells = (statement.id, statement.text, paper, nominal, *_proportion(population, statement.id))

@@ -15,8 +15,8 @@ from typing import Any, Final
 import numpy as np
 import pyarrow as pa
 
-from activesteer.analysis.claims import Claim
-from activesteer.analysis.claims.population import NO_FACTOR, ClaimProportion, read_claims, stored_table
+from activesteer.analysis.claims.judge import Claim
+from activesteer.analysis.claims.stored import NO_FACTOR, ClaimProportion, read_claims, stored_table
 from activesteer.analysis.harm import MEASURES, harms, severity, track_harm_m
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.analysis.loss_of_control import has_spun, is_lost

@@ -31,9 +31,10 @@ import pyarrow.parquet as pq
 
 from activesteer.analysis.bands import FILE as BANDS
 from activesteer.analysis.bands import TRACK, Band
-from activesteer.analysis.claims import PAPER, SCENARIO_OF, STATEMENTS, SYSTEMS, Claim, Kind, read_setting
-from activesteer.analysis.claims.population import SUMMARY
-from activesteer.commands.progress import RunCounter
+from activesteer.analysis.claims.judge import SYSTEMS, Claim, Kind
+from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.stored import PAPER, SUMMARY, read_setting
+from activesteer.commands.terminal import RunCounter
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
 from activesteer.files import make_folder, replacing, write_text
@@ -49,7 +50,15 @@ from activesteer.theory.proportions import percent
 from tools.comparison_text import comparison_text
 from tools.make_claims_table import NOT_REPRODUCED, REPRODUCED
 from tools.make_setting import AROUND
-from tools.population_results import STUDY, Change, Population, population, population_study, read_population, summarise
+from tools.population_results import (
+    STUDY,
+    Change,
+    Population,
+    population,
+    population_study,
+    read_population,
+    summarise,
+)
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
 PAGE: Final = DOCS / "population.md"
@@ -163,7 +172,8 @@ def _row(head: str, cells: Iterable[str]) -> str:
 
 def _claims(found: Population) -> list[str]:
     return [
-        f"| {claim.id} | {STATEMENTS[claim.id].text} | {'yes' if STATEMENTS[claim.id].kind is Kind.DRIVER else ''} | "
+        f"| {claim.id} | {STATEMENTS[claim.id].text} | "
+        f"{'yes' if SCENARIOS[SCENARIO_OF[claim.id]].kind is Kind.DRIVER else ''} | "
         f"{REPRODUCED if claim.passed else NOT_REPRODUCED} | {percent(claim.share)} % | {percent(claim.low)} to "
         f"{percent(claim.high)} % | **{claim.verdict.value}** | "
         f"{f'{percent(claim.at[PRODUCTION])} %' if PRODUCTION in claim.at else ''} | "

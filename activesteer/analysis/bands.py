@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import pyarrow.parquet as pq
 
-from activesteer.analysis.claims import claims_for
+from activesteer.analysis.claims.stored import claims_for
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import Array
 from activesteer.errors import StudyError

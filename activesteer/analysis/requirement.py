@@ -1,4 +1,4 @@
-"""Requirements on runs, with a graded distance: expressions over metrics, and the conditions of claims.
+"""Requirements on runs, with a graded distance: expressions over metrics.
 
 An example is `max(0, lane_overstep_m(lqr)) - max(0, lane_overstep_m(none)) <= 0.05`. `METRIC(CONTROLLER, MANEUVER)` is
 the metric of that run [SI]; the manoeuvre may be left out if there is only one.
@@ -41,42 +41,11 @@ _LONGEST: Final = 1000
 """Largest number of characters of an expression."""
 
 
-class Condition(NamedTuple):
-    """A condition of a claim: of several conditions, the smallest decides about all, the largest about any.
-
-    Attributes:
-        margin: Distance to the limit on the right side, in units of a scale [-]; below 0 if the condition is broken.
-        strict: Whether a value at the limit breaks it.
-    """
-
-    margin: float
-    strict: bool = False
-
-    @property
-    def holds(self) -> bool:
-        """True if the condition holds."""
-        return self.margin > 0.0 if self.strict else self.margin >= 0.0
-
-    @property
-    def distance(self) -> float:
-        """Distance from holding: 0 if it holds, 0.5 a scale away from the limit, 1 far away or undefined."""
-        if self.holds:
-            return 0.0
-        return max(1e-6, self.margin / (self.margin - 1.0)) if math.isfinite(self.margin) else 1.0
-
-
-def at_most(value: float, limit: float, scale: float | None = None, *, strict: bool = False) -> Condition:
-    """Return the condition that a value is at most a limit, or below it; an undefined value (nan) breaks it.
-
-    The difference that counts as 1 is by default the magnitude of the limit.
-    """
-    margin = _margin(limit - value, limit if scale is None else scale)
-    return Condition(-math.inf if math.isnan(margin) else margin, strict)
-
-
-def at_least(value: float, limit: float, scale: float | None = None, *, strict: bool = False) -> Condition:
-    """Return the condition that a value is at least a limit; see `at_most`."""
-    return at_most(-value, -limit, scale, strict=strict)
+def distance(margin: float) -> float:
+    """Return the distance from holding: 0 if it holds, 0.5 a scale away from the limit, 1 far away or undefined."""
+    if margin >= 0.0:
+        return 0.0
+    return max(1e-6, margin / (margin - 1.0)) if math.isfinite(margin) else 1.0
 
 
 def _margin(room: float, limit: float) -> float:

@@ -7,6 +7,7 @@ from typing import Final
 
 from activesteer.analysis.loss_of_control import LOST, shown
 from activesteer.metric_table import TYRE_USE, recorded_metric
+from activesteer.text_table import text_table, wrapped_line
 
 Paint = Callable[[str, float, float, str], str]
 """Function from the name of a metric, its value in a run and in the first run, and its text to the text as shown."""
@@ -29,31 +30,20 @@ def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = No
         shown as `-`; a value of a car that has turned round as `lost`.
     """
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
-    rows = [["", "", *runs]]
+    rows, first = [["", "", *runs]], next(iter(runs.values()), {})
     for name in names:
         metric = recorded_metric(name)
         numbers = [
             shown(name, metrics, metric.text(metrics[name])) if name in metrics else "" for metrics in runs.values()
         ]
+        for place, (metrics, text) in enumerate(zip(list(runs.values())[1:], numbers[1:], strict=True), start=1):
+            if paint is not None and name in metrics and name in first and LOST not in numbers:
+                numbers[place] = paint(name, metrics[name], first[name], text)
         rows.append([metric.label, metric.unit.name, *numbers])
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    cells = [_cells(row, widths) for row in rows]
-    first = next(iter(runs.values()), {})
-    for row, name in zip(cells[1:], names, strict=True):
-        for place, metrics in enumerate(list(runs.values())[1:], start=3):
-            painted = paint is not None and name in metrics and name in first and LOST not in row[2:]
-            if paint is not None and painted:
-                row[place] = paint(name, metrics[name], first[name], row[place])
-    lines = ["  ".join(row).rstrip() for row in cells]
-    return "\n".join((*lines, *notes(runs)))
+    return "\n".join((*text_table(rows, text=2, repeat=2, least=8), *notes(runs)))
 
 
 def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
     """Return explanations of values that a reader may take for an error."""
     above = any(metrics.get(name, 0.0) > 1.0 for metrics in runs.values() for name in TYRE_USE)
-    return [TYRE_USE_NOTE] if above else []
-
-
-def _cells(row: list[str], widths: list[int]) -> list[str]:
-    texts = [cell.ljust(width) for cell, width in zip(row[:2], widths[:2], strict=True)]
-    return texts + [cell.rjust(max(width, 8)) for cell, width in zip(row[2:], widths[2:], strict=True)]
+    return wrapped_line(TYRE_USE_NOTE) if above else []

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
+from activesteer.text_table import text_table, wrapped_line
+
 Text = str | Markup
 """Text is escaped; markup must be made by `Markup`."""
 
@@ -34,11 +36,9 @@ class Table(NamedTuple):
     def lines(self) -> Iterator[str]:
         """Yield the table as aligned text; `!` marks rows that break a limit, `~` rows that nothing is asked of."""
         rows = [[_plain(cell) for cell in row] for row in (self.columns, *self.rows)]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        for number, row in enumerate(rows, start=-1):
-            mark = "!" if number in self.outside else "~" if number in self.quiet else " "
-            cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-            yield f"{mark} {'  '.join(cells)}".rstrip()
+        places = range(-1, len(self.rows))
+        marks = ["! " if place in self.outside else "~ " if place in self.quiet else "  " for place in places]
+        yield from text_table(rows, text=len(self.columns), marks=marks)
 
 
 class Section(NamedTuple):
@@ -78,10 +78,12 @@ class Page(NamedTuple):
 
     def lines(self) -> Iterator[str]:
         """Yield heading, paragraphs and tables as text."""
-        yield from map(_plain, (self.heading, *self.lead))
+        for text in map(_plain, (self.heading, *self.lead)):
+            yield from wrapped_line(text)
         for section in self.sections:
             if section.texts or section.tables:
-                yield from map(_plain, filter(None, (section.title, *section.texts)))
+                for text in map(_plain, filter(None, (section.title, *section.texts))):
+                    yield from wrapped_line(text)
             for table in section.tables:
                 yield from table.lines()
 

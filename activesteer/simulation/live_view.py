@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+import sys
+import threading
 import time
 import warnings
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Final, NamedTuple, Protocol
 
 from activesteer.conventions import run_looks
@@ -31,6 +33,7 @@ _SLOWER: Final = (ord("-"), 333)
 _FASTER: Final = (ord("="), ord("+"), 334)
 """Codes of minus and plus, also of those of the number pad."""
 _SLOWEST, _FASTEST = 0.01, 100.0
+_LONGEST_CLOSING_S: Final = 5.0
 _TURN_S: Final = 0.4
 """Time constant of the camera's direction behind the car's direction of motion [s]."""
 
@@ -282,3 +285,43 @@ def check_display() -> None:
         reasons = [re.sub(r"^\(\d+\) b'(.*)'$", r"\1", str(warning.message)) for warning in caught]
         msg = f"there is no display to open a window on: {reasons[-1] if reasons else 'GLFW does not say why'}"
         raise PlaybackError(f"{msg}; `activesteer video` makes a film of a recording without a window")
+
+
+def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> None:
+    """Drive a scenario again and again in a window until it is closed; nothing is recorded."""
+    import mujoco.viewer  # noqa: PLC0415 - needs a display
+
+    simulation, keys = ClosedLoop(scenario, controller), Keys()
+    scene = scene_for(simulation, scenario.maneuver, controller, cutaway=cutaway)
+    with (
+        _threads_joined(),
+        mujoco.viewer.launch_passive(
+            scene.model, scene.data, show_left_ui=False, show_right_ui=False, key_callback=keys
+        ) as viewer,
+    ):
+        pacer = Pacer(speed)
+        while viewer.is_running():
+            driven = drive(simulation, scene, viewer, pacer, keys)
+            slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
+            if driven.finished:
+                print(
+                    f"{driven.simulated_s:.1f} s driven{slow}; R drives again, close the window to end", file=sys.stderr
+                )
+            elif not keys.restart:
+                print(f"closed at {driven.simulated_s:.1f} s{slow}", file=sys.stderr)
+            while driven.finished and viewer.is_running() and not keys.restart:
+                time.sleep(0.05)
+                viewer.sync()
+            pacer = Pacer(pacer.speed)
+            simulation = ClosedLoop(scenario, controller)
+
+
+@contextmanager
+def _threads_joined() -> Iterator[None]:
+    """Wait for the thread of the viewer at the end; without it, the shutdown of Python crashes."""
+    before = set(threading.enumerate())
+    try:
+        yield
+    finally:
+        for thread in set(threading.enumerate()) - before:
+            thread.join(_LONGEST_CLOSING_S)

@@ -23,7 +23,8 @@ from typing import Any, Final, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.analysis.claims import SCENARIOS, SYSTEMS
+from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
 from activesteer.brakes.control_unit import step_brakes
 from activesteer.compilation import compiled

@@ -7,30 +7,34 @@ made from the files.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from activesteer.analysis.claims import (
-    HUMAN,
-    PAPER,
-    SCENARIOS,
-    SYSTEMS,
-    Claim,
-    Scorecard,
-    read_setting,
-    scorecard,
-)
-from activesteer.analysis.claims.setting import VEHICLE
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.analysis.claims.judge import SYSTEMS, Claim
+from activesteer.analysis.claims.scorecard import Scorecard, scorecard
+from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.stored import HUMAN, PAPER, VEHICLE, read_setting
+from activesteer.analysis.figures import FORMATS, figure_2
+from activesteer.analysis.figures import draw_all as draw_runs
+from activesteer.analysis.report import write_report
+from activesteer.controllers import SingleTrackParameters
+from activesteer.conventions import Array
+from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.files import make_folder
+from activesteer.plotting import save
 from activesteer.recording import Recording, check_target
+from activesteer.rigs import kinematics_compliance
+from activesteer.rigs.kc import rear_camber_figure
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.task_queue import TaskQueue, in_parallel
 from activesteer.studies.engine.workers import workers_for
+from activesteer.studies.linear.identification import single_track_response
+from activesteer.studies.linear.linearisation import linear_response, linearise
 
 Progress = Callable[[str, int, int], None]
 """Called with the finished run, the number of finished runs, and the total."""
@@ -79,7 +83,7 @@ def reproduce(
 
     With more than one job, the runs are made in newly started processes: a script that calls this function needs `if
     __name__ == "__main__":`. The recordings are SCENARIO-SYSTEM.mcap in the folder. The setting is `human` or `paper`,
-    see `activesteer.analysis.claims.setting`. A failed run stops no other run; `failures` names it.
+    see `activesteer.analysis.claims.stored`. A failed run stops no other run; `failures` names it.
     """
     if setting == PAPER and vehicle != VEHICLE:
         raise ParameterError(
@@ -158,3 +162,50 @@ def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None)
 def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
     scenario = prepared(resolve(name, vehicle))
     return SCENARIOS[name]({system: run_scenario(scenario, system) for system in SYSTEMS})
+
+
+def write_page(results: Iterable[Reproduction], folder: Path) -> Path | None:
+    """Write a page with all runs, including those that ended early; return None if no run made a step."""
+    recordings: dict[str, Recording] = {}
+    for result in results:
+        for scenario, systems in result.paths.items():
+            for system, path in systems.items():
+                with suppress(RecordingError):
+                    recording = Recording.open(path, recover=True)
+                    # A complete file of a run that failed now is left from an earlier call.
+                    if len(recording) and recording.metadata["complete"] is ((scenario, system) not in result.failures):
+                        recordings[str(path)] = recording
+    return write_report(recordings, folder / "report.html") if recordings else None
+
+
+def draw_figures(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle: str) -> list[Path]:
+    """Draw all figures that these runs allow, and the figure of the suspension: PNG, SVG and PDF.
+
+    Args:
+        recordings: Scenario -> system -> recording.
+        folder: Folder for the figures.
+        vehicle: Name or path of the vehicle, for the rig and the linear models.
+    """
+    files = draw_runs(recordings, folder)
+    camber = rear_camber_figure(kinematics_compliance(vehicle))
+    files += [save(camber, folder / f"figure_01_rear_camber{ending}") for ending in FORMATS]
+    if step_steers := recordings.get("step_steer"):
+        run = step_steers["none"]
+        models = models_beside(run)
+        files += [figure_2(run, folder / f"figure_02_step_steer_models{ending}", models) for ending in FORMATS]
+    return sorted(files)
+
+
+def models_beside(run: Recording) -> dict[str, dict[str, Array]]:
+    """Return responses of linear models to the steering of a run: single track and, on a level road, the full car.
+
+    Returns:
+        Name of the model -> channel -> values over the time of the run.
+    """
+    maneuver, vehicle = run.metadata["maneuver"], run.metadata["vehicle"]
+    single_track = SingleTrackParameters(**vehicle["single_track"])
+    models = {"single-track model": single_track_response(run, single_track, vehicle["steering"]["ratio"])}
+    if maneuver["road"]["grade"] == 0.0:
+        linear = linearise(vehicle, maneuver["speed_mps"], {"road.mu": maneuver["road"]["mu"]})
+        models["linear car"] = linear_response(run, linear)
+    return models

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from activesteer.text_table import text_table, wrapped_line
 from activesteer.tyre.diagnostics import remarks
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -143,13 +144,12 @@ def describe(params: TyreParameters) -> str:
         "  Without camber, at the file's pressure and the speed of measurement:",
     ]
     over = figures["over_load"]
-    for title, key, factor, form in _TABLE:
-        cells = "".join(f"{factor * value:{form}}".rjust(9) for value in over[key])
-        lines.append(f"  {title:<36}{cells}")
-    lines.append("")
+    rows = [[title, *(f"{factor * value:{form}}" for value in over[key])] for title, key, factor, form in _TABLE]
+    lines = [part for line in lines for part in wrapped_line(line)]
+    lines += [*text_table(rows, repeat=1, least=7, marks=["  "] * len(rows)), ""]
     unusual = remarks(params)
     if not unusual:
         return "\n".join([*lines, "  Nothing unusual."])
     lines.append("  Unusual:")
-    lines += [f"  - {what}: {why}." for what, why in unusual]
+    lines += [part for what, why in unusual for part in wrapped_line(f"  - {what}: {why}.")]
     return "\n".join(lines)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from activesteer import Recording
-from activesteer.cli import all_commands, main
-from activesteer.commands.arguments import SUCCESSORS
+from activesteer.cli import command_line, main
+from activesteer.commands.options import SUCCESSORS
 from activesteer.resources import find_vehicle
 
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.3")
@@ -227,4 +227,4 @@ def test_a_removed_command_names_its_successor(capsys):
         with pytest.raises(SystemExit, match="2"):
             main([removed])
         assert f"use `activesteer {successor}`" in capsys.readouterr().err
-        assert successor.split()[0] in all_commands().names()
+        assert successor.split()[0] in command_line().names

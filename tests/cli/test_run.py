@@ -15,8 +15,8 @@ import activesteer
 from activesteer import Recording
 from activesteer.analysis.metrics import EVALUATIONS
 from activesteer.analysis.tables import comparison
-from activesteer.commands import run as run_command
-from activesteer.commands.output import BAD, coloured, painted
+from activesteer.commands import drive as run_command
+from activesteer.commands.terminal import BAD, coloured, painted
 from activesteer.metric_table import recorded_metric
 from activesteer.resources import find_vehicle
 from activesteer.version import __version__
@@ -259,8 +259,8 @@ def test_metrics_that_are_better_than_in_the_first_run_are_green_and_worse_ones_
     none = {"sideslip_peak_abs_rad": 0.8, "cones_hit": 0.0, "yaw_rate_peak_abs_radps": 0.5}
     ars = {"sideslip_peak_abs_rad": 0.1, "cones_hit": 2.0, "yaw_rate_peak_abs_radps": 0.6}
     table = comparison({"none": none, "ars": ars}, run_command._paint)
-    assert "\x1b[32m   5.730\x1b[0m" in table
-    assert "\x1b[31m       2\x1b[0m" in table
+    assert "\x1b[32m5.730\x1b[0m" in table
+    assert "\x1b[31m2\x1b[0m" in table
     assert table.count("\x1b[0m") == 2
     run_command._print_outcomes({"none": none, "ars": ars})
     told = capsys.readouterr().out

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.commands.progress import RunCounter
+from activesteer.commands.terminal import RunCounter
 from activesteer.studies.engine.study import StudyProgress
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from activesteer.commands.video import _size
+from activesteer.commands.recordings import _size
 from tests.unit.playback.synthetic import circle
 
 

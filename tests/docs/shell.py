@@ -13,7 +13,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from activesteer.cli import all_commands, main
+from activesteer.cli import command_line, main
 from tests.docs.blocks import Command, same_output
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,7 +35,7 @@ def check(command: Command) -> None:
         if words[0] == "activesteer":
             with contextlib.redirect_stderr(io.StringIO()) as told:
                 try:
-                    all_commands().parse(words[1:])
+                    command_line().parse(words[1:])
                 except SystemExit:
                     raise AssertionError(f"{command.words}\n{told.getvalue()}") from None
         elif words[0] in {"make", "pip"}:

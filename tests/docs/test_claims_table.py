@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from activesteer.analysis.claims import STATEMENTS
+from activesteer.analysis.claims.statements import STATEMENTS
 from tools.make_claims_table import PAGE, page
 
 TEXT = PAGE.read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.cli import all_commands
+from activesteer.cli import command_line
 from activesteer.maneuver import KINDS
 from activesteer.resources import list_maneuvers
 
@@ -49,7 +49,7 @@ def test_reference_names_what_exists_and_has_a_docstring(page: Path) -> None:
     assert not [name for name in names if not pkgutil.resolve_name(name).__doc__]
 
 
-@pytest.mark.parametrize("command", all_commands().names())
+@pytest.mark.parametrize("command", command_line().names)
 def test_every_command_is_in_the_list(command: str) -> None:
     page = (DOCS / "commands.md").read_text(encoding="utf-8")
     assert re.search(rf"^\| `{command}\b", page, re.MULTILINE), f"docs/commands.md does not list {command}"

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from activesteer import ActuatorCommand, simulate
-from activesteer.analysis.claims import SCENARIOS, SYSTEMS, Claim, Fake
+from activesteer.analysis.claims.judge import SYSTEMS, Claim
+from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.controllers import load_controller
 from activesteer.metric_table import STEER_RAD
 from activesteer.recording import Recording
+from tests.fakes import Fake, rejected
 
 Runs = Mapping[str, Mapping[str, Recording]]
 IDLE = {
@@ -72,7 +74,7 @@ def cut(recording: Recording, end_s: float) -> Recording:
 
 def passed(claims: list[Claim], fake: Fake) -> list[Claim]:
     """Return the claims that should have rejected the fake."""
-    return [claim for claim in claims if claim.passed and fake in claim.statement.rejects]
+    return [claim for claim in claims if claim.passed and fake in rejected(claim.id)]
 
 
 # Judging the fakes of the step steer and the sine with dwell takes ten seconds each; the quick tests try two others.

@@ -7,9 +7,12 @@ from typing import Any
 import pytest
 
 from activesteer import simulate
-from activesteer.analysis.claims import PAPER, SCENARIO_OF, SCENARIOS, SYSTEMS, Fake, read_setting
+from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS
+from activesteer.analysis.claims.stored import PAPER, read_setting
 from activesteer.recording import Recording
 from activesteer.studies.engine.study_file import read_study
+from tests.fakes import Fake
 from tests.reproduction.test_fakes import passed, turned_round
 from tools.make_setting import AROUND, around
 

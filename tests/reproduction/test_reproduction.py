@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.analysis.claims import SCENARIOS, STATEMENTS, SYSTEMS, not_reproduced
+from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.stored import not_reproduced
 from activesteer.analysis.figures import BY_SCENARIO, OF_ANY_RUN
 from activesteer.cli import main
-from activesteer.commands.paper_figures import draw_all
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
-from activesteer.studies.reproduction import Reproduction, reproduce
+from activesteer.studies.reproduction import Reproduction, draw_figures, reproduce
 from tests.raising import raises
 
 Runs = dict[str, dict[str, Recording]]
@@ -80,7 +81,7 @@ def test_the_figures_are_drawn_from_the_files(runs: Runs, tmp_path: Path, monkey
             path.touch()
 
     monkeypatch.setattr(figure, "savefig", save)
-    names = {path.name for path in draw_all(runs, tmp_path / "figures", "compact")}
+    names = {path.name for path in draw_figures(runs, tmp_path / "figures", "compact")}
     for number in (1, 2, 7, 9, *range(11, 25)):
         assert {".png", ".svg", ".pdf"} == {
             Path(name).suffix for name in names if name.startswith(f"figure_{number:02}_")

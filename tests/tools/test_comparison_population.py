@@ -9,7 +9,7 @@ import shlex
 import pyarrow as pa
 import pytest
 
-from activesteer.commands.arguments import pairs
+from activesteer.commands.options import pairs
 from activesteer.errors import ParameterError, StudyError
 from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.studies.engine.factor_values import FactorValues, label_of

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.resources import files
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
-from activesteer.analysis.claims.claim import SYSTEMS, Claim
-from activesteer.analysis.claims.population import ClaimProportion, Population, stored_population
-from activesteer.analysis.claims.scenarios import STATEMENTS
-from activesteer.analysis.claims.setting import HUMAN, PAPER, read_setting
-from activesteer.errors import ParameterError, nearest_names
+from activesteer.analysis.claims.judge import SYSTEMS, Claim
+from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS
+from activesteer.analysis.claims.stored import (
+    HUMAN,
+    NOT_REPRODUCED,
+    PAPER,
+    ClaimProportion,
+    Population,
+    not_reproduced,
+    read_setting,
+    stored_population,
+)
 from activesteer.files import finite
 from activesteer.metric_table import recorded_metric
 from activesteer.theory.proportions import ProportionVerdict, percent
-
-FILE: Final = "not_reproduced.toml"
 
 
 class Verdict(StrEnum):
@@ -56,7 +59,7 @@ class Scorecard:
     Attributes:
         judged: All of them, in the order given.
         population: The stored population of the car; None without one.
-        setting: Setting of the runs; see `setting`.
+        setting: Setting of the runs; see `stored`.
     """
 
     judged: tuple[Judged, ...]
@@ -80,8 +83,8 @@ class Scorecard:
                     "verdict": item.verdict.value,
                     "reason": item.reason,
                     "values": finite(item.claim.values),
-                    "criterion": item.claim.criterion,
-                    "kind": item.claim.statement.kind.value,
+                    "criterion": item.claim.statement.criterion,
+                    "kind": SCENARIOS[SCENARIO_OF[item.claim.id]].kind.value,
                     "obstacle": item.claim.obstacle,
                     "population": None if item.proportion is None else item.proportion.to_json(),
                 }
@@ -107,7 +110,7 @@ class Scorecard:
             if claim.obstacle:
                 lines.append(f"{'':20}nothing is proved: {claim.obstacle}")
             if verdict is Verdict.UNEXPECTED:
-                lines.append(f"{'':20}listed in {FILE}; remove it from there")
+                lines.append(f"{'':20}listed in {NOT_REPRODUCED.name}; remove it from there")
             elif reason:
                 lines.append(f"{'':20}because: {reason}")
         counts = [f"{self._count(verdict)} {verdict.value}" for verdict in Verdict if self._count(verdict)]
@@ -156,36 +159,6 @@ def scorecard(
         for claim in claims
     )
     return Scorecard(tuple(judged), stored, setting)
-
-
-def not_reproduced(vehicle: str, text: str | None = None) -> dict[str, str]:
-    """Return the claims that are not reproduced with a vehicle.
-
-    Returns:
-        Number of the claim -> reason; empty for a vehicle that is not listed.
-    """
-    if text is None:
-        text = files("activesteer.analysis.claims").joinpath(FILE).read_text(encoding="utf-8")
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ParameterError(str(error), file=FILE) from error
-    for name, entries in table.items():
-        if not isinstance(entries, dict):
-            raise ParameterError(f"is {entries!r}; claims and reasons are needed", file=FILE, key=name, value=entries)
-        for number, reason in entries.items():
-            if number not in STATEMENTS:
-                raise ParameterError(
-                    f"no such claim; {nearest_names(number, STATEMENTS)}",
-                    file=FILE,
-                    key=f"{name}.{number}",
-                    allowed=tuple(STATEMENTS),
-                )
-            if not isinstance(reason, str) or not reason.strip():
-                raise ParameterError(
-                    f"is {reason!r}; the reason in words is needed", file=FILE, key=f"{name}.{number}", value=reason
-                )
-    return dict(table.get(vehicle, {}))
 
 
 def _verdict(claim: Claim, known: Mapping[str, str]) -> Verdict:

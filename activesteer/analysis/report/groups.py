@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.analysis.claims import PAPER, SCENARIOS, SETTINGS, setting_of
+from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.stored import PAPER, SETTINGS, setting_of
 from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording

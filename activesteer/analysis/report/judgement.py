@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from activesteer.analysis.claims import HUMAN, SYSTEMS, Scorecard, claims_for, scorecard, setting_of
+from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.analysis.claims.scorecard import Scorecard, scorecard
+from activesteer.analysis.claims.stored import HUMAN, claims_for, setting_of
 from activesteer.analysis.report.groups import Group, entry
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.analysis.claims import SYSTEMS
+from activesteer.analysis.claims.judge import SYSTEMS
 from activesteer.controllers import keys_read, load_controller
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
 from activesteer.scenario import Scenario, check_gains, describe, resolve

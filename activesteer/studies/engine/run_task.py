@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.analysis.claims import SCENARIOS
+from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.conventions import CURVE_STEP_S
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import file_word

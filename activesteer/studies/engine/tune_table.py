@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
-from activesteer.analysis.claims import SCENARIO_OF
-from activesteer.analysis.requirement import ANY, Condition, Expression, Names, Requirement, Run, Runs
+from activesteer.analysis.claims.statements import SCENARIO_OF
+from activesteer.analysis.requirement import ANY, Expression, Names, Requirement, Run, Runs, distance
 from activesteer.config import Range, build
 from activesteer.errors import nearest_names, shown
 from activesteer.metric_table import METRICS
@@ -202,5 +202,5 @@ def _bounded(margin: float) -> float:
 def _cost(margin: float) -> float:
     """Return the cost of a statement: 1 to 2 by its distance if it fails, and a little if its margin is thin."""
     if margin < 0.0:
-        return 1.0 + Condition(margin).distance
+        return 1.0 + distance(margin)
     return 0.3 * max(0.0, 1.0 - margin / _ROOM)

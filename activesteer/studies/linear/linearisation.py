@@ -40,7 +40,7 @@ from activesteer.vehicle.modes import Mode, find_modes
 
 if TYPE_CHECKING:
     import control
-
+from activesteer.text_table import text_table
 
 CUT_OFF_HZ: Final = 45.0
 """Natural frequency above which a mode is replaced by its static part [Hz].
@@ -275,8 +275,7 @@ def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> s
         value = f"{s.real:.2f}" + (f" +- {s.imag:.2f}i" if s.imag else "")
         parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in list(mode.participation.items())[:3])
         rows.append((mode.name, f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}", value, parts))
-    widths = [max(len(row[column]) for row in rows) for column in range(4)]
-    return "\n".join(
-        f"{row[0]:<{widths[0]}}  {row[1]:>{widths[1]}}  {row[2]:>{widths[2]}}  {row[3]:<{widths[3]}}  {row[4]}"
-        for row in rows
-    )
+    for place in (1, 2):  # numbers are aligned to the right
+        width = max(len(row[place]) for row in rows)
+        rows = [(*row[:place], row[place].rjust(width), *row[place + 1 :]) for row in rows]
+    return "\n".join(text_table(rows, text=5))

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from activesteer.analysis.claims import SCENARIOS, Claim
+from activesteer.analysis.claims.judge import Claim
+from activesteer.analysis.claims.statements import SCENARIOS
 from tests.unit.analysis import synthetic
 from tests.unit.analysis.synthetic import SyntheticRun, offset_track, second_order
 

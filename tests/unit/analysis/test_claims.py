@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.analysis.claims import SCENARIOS, STATEMENTS, claims_for
+from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.stored import claims_for
 from activesteer.errors import ParameterError, RecordingError
 from tests.raising import raises
 from tests.unit.analysis.good_runs import check, failing, good, runs_of

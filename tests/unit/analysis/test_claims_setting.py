@@ -7,18 +7,10 @@ from typing import Any
 
 import pytest
 
-from activesteer.analysis.claims import (
-    HUMAN,
-    PAPER,
-    SCENARIOS,
-    STATEMENTS,
-    Claim,
-    Verdict,
-    claims_for,
-    read_setting,
-    scorecard,
-    setting_of,
-)
+from activesteer.analysis.claims.judge import Claim
+from activesteer.analysis.claims.scorecard import Verdict, scorecard
+from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.stored import HUMAN, PAPER, claims_for, read_setting, setting_of
 from activesteer.errors import ParameterError
 from activesteer.scenario import resolve, value_of
 from activesteer.studies.reproduction import reproduce

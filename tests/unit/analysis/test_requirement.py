@@ -13,8 +13,7 @@ from activesteer.analysis.requirement import (
     Names,
     Requirement,
     Run,
-    at_least,
-    at_most,
+    distance,
 )
 from activesteer.config import Source
 from activesteer.errors import StudyError
@@ -22,25 +21,12 @@ from tests.raising import raises
 from tests.unit.analysis.good_runs import check, good
 
 
-def test_a_condition_is_its_inequality():
-    assert at_most(1.0, 1.0).holds
-    assert not at_most(1.0, 1.0, strict=True).holds
-    assert at_least(2.0, 1.0, strict=True).holds
-    assert not at_most(math.nan, 1.0).holds
-
-
 def test_the_distance_is_half_a_scale_away_and_one_if_undefined():
-    assert at_most(0.5, 1.0).distance == 0.0
-    assert at_most(2.0, 1.0).distance == pytest.approx(0.5)
-    assert at_least(-1.0, 0.0, 0.5).distance == pytest.approx(2.0 / 3.0)
-    assert at_most(math.nan, 1.0).distance == 1.0
-    assert 0.0 < at_most(1.0, 1.0, strict=True).distance < 1e-5
-
-
-def test_alternatives_take_the_nearest_and_all_the_furthest():
-    near, far = at_most(1.1, 1.0), at_most(3.0, 1.0)
-    assert max(near, far) == near
-    assert min(near, far) == far
+    assert distance(0.5) == 0.0
+    assert distance(-1.0) == pytest.approx(0.5)
+    assert distance(-2.0) == pytest.approx(2.0 / 3.0)
+    assert distance(math.nan) == distance(-math.inf) == 1.0
+    assert 0.0 < distance(-1e-12) < 1e-5
 
 
 def test_a_claim_is_nearer_the_smaller_its_gap_and_at_zero_if_it_passes():

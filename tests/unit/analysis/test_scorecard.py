@@ -7,15 +7,16 @@ import math
 
 import pytest
 
-from activesteer.analysis.claims import Claim, Kind, Statement, Verdict, not_reproduced, scorecard
-from activesteer.analysis.claims.population import ClaimProportion, Population
+from activesteer.analysis.claims.judge import Claim, Statement
+from activesteer.analysis.claims.scorecard import Verdict, scorecard
+from activesteer.analysis.claims.stored import ClaimProportion, Population, not_reproduced
 from activesteer.errors import ParameterError
 from activesteer.theory.proportions import percent
 from tests.raising import raises
 
 
 def claim(number: str, passed: bool, **values: float) -> Claim:
-    statement = Statement.about(Kind.SYSTEMS, number, f"text of {number}", f"criterion of {number}")
+    statement = Statement(number, f"text of {number}", f"criterion of {number}", {}, ())
     return Claim(statement, passed, values)
 
 
@@ -77,10 +78,11 @@ def test_the_list_in_the_package_can_be_read():
     assert not_reproduced("a car that nobody knows") == {}
 
 
-def test_the_list_of_the_vehicle_is_looked_up_by_its_name():
-    text = '[compact]\nD5 = "why"\n[other]\nS1 = "for another reason"'
-    assert not_reproduced("compact", text) == {"D5": "why"}
-    assert not_reproduced("other", text) == {"S1": "for another reason"}
+def test_the_list_of_the_vehicle_is_looked_up_by_its_name(tmp_path):
+    path = tmp_path / "list.toml"
+    path.write_text('[compact]\nD5 = "why"\n[other]\nS1 = "for another reason"')
+    assert not_reproduced("compact", path) == {"D5": "why"}
+    assert not_reproduced("other", path) == {"S1": "for another reason"}
 
 
 @pytest.mark.parametrize(
@@ -93,9 +95,11 @@ def test_the_list_of_the_vehicle_is_looked_up_by_its_name():
         ("[compact\n", None),
     ],
 )
-def test_a_wrong_list_is_refused(text, key):
-    with raises(ParameterError, file="not_reproduced.toml", key=key):
-        not_reproduced("compact", text)
+def test_a_wrong_list_is_refused(text, key, tmp_path):
+    path = tmp_path / "list.toml"
+    path.write_text(text)
+    with raises(ParameterError, file="list.toml", key=key):
+        not_reproduced("compact", path)
 
 
 def test_the_share_of_the_population_stands_beside_the_nominal_verdict():

@@ -1,69 +1,73 @@
-"""`activesteer run MANEUVER`: drive and record a manoeuvre, with one controller after the other."""
+"""Commands that drive: `list`, `run`, `explore`."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+import webbrowser
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.arguments import (
-    add_controller,
-    add_cutaway,
-    add_json,
-    add_output,
-    add_scenario,
+from activesteer.commands.options import (
+    CAR,
+    JSON,
+    Group,
+    controllers,
+    cutaway,
+    driver,
+    flag,
+    option,
+    output,
     scenario_of,
 )
-from activesteer.commands.output import BAD, GOOD, painted, print_json
-from activesteer.commands.progress import ProgressBar
+from activesteer.commands.terminal import BAD, GOOD, ProgressBar, painted, print_entry, print_json
 from activesteer.errors import ActiveSteerError, ParameterError, shown
 from activesteer.files import make_folder
 
 if TYPE_CHECKING:
     from activesteer.plugins import Plugin
 
+command: Final = Group("drive")
+_WIDTH: Final = 25
+"""Width of the column of names."""
 _OTHER_FILES: Final = frozenset((".mp4", ".gif", ".rrd", ".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf"))
 """Endings of files of other commands; such a name for a folder is a mistake."""
 
 
-def add_to(commands: Any) -> None:
-    """Add the command to the command line."""
-    run = commands.add_parser("run", help="drive a manoeuvre and record it")
-    add_scenario(run)
-    add_controller(run, several=True)
-    words = "a file *.mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)"
-    add_output(run, "FILE_OR_DIR", words)
-    run.add_argument("--replace", action="store_true", help="replace recordings of other settings")
-    run.add_argument("--all", action="store_true", help="print all metrics, not only the key metrics of the manoeuvre")
-    run.add_argument(
-        "--isolate", type=float, nargs="?", const=5.0, metavar="SECONDS",
-        help="run each FMU in a process of its own, in which it may crash, or hang for this time (default: 5 s)",
-    )  # fmt: skip
-    run.add_argument(
-        "--realtime", type=float, nargs="?", const=1.0, default=False, metavar="FACTOR",
-        help="pace the steps to the clock; 2 is twice as fast (default: 1)",
-    )  # fmt: skip
-    run.add_argument(
-        "--udp", metavar="[HOST:]PORT", help="take commands of another process, on this machine by default"
-    )
-    run.add_argument(
-        "--udp-timeout", type=float, default=0.1, metavar="SECONDS", help="time without a command (default: 0.1)"
-    )
-    run.add_argument(
-        "--udp-reaction", choices=("release", "hold", "stop"), default="release",
-        help="what follows: the run's own driver and controller, the last command, or the end (default: release)",
-    )  # fmt: skip
-    run.add_argument("--plot", action="store_true", help="also draw the runs: PNG and PDF")
-    run.add_argument(
-        "--watch", action="store_true",
-        help="instead, show one controller in a window of MuJoCo at the pace of --realtime, without a recording",
-    )  # fmt: skip
-    add_cutaway(run, "with --watch: ")
-    add_json(run)
-    run.set_defaults(action=_run)
+@command("list", "list manoeuvres, controllers, drivers, cars, studies, standards", JSON)
+def _list(options: argparse.Namespace) -> int:
+    from activesteer import resources
+    from activesteer.controllers import CONTROLLERS, read_variant
+    from activesteer.standards.catalogue import STANDARDS
+
+    controllers = {name: (made_from.__doc__ or "").splitlines()[0] for name, made_from in CONTROLLERS.items()}
+    controllers |= {name: read_variant(name).title for name in resources.list_controller_variants()}
+    found = {
+        "manoeuvres": _titles(resources.list_maneuvers(), resources.find_maneuver),
+        "controllers": controllers,
+        "drivers": _titles(resources.list_drivers(), resources.find_driver_file),
+        "vehicles": dict.fromkeys(resources.list_vehicles(), ""),
+        "studies": _titles(resources.list_studies(), resources.find_study),
+        "standards": {name: standard.title for name, standard in STANDARDS.items()},
+    }
+    if options.json:
+        print_json(found)
+        return 0
+    found["controllers"]["my_file.py:MyController"] = "your own: step(self, command, measurement)"
+    found["drivers"]["my_file.py:MyDriver"] = "your own: step(self, setpoint, measurement, motion)"
+    for kind, titles in found.items():
+        print(f"{kind}:")
+        for name, title in titles.items():
+            print_entry(f"  {name:{_WIDTH}} ", title, _WIDTH + 3)
+    return 0
+
+
+def _titles(names: Iterable[str], find: Callable[[str], Path]) -> dict[str, str]:
+    from activesteer.config import read_toml
+
+    return {name: read_toml(find(name))[0].get("title", "") for name in names}
 
 
 class _Failures(dict[str, str]):
@@ -81,6 +85,31 @@ class _Failures(dict[str, str]):
             print("\n".join([f"activesteer: {label}: {error}", *getattr(error, "__notes__", [])]), file=sys.stderr)
 
 
+@command("run", "drive a manoeuvre and record it",
+    option("maneuver", "MANEUVER",
+        "a name from `activesteer list`, a TOML file, or a recording, whose inputs are driven again"),
+    CAR, driver(),
+    option("--fault", "PART:KIND[=SIZE]@START[-END]",
+        "let an actuator or a sensor fail, such as rear:stuck@2.0 or yaw_rate_sensor:offset=2degps@1-3; replaces the "
+        "faults of the manoeuvre", many=True, dest="faults"),
+    controllers(),
+    output("FILE_OR_DIR", "a file *.mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)"),
+    flag("--replace", "replace recordings of other settings"),
+    flag("--all", "print all metrics, not only the key metrics of the manoeuvre"),
+    option("--isolate", "SECONDS",
+        "run each FMU in a process of its own, in which it may crash, or hang for this time (default: 5 s)",
+        type=float, nargs="?", const=5.0),
+    option("--realtime", "FACTOR", "pace the steps to the clock; 2 is twice as fast (default: 1)", type=float,
+        nargs="?", const=1.0),
+    option("--udp", "[HOST:]PORT", "take commands of another process, on this machine by default"),
+    option("--udp-timeout", "SECONDS", "time without a command", 0.1),
+    option("--udp-reaction", ("release", "hold", "stop"),
+        "what follows: the run's own driver and controller, the last command, or the end", "release"),
+    flag("--plot", "also draw the runs: PNG and PDF"),
+    flag("--watch",
+        "instead, show one controller in a window of MuJoCo at the pace of --realtime, without a recording"),
+    cutaway("with --watch: "), JSON,
+)  # fmt: skip
 def _run(options: argparse.Namespace) -> int:
     from activesteer.controllers import find_controller
     from activesteer.conventions import DEFAULT_TIMESTEP_S
@@ -106,7 +135,7 @@ def _run(options: argparse.Namespace) -> int:
     scenario = prepared(scenario)
     if not options.replace:
         for controller, path in driving:
-            _check_settings(path, _settings(scenario, controller))
+            _check_settings(path, scenario, controller)
     recordings = {}
     for controller, path in driving:
         if (label := controller.label) not in failures:
@@ -145,8 +174,7 @@ def _watch(options: argparse.Namespace) -> int:
     scenario = scenario_of(options)
     check_gains(scenario.overrides, [controller])
 
-    from activesteer.commands.window import watch
-    from activesteer.simulation.live_view import check_display
+    from activesteer.simulation.live_view import check_display, watch
 
     check_display()
     watch(prepared(scenario), controller, pace, cutaway=options.cutaway)
@@ -164,7 +192,7 @@ def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Nam
         link = UdpLink(UdpPort.read(options.udp, options.udp_timeout, options.udp_reaction))
     with ProgressBar(name, quiet=quiet) as progress:
         recording = run_scenario(
-            scenario, controller, path=path, progress=progress, realtime=options.realtime, link=link
+            scenario, controller, path=path, progress=progress, realtime=options.realtime or False, link=link
         )  # fmt: skip
     if not quiet:
         for words in _clock_words(recording.metadata):
@@ -241,24 +269,18 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
     return paths
 
 
-def _settings(scenario: Any, controller: Plugin) -> dict[str, Any]:
-    """Return the settings of a run as its recording holds them."""
-    from activesteer.scenario import describe
-
-    values = controller.parameters_with(scenario.own)
-    return describe(scenario) | {"controller": controller.name, "controller_parameters": values}
-
-
-def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
+def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
     """Refuse to replace a recording of other settings."""
     from activesteer.errors import RecordingError
     from activesteer.recording import Recording
+    from activesteer.scenario import describe
 
     try:
         before = _flat(Recording.open(path, recover=True).metadata)
     except RecordingError:  # there is no recording
         return
-    now = _flat({key: value for key, value in settings.items() if key != "overrides"})
+    own = {"controller": controller.name, "controller_parameters": controller.parameters_with(scenario.own)}
+    now = _flat({key: value for key, value in (describe(scenario) | own).items() if key != "overrides"})
     other = sorted(key for key, value in now.items() if before.get(key, value) != value)
     if other:
         some = ", ".join(f"{key} {shown(before[key])}" for key in other[:3]) + (" ..." if len(other) > 3 else "")
@@ -281,7 +303,7 @@ def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
     """Draw all runs in one figure, and for a step steer the car without control beside its linear models."""
     from activesteer.analysis.figures import figure_2, figure_for
-    from activesteer.commands.paper_figures import models_beside
+    from activesteer.studies.reproduction import models_beside
 
     name, kind = scenario.maneuver.name, scenario.maneuver.kind
     figures = [figure_for(kind)(recordings, folder / f"{name}{ending}") for ending in (".png", ".pdf")]
@@ -290,3 +312,37 @@ def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Pa
         models = models_beside(run)
         figures += [figure_2(run, folder / f"{name}-models{ending}", models) for ending in (".png", ".pdf")]
     return figures
+
+
+@command("explore", "change a run by sliders, or drive the car by hand, in a local page",
+    option("--port", "N", "port on 127.0.0.1 (default: a free one)", type=int),
+    flag("--no-browser", "print the address and open no browser"),
+    output("DIR", "folder of your own controllers and manoeuvres, and of saved recordings", "."),
+    JSON,
+    description="Open a page in the browser that only this computer can reach; Ctrl-C ends it.",
+)  # fmt: skip
+def _explore(options: argparse.Namespace) -> int:
+    port = options.port or 0
+    if not 0 <= port <= 65535:
+        raise ParameterError(f"--port: is {port}, must be 0 to 65535")
+    if not Path(options.output).is_dir():
+        raise ParameterError(f"-o: {options.output} is no folder; the page reads and writes files there")
+    try:
+        from activesteer.explore.server import ExploreServer
+    except ModuleNotFoundError as error:
+        raise ParameterError(
+            f"explore needs {error.name}, which is not installed: pip install 'activesteer[explore]'"
+        ) from error
+    server = ExploreServer(Path(options.output), port)
+
+    def listening() -> None:
+        if options.json:
+            print_json({"url": server.url, "port": server.port}, one_line=True)
+        else:
+            print(server.url, flush=True)
+            print("Ctrl-C ends the page", file=sys.stderr)
+        if not (options.no_browser or options.json):
+            webbrowser.open(server.url)
+
+    server.serve(listening)
+    return 0

@@ -1,4 +1,4 @@
-"""Output of commands: JSON, tables, colours, wrapped text and log messages."""
+"""Output of commands on the terminal: JSON, tables, colours, wrapped text, progress and log messages."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ import os
 import re
 import sys
 import textwrap
+import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import Any, Final, TextIO
+from typing import TYPE_CHECKING, Any, Final, TextIO
 
 from activesteer.files import json_text
+from activesteer.text_table import COLUMNS, WHOLE, text_table, wrapped_line
+
+if TYPE_CHECKING:
+    from activesteer.studies.engine.study import StudyProgress
 
 GOOD: Final = 32
 BAD: Final = 31
@@ -23,27 +28,17 @@ _COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": KNOWN}
 """Verdict -> colour."""
 _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
-_COLUMNS: Final = 80
-_WHOLE: Final[dict[str, Any]] = {"break_on_hyphens": False, "break_long_words": False, "replace_whitespace": False}
-"""Arguments of `textwrap` that keep words and columns as they are."""
-
 
 def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
     """Print a table of rows, a column for each key with its head; numbers have three digits."""
-    texts = {key: [row[key] for row in rows if isinstance(row[key], str)] for key in columns}
-    widths = {key: max(10, len(head), *map(len, texts[key])) for key, head in columns.items()}
-    print(" ".join(f"{head:>{widths[key]}}" for key, head in columns.items()))
-    for row in rows:
-        cells = ((row[key], width) for key, width in widths.items())
-        print(" ".join(f"{cell:>{w}}" if isinstance(cell, str) else f"{cell:{w}.3g}" for cell, w in cells))
+    cells = [[row[key] if isinstance(row[key], str) else f"{row[key]:.3g}" for key in columns] for row in rows]
+    print("\n".join(text_table([list(columns.values()), *cells], text=0, repeat=2, least=10, gap=1)))
 
 
 def wrapped(text: str) -> Iterator[str]:
     """Yield lines of 80 columns; the continuation of a longer line is indented four columns further than the line."""
     for line in text.splitlines():
-        indent = " " * (len(line) - len(line.lstrip()) + 4)
-        parts = textwrap.wrap(line, _COLUMNS, subsequent_indent=indent, **_WHOLE) if len(line) > _COLUMNS else [line]
-        yield coloured("\n".join(parts))
+        yield coloured("\n".join(wrapped_line(line)))
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:
@@ -59,7 +54,8 @@ def tell(options: argparse.Namespace, values: Any, lines: Iterable[str], figures
         print_json(values if figures is None else values | {"figures": [str(path) for path in figures]})
         return
     for line in lines:
-        print(line)
+        command = line.lstrip().startswith("activesteer ")  # to be copied
+        print("\n".join([line] if command else [part for one in line.split("\n") for part in wrapped_line(one)]))
     tell_files(options, figures or ())
 
 
@@ -132,7 +128,7 @@ def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = No
     The text may come from any file: control characters are printed as escape sequences.
     """
     plain = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
-    lines = textwrap.wrap(plain, _COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **_WHOLE)
+    lines = textwrap.wrap(plain, COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **WHOLE)
     print("\n".join(lines) or head.rstrip(), file=file)
 
 
@@ -148,3 +144,68 @@ def log_to_terminal() -> Iterator[None]:
         yield
     finally:
         logger.removeHandler(handler)
+
+
+_CELLS: Final = 30
+_LINE_EVERY_S: Final = 10.0
+"""Time between two lines of a log [s]."""
+
+
+class ProgressBar:
+    """Bar that shows which fraction of the work is done."""
+
+    def __init__(self, label: str, *, quiet: bool) -> None:
+        self._label = label
+        self._shown = not quiet and sys.stderr.isatty()
+        self._width = 0
+
+    def __enter__(self) -> ProgressBar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown:
+            print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)
+
+    def __call__(self, fraction: float, note: str = "") -> None:
+        """Show a fraction, 0 to 1, and a note."""
+        if self._shown:
+            filled = round(_CELLS * fraction)
+            line = f"{self._label} [{'#' * filled}{' ' * (_CELLS - filled)}] {fraction:4.0%} {note}"
+            print("\r" + line.ljust(self._width), end="", file=sys.stderr, flush=True)
+            self._width = max(self._width, len(line))
+
+
+class RunCounter:
+    """Progress of many runs: number, rate and remaining time.
+
+    A terminal gets a bar; a log, as of a batch job, gets a line every ten seconds.
+    """
+
+    def __init__(self, label: str, *, quiet: bool) -> None:
+        self._bar = ProgressBar(label, quiet=quiet)
+        self._as_lines = not quiet and not sys.stderr.isatty()
+        self._begun_s = self._said_s = time.monotonic()
+
+    def __enter__(self) -> RunCounter:
+        self._begun_s = self._said_s = time.monotonic()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.__exit__()
+
+    def __call__(self, counted: StudyProgress) -> None:
+        """Show the progress."""
+        now_s = time.monotonic()
+        words = _words(counted, now_s - self._begun_s)
+        self._bar(counted.done / counted.total, words)
+        if self._as_lines and (now_s - self._said_s >= _LINE_EVERY_S or counted.done == counted.total):
+            print(words, file=sys.stderr, flush=True)
+            self._said_s = now_s
+
+
+def _words(counted: StudyProgress, elapsed_s: float) -> str:
+    rate = counted.here / max(elapsed_s, 1e-6)
+    left_s = round((counted.total - counted.done) / rate) if rate > 0.0 else 0
+    clock = f"{left_s // 3600}:{left_s // 60 % 60:02}:{left_s % 60:02}"
+    failed = f", {counted.failed} failed" if counted.failed else ""
+    return f"{counted.done}/{counted.total} runs, {rate:.3g} runs/s, {clock} left{failed}"

@@ -1,0 +1,207 @@
+"""Commands on the car: `vehicle`, `tyre`, `kc`, `export`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Final
+
+from activesteer.commands.options import (
+    CAR,
+    JSON,
+    OVERRIDES,
+    VEHICLE_WORDS,
+    Group,
+    figures,
+    flag,
+    option,
+    output,
+    overrides_of,
+)
+from activesteer.commands.terminal import print_json, tell, tell_files
+from activesteer.errors import ParameterError, TyreFileError, nearest_names
+
+command: Final = Group("car")
+vehicle: Final = command.with_actions("vehicle", "make a car from a table of hardpoints, or check a car")
+
+
+@vehicle("new", "make a car from a table of hardpoints, masses, springs and bushings",
+    option("name", "NAME", "name of the car"),
+    option("--table", "FILE", ".toml or .csv; see docs/own_car.md (default with --kc: its car.toml)", type=Path),
+    option("--kc", "DIR", "measurements of a K&C rig, for axles of kind curves", type=Path),
+    output("DIR", "folder for the files (default: vehicles/NAME)"),
+    option("--front", "KIND", "mcpherson, double_wishbone, curves (default: that of the table)"),
+    option("--rear", "KIND", "five_link, multilink, double_wishbone, curves (default: that of the table)"),
+    flag("--overwrite", "replace an earlier car in that folder"),
+    JSON,
+)  # fmt: skip
+def _new(options: argparse.Namespace) -> int:
+    from activesteer.vehicle_builder import new_vehicle
+
+    made = new_vehicle(
+        options.name,
+        options.table,
+        options.output,
+        options.front,
+        options.rear,
+        kc=options.kc,
+        overwrite=options.overwrite,
+    )
+    if options.json:
+        print_json({
+            "folder": str(made.folder),
+            "vehicle_file": str(made.vehicle_file),
+            "questions": list(made.questions),
+            "assumptions": [
+                {"key": item.key, "value": item.value, "rule": item.rule} for item in made.assumptions
+            ],
+        })  # fmt: skip
+        return 0
+    print(f"vehicle: {made.vehicle_file}")
+    found = made.trimmed
+    for axle in ("front", "rear"):
+        part = found.axle(axle)
+        print(f"  {axle} springs {1e-3 * part.spring_rate_Npm:.1f} N/mm, {part.spring_force_N:.0f} N as it stands")
+    print(f"  steering ratio {found.ratio:.2f}, chassis {found.chassis.mass_kg:.0f} kg")
+    print(f"  {len(made.assumptions)} missing values were assumed by rules: {made.folder / 'README.md'}")
+    for line in made.questions:
+        print(f"  unusual: {line}")
+    print(f"next: activesteer vehicle check {made.vehicle_file}")
+    return 0
+
+
+@vehicle("table", "print a table of the package, as a start",
+    option("table", "NAME", "name of a table (default: print all names)", nargs="?"),
+)  # fmt: skip
+def _table(options: argparse.Namespace) -> int:
+    from activesteer.errors import ParameterError, nearest_names
+    from activesteer.resources import models_dir
+
+    files = {file.stem: file for file in sorted((models_dir() / "tables").iterdir())}
+    if options.table is None:
+        print("\n".join(file.name for file in files.values()))
+        return 0
+    file = files.get(options.table.removesuffix(".toml").removesuffix(".csv"))
+    if file is None:
+        raise ParameterError(
+            f"no table is named {options.table!r}; {nearest_names(options.table, files)}", value=options.table
+        )
+    print(file.read_text(encoding="utf-8"), end="")
+    return 0
+
+
+@vehicle("check", "list missing and implausible values of a car; exit status 1 on errors",
+    option("vehicle", "NAME_OR_PATH", "name, vehicle file, or its folder"),
+    JSON,
+)  # fmt: skip
+def _check(options: argparse.Namespace) -> int:
+    from activesteer.commands.terminal import tell
+    from activesteer.vehicle_builder import check_vehicle
+
+    report = check_vehicle(options.vehicle)
+    tell(options, report.as_table(), [report.table()])
+    return 1 if report.count("error") else 0
+
+
+@vehicle("keyframe", "write the standing position of an edited car",
+    option("vehicle", "PATH", "vehicle file or its folder"),
+)  # fmt: skip
+def _keyframe(options: argparse.Namespace) -> int:
+    from activesteer.errors import ParameterError
+    from activesteer.files import write_text
+    from activesteer.vehicle_builder.keyframe import keyframe_xml
+
+    text, path = keyframe_xml(options.vehicle)
+    print(write_text(path, text, ParameterError))
+    return 0
+
+
+@command("tyre", "describe a tyre file, list unusual values, draw curves",
+    option("file", "FILE.tir", "a path, or a name in models/tyres"),
+    figures(), JSON,
+)  # fmt: skip
+def _tyre(options: argparse.Namespace) -> int:
+    from activesteer.tyre import load_tir
+    from activesteer.tyre.report import describe, key_figures
+
+    params = load_tir(_find(options.file))
+    tell(options, key_figures(params), [describe(params)])
+    if options.output is not None:
+        from activesteer.tyre.figures import draw
+
+        tell_files(options, draw(params, options.output))
+    return 0
+
+
+def _find(name: str) -> Path:
+    from activesteer.resources import models_dir
+
+    folder = models_dir() / "tyres"
+    for candidate in (Path(name), folder / name, folder / f"{name}.tir"):
+        if candidate.is_file():
+            return candidate
+    names = [path.name for path in folder.glob("*.tir")]
+    raise TyreFileError(
+        f"there is no tyre file {name}, neither as a path nor in models/tyres; {nearest_names(name, names)}", value=name
+    )
+
+
+@command("kc", "measure kinematics and compliance of the suspensions",
+    CAR, figures(),
+    option("--tables", "DIR", "write all curves as CSV and the table of the car, as input of vehicle new --kc",
+        type=Path),
+    JSON,
+)  # fmt: skip
+def _kc(options: argparse.Namespace) -> int:
+    from activesteer.rigs import kinematics_compliance
+
+    result = kinematics_compliance(options.vehicle, overrides_of(options))
+    tell(options, result.to_json(), [result.table()])
+    if options.tables is not None:
+        from activesteer.errors import ParameterError
+        from activesteer.files import write_text
+        from activesteer.rigs.kc.tables import write_tables
+        from activesteer.scenario import load_car
+        from activesteer.vehicle_builder.car_table import car_table
+
+        written = write_tables(result, options.tables)
+        text = car_table(load_car(options.vehicle, overrides_of(options)), result)
+        written.append(write_text(options.tables / "car.toml", text, ParameterError))
+        if not options.json:
+            print(f"tables: {len(written)} files in {options.tables}")
+    if options.output is not None:
+        from activesteer.rigs.kc import draw
+
+        tell_files(options, draw(result, options.output))
+    return 0
+
+
+@command("export", "write the car as an FMU or a C library, without Python",
+    option("vehicle", "VEHICLE", VEHICLE_WORDS),
+    OVERRIDES,
+    option("--maneuver", "MANEUVER", "manoeuvre that gives road and speed at the start", "straight_line"),
+    option("--fmi", (2, 3), "version of FMI", 2),
+    flag("--header", "write a shared library with a C header instead"),
+    output("FILE.fmu", "the FMU (default: VEHICLE.fmu), or with --header the folder (default: VEHICLE)"),
+    JSON,
+)  # fmt: skip
+def _export(options: argparse.Namespace) -> int:
+    from activesteer.coupling.car import export_fmu, export_library
+    from activesteer.files import make_folder
+    from activesteer.scenario import resolve
+
+    scenario = resolve(options.maneuver, options.vehicle, overrides_of(options))
+    name = scenario.car.name
+    output = options.output or Path(name if options.header else f"{name}.fmu")
+    if options.header:
+        export = export_library(scenario, make_folder(output, ParameterError))
+    else:
+        if output.suffix != ".fmu" or output.is_dir():
+            raise ParameterError(f"-o {output}: an FMU ends in .fmu; --header writes a folder", value=output)
+        export = export_fmu(scenario, output, options.fmi)
+    size = sum(file.stat().st_size for file in output.iterdir()) if options.header else output.stat().st_size
+    count = {cause: sum(v.causality == cause for v in export.variables) for cause in ("input", "output", "parameter")}
+    about = {"file": str(output), "bytes": size, "token": export.token, "timestep_s": export.timestep_s, **count}
+    words = ", ".join(f"{number} {cause}s" for cause, number in count.items())
+    tell(options, about, [f"{output}: {size / 1e6:.1f} MB, {words}; steps of {1e3 * export.timestep_s:g} ms"])
+    return 0

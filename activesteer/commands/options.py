@@ -1,0 +1,289 @@
+"""Declaration of commands and of the options that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from activesteer.errors import MAX_SHOWN, ParameterError, nearest_names
+from activesteer.resources import DEFAULT_DRIVER
+
+if TYPE_CHECKING:
+    from activesteer.scenario import Scenario
+
+Action = Callable[[argparse.Namespace], int]
+_NAME_WIDTH: Final = 12
+SUCCESSORS: Final = {
+    "recover": "info FILE.mcap --recover OUT.mcap",
+    "figures": "reproduce --figures",
+    "watch": "run MANEUVER --watch",
+    "driver": "linearise --loop driver",
+    "margins": "linearise --loop controller",
+    "validate": "compare FOLDER` or `activesteer fit FOLDER",
+    "envelope": "study envelope -o DIR",
+    "fault-map": "study fault_map -o DIR` or `activesteer test r79-circle",
+    "match": "tune STUDY",
+    "falsify": "tune STUDY -c CONTROLLER",
+    "reproduce --population": "study population -o DIR` or `activesteer study comparison -o DIR",
+    **dict.fromkeys(
+        ("reproduce -c", "reproduce --controller", "reproduce --controllers"), "study side_by_side -o DIR -c CONTROLLER"
+    ),
+}
+"""Removed command, or command and option -> what does its work now."""
+
+
+class Option(NamedTuple):
+    """An argument of a command, as `argparse` takes it."""
+
+    names: Sequence[str]
+    words: Mapping[str, Any]
+
+
+class OneOf(NamedTuple):
+    """Options of which at most one may be given."""
+
+    options: Sequence[Option]
+
+
+Part = Option | OneOf | Sequence[Option]
+
+
+class Group:
+    """Commands that `--help` lists together; call it with a declaration to decorate the function of a command."""
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self.commands: list[tuple[str, str, str, Sequence[Part], Action | Group]] = []
+
+    def __call__(self, name: str, help: str, *parts: Part, description: str = "") -> Callable[[Action], Action]:
+        """Declare a command.
+
+        Args:
+            name: Name of the command.
+            help: One line for the list of commands.
+            parts: Its arguments.
+            description: First lines of the command's own help; `help` by default.
+        """
+
+        def declare(action: Action) -> Action:
+            self.commands.append((name, help, description or f"{help[0].upper()}{help[1:]}.", parts, action))
+            return action
+
+        return declare
+
+    def with_actions(self, name: str, help: str) -> Group:
+        """Declare a command of several actions, which are declared with the returned group."""
+        actions = Group(name)
+        self.commands.append((name, help, f"{help[0].upper()}{help[1:]}.", (), actions))
+        return actions
+
+    def add_to(self, parsers: Any, *, listed: bool = False) -> None:
+        """Add the commands to the parsers of `argparse`, which lists them if they are actions of a command."""
+        for name, help, description, parts, action in self.commands:
+            parser = parsers.add_parser(name, description=description, **({"help": help} if listed else {}))
+            for part in parts:
+                group = parser.add_mutually_exclusive_group() if isinstance(part, OneOf) else parser
+                options = part.options if isinstance(part, OneOf) else (part,) if isinstance(part, Option) else part
+                for option in options:
+                    group.add_argument(*option.names, **option.words)
+            parser.set_defaults(parser=parser)
+            if isinstance(action, Group):
+                action.add_to(parser.add_subparsers(required=True, metavar="ACTION"), listed=True)
+            else:
+                parser.set_defaults(action=action)
+
+
+class CommandLine:
+    """All commands of the program, listed by `--help` in groups.
+
+    Attributes:
+        names: Names of the commands.
+    """
+
+    def __init__(self, version: str, groups: Sequence[Group]) -> None:
+        self._parser = argparse.ArgumentParser(
+            prog="activesteer",
+            usage="activesteer [-h] [--version] COMMAND ...",
+            description="A multibody car with active steering, in MuJoCo.",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        self._parser.add_argument("--version", action="version", version=version)
+        added = self._parser.add_subparsers(
+            required=True, metavar="COMMAND", help=argparse.SUPPRESS, prog="activesteer"
+        )
+        lines: list[str] = []
+        for group in groups:
+            group.add_to(added)
+            lines += [f"{group.title}:", *(f"  {name:{_NAME_WIDTH}}{help}" for name, help, *_ in group.commands), ""]
+        self._parser.epilog = "\n".join([*lines, "`activesteer COMMAND --help` describes a command."])
+        self.names = [name for group in groups for name, *_ in group.commands]
+
+    def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
+        """Parse a command line; end the program with a correction if the command line is wrong.
+
+        Args:
+            arguments: Words after the name of the program; those of the process by default.
+        """
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        command = next((word for word in words if not word.startswith("-")), None)
+        if command in SUCCESSORS:
+            self._parser.error(f"there is no command {command!r} any more; use `activesteer {SUCCESSORS[command]}`")
+        if command is not None and command not in self.names:
+            self._parser.error(f"there is no command {command!r}; {nearest_names(command, self.names)}")
+        options, unknown = self._parser.parse_known_args(words)
+        if unknown:
+            parser: argparse.ArgumentParser = options.parser
+            parser.error(f"unrecognized arguments: {' '.join(unknown)}; {_hint(parser, words, unknown[0])}")
+        return options
+
+
+def _hint(parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -> str:
+    """Return the correction of an unknown argument."""
+    known = list(parser._option_string_actions)
+    option = unknown.partition("=")[0]
+    if successor := SUCCESSORS.get(f"{parser.prog.split()[-1]} {option}"):
+        return f"use `activesteer {successor}`"
+    if option in known:
+        return f"put {option} after the command: activesteer {next(w for w in words if w[0] != '-')} {option}"
+    if close := difflib.get_close_matches(option, known, 1, 0.7):
+        return f"did you mean {close[0]}?"
+    if "=" in unknown and "--set" in known:
+        return f"--set {unknown} replaces a parameter"
+    if "--set" in words and not unknown.startswith("-"):
+        return "write --set KEY=VALUE without blanks around '='"
+    return f"`{parser.prog} --help` lists the arguments"
+
+
+def option(names: str, metavar: str | tuple[Any, ...], help: str, default: Any = None, **words: Any) -> Option:
+    """Declare an argument with a value; its help ends with the default if there is one.
+
+    Args:
+        names: Names such as `-o --output`, or the name of an argument without dashes.
+        metavar: Name of its value, or all allowed values.
+        help: Help text.
+        default: Default value, whose type is the type of the values. A default in words belongs into the help text.
+        words: Further keywords of `argparse`. `many` allows the option several times.
+    """
+    if words.pop("many", False):
+        words["action"] = "append"
+    words["metavar" if isinstance(metavar, str) else "choices"] = metavar
+    if default is not None:
+        words |= {"default": default, "type": words.get("type", type(default))}
+        help += f" (default: {default:g})" if isinstance(default, float) else f" (default: {default})"
+    return Option(names.split(), words | {"help": help})
+
+
+def flag(name: str, help: str) -> Option:
+    """Declare an option without a value."""
+    return Option((name,), {"action": "store_true", "help": help})
+
+
+JSON: Final = flag("--json", "print JSON and nothing else")
+VEHICLE_WORDS: Final = "a name from `activesteer list`, a vehicle file or its folder"
+VEHICLE: Final = option("--vehicle", "NAME_OR_PATH", VEHICLE_WORDS, "compact")
+OVERRIDES: Final = (
+    option("--set", "KEY=VALUE", "replace a parameter, such as road.mu=0.4 or controllers.ars.limit_deg=2",
+           many=True, dest="overrides"),
+    option("--overrides", "FILE.toml", 'replace the parameters listed in a file, a line such as "road.mu" = 0.4 each',
+           many=True, dest="override_files", type=Path),
+)  # fmt: skip
+"""Options of `overrides_of`."""
+CAR: Final = (VEHICLE, *OVERRIDES)
+JOBS: Final = option("--jobs", "N", "number of processes (default: one per processor)", type=int)
+WORKERS: Final = (
+    JOBS,
+    option("--scheduler", "ADDRESS",
+           "work on a Dask cluster instead: tcp://host:8786, or the file of `dask scheduler --scheduler-file`"),
+)  # fmt: skip
+_RECORDING: Final = "a recording of `activesteer run` or `reproduce`"
+RECORDING: Final = option("file", "FILE.mcap", _RECORDING, type=Path)
+RECORDINGS: Final = option("files", "FILE.mcap", f"{_RECORDING}; several are compared", nargs="+", type=Path)
+
+
+def driver(default: str = "") -> Option:
+    """Return `--driver`; with a default in words, `options.driver` is None without the option."""
+    words = "novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu"
+    if default:
+        return option("--driver", "DRIVER", f"{words} (default: {default})")
+    return option("--driver", "DRIVER", words, DEFAULT_DRIVER)
+
+
+def controllers(default: str = "none") -> Option:
+    """Return `-c`; `options.controller` is a list, or None for the default, which is given in words."""
+    words = (
+        "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
+    )
+    return option("-c --controller", "CONTROLLER", f"{words}; may be repeated (default: {default})", many=True)
+
+
+def output(metavar: str, help: str, default: str | None = None) -> Option:
+    """Return `-o`; the help says what is written there, and what happens without the option if it has no default."""
+    return option("-o --output", metavar, help, None if default is None else Path(default), type=Path)
+
+
+def cutaway(when: str = "") -> Option:
+    """Return `--cutaway`; `when` says with which option it has an effect."""
+    return flag("--cutaway", f"{when}show the suspension through the body")
+
+
+def figures() -> Option:
+    """Return `-o` of a command that draws figures only with this option."""
+    return output("DIR", "folder for figures (default: no figures)")
+
+
+def numbers(text: str) -> list[float]:
+    """Return the numbers of an option, which are separated by commas."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no list of numbers such as 60,100") from None
+
+
+def scenario_of(options: argparse.Namespace) -> Scenario:
+    """Return the scenario that the arguments describe."""
+    from activesteer.scenario import resolve
+
+    faults = {"fault": " ".join(options.faults)} if options.faults else {}
+    overrides = overrides_of(options, faults)
+    given = getattr(options, "controller", None) or ()
+    controllers = [given] if isinstance(given, str) else given
+    return resolve(options.maneuver, options.vehicle, overrides, options.driver, controllers)
+
+
+def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return the parameters that `--overrides` and `--set` replace."""
+    from activesteer.config import read_toml
+
+    values = dict(given or {})
+    for path in options.override_files or ():
+        table, source = read_toml(path)
+        if not table:
+            raise source.fail((), 'replaces nothing; write lines such as "road.mu" = 0.4')
+        for key in table:
+            if key in values:
+                raise source.fail((key,), "is given twice; leave one out")
+        values |= table
+    return pairs(options.overrides or (), "--set", "road.mu=0.4", values)
+
+
+def pairs(texts: Sequence[str], option: str, example: str, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return the keys and values of a repeated option `key=value`, beside those that are given already.
+
+    A value is written as in TOML; any other value is a text.
+    """
+    from activesteer.config import parse_value
+
+    values = dict(given or {})
+    for text in texts:
+        key, sign, value = (part.strip() for part in text.partition("="))
+        if not sign or not key:
+            shortened = text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
+            raise ParameterError(f"{option} {shortened}: KEY=VALUE is needed, as in {option} {example}", value=text)
+        if key in values:
+            raise ParameterError("is given twice; leave one out", key=key, value=value, overridden=True)
+        values[key] = parse_value(value)
+    return values

@@ -1,0 +1,365 @@
+"""Commands on recordings: `info`, `report`, `compare`, `replay`, `video`, `import`."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import re
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from activesteer.commands.options import (
+    JSON,
+    RECORDING,
+    RECORDINGS,
+    VEHICLE,
+    WORKERS,
+    Group,
+    cutaway,
+    flag,
+    option,
+    output,
+)
+from activesteer.commands.terminal import BAD, GOOD, ProgressBar, painted, print_entry, print_json, print_notes
+from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
+from activesteer.files import replacing, shown_path
+from activesteer.text_table import text_table
+
+if TYPE_CHECKING:
+    from activesteer.recording import Recording
+
+command: Final = Group("recordings")
+_CORNERS: Final = ("fl", "fr", "rl", "rr")
+"""As in `activesteer.conventions`, which takes too long to import for `--help`."""
+
+
+@command("info", "print the contents of a recording, or repair it",
+    RECORDING,
+    option("--recover", "OUT.mcap",
+        "instead, write the readable part of a damaged or cut recording to a new file, which stays marked as "
+        "incomplete", type=Path),
+    JSON,
+)  # fmt: skip
+def _info(options: argparse.Namespace) -> int:
+    from activesteer.analysis.loss_of_control import kept, losses
+    from activesteer.analysis.tables import comparison
+    from activesteer.recording import Recording
+    from activesteer.recording.events import events_of
+
+    recording = Recording.open(options.file, recover=True)
+    if options.recover is not None:
+        return _recover(recording, options)
+    metadata = recording.metadata
+    time_s = recording.time_s
+    if options.json:
+        channels = {each.name: {"unit": each.unit, "meaning": each.meaning} for each in recording.channels}
+        span = {"from_s": float(time_s[0]), "to_s": float(time_s[-1])} if len(time_s) else {}
+        print_json(
+            {"steps": len(time_s), **span, "metadata": metadata, "metrics": recording.metrics, "channels": channels}
+        )
+        return 0
+    span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
+    print(f"{shown_path(options.file)}: {span}")
+    for key in ("maneuver", "vehicle"):
+        table = metadata.get(key, {})
+        print_entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}")
+    uses_truth = ", which uses the truth" if metadata.get("controller_uses_truth") else ""
+    print_entry("controller: ", f"{metadata.get('controller', '?')}{uses_truth}")
+    sensors = metadata.get("vehicle", {}).get("sensors", {})
+    if "seed" in sensors or sensors.get("preset", "ideal") != "ideal":
+        print_entry("sensors: ", f"{sensors.get('preset', '?')}, seed {sensors.get('seed', 'none')}")
+    print_entry("driver: ", _driver(metadata.get("driver", "?")))
+    for key in ("overrides", "versions"):
+        if metadata.get(key):
+            print_entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
+    for event in events_of(metadata):
+        print_entry(f"at {event.time_s:.3f} s: ", f"{event.kind} {event.what}")
+    if not metadata.get("complete", True):
+        print_entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly")))
+    if result := [*losses(recording.metrics), *kept(recording.metrics)]:
+        print_entry("result: ", ", ".join(result))
+    if recording.metrics:
+        print(comparison({"metrics": recording.metrics}))
+    print("channels:")
+    width = max((len(channel.name) for channel in recording.channels), default=0)
+    for channel in recording.channels:
+        head = f"  {channel.name:{width}} {channel.unit or '-':6} "
+        print_entry(head, channel.meaning, len(head))
+    print_entry("attachments: ", ", ".join(recording.attachments))
+    return 0
+
+
+def _recover(recording: Recording, options: argparse.Namespace) -> int:
+    if options.json:
+        raise ParameterError("has no effect with --recover", key="--json")
+    if options.recover.exists() and options.recover.samefile(options.file):
+        raise ParameterError(f"--recover {options.recover} is the input file; choose another name")
+    recording.save(options.recover)
+    span = f"{len(recording)} steps up to {recording.time_s[-1]:.3f} s" if len(recording) else "no steps"
+    print(f"{options.recover}: {span}")
+    return 0
+
+
+def _driver(recorded: Any) -> str:
+    """Name and parameters of the driver; recordings of earlier versions hold the name only."""
+    if not isinstance(recorded, dict):
+        return str(recorded)
+    numbers = recorded.get("parameters", recorded)
+    words = (
+        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {shown(value)}"
+        for key, value in numbers.items()
+        if key not in ("name", "title")
+    )
+    said = ", ".join(words)
+    return f"{recorded.get('name', '?')} {recorded.get('title', '')}".rstrip() + (f" ({said})" if said else "")
+
+
+@command("report", "compare recordings on one HTML page",
+    RECORDINGS,
+    output("FILE.html", "the page; replaces an existing one", "report.html"),
+    description="Write a page that needs no network: scorecard, plots, track, metrics, parameters, versions.",
+)  # fmt: skip
+def _report(options: argparse.Namespace) -> int:
+    from activesteer.analysis.report import open_all, write_report
+    from activesteer.errors import ParameterError
+
+    if options.output.suffix.lower() not in {".html", ".htm"}:
+        raise ParameterError(f"-o {options.output}: the name of a report ends in .html")
+
+    print(f"report: {write_report(open_all(options.files), options.output)}")
+    return 0
+
+
+@command("compare", "compare measured runs with a simulated one",
+    option("files", "FILE.mcap",
+        "recordings: measured ones, whose mean is compared, and the simulated one last; or a folder with a "
+        "validation.toml, or bmw_m8 or tesla_model_s", nargs="*", type=Path),
+    option("--new", "FOLDER", "make a folder with an example, to be replaced by your measured runs", type=Path),
+    option("--standard", ("iso19364", "iso19365"),
+        "iso19364: cross plots over the lateral acceleration, for steady-state driving; iso19365: over time (default)"),
+    option("--filter", ("iso15037", "fmvss126", "none"),
+        "zero-phase Butterworth filter of both sides: iso15037 (8 poles, 10.1 Hz; default), fmvss126 (12 poles, 6 Hz, "
+        "steering wheel 10 Hz), or none"),
+    option("--noise", ("estimate", "none"),
+        "widen the corridor by the noise of the measurement, estimated from it (default), or not"),
+    output("FILE.html", "the page (default: no page)"),
+    option("--samples", "N", "with a measured circle: number of samples of what varies from lap to lap (default: 200)",
+        type=int),
+    WORKERS, JSON,
+    description="Find the time shift, and print the share of the measurement inside the tolerance corridor of the "
+    "simulation. With a folder of measured runs, or of a measured circle, predict the measurement first. The exit "
+    "status is 1 if a quantity is outside.",
+)  # fmt: skip
+def _compare(options: argparse.Namespace) -> int:
+    if options.new is not None:
+        from activesteer.measured.example_folder import write_template
+
+        if options.files:
+            raise ParameterError("makes a new folder and compares nothing", key="--new")
+        for file in write_template(options.new):
+            print(file)
+        print(f"next: activesteer fit {options.new} -o {options.new}/page; then replace the lines marked with <-")
+        return 0
+    of_recordings, of_folder = ("standard", "filter", "noise"), ("samples", "jobs", "scheduler")
+    is_folder = len(options.files) == 1 and options.files[0].suffix != ".mcap"
+    for name in of_recordings if is_folder else of_folder:
+        if getattr(options, name) is not None:
+            raise ParameterError(f"has no effect with {'a folder' if is_folder else 'recordings'}", key=f"--{name}")
+    if is_folder:
+        from activesteer.commands.studying import judge
+
+        return judge(str(options.files[0]), options, page=options.output)
+    return _recordings(options)
+
+
+def _recordings(options: argparse.Namespace) -> int:
+    from activesteer.measured.comparison import compare, words
+    from activesteer.measured.noise import FILTERS
+    from activesteer.recording import Recording
+
+    if len(options.files) < 2:
+        raise ParameterError("at least two recordings are needed: measured ones, and the simulated one last")
+    *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
+    found = compare(
+        measured, simulated, options.standard or "iso19365", filtered=options.filter or "iso15037",
+        noise=options.noise != "none",
+    )  # fmt: skip
+    if options.output is not None:
+        from activesteer.measured.comparison_page import comparison_page
+        from activesteer.pages import write_page
+
+        names = [file.stem for file in options.files]
+        write_page(comparison_page(found, names[:-1], names[-1]), options.output)
+    if options.json:
+        print_json(found.to_json())
+        return 0 if found.inside else 1
+    for file, shift_s in zip(options.files, found.shifts_s, strict=False):
+        later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"
+        print(f"time shift of {file}: {later}")
+    chosen = FILTERS[found.filtered]
+    print_entry("filter of both sides: ", "none" if chosen is None else chosen.words())
+    for problem in found.unfiltered:
+        print_entry("not filtered: ", problem)
+    rows = [["", "rms", "tolerance", "inside", ""]]
+    for each in found.quantities:
+        label, residual, tolerance, share, _ = words(each)
+        value, _, unit = residual.partition(" ")
+        rows.append([f"{label}, {unit}", value, tolerance.replace(f" {unit}", ""), share, _verdict(each.inside)])
+    print("\n".join(text_table(rows, repeat=1, marks=["  "] * len(rows))))
+    print(_verdict(found.inside))
+    if options.output is not None:
+        print(f"page: {options.output}")
+    return 0 if found.inside else 1
+
+
+def _verdict(inside: bool) -> str:
+    return painted("inside", GOOD) if inside else painted("outside", BAD)
+
+
+@command("replay", "show recordings in 3D, with signals and metrics",
+    RECORDINGS,
+    option("-o --output --save", "OUT.rrd", "write a file for the viewer instead of opening a window", type=Path),
+    flag("--web", "serve a page for a browser until Ctrl-C"),
+    flag("--compare", "show only the page that compares several files side by side"),
+    cutaway(),
+    description="Open recordings in the rerun viewer, several in one window.",
+)  # fmt: skip
+def _replay(options: argparse.Namespace) -> int:
+    # Threads of rerun would repeat our messages on the terminal.
+    os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
+    try:
+        from activesteer.playback import Showing, runs_of, save, serve, show
+    except ImportError as error:
+        raise PlaybackError("replay needs the viewer rerun: pip install rerun-sdk") from error
+    from activesteer.analysis.verdict import verdict
+    from activesteer.recording import Recording
+    from activesteer.recording.run_names import run_names
+
+    if options.compare and len(options.files) < 2:
+        raise ParameterError(f"--compare needs at least two files, and {options.files[0]} is one")
+    if len(set(options.files)) != len(options.files):
+        raise ParameterError(f"a file is named twice: {', '.join(str(file) for file in options.files)}")
+    recordings = [Recording.open(file, recover=True) for file in options.files]
+    names = run_names(options.files, recordings)
+    named = dict(zip(names, recordings, strict=True))
+    runs, how = runs_of(named), Showing(options.compare, options.cutaway, tuple(verdict(named)))
+    if options.output is not None:
+        save(runs, options.output, how)
+        print(f"{options.output}: open it with `rerun {options.output}`", file=sys.stderr)
+    if options.web:
+        serve(runs, _announce, how)
+    elif options.output is None:
+        show(runs, how)
+    return 0
+
+
+def _announce(url: str) -> None:
+    import webbrowser
+
+    print(url, flush=True)
+    print("Ctrl-C ends the server", file=sys.stderr, flush=True)
+    webbrowser.open(url)
+
+
+def _size(text: str) -> tuple[int, int]:
+    """`1280x720`."""
+    found = re.fullmatch(r"(\d{1,6})[x*](\d{1,6})", text.strip().lower())
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is no size such as 1280x720")
+    return int(found[1]), int(found[2])
+
+
+@command("video", "make a film of a recording",
+    RECORDING,
+    output("OUT.mp4|gif", "the film (default: FILE.mp4 beside the recording)"),
+    option("--camera", ("chase", "top", "wheel"), "camera position", "chase"),
+    option("--corner", _CORNERS, "wheel for the camera `wheel` (default: fl)"),
+    option("--compare", "OTHER.mcap", "also show the car of another recording; may be repeated", many=True, type=Path),
+    option("--layout", ("overlay", "side-by-side"), "transparent cars in one picture, or one picture for each car",
+        "overlay"),
+    option("--gauges", ("full", "sideslip"), "all gauges, or one large sideslip angle for each car", "full"),
+    option("--size", "WxH", "pixels", "1280x720", type=_size),
+    option("--fps", "FPS", "pictures per second (default: 30, GIF: 20)", type=float),
+    option("--speed", "FACTOR", "pace: 0.25 is slow motion, 4 is fast", 1.0),
+    cutaway(),
+    description="Draw a recording without a window, and write an MP4 or a GIF.",
+)  # fmt: skip
+def _video(options: argparse.Namespace) -> int:
+    from activesteer.analysis.verdict import verdict
+    from activesteer.recording import Recording
+    from activesteer.recording.run_names import run_names
+    from activesteer.video import Settings, make_film
+
+    files = [options.file, *(options.compare or ())]
+    for number, other in enumerate(files):
+        if other.resolve() in [file.resolve() for file in files[:number]]:
+            raise ParameterError(f"--compare {other}: this file is already shown")
+    if options.corner and options.camera != "wheel":
+        raise ParameterError("belongs to --camera wheel", key="--corner", value=options.corner)
+    if options.layout == "side-by-side" and not options.compare:
+        raise ParameterError("--layout side-by-side needs --compare OTHER.mcap")
+    recordings = [Recording.open(file, recover=True) for file in files]
+    output = options.output if options.output is not None else options.file.with_suffix(".mp4")
+    rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
+    settings = Settings(
+        options.camera,
+        options.corner or _CORNERS[0],
+        options.size,
+        rate,
+        options.speed,
+        options.layout,
+        gauges=options.gauges,
+        cutaway=options.cutaway,
+    )
+    named = dict(zip(run_names(files, recordings), recordings, strict=True))
+    started = time.monotonic()
+    with ProgressBar(f"{output}", quiet=False) as progress:
+        made = make_film(named, output, settings, progress, verdict(named))
+    took = time.monotonic() - started
+    print(
+        f"{output}: {made.pictures} pictures, {made.pictures / made.rate_hz:.1f} s at {made.rate_hz:g} a second, "
+        f"made in {took:.1f} s",
+        file=sys.stderr,
+    )
+    return 0
+
+
+@command("import", "convert measured data to a recording",
+    option("files", "FILE",
+        "a .csv, .txt, .mat, .parquet or .mf4 file, or several of one run, each with its own times", nargs="+",
+        type=Path),
+    option("--map", "MAP.toml", "column and unit of each channel", type=Path),
+    VEHICLE,
+    output("OUT.mcap", "the recording (default: FILE.mcap)"),
+    JSON,
+    description="Read CSV, MAT, Parquet or MDF files of one run. Columns become channels in SI units with the signs "
+    "of ISO 8855 on a uniform time. Without a map, columns are recognised by the names that exporters write.",
+)  # fmt: skip
+def _import(options: argparse.Namespace) -> int:
+    from activesteer.measured.importing import import_file
+    from activesteer.recording import check_target
+
+    if options.output is not None and options.output.suffix != ".mcap":
+        raise ParameterError(f"-o {options.output}: the name of a recording ends in .mcap")
+    found = import_file(options.files, options.map, options.vehicle)
+    output = options.output or options.files[0].with_suffix(".mcap")
+    recording = found.recording
+    check_target(output)
+    with replacing(output, RecordingError) as part:
+        try:
+            recording.save(part)
+        except RecordingError as error:
+            raise RecordingError(error.problem.replace(str(part), str(output))) from error
+    print_notes(found.notes)
+    if options.json:
+        step_s = float(recording.time_s[1] - recording.time_s[0])
+        print_json({"file": str(output), "rows": len(recording), "step_s": step_s, "channels": found.taken,
+                    "notes": list(found.notes)})  # fmt: skip
+        return 0
+    print(f"{output}: {len(recording)} rows, {recording.time_s[0]:.3f} to {recording.time_s[-1]:.3f} s")
+    for name, column in found.taken.items():
+        print_entry(f"  {name:24} ", column)
+    return 0

@@ -1,0 +1,97 @@
+"""Tables as text that fits a terminal of 80 columns."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+COLUMNS: Final = 80
+_COLOUR: Final = re.compile(r"\x1b\[\d*m")
+
+WHOLE: Final[dict[str, Any]] = {"break_on_hyphens": False, "break_long_words": False, "replace_whitespace": False}
+"""Arguments of `textwrap` that keep words and columns as they are."""
+Rows = Sequence[Sequence[str]]
+
+
+def text_table(
+    rows: Rows,
+    *,
+    text: int = 1,
+    repeat: int | None = None,
+    least: int = 0,
+    gap: int = 2,
+    marks: Sequence[str] = (),
+) -> Iterator[str]:
+    """Yield the lines of a table; its first row is the head.
+
+    A table that is too wide gets narrower columns, then smaller gaps. If that is not enough, it is split into several
+    tables below each other, or its words are wrapped.
+
+    Args:
+        rows: Cells of each row, all of the same number.
+        text: Number of the first columns that hold words, aligned to the left; the others are aligned to the right.
+        repeat: Number of the first columns that every part of a split table repeats; None to wrap words instead.
+        least: Least width of the other columns if the table fits.
+        gap: Blanks between columns if the table fits.
+        marks: Beginning of the first line of each row; all of one length.
+    """
+    marks = marks or [""] * len(rows)
+    width = COLUMNS - len(marks[0])
+    widths = [max(map(_length, column)) for column in zip(*rows, strict=True)]
+    wide = [max(each, least) if place >= text else each for place, each in enumerate(widths)]
+    if _total(wide, gap) <= width:
+        yield from _lines(rows, wide, text, gap, marks)
+        return
+    gap = 1 if _total(widths, 1) <= width < _total(widths, 2) else 2
+    if repeat is not None and _total(widths, gap) > width and len(widths) > repeat + 1:
+        end = max(repeat + 1, *(n for n in range(len(widths)) if _total(widths[:n], gap) <= width))
+        yield from _lines([row[:end] for row in rows], widths[:end], text, gap, marks)
+        yield ""
+        rest = [[*row[:repeat], *row[end:]] for row in rows]
+        yield from text_table(rest, text=text, repeat=repeat, gap=gap, marks=marks)
+        return
+    if repeat is None:
+        words = [max(map(len, " ".join(column).split()), default=0) for column in zip(*rows, strict=True)]
+        gap = 2 if _total(words[:text] + widths[text:], 2) <= width else 1
+        while _total(widths, gap) > width:
+            place = max(range(text), key=lambda n: (widths[n] > words[n], widths[n]))
+            if widths[place] <= words[place]:  # every column is as narrow as its longest word
+                break
+            widths[place] -= 1
+    yield from _lines(rows, widths, text, gap, marks)
+
+
+def wrapped_line(line: str, width: int = COLUMNS) -> list[str]:
+    """Return a line in parts that fit; further parts are indented four columns more than the line."""
+    if _length(line) <= width:
+        return [line]
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    return textwrap.wrap(line, width, subsequent_indent=indent, **WHOLE)
+
+
+def _length(cell: str) -> int:
+    return len(_COLOUR.sub("", cell))
+
+
+def _total(widths: Sequence[int], gap: int) -> int:
+    return sum(widths) + gap * (len(widths) - 1)
+
+
+def _lines(rows: Rows, widths: Sequence[int], text: int, gap: int, marks: Sequence[str]) -> Iterator[str]:
+    for row, mark in zip(rows, marks, strict=True):
+        cells = [
+            [cell]
+            if _length(cell) <= width
+            else textwrap.wrap(cell, width, break_on_hyphens=False, break_long_words=False) or [""]
+            for cell, width in zip(row, widths, strict=True)
+        ]
+        for n in range(max(map(len, cells))):
+            parts = (cell[n] if n < len(cell) else "" for cell in cells)
+            padded = (
+                f"{part}{blanks}" if place < text else f"{blanks}{part}"
+                for place, (part, width) in enumerate(zip(parts, widths, strict=True))
+                for blanks in (" " * (width - _length(part)),)
+            )
+            yield f"{mark if n == 0 else ' ' * len(mark)}{(' ' * gap).join(padded)}".rstrip()
