@@ -31,8 +31,6 @@ from activesteer.commands.terminal import (
     ProgressBar,
     RunCounter,
     painted,
-    print_entry,
-    print_json,
     print_notes,
     printable,
     table_lines,
@@ -45,6 +43,7 @@ from activesteer.resources import DEFAULT_DRIVER
 from activesteer.text_table import text_table
 
 if TYPE_CHECKING:
+    from activesteer.measured.fit_result import Fit
     from activesteer.measured.fitting import FitProgress
     from activesteer.studies.engine.tuning import Trial, Tuning
     from activesteer.studies.linear.margins import LoopMargins
@@ -260,7 +259,6 @@ def _fit(options: argparse.Namespace) -> int:
     if is_measured(options.study):
         page = None if options.output is None else options.output / "page.html"
         return judge(options.study, options, page=page, fitted=True)
-    from activesteer.measured.fit_result import rests_on
     from activesteer.measured.fitting import fit
 
     with ProgressBar("fit", quiet=options.json) as bar:
@@ -276,25 +274,23 @@ def _fit(options: argparse.Namespace) -> int:
 
         files = write_fit(found, Path(options.study).stem, options.output)
     print_notes(found.notes)
-    if options.json:
-        print_json(found.to_json())
-        return 0
+    tell(options, found.to_json(), [*_fit_lines(found), *map(str, files)])
+    return 0
+
+
+def _fit_lines(found: Fit) -> Iterator[str]:
+    from activesteer.measured.fit_result import rests_on
+
     width = max(len(one.key) for one in found.parameters)
-    for one in found.parameters:
-        print(f"{one.key:{width}}  {one.words}")
-    for one, other, value in found.pairs(0.5):
-        print(f"correlation {value:+.2f}  {one}, {other}")
+    yield from (f"{one.key:{width}}  {one.words}" for one in found.parameters)
+    yield from (f"correlation {value:+.2f}  {one}, {other}" for one, other, value in found.pairs(0.5))
     rows = [["", "", "noise", "rms", "fitted", "independent"]]
     for recording, label, noise, before, after, samples, independent in (each.words() for each in found.compared):
         values = (text.partition(" ")[0] for text in (noise, before, after))
         rows.append([recording, f"{label}, {noise.partition(' ')[2]}", *values, f"{independent} of {samples}"])
-    print("\n".join(text_table(rows, text=2, repeat=2, marks=["  "] * len(rows))))
-    print(f"{found.rounds} rounds, {found.runs} runs; the remaining difference is {found.misfit:.3g} times the noise")
-    for line in rests_on(found)[:1]:
-        print_entry("", line, hanging=0)
-    for path in files:
-        print(path)
-    return 0
+    yield from text_table(rows, text=2, repeat=2, marks=["  "] * len(rows))
+    yield f"{found.rounds} rounds, {found.runs} runs; the remaining difference is {found.misfit:.3g} times the noise"
+    yield from rests_on(found)[:1]
 
 
 def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: bool = False) -> int:
