@@ -1,7 +1,7 @@
 """Results of a population of cars, roads and drivers: proportions of the claims, effects of controllers.
 
 `activesteer study population` and `study comparison` drive the runs, paired: all controllers meet the same samples.
-`summarise` counts their results; `tools/renew_population.py` stores them with the package.
+`summarise` counts their results; `population_store.py` stores them with the package.
 """
 
 from __future__ import annotations
@@ -35,8 +35,10 @@ from activesteer.studies.engine.study import StudyProgress, study
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.reproduction import nominal_claims
 from activesteer.theory.proportions import Proportion, percent
-from tools.controller_targets import NONE, REFERENCES, asked
 
+NONE: Final = "none"
+REFERENCES: Final = ("ars", "afs", "esc")
+"""Reference controllers: the paper's two systems, and the system that the law requires."""
 TOTAL: Final = "all scenarios"
 STUDY: Final = "population"
 COMPARISON: Final = "comparison"
@@ -53,6 +55,11 @@ CHANGES: Final = (
 _RANGE: Final = (0.05, 0.5, 0.95)
 _WORST: Final = 10
 """Number of the worst runs of a controller."""
+
+
+def asked(controllers: Iterable[str]) -> list[str]:
+    """Return the controllers that have targets."""
+    return [name for name in controllers if name not in (NONE, *REFERENCES)]
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import os
 import re
 import sys
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -23,12 +24,24 @@ from activesteer.commands.options import (
     option,
     output,
 )
-from activesteer.commands.terminal import BAD, GOOD, ProgressBar, painted, print_entry, print_json, print_notes
+from activesteer.commands.terminal import (
+    BAD,
+    GOOD,
+    ProgressBar,
+    painted,
+    print_entry,
+    print_json,
+    print_notes,
+    printable,
+    tell,
+    tell_files,
+)
 from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
 from activesteer.files import replacing, shown_path
 from activesteer.text_table import text_table
 
 if TYPE_CHECKING:
+    from activesteer.measured.comparison import Comparison
     from activesteer.recording import Recording
 
 command: Final = Group("recordings")
@@ -176,8 +189,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _recordings(options: argparse.Namespace) -> int:
-    from activesteer.measured.comparison import compare, words
-    from activesteer.measured.noise import FILTERS
+    from activesteer.measured.comparison import compare
     from activesteer.recording import Recording
 
     if len(options.files) < 2:
@@ -193,26 +205,29 @@ def _recordings(options: argparse.Namespace) -> int:
 
         names = [file.stem for file in options.files]
         write_page(comparison_page(found, names[:-1], names[-1]), options.output)
-    if options.json:
-        print_json(found.to_json())
-        return 0 if found.inside else 1
-    for file, shift_s in zip(options.files, found.shifts_s, strict=False):
+    tell(options, found.to_json(), _compared_lines(options.files, found))
+    if options.output is not None:
+        tell_files(options, [options.output], "page")
+    return 0 if found.inside else 1
+
+
+def _compared_lines(files: Sequence[Path], found: Comparison) -> Iterator[str]:
+    from activesteer.measured.comparison import words
+    from activesteer.measured.noise import FILTERS
+
+    for file, shift_s in zip(files, found.shifts_s, strict=False):
         later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"
-        print(f"time shift of {file}: {later}")
+        yield f"time shift of {file}: {later}"
     chosen = FILTERS[found.filtered]
-    print_entry("filter of both sides: ", "none" if chosen is None else chosen.words())
-    for problem in found.unfiltered:
-        print_entry("not filtered: ", problem)
+    yield f"filter of both sides: {'none' if chosen is None else chosen.words()}"
+    yield from (f"not filtered: {problem}" for problem in found.unfiltered)
     rows = [["", "rms", "tolerance", "inside", ""]]
     for each in found.quantities:
         label, residual, tolerance, share, _ = words(each)
         value, _, unit = residual.partition(" ")
         rows.append([f"{label}, {unit}", value, tolerance.replace(f" {unit}", ""), share, _verdict(each.inside)])
-    print("\n".join(text_table(rows, repeat=1, marks=["  "] * len(rows))))
-    print(_verdict(found.inside))
-    if options.output is not None:
-        print(f"page: {options.output}")
-    return 0 if found.inside else 1
+    yield from text_table(rows, repeat=1, marks=["  "] * len(rows))
+    yield _verdict(found.inside)
 
 
 def _verdict(inside: bool) -> str:
@@ -354,12 +369,9 @@ def _import(options: argparse.Namespace) -> int:
         except RecordingError as error:
             raise RecordingError(error.problem.replace(str(part), str(output))) from error
     print_notes(found.notes)
-    if options.json:
-        step_s = float(recording.time_s[1] - recording.time_s[0])
-        print_json({"file": str(output), "rows": len(recording), "step_s": step_s, "channels": found.taken,
-                    "notes": list(found.notes)})  # fmt: skip
-        return 0
-    print(f"{output}: {len(recording)} rows, {recording.time_s[0]:.3f} to {recording.time_s[-1]:.3f} s")
-    for name, column in found.taken.items():
-        print_entry(f"  {name:24} ", column)
+    step_s = float(recording.time_s[1] - recording.time_s[0])
+    about = {"rows": len(recording), "step_s": step_s, "channels": found.taken, "notes": list(found.notes)}
+    head = f"{output}: {len(recording)} rows, {recording.time_s[0]:.3f} to {recording.time_s[-1]:.3f} s"
+    columns = (f"  {name:24} {printable(column)}" for name, column in found.taken.items())
+    tell(options, {"file": str(output), **about}, [head, *columns])
     return 0

@@ -31,10 +31,9 @@ from activesteer.commands.terminal import (
     ProgressBar,
     RunCounter,
     painted,
-    print_entry,
-    print_json,
     print_notes,
-    print_table,
+    printable,
+    table_lines,
     tell,
     tell_files,
 )
@@ -44,6 +43,7 @@ from activesteer.resources import DEFAULT_DRIVER
 from activesteer.text_table import text_table
 
 if TYPE_CHECKING:
+    from activesteer.measured.fit_result import Fit
     from activesteer.measured.fitting import FitProgress
     from activesteer.studies.engine.tuning import Trial, Tuning
     from activesteer.studies.linear.margins import LoopMargins
@@ -111,9 +111,15 @@ def _study(options: argparse.Namespace) -> int:
         read_study(options.study)
         raise StudyError(f"-o DIR is needed: the folder for the results of {options.study}")
     if options.status:
-        return _status(folder, as_json=options.json)
+        progress = _progress_of(folder)
+        tell(options, progress, _status(progress))
+        return 0
     if options.report:
-        return _report(folder, as_json=options.json)
+        from activesteer.studies.engine.report import write_report
+
+        path = write_report(folder)
+        tell(options, {"report": str(path)}, [f"report: {path}"])
+        return 0
     from activesteer.studies.engine.store import RESULTS, read_environment
     from activesteer.studies.engine.study import study
 
@@ -132,13 +138,9 @@ def _study(options: argparse.Namespace) -> int:
         )
     result = folder / RESULTS
     made = _progress_of(folder)
-    status = 1 if made["by_status"] and set(made["by_status"]) <= {"failed", "crashed"} else 0
-    if options.json:
-        print_json(made | {"results": str(result) if result.exists() else None})
-        return status
-    _status(folder, as_json=False)
-    print(f"results: {result}" if result.exists() else f"not finished; resume with `activesteer study {folder}`")
-    return status
+    end = f"results: {result}" if result.exists() else f"not finished; resume with `activesteer study {folder}`"
+    tell(options, made | {"results": str(result) if result.exists() else None}, [*_status(made), end])
+    return 1 if made["by_status"] and set(made["by_status"]) <= {"failed", "crashed"} else 0
 
 
 def _progress_of(folder: Path) -> dict[str, Any]:
@@ -147,30 +149,12 @@ def _progress_of(folder: Path) -> dict[str, Any]:
     return {"folder": str(folder), **Store(folder, ()).progress().to_json()}
 
 
-def _status(folder: Path, *, as_json: bool) -> int:
-    progress = _progress_of(folder)
-    if as_json:
-        print_json(progress)
-        return 0
+def _status(progress: dict[str, Any]) -> Iterator[str]:
     counts = ", ".join(f"{number} {status}" for status, number in progress["by_status"].items()) or "none"
     at_work = "; a process is at work" if progress["running"] else ""
-    print(f"{progress['done']} of {progress['total']} runs are done: {counts}{at_work}")
-    for error, number in progress["errors"].items():
-        print_entry(f"{number:6}  ", error, 8)
-    for key in progress["without_effect"]:
-        print_entry("without effect: ", f"{key} changes no metric of any run")
-    return 0
-
-
-def _report(folder: Path, *, as_json: bool) -> int:
-    from activesteer.studies.engine.report import write_report
-
-    path = write_report(folder)
-    if as_json:
-        print_json({"report": str(path)})
-    else:
-        print(f"report: {path}")
-    return 0
+    yield f"{progress['done']} of {progress['total']} runs are done: {counts}{at_work}"
+    yield from (f"{number:6}  {printable(error)}" for error, number in progress["errors"].items())
+    yield from (f"without effect: {key} changes no metric of any run" for key in progress["without_effect"])
 
 
 @command("tune", "minimise objectives, satisfy statements or violate a requirement",
@@ -275,7 +259,6 @@ def _fit(options: argparse.Namespace) -> int:
     if is_measured(options.study):
         page = None if options.output is None else options.output / "page.html"
         return judge(options.study, options, page=page, fitted=True)
-    from activesteer.measured.fit_result import rests_on
     from activesteer.measured.fitting import fit
 
     with ProgressBar("fit", quiet=options.json) as bar:
@@ -291,33 +274,23 @@ def _fit(options: argparse.Namespace) -> int:
 
         files = write_fit(found, Path(options.study).stem, options.output)
     print_notes(found.notes)
-    if options.json:
-        print_json(found.to_json())
-        return 0
+    tell(options, found.to_json(), [*_fit_lines(found), *map(str, files)])
+    return 0
+
+
+def _fit_lines(found: Fit) -> Iterator[str]:
+    from activesteer.measured.fit_result import rests_on
+
     width = max(len(one.key) for one in found.parameters)
-    for one in found.parameters:
-        print(f"{one.key:{width}}  {one.words}")
-    for one, other, value in found.pairs(0.5):
-        print(f"correlation {value:+.2f}  {one}, {other}")
+    yield from (f"{one.key:{width}}  {one.words}" for one in found.parameters)
+    yield from (f"correlation {value:+.2f}  {one}, {other}" for one, other, value in found.pairs(0.5))
     rows = [["", "", "noise", "rms", "fitted", "independent"]]
     for recording, label, noise, before, after, samples, independent in (each.words() for each in found.compared):
         values = (text.partition(" ")[0] for text in (noise, before, after))
         rows.append([recording, f"{label}, {noise.partition(' ')[2]}", *values, f"{independent} of {samples}"])
-    print("\n".join(text_table(rows, text=2, repeat=2, marks=["  "] * len(rows))))
-    print(f"{found.rounds} rounds, {found.runs} runs; the remaining difference is {found.misfit:.3g} times the noise")
-    for line in rests_on(found)[:1]:
-        print_entry("", line, hanging=0)
-    for path in files:
-        print(path)
-    return 0
-
-
-def add_samples(parser: argparse.ArgumentParser) -> None:
-    """Add `--samples`."""
-    parser.add_argument(
-        "--samples", type=int, metavar="N",
-        help="with a measured circle: number of samples of what varies from lap to lap (default: 200)",
-    )  # fmt: skip
+    yield from text_table(rows, text=2, repeat=2, marks=["  "] * len(rows))
+    yield f"{found.rounds} rounds, {found.runs} runs; the remaining difference is {found.misfit:.3g} times the noise"
+    yield from rests_on(found)[:1]
 
 
 def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: bool = False) -> int:
@@ -459,19 +432,13 @@ def _driver_loop(options: argparse.Namespace) -> int:
         overrides_of(options),
     )
     rows = [loop.to_json() for loop in loops]
-    if options.json:
-        print_json(rows)
-    else:
-        print(f"{driver} in {options.vehicle}")
-        print_table(rows, _DRIVER_COLUMNS)
+    tell(options, rows, [f"{driver} in {options.vehicle}", *table_lines(rows, _DRIVER_COLUMNS)])
     if options.output is not None:
         from activesteer.analysis.linear_plots import driver_loops_figure
         from activesteer.plotting import save
 
         figure = driver_loops_figure(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-        path = save(figure, options.output / "driver.png")
-        if not options.json:
-            print(f"figure: {path}")
+        tell_files(options, [save(figure, options.output / "driver.png")])
     return 0
 
 
@@ -480,22 +447,17 @@ def _controller_loop(options: argparse.Namespace) -> int:
     rows = [margins.to_json() for margins in found]
     if not rows:
         raise ParameterError("none of these controllers uses a measurement, so there is no loop", key="-c")
-    page = None
-    if options.output is not None:
-        from activesteer.studies.linear.margins_page import write_margins_page
-
-        page = write_margins_page(found, str(options.vehicle), options.output)
-    if options.json:
-        print_json(rows)
-        return 0
-    print_table(rows, _CONTROLLER_COLUMNS)
+    lines = [*table_lines(rows, _CONTROLLER_COLUMNS)]
     if options.study:
         least = min(rows, key=lambda row: row["disk_margin"])
         changed = ", ".join(f"{key} = {value:.3g}" for key, value in least["factors"].items())
         where = f"{least['controller']}, {least['loop']}, {least['speed_kmh']:.0f} km/h"
-        print(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
-    if page is not None:
-        print(f"page: {page}")
+        lines.append(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
+    tell(options, rows, lines)
+    if options.output is not None:
+        from activesteer.studies.linear.margins_page import write_margins_page
+
+        tell_files(options, [write_margins_page(found, str(options.vehicle), options.output)], "page")
     return 0
 
 

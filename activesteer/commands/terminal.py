@@ -29,10 +29,10 @@ _COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": KNOWN}
 _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 
-def print_table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> None:
-    """Print a table of rows, a column for each key with its head; numbers have three digits."""
+def table_lines(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> Iterator[str]:
+    """Yield the lines of a table of rows, a column for each key with its head; numbers have three digits."""
     cells = [[row[key] if isinstance(row[key], str) else f"{row[key]:.3g}" for key in columns] for row in rows]
-    print("\n".join(text_table([list(columns.values()), *cells], text=0, repeat=2, least=10, gap=1)))
+    return text_table([list(columns.values()), *cells], text=0, repeat=2, least=10, gap=1)
 
 
 def wrapped(text: str) -> Iterator[str]:
@@ -54,7 +54,7 @@ def tell(options: argparse.Namespace, values: Any, lines: Iterable[str], figures
         print_json(values if figures is None else values | {"figures": [str(path) for path in figures]})
         return
     for line in lines:
-        command = line.lstrip().startswith("activesteer ")  # to be copied
+        command = "activesteer " in line  # to be copied
         print("\n".join([line] if command else [part for one in line.split("\n") for part in wrapped_line(one)]))
     tell_files(options, figures or ())
 
@@ -127,9 +127,13 @@ def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = No
 
     The text may come from any file: control characters are printed as escape sequences.
     """
-    plain = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
-    lines = textwrap.wrap(plain, COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **WHOLE)
+    lines = textwrap.wrap(printable(text), COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **WHOLE)
     print("\n".join(lines) or head.rstrip(), file=file)
+
+
+def printable(text: str) -> str:
+    """Return a text with escape sequences in place of control characters."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 @contextmanager

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from activesteer.analysis.claims.statements import STATEMENTS
-from tools.make_claims_table import PAGE, page
+from tools.tables import CLAIMS_PAGE, claims_page
 
-TEXT = PAGE.read_text(encoding="utf-8")
+TEXT = CLAIMS_PAGE.read_text(encoding="utf-8")
 
 
 def test_table_is_as_the_tool_writes_it():
-    assert page(TEXT) == TEXT
+    assert claims_page(TEXT) == TEXT
 
 
 def test_every_statement_is_in_the_table_once():

@@ -26,14 +26,14 @@ def test_every_manoeuvre_has_a_section_with_its_picture(name: str) -> None:
     pages = "\n".join(page.read_text(encoding="utf-8") for page in sorted((DOCS / "manoeuvres").glob("*.md")))
     section = re.search(rf"^### {name}\n(.*?)(?=^#|\Z)", pages, re.MULTILINE | re.DOTALL)
     assert section, f"docs/manoeuvres/ has no section {name}"
-    assert f"(../pictures/manoeuvre_{name}.png)" in section[1], "python tools/make_doc_pictures.py makes it"
+    assert f"(../pictures/manoeuvre_{name}.png)" in section[1], "python tools/renew.py pictures makes it"
     assert (DOCS / "pictures" / f"manoeuvre_{name}.png").is_file()
 
 
 @pytest.mark.parametrize("page", sorted((DOCS / "manoeuvres").glob("*.md")), ids=lambda page: page.stem)
 def test_every_page_of_manoeuvres_has_a_film(page: Path) -> None:
     films = re.findall(r"\(\.\./pictures/(film_\w+\.webp)\)", page.read_text(encoding="utf-8"))
-    assert len(films) == 1, "python tools/make_film_pictures.py makes it"
+    assert len(films) == 1, "python tools/renew.py films makes it"
     assert (DOCS / "pictures" / films[0]).is_file()
 
 

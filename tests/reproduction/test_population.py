@@ -21,7 +21,7 @@ from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.run_task import CLAIM, Row, drive
 from tools.population_results import CHANGES, Population, population_study, read_population, summarise
-from tools.renew_population import CHASSIS_CONTROL, PAGE, comparison_page, page, stored_runs
+from tools.population_store import CHASSIS_CONTROL, PAGE, comparison_page, page, stored_runs
 
 TOLERANCE = 1e-3
 CHECKED = 8

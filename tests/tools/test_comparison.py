@@ -11,9 +11,8 @@ from activesteer.controllers import find_controller
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from tests.raising import raises
-from tools import compare_controllers as comparison
-from tools.compare_controllers import CASES, SHOWN, Comparison, Row, compare
-from tools.comparison_figures import comparison_figure
+from tools import comparison
+from tools.comparison import CASES, SHOWN, Comparison, Row, compare, comparison_figure
 
 
 @pytest.fixture

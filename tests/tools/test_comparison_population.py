@@ -16,7 +16,7 @@ from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.plan import Plan
 from activesteer.theory.proportions import Proportion
 from tests.raising import raises
-from tools.comparison_text import (
+from tools.comparison import (
     comparison_text,
     population_targets,
 )

@@ -20,7 +20,7 @@ from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.theory.proportions import Proportion, ProportionVerdict
 from tests.raising import raises
-from tools import renew_population
+from tools import population_store
 from tools.population_results import Population, population_study, summarise
 
 RESULTS = "results.parquet"
@@ -155,9 +155,9 @@ def test_what_is_stored_is_what_was_found(serial: Path) -> None:
 def test_the_package_stores_results_runs_and_bands(
     serial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(renew_population, "studies_dir", lambda: tmp_path)
+    monkeypatch.setattr(population_store, "studies_dir", lambda: tmp_path)
     found = summarise(pq.read_table(serial / RESULTS), shortened(2), nominal(S1=True))
-    summary, runs, bands = renew_population.store_population(found, serial)
+    summary, runs, bands = population_store.store_population(found, serial)
     assert Population.from_json(json.loads(summary.read_text())) == found
     assert (
         pq.read_table(runs).select(["sample", "maneuver", "controller"]).to_pylist()
@@ -167,7 +167,7 @@ def test_the_package_stores_results_runs_and_bands(
     assert not set(shortened(2).keys) & set(pq.read_table(runs).column_names)
     assert set(pq.read_table(bands)["controller"].to_pylist()) == set(SYSTEMS)
     with raises(StudyError):
-        renew_population.store_population(found, tmp_path)
+        population_store.store_population(found, tmp_path)
 
 
 def test_a_share_is_whole_only_where_it_is() -> None:

@@ -9,7 +9,7 @@ import pytest
 from activesteer.analysis.report.results import KEY_FIGURES
 from activesteer.analysis.report.significance import Change, significance
 from activesteer.metric_table import METRICS
-from tools.compare_controllers import SHOWN
+from tools.comparison import SHOWN
 
 JUDGED = [metric for metric in METRICS.values() if metric.better is not None]
 

@@ -1,4 +1,4 @@
-"""Makes the pictures of the documentation that come from runs: `python tools/make_doc_pictures.py [NAME]...`.
+"""Make the pictures of the documentation that come from runs: `python tools/renew.py pictures [NAME]...`.
 
 One for every manoeuvre and those of the pages on controllers, drivers and tyres. Without names all are made, in two
 minutes and another two for each envelope; to be run again when the car, a controller or a manoeuvre has changed. What
@@ -37,8 +37,7 @@ from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loo
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
 from activesteer.units import DisplayUnit, Quantity, quantity_of
-from tools.compare_controllers import compare
-from tools.comparison_figures import comparison_figure, comparison_population_figure
+from tools.comparison import COMPARED, compare, comparison_figure, comparison_population_figure
 from tools.population_results import read_population
 
 if TYPE_CHECKING:
@@ -52,8 +51,6 @@ COLOURS: Final = 64
 """A plot has few colours and their shades: a palette makes the file a third as large."""
 SYSTEMS: Final = ("none", "ars", "afs")
 CORNER_WORDS: Final = {"fl": "front left", "rl": "rear left"}
-COMPARED: Final = ("none", "ars", "afs", "ars_sideslip", "esc", "lqr", "integrated")
-"""Controllers of the page on chassis control."""
 
 
 def at_wheel(channel: str) -> Quantity:
@@ -89,8 +86,8 @@ ENVELOPES: Final = ("slalom", "double_lane_change", "double_lane_change_low_mu")
 """Manoeuvres with a map of speed and line."""
 
 
-def main(names: Sequence[str]) -> None:
-    """Draws the pictures with these names, or all."""
+def draw_pictures(names: Sequence[str]) -> None:
+    """Draw the pictures with these names, or all."""
     pictures: dict[str, Callable[[], Mapping[str, Figure]]] = {
         name: lambda name=name: {f"manoeuvre_{name}": _manoeuvre(name)} for name in list_maneuvers()
     }
@@ -354,7 +351,3 @@ def _save(figure: Figure, path: Path) -> None:
         picture = Image.open(stream).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
     picture.save(path, optimize=True)
     print(f"{path.relative_to(DOCS.parent)}: {path.stat().st_size / 1000:.0f} kB")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -1,4 +1,4 @@
-"""Make the pictures of HTML pages in the documentation: `python tools/make_page_pictures.py`.
+"""Make the pictures of HTML pages in the documentation: `python tools/renew.py pages`.
 
 The tool drives short runs, writes a report, a comparison and a standard's page, and draws the top of each in Chromium.
 It also draws the page of `activesteer explore` and the rerun viewer.
@@ -84,7 +84,7 @@ def draw_viewer(folder: Path) -> Image.Image:
         return viewer.window(2.6)
 
 
-def main() -> None:
+def draw_pages() -> None:
     """Draw the top of each page."""
     width, height = SIZE
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
@@ -102,7 +102,3 @@ def main() -> None:
             picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
             print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
         browser.close()
-
-
-if __name__ == "__main__":
-    main()

@@ -1,17 +1,6 @@
-"""Drive the population again, or its missing runs, store the results with the package, and write its page.
+"""The stored populations and comparisons, and their pages: see `tools/renew.py`.
 
-    python tools/renew_population.py [-o DIR] [--samples N] [--jobs N]
-    python tools/renew_population.py --comparison [--controllers C,C...] [-o DIR] [--samples N] [--jobs N]
-    python tools/renew_population.py --around [-o DIR] [--samples N] [--jobs N]
-    python tools/renew_population.py --judge S2=S1 W2=W2 W3=W3
-
-The stored population has 250 samples, which take a quarter of an hour on two idle processors. The tool resumes an
-interrupted run and accepts a folder that `activesteer study population -o DIR` has finished. Call
-tools/make_claims_table.py afterwards. The second line does the same for the comparison of controllers, whose table
-stands in docs/chassis_control.md; call `tools/make_doc_pictures.py comparison_population` after it. The third line
-drives the two populations around the paper's setting, whose shares stand in docs/claims.md. The fourth line judges the
-stored population again after a criterion has changed: it drives only the samples in which the claim behind the equals
-sign held, because the claim before it can hold only there.
+The stored population has 250 samples, which take a quarter of an hour on two idle processors.
 """
 
 from __future__ import annotations
@@ -47,8 +36,6 @@ from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.engine.task_queue import in_parallel
 from activesteer.theory.proportions import percent
-from tools.comparison_text import comparison_text
-from tools.make_claims_table import NOT_REPRODUCED, REPRODUCED
 from tools.make_setting import AROUND
 from tools.population_results import (
     STUDY,
@@ -59,11 +46,12 @@ from tools.population_results import (
     read_population,
     summarise,
 )
+from tools.tables import NOT_REPRODUCED, REPRODUCED
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
 PAGE: Final = DOCS / "population.md"
 CHASSIS_CONTROL: Final = DOCS / "chassis_control.md"
-BEGIN: Final = "<!-- the table is written by tools/renew_population.py -->\n"
+BEGIN: Final = "<!-- the table is written by tools/renew.py comparison -->\n"
 END: Final = "<!-- end of the table -->\n"
 COMPARED: Final = ("none", "ars", "afs", "esc", "lqr", "integrated")
 """Controllers of the comparison, unless others are given."""
@@ -86,7 +74,7 @@ After this page you know how often each claim holds if car, road, driver, line, 
 `activesteer study population` drives {samples} variations of the {vehicle}, its road, its
 driver, his line and the gains through the paper's five scenarios with all three systems: {runs} runs. The package
 stores the results (`studies/population/`). `activesteer reproduce` prints the proportions beside every nominal verdict,
-and the figures show 10 to 90 % of the runs behind the curves. `tools/renew_population.py` renews the results and this
+and the figures show 10 to 90 % of the runs behind the curves. `tools/renew.py population` renews the results and this
 page. They were driven with {versions}.
 
 ## Varied quantities
@@ -121,6 +109,14 @@ relative to the same sample without control: median, and the range of 90 % of th
 """
 
 
+def driven(options: argparse.Namespace, controllers: Sequence[str] | None, name: str) -> tuple[Population, Path]:
+    """Drive a population or what is missing of it; return its results and the folder of its runs."""
+    output = options.output or Path("build", name)
+    with RunCounter("population", quiet=False) as counter:
+        found = population(options.samples, controllers, output=output, jobs=options.jobs, progress=counter)
+    return found, output
+
+
 def page(found: Population) -> str:
     """Return the page of a population."""
     lines = find_study(STUDY).read_text(encoding="utf-8").splitlines()
@@ -141,7 +137,7 @@ def comparison_page(text: str, found: Population | None) -> str:
     """
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
-    lines = ["The package stores no comparison yet; `tools/renew_population.py --comparison` makes one."]
+    lines = ["The package stores no comparison yet; `tools/renew.py comparison` makes one."]
     return f"{before}{BEGIN}" + "\n".join(lines if found is None else _comparison(found)) + f"\n{END}{after}"
 
 
@@ -255,7 +251,7 @@ def stored_runs() -> pa.Table:
     folder = studies_dir() / STUDY
     summary = read_population(STUDY)
     if summary is None or not (folder / RUNS).is_file():
-        raise StudyError(f"{folder} holds no population; make one with tools/renew_population.py")
+        raise StudyError(f"{folder} holds no population; make one with tools/renew.py population")
     table = pq.read_table(folder / RUNS)
     table = table.append_column("vehicle", pa.array([summary.vehicle] * len(table)))
     samples = population_study(summary.samples, summary.seed).samples()[0]
@@ -423,45 +419,3 @@ def judge_again(changed: dict[str, str], jobs: int | None) -> Population:
 
 def _curves(rows: pa.Table, channel: str) -> list[np.ndarray]:
     return [np.asarray(curve.values, dtype=np.float64) for curve in rows[f"{CURVE}{channel}"]]
-
-
-def main() -> None:
-    """Run the tool."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--comparison", action="store_true", help="compare controllers, not claims")
-    parser.add_argument(
-        "--controllers", default=",".join(COMPARED), metavar="C,C...", help="controllers to compare (%(default)s)"
-    )
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="default: build/population or build/comparison"
-    )
-    parser.add_argument("--samples", type=int, metavar="N", help="default: that of studies/population.toml")
-    parser.add_argument("--jobs", type=int, metavar="N")
-    parser.add_argument("--judge", nargs="+", metavar="CLAIM=CLAIM", help="judge the stored population again")
-    parser.add_argument("--around", action="store_true", help="drive the populations around the paper's setting")
-    options = parser.parse_args()
-    if options.around:
-        renew_around(options.output or Path("build", "around"), options.samples, options.jobs)
-        return
-    if options.judge:
-        found = judge_again(dict(pair.split("=") for pair in options.judge), options.jobs)
-        PAGE.write_text(page(found), encoding="utf-8")
-        return
-    output = options.output or Path("build", "comparison" if options.comparison else "population")
-    with RunCounter("population", quiet=False) as counter:
-        controllers = options.controllers.split(",") if options.comparison else None
-        found = population(options.samples, controllers, output=output, jobs=options.jobs, progress=counter)
-    if options.comparison:
-        print(comparison_text(found))
-        print(store_summary(found, "comparison"))
-        text = CHASSIS_CONTROL.read_text(encoding="utf-8")
-        CHASSIS_CONTROL.write_text(comparison_page(text, found), encoding="utf-8")
-        return
-    print(found.to_text())
-    for path in store_population(found, output):
-        print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
-    PAGE.write_text(page(found), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

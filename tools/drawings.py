@@ -1,4 +1,4 @@
-"""Makes the drawings of axes and signs in the documentation: `python tools/make_doc_drawings.py`.
+"""Make the drawings of axes and signs in the documentation: `python tools/renew.py drawings`.
 
 They are drawn in the axes that they explain, in metres: what is at y = 1 here is on the left of the car. Plain SVG
 without fonts or scripts of their own, light, and dark where the reader's system is.
@@ -234,12 +234,8 @@ DRAWINGS: Final[dict[str, tuple[str, Callable[[], Drawing]]]] = {
 }
 
 
-def main() -> None:
-    """Writes the files."""
+def write_drawings() -> None:
+    """Write the files."""
     for name, (title, draw) in DRAWINGS.items():
         (PICTURES / f"{name}.svg").write_text(draw().svg(title), encoding="utf-8")
         print(f"docs/pictures/{name}.svg")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Makes the still and the animations of README and documentation: `python tools/make_film_pictures.py [NAME ...]`.
+"""Make the still and the animations of README and documentation: `python tools/renew.py films [NAME]...`.
 
 The still and the animation of README are of the sine with dwell, in which the three systems differ most; each page of
 manoeuvres has an animation of one of its own. Names of files choose some of them. It needs offscreen OpenGL; to be run
@@ -7,8 +7,7 @@ again when films look different, or the car or a controller has changed.
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -65,9 +64,9 @@ SCENES: Final = {
 """Animations by their page; that on transient manoeuvres shows the one of README."""
 
 
-def main() -> None:
-    """Drives the cars and draws them."""
-    wanted = set(sys.argv[1:])
+def draw_films(names: Sequence[str] = ()) -> None:
+    """Drive the cars and draw them."""
+    wanted = set(names)
     for page, scene in SCENES.items():
         name = f"film_{page}.webp"
         if not wanted or name in wanted:
@@ -94,7 +93,3 @@ def animate(runs: Mapping[str, Recording], settings: Settings, file: Path, from_
     times_ms = [round(1000.0 / RATE_HZ)] * (count - 1) + [2000]
     first.save(file, save_all=True, append_images=others, duration=times_ms, loop=0, quality=QUALITY, method=4)
     print(f"{file.name}: {file.stat().st_size / 1000:.0f} kB")
-
-
-if __name__ == "__main__":
-    main()
