@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from activesteer import simulate
-from activesteer.errors import SimulationDiverged
+from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.studies.engine.task_queue import in_parallel
 
 CARS: Final[dict[str, dict[str, Any]]] = {
@@ -121,8 +121,8 @@ def _metrics(
     sensors = {"sensors.preset": "production", "sensors.seed": seed}
     try:
         run = simulate(maneuver, controller, vehicle, {**sensors, **changes}, driver=driver)
-    except SimulationDiverged:
-        return {}
+    except (SimulationDiverged, ModelError):
+        return {}  # lost, or a rear suspension without a toe link for the screw
     last = run.time_s > run.time_s[-1] - 1.0
     return {**run.metrics, "ay_steady_mps2": abs(float(run["ay_mps2"][last].mean()))}
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Final
 
 from activesteer.controllers import Controller, ControllerParameters, ControllerSetup, find_controller
@@ -12,7 +14,10 @@ from activesteer.plugins import Plugin
 from activesteer.scenario import Scenario
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, new_message
 from activesteer.vehicle import Vehicle
+from activesteer.vehicle.steering_rates import steering_rates
 
+_SLOWER: Final = 0.95
+"""Ratio of rates below which an actuator counts as slower: loads and geometry change the rate by some percent."""
 _STEERING_WHEEL: Final = DriverCommand._fields.index("steering_wheel_demand_rad")
 _FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 
@@ -133,7 +138,7 @@ def control_unit(controller: Any, scenario: Scenario, vehicle: Vehicle) -> tuple
         ControllerError: there is no such controller, or it cannot be created.
     """
     plugin, car, timestep_s = find_controller(controller), scenario.car.config, vehicle.timestep_s
-    setup = scenario.controller_setup(interval_s(plugin, car.controllers, timestep_s))
+    setup = _with_rates(scenario.controller_setup(interval_s(plugin, car.controllers, timestep_s)), scenario, vehicle)
     every = round(setup.timestep_s / timestep_s)
     delay = _steps("controllers.bus_delay_s", car.controllers.bus_delay_s, timestep_s, 0)
     ratio = None if car.sensors.steering_wheel.is_ideal else car.steering.ratio
@@ -142,6 +147,29 @@ def control_unit(controller: Any, scenario: Scenario, vehicle: Vehicle) -> tuple
         return setup, block
     truth = vehicle.truth if plugin.uses_truth else None
     return setup, ControlUnit(block, every, delay, steering_ratio=ratio, truth=truth)
+
+
+def _with_rates(setup: ControllerSetup, scenario: Scenario, vehicle: Vehicle) -> ControllerSetup:
+    """Tell the controller the rates of slower actuators than those in its table, unless an override sets them."""
+    rates, servos, gains = steering_rates(vehicle.model, scenario.car.config), setup.gains.servos, setup.gains
+    slower = {
+        name: rate_radps
+        for name, rate_radps in (("rear_rate_radps", rates.rear), ("superposition_rate_radps", rates.superposition))
+        if f"servos.{name}" not in setup.overridden and rate_radps < _SLOWER * getattr(servos, name)
+    }
+    return replace(setup, gains=replace(gains, servos=replace(servos, **slower))) if slower else setup
+
+
+def slow_actuators(plugin: Plugin, scenario: Scenario, vehicle: Vehicle) -> str:
+    """Describe the actuators that are slower than the controller needs by its `rates_radps`; empty if none."""
+    needed = getattr(plugin.origin, "rates_radps", {})
+    rates = steering_rates(vehicle.model, scenario.car.config)._asdict() if needed else {}
+    return "; ".join(
+        f"{name.replace('rear', 'rear steering')} turns the wheels at {math.degrees(rates[name]):.0f} deg/s, "
+        f"{plugin.label} needs {math.degrees(need_radps):.0f} deg/s"
+        for name, need_radps in needed.items()
+        if rates[name] < _SLOWER * need_radps
+    )
 
 
 def told_by_sensor(controller: Any, steering_ratio: float) -> ControlUnit:
