@@ -74,6 +74,9 @@ class LqrParameters:
     """Time for which the superposition is held against a driver who does not steer back [s]."""
     decay_s: _Lag
     """Time in which it then decays to zero [s]."""
+    lacking_radps: _Scale
+    """Yaw rate by which the car turns less than desired, from which the superposition is not held against the driver
+    [rad/s]."""
     relaxation_length_m: _Length
     """Distance over which a tyre of the model builds up its force [m]."""
     moment_scale_Nm: _Size

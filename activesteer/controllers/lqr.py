@@ -127,6 +127,7 @@ class Lqr(NativeBlock):
     _superposition_limit_rad: float
     _hold_s: float
     _decay_s: float
+    _lacking_radps: float
     _against_s: float
     _driver_before_rad: float
     _torque_per_pressure_NmpPa: PerWheel
@@ -150,6 +151,7 @@ class Lqr(NativeBlock):
         self._curves = self._allocation.slopes
         self._adapt(BOTH)
         self._lag_s, self._hold_s, self._decay_s = self._servos.lag_s, p.hold_s, p.decay_s
+        self._lacking_radps = p.lacking_radps
         self._against_s = self._driver_before_rad = 0.0
         self._superposition_limit_rad = self._servos.superposition_limit_rad
         self._relaxation_length_m, self._friction_deviations = p.relaxation_length_m, p.friction_deviations
@@ -331,6 +333,9 @@ def fed_back(
     against = block._against_driver_rad
     against += certain * max(block._superposition_limit_rad - against, 0.0)
     against *= _patience(block, driver_rad)
+    # Against the driver it lessens the turn, which a car that turns less than desired does not need.
+    lacking = math.copysign(1.0, driver_rad) * (desired - now[_YAW_RATE])
+    against *= min(max(1.0 - lacking / block._lacking_radps, 0.0), 1.0)
     front_demand, rear_demand = authority * (held_front - front_feedback), authority * (held_rear - rear_feedback)
     return desired, sideslip, steady, rear, front_demand, rear_demand, against
 

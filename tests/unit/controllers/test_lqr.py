@@ -202,6 +202,29 @@ def test_superposition_is_not_held_against_a_driver_who_does_not_steer_back(know
     assert max(other) > math.radians(0.9)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_superposition_is_not_against_the_driver_while_the_car_turns_less_than_desired(known, side):
+    def limit_rad(yaw_rate_radps):
+        controller, rate = Lqr(known), side * yaw_rate_radps
+
+        class Certain:
+            innovation = 0.0
+
+            def step(self, _measurement):
+                return Estimate(25.0, 0.0, 0.0, rate, 0.3, *[0.001] * 5)
+
+        controller._estimator = Certain()  # pyright: ignore[reportAttributeAccessIssue]
+        return [controller.turn(steering(0.2 * side), measured(rate)) for _ in range(40)][-1]
+
+    free = limit_rad(1.0)
+    band = known.gains.lqr.lacking_radps
+    desired = abs(free.desired_radps)
+    most = known.gains.servos.superposition_limit_rad
+    assert free.against_rad == pytest.approx(most, rel=0.01)
+    assert limit_rad(desired - 0.5 * band).against_rad == pytest.approx(0.5 * most, rel=0.02)
+    assert limit_rad(desired - 1.1 * band).against_rad == 0.0
+
+
 def test_angles_follow_the_demand_exactly_within_limits_and_rates(known):
     allocation = Allocation(known)
     now = Estimate(25.0, 0.0, 0.0, 0.1, 0.9, *[0.0] * 5)
