@@ -22,6 +22,9 @@ _AY_STEP_MPS2: Final = 0.2
 """Step of the tabulated lateral accelerations [m/s2]."""
 _ROUNDS: Final = 8
 """Iterations after which force and load of a wheel agree to a thousandth."""
+_SPEED, _SIDESLIP, _YAW_RATE, _FRICTION = map(
+    Estimate._fields.index, ("speed_mps", "sideslip_rad", "yaw_rate_radps", "friction")
+)
 _MOST: Final = 0.95
 """Fraction of the largest axle force up to which slip angles are tabulated [-]. There one percent of force is 0.3 deg
 of slip angle for the compact's tyre; at 0.99 it is 0.7 deg, and the friction is not known to a percent."""
@@ -39,6 +42,11 @@ class AxleSlopes(NativeBlock):
 
     _front_excess_rad: Table
     _rear_excess_rad: Table
+    _front_curve: Table
+    _rear_curve: Table
+    _step_rad: float
+    _cg_to_front_m: float
+    _cg_to_rear_m: float
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Read the curves."""
@@ -47,11 +55,13 @@ class AxleSlopes(NativeBlock):
         half = 0.5 * self._car.mass_kg * GRAVITY_MPS2 / self._car.wheelbase_m
         self.loads_N = half * self._car.cg_to_rear_m, half * self._car.cg_to_front_m
         self._step_rad = known.tyres[0].slip_angle_step_rad
-        self._curves: list[list[float]] = []
+        self._cg_to_front_m, self._cg_to_rear_m = self._car.cg_to_front_m, self._car.cg_to_rear_m
+        curves = []
         for tyre, load_N in zip(known.tyres, self.loads_N, strict=True):
             loads = tyre.load_step_N * np.arange(len(tyre.force_N))
             curve = np.array([np.interp(load_N, loads, column) for column in np.array(tyre.force_N).T])
-            self._curves.append((curve / (curve[1] / self._step_rad)).tolist())
+            curves.append(array("d", (curve / (curve[1] / self._step_rad)).tolist()))
+        self._front_curve, self._rear_curve = curves
         car = known.two_track
         fractions = car.front_load_transfer_fraction, 1.0 - car.front_load_transfer_fraction
         shifts_kg = (
@@ -71,10 +81,16 @@ class AxleSlopes(NativeBlock):
             front_rad: Angle of the front wheels [rad].
             rear_rad: Angle of the rear wheels [rad].
         """
-        turning = now.yaw_rate_radps / now.speed_mps
-        front = front_rad - now.sideslip_rad - self._car.cg_to_front_m * turning
-        rear = rear_rad - now.sideslip_rad + self._car.cg_to_rear_m * turning
-        return self._slope(0, front, now.friction), self._slope(1, rear, now.friction)
+        front, rear = slopes(self, now, front_rad, rear_rad)
+        return abs(front), abs(rear)
+
+    def used(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
+        """Return how far front and rear axle are used: 0 straight ahead to 1 sliding; negative in turns to the right.
+
+        Arguments as in `at`.
+        """
+        front, rear = slopes(self, now, front_rad, rear_rad)
+        return math.copysign(1.0 - abs(front), front), math.copysign(1.0 - abs(rear), rear)
 
     def excess_rad(self, ay_mps2: float, friction: float) -> tuple[float, float]:
         """Return the additional slip angles of a steady turn that the curvature of the axle curves requires.
@@ -87,11 +103,6 @@ class AxleSlopes(NativeBlock):
             Slip angles of front and rear axle, positive to the side of the turn [rad].
         """
         return excess(self, ay_mps2, friction)
-
-    def _slope(self, axle: int, slip_angle_rad: float, friction: float) -> float:
-        curve = self._curves[axle]
-        index = min(int(abs(slip_angle_rad) / friction / self._step_rad), len(curve) - 2)
-        return max((curve[index + 1] - curve[index]) / self._step_rad, LEAST)
 
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
@@ -118,6 +129,29 @@ def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
     wanted = np.arange(0.0, _MOST * ay_mps2[rising - 1], _AY_STEP_MPS2)
     straight = wanted * angles_rad[1] / ay_mps2[1]
     return (np.interp(wanted, ay_mps2[:rising], angles_rad[:rising]) - straight).tolist()
+
+
+@shared
+def slopes(block: AxleSlopes, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
+    """Law of `AxleSlopes.at`; a slope is negative if the side force of its axle points to the right."""
+    speed, sideslip, turning, friction = now[_SPEED], now[_SIDESLIP], now[_YAW_RATE], now[_FRICTION]
+    turning /= speed
+    front = front_rad - sideslip - block._cg_to_front_m * turning
+    rear = rear_rad - sideslip + block._cg_to_rear_m * turning
+    return (
+        _slope(table(block._front_curve), block._step_rad, front, friction),
+        _slope(table(block._rear_curve), block._step_rad, rear, friction),
+    )
+
+
+@shared
+def _slope(curve: Table, step_rad: float, slip_angle_rad: float, friction: float) -> float:
+    # Slopes between the points, at their middles; a jump from one to the next would move the wheels.
+    place = max(abs(slip_angle_rad) / friction / step_rad - 0.5, 0.0)
+    index = min(int(place), len(curve) - 3)
+    part = min(place - index, 1.0)
+    near, far = curve[index + 1] - curve[index], curve[index + 2] - curve[index + 1]
+    return math.copysign(max((near + part * (far - near)) / step_rad, LEAST), slip_angle_rad)
 
 
 @shared

@@ -59,6 +59,11 @@ class ConfidenceMonitor(NativeBlock):
         """Present innovation of the estimator."""
         return self._estimator.innovation
 
+    @property
+    def authority(self) -> float:
+        """Present factor on the demands of the controller."""
+        return self._authority
+
     def step(self, now: Estimate) -> Confidence:
         """Return the confidence in the estimate of this call."""
         return new_message(Confidence, confidence(self, self.innovation, now.friction_std))
@@ -74,21 +79,3 @@ def confidence(block: ConfidenceMonitor, innovation: float, friction_std: float)
     left = friction_std / block._prior
     known = 1.0 - left * left
     return known if known > 0.0 else 0.0, block._authority
-
-
-@shared
-def bounded(added_rad: float, driver_rad: float, against_rad: float, limit_rad: float) -> float:
-    """Return a superposition angle within its limit, and within another one against the driver [rad].
-
-    Args:
-        added_rad: Demanded angle.
-        driver_rad: The driver's angle.
-        against_rad: Limit in the direction against the driver's angle.
-        limit_rad: Limit in any direction.
-    """
-    least, most = -limit_rad, limit_rad
-    if driver_rad > 0.0:
-        least = -min(against_rad, limit_rad)
-    elif driver_rad < 0.0:
-        most = min(against_rad, limit_rad)
-    return min(max(added_rad, least), most)

@@ -71,9 +71,7 @@ class Esc:
         desired = self._reference.borne(
             command.front_steer_demand_rad, now.speed_mps, now.friction, measurement.ay_mps2
         )
-        error = beyond(desired - now.yaw_rate_radps, p.yaw_rate_band_radps)
-        slide = beyond(now.sideslip_rad, p.sideslip_limit_rad)
-        moment = self._yaw_inertia_kgm2 * (error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2)
+        moment = self._yaw_inertia_kgm2 * stabilising(p, desired - now.yaw_rate_radps, now.sideslip_rad)
         torques = wheel_torques(moment, now.yaw_rate_radps, self._levers, p.torque_limit_Nm)
         braked = max(torques)  # of the only wheel that brakes
         limited = braked >= p.torque_limit_Nm
@@ -90,6 +88,13 @@ class Esc:
 def beyond(value: float, band: float) -> float:
     """Return the part of a value beyond a band about 0."""
     return value - band if value > band else value + band if value < -band else 0.0
+
+
+def stabilising(p: EscParameters, error_radps: float, sideslip_rad: float) -> float:
+    """Return M_z / J_z for a yaw rate error, desired less actual, and a sideslip angle [rad/s2]."""
+    error = beyond(error_radps, p.yaw_rate_band_radps)
+    slide = beyond(sideslip_rad, p.sideslip_limit_rad)
+    return error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2
 
 
 def brake_levers(setup: ControllerSetup) -> tuple[float, float]:

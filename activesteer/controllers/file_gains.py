@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import Annotated, TypeVar
+from typing import Annotated, ClassVar, TypeVar
 
 from activesteer.config import Range, build, read_toml
 from activesteer.errors import ControllerError
@@ -70,8 +70,23 @@ class LqrParameters:
     against_driver_rad: _Limit
     """Superposition against the driver's angle that is allowed while the friction is unknown [rad]; it grows to the
     limit of the actuator with the certainty of the friction."""
+    hold_s: _Lag
+    """Time for which the superposition is held against a driver who does not steer back [s]."""
+    decay_s: _Lag
+    """Time in which it then decays to zero [s]."""
+    lacking_radps: _Scale
+    """Yaw rate by which the car turns less than desired, from which the superposition is not held against the driver
+    [rad/s]."""
     relaxation_length_m: _Length
     """Distance over which a tyre of the model builds up its force [m]."""
+    moment_scale_Nm: _Size
+    """Scale of a missing yaw moment [Nm]."""
+    force_scale_N: _Size
+    """Scale of a missing side force [N]."""
+    ahead_s: _Lag
+    """Time ahead for which the rates of the actuators limit the angles [s]."""
+    removal_s: _Lag
+    """Time in which an actuator must be able to remove its angle [s]."""
 
 
 @dataclass(frozen=True)
@@ -128,29 +143,24 @@ class TorqueVectoringParameters:
 
 @dataclass(frozen=True)
 class IntegratedParameters:
-    """Allocation to steering and brakes (`integrated`); [controllers.lqr] gives the feedback.
+    """Brakes for what the steering of `lqr` cannot give (`integrated`); [controllers.lqr] gives the feedback.
 
-    A missing moment, a missing side force, an angle and a brake force, each as large as its scale, cost the same.
+    A missing moment as large as its scale in [controllers.lqr] and a brake force as large as its scale cost the same.
     """
 
-    yaw_rate_time_s: _Lag
-    """T_r: time constant for the yaw rate error [s]."""
-    sideslip_time_s: _Lag
-    """T_b: time constant for the sideslip error [s]."""
-    moment_scale_Nm: _Size
-    """Scale of the missing yaw moment [Nm]."""
-    force_scale_N: _Size
-    """Scale of the missing side force [N]."""
-    angle_scale_rad: _Scale
-    """s: scale of the difference from the angles of the feedback [rad]."""
+    KEY_HINTS: ClassVar = {
+        **{key: f"now controllers.lqr.{key}" for key in ("moment_scale_Nm", "force_scale_N", "ahead_s")},
+        **{key: f"now controllers.esc.{key}" for key in ("yaw_rate_time_s", "sideslip_time_s")},
+        "brake_fraction": "the brakes have the limit controllers.esc.torque_limit_Nm",
+        "angle_scale_deg": "the angles are those of lqr; see controllers.lqr.superposition_scale_deg",
+    }
+
     brake_scale_N: _Size
     """F_0: scale of the brake force at a wheel [N]."""
     brake_threshold_Nm: _Size
     """Missing yaw moment below which the brakes do nothing [Nm]."""
-    brake_fraction: _Fraction
-    """Fraction of the friction force under the static wheel load that a brake may use [-]."""
-    ahead_s: _Lag
-    """Time ahead for which the rates of the actuators limit the angles [s]."""
+    brake_side_loss: _Fraction
+    """Side force that a fully used tyre loses per brake force [-]."""
     side_difference_Pa: Annotated[float, Range(0.0, 1e8)]
     """Brake pressure difference between the sides for a car without errors, in addition to the difference that the
     anti-lock system leaves to the driver [Pa]."""

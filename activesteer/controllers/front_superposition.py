@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from types import MappingProxyType
+
 from activesteer.controllers.corrector import Corrector, corrected, cut_off, rear_direction, reset
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
@@ -15,6 +18,8 @@ class FrontSuperposition(NativeBlock):
     """Active front steering (AFS): the corrector of the rear steering with the opposite sign, without prediction."""
 
     reads = ("afs", "desired_yaw_rate")
+    rates_radps = MappingProxyType({"superposition": math.radians(13.0)})
+    """A sine of 0.7 Hz, as in FMVSS 126, with 3 deg."""
     _desired: DesiredYawRate
     _corrector: Corrector
     _limit_rad: float

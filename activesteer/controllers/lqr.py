@@ -41,12 +41,14 @@ import math
 from array import array
 from functools import lru_cache
 from itertools import chain
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from activesteer.controllers.allocation import Allocation, allocated
 from activesteer.controllers.axle_slopes import AxleSlopes, excess
-from activesteer.controllers.confidence import ConfidenceMonitor, bounded, confidence
+from activesteer.controllers.confidence import ConfidenceMonitor, confidence
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
 from activesteer.controllers.esc import brake_levers
 from activesteer.controllers.file_gains import LqrParameters
@@ -74,6 +76,8 @@ _ROW: Final = _STEADY + 2 * len(STATES)
 _SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD = map(
     Estimate._fields.index, ("speed_mps", "sideslip_rad", "yaw_rate_radps", "friction", "friction_std")
 )
+_SAME_RAD: Final = 1e-6
+"""Difference of an angle from its demand that is no limit [rad]."""
 _FULL_MPS: Final = 8.0
 """Speed from which the controller acts fully; below it fades out until `MIN_SPEED_MPS` [m/s]."""
 
@@ -104,12 +108,15 @@ class Lqr(NativeBlock):
     interval_s = 0.005
     reads = ("lqr", "servos", "estimator")
     compiled_in = "activesteer.controllers.native_lqr"
+    rates_radps = MappingProxyType({"rear": math.radians(25.0), "superposition": math.radians(25.0)})
+    """It removes 3 deg within the time in which the car answers, `removal_s`."""
     gains = LqrParameters
     derived = ("_schedule", "_superposition_works", "_rear_works")
     _estimator: Estimator
     _confidence: ConfidenceMonitor
     _reference: TurnReference
     _curves: AxleSlopes
+    _allocation: Allocation
     _schedule: Table
     _superposition_works: bool
     _rear_works: bool
@@ -119,7 +126,11 @@ class Lqr(NativeBlock):
     _friction_deviations: float
     _against_driver_rad: float
     _superposition_limit_rad: float
-    _rear_limit_rad: float
+    _hold_s: float
+    _decay_s: float
+    _lacking_radps: float
+    _against_s: float
+    _driver_before_rad: float
     _torque_per_pressure_NmpPa: PerWheel
     _moment_per_torque: PerWheel
     _front_compensation_radpNm: float
@@ -137,9 +148,12 @@ class Lqr(NativeBlock):
         self._confidence = ConfidenceMonitor(setup, self._estimator)
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
-        self._curves = AxleSlopes(setup)
+        self._allocation = Allocation(setup)
+        self._curves = self._allocation.slopes
         self._adapt(BOTH)
-        self._lag_s, self._rear_limit_rad = self._servos.lag_s, self._servos.rear_limit_rad
+        self._lag_s, self._hold_s, self._decay_s = self._servos.lag_s, p.hold_s, p.decay_s
+        self._lacking_radps = p.lacking_radps
+        self._against_s = self._driver_before_rad = 0.0
         self._superposition_limit_rad = self._servos.superposition_limit_rad
         self._relaxation_length_m, self._friction_deviations = p.relaxation_length_m, p.friction_deviations
         self._against_driver_rad = p.against_driver_rad
@@ -198,6 +212,32 @@ class Lqr(NativeBlock):
         self._schedule = array("d", chain.from_iterable(rows))
         self._superposition_works, self._rear_works = works
 
+    def allocate(
+        self, turn: Turn, command: DriverCommand, measurement: Measurement, works: tuple[bool, bool]
+    ) -> tuple[float, float, float]:
+        """Return superposition and rear angle within their limits [rad], and the change of moment by them [Nm].
+
+        Args:
+            turn: Turn of this call, faster than walking speed.
+            command: Command of the driver.
+            measurement: Measurement of the car's sensors.
+            works: Whether superposition and rear steering work.
+        """
+        return allocated(
+            self._allocation, turn.estimate, command.front_steer_demand_rad,
+            (measurement.superposition_rad, measurement.rear_steer_rad), turn.demand_rad, turn.against_rad, works,
+        )  # fmt: skip
+
+    @property
+    def authority(self) -> float:
+        """Factor on the demands by the confidence in the estimator, 0 to 1."""
+        return self._confidence.authority
+
+    @property
+    def slopes(self) -> AxleSlopes:
+        """Curves of both axles."""
+        return self._curves
+
     def apply(self, superposition_rad: float, rear_rad: float) -> None:
         """Store the final demands of the actuators; for a failed actuator its position."""
         self._superposition_before_rad, self._rear_before_rad = superposition_rad, rear_rad
@@ -224,10 +264,12 @@ def regulated(
         return 0.0, 0.0, 0.0, 0.0, 0.0, False
     fade = min((speed - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
     front_demand, rear_demand = fade * front_demand, fade * rear_demand
-    added = bounded(front_demand, driver_rad, against, block._superposition_limit_rad)
-    rear = min(max(rear_demand, -block._rear_limit_rad), block._rear_limit_rad)
+    added, rear, _ = allocated(
+        block._allocation, now, driver_rad, (superposition_rad, rear_rad), (front_demand, rear_demand), against, BOTH
+    )
     block._superposition_before_rad, block._rear_before_rad = added, rear
-    return rear, added, desired, steady, rear - steady, added != front_demand or rear != rear_demand
+    off = max(abs(added - front_demand), abs(rear - rear_demand))
+    return rear, added, desired, steady, rear - steady, off > _SAME_RAD
 
 
 @shared
@@ -291,8 +333,30 @@ def fed_back(
         rear_feedback += _gain(rows, start, part, _STEADY + len(errors) + place) * errors[place]
     against = block._against_driver_rad
     against += certain * max(block._superposition_limit_rad - against, 0.0)
+    against *= _patience(block, driver_rad)
+    # Against the driver it lessens the turn, which a car that turns less than desired does not need.
+    lacking = math.copysign(1.0, driver_rad) * (desired - now[_YAW_RATE])
+    against *= min(max(1.0 - lacking / block._lacking_radps, 0.0), 1.0)
     front_demand, rear_demand = authority * (held_front - front_feedback), authority * (held_rear - rear_feedback)
     return desired, sideslip, steady, rear, front_demand, rear_demand, against
+
+
+@shared
+def _patience(block: Lqr, driver_rad: float) -> float:
+    """Return the part of the superposition that may still be held against the driver.
+
+    It counts the time of a superposition against a driver whose angle is not below its own lagged value. A driver who
+    has steered to the other side begins anew.
+    """
+    before = block._driver_before_rad
+    if driver_rad * before < 0.0:
+        block._against_s = 0.0
+    elif abs(driver_rad) < abs(before):
+        block._against_s = max(block._against_s - block._interval_s, 0.0)
+    elif block._superposition_before_rad * driver_rad < 0.0:
+        block._against_s = min(block._against_s + block._interval_s, block._hold_s + block._decay_s)
+    block._driver_before_rad += -math.expm1(-block._interval_s / block._hold_s) * (driver_rad - before)
+    return min((block._hold_s + block._decay_s - block._against_s) / block._decay_s, 1.0)
 
 
 @shared

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import MappingProxyType
 
 from activesteer.controllers.corrector import Corrector, corrected, cut_off, rear_direction, reset
 from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate, desired_yaw_rate
@@ -61,6 +62,8 @@ class RearSteer(NativeBlock):
     """
 
     reads = ("ars", "desired_yaw_rate")
+    rates_radps = MappingProxyType({"rear": math.radians(13.0)})
+    """A sine of 0.7 Hz, as in FMVSS 126, with 3 deg."""
     _desired: DesiredYawRate
     _prediction: RearPrediction
     _corrector: Corrector

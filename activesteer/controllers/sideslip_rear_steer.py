@@ -26,6 +26,7 @@ class SideslipRearSteer:
 
     interval_s = 0.005
     reads = (*RearSteer.reads, "ars_sideslip", "estimator")
+    rates_radps = RearSteer.rates_radps
     gains = SideslipRearSteerParameters
 
     def __init__(self, paper: RearSteer, estimator: Estimator, sideslip_gain: float, limit_rad: float) -> None:

@@ -62,6 +62,11 @@ class Variant:
         return getattr(CONTROLLERS[self.system], "interval_s", None)
 
     @property
+    def rates_radps(self) -> Mapping[str, float]:
+        """Rates of the actuators that the controller needs [rad/s]."""
+        return getattr(CONTROLLERS[self.system], "rates_radps", {})
+
+    @property
     def reads(self) -> tuple[str, ...]:
         """Keys of the table [controllers] that the controller reads."""
         return CONTROLLERS[self.system].reads

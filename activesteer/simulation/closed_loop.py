@@ -127,7 +127,7 @@ class ClosedLoop(Uncopyable):
         vehicle.limit_hands(scenario.driver.parameters.steering_torque_limit_Nm)
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
         driver: Driver = scenario.driver.plugin.make(self.driver_setup)
-        self.controller_setup, self.unit, block = control_unit(self._plugin, scenario, timestep_s)
+        self.controller_setup, self.unit, block = control_unit(self._plugin, scenario, vehicle)
         self.blocks = driver, block
         self.recorder: Recorder | None = None
         self.in_use = OneAtATime()
@@ -198,9 +198,7 @@ class ClosedLoop(Uncopyable):
             ControllerError: there is no such controller, or it cannot be created.
         """
         self._plugin = find_controller(controller)
-        self.controller_setup, self.unit, self.controller = control_unit(
-            self._plugin, self.scenario, self.vehicle.timestep_s
-        )
+        self.controller_setup, self.unit, self.controller = control_unit(self._plugin, self.scenario, self.vehicle)
         self._cars.connect(self._car)
 
     @property
@@ -299,8 +297,8 @@ class ClosedLoop(Uncopyable):
         time_s = self.step_count * self.vehicle.timestep_s
         part, after = changed(self.scenario, key, value, self._plugin, time_s)
         if part == "controller":
-            _, _, old = control_unit(self._plugin, self.scenario, self.vehicle.timestep_s)
-            self.controller_setup, _, new = control_unit(self._plugin, after, self.vehicle.timestep_s)
+            _, _, old = control_unit(self._plugin, self.scenario, self.vehicle)
+            self.controller_setup, _, new = control_unit(self._plugin, after, self.vehicle)
             self.controller = retuned(self.controller, old, new)
         elif part == "driver":
             make, who = after.driver.plugin.make, after.driver
@@ -412,7 +410,7 @@ class ClosedLoop(Uncopyable):
             self._adopt(self._changed_by(state.changes))
             self.changes, who = state.changes, self.scenario.driver
             self.driver_setup = replace(self.driver_setup, parameters=who.parameters, own=who.own)
-            self.controller_setup, _, _ = control_unit(self._plugin, self.scenario, self.vehicle.timestep_s)
+            self.controller_setup, _, _ = control_unit(self._plugin, self.scenario, self.vehicle)
         if state.faults != self._fault_list:
             self.fail(state.faults)
         self.vehicle.restore_state(state.engine)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import math
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
 
 from activesteer.controllers import Controller, ControllerParameters, ControllerSetup
 from activesteer.errors import ParameterError
 from activesteer.plugins import Plugin
 from activesteer.scenario import Scenario
+from activesteer.vehicle import Vehicle
+from activesteer.vehicle.steering_rates import steering_rates
+
+_SLOWER: Final = 0.95
+"""Ratio of rates below which an actuator counts as slower: loads and geometry change the rate by some percent."""
 
 
 class ControlUnit(NamedTuple):
@@ -49,14 +56,14 @@ def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: flo
 
 
 def control_unit(
-    plugin: Plugin, scenario: Scenario, timestep_s: float
+    plugin: Plugin, scenario: Scenario, vehicle: Vehicle
 ) -> tuple[ControllerSetup, ControlUnit, Controller]:
     """Create a controller and its control unit.
 
     Args:
         plugin: The controller.
         scenario: Manoeuvre and car.
-        timestep_s: Step of the simulation [s].
+        vehicle: The car in the engine.
 
     Returns:
         The properties of the car that the controller may know, its control unit, and the controller.
@@ -65,8 +72,8 @@ def control_unit(
         ParameterError: its interval or the delay of the bus is not a whole number of steps.
         ControllerError: it cannot be created.
     """
-    car = scenario.car.config
-    setup = scenario.controller_setup(interval_s(plugin, car.controllers, timestep_s))
+    car, timestep_s = scenario.car.config, vehicle.timestep_s
+    setup = _with_rates(scenario.controller_setup(interval_s(plugin, car.controllers, timestep_s)), scenario, vehicle)
     unit = ControlUnit(
         round(setup.timestep_s / timestep_s),
         _steps("controllers.bus_delay_s", car.controllers.bus_delay_s, timestep_s, 0),
@@ -74,6 +81,29 @@ def control_unit(
         plugin.uses_truth,
     )
     return setup, unit, plugin.make(setup)
+
+
+def _with_rates(setup: ControllerSetup, scenario: Scenario, vehicle: Vehicle) -> ControllerSetup:
+    """Tell the controller the rates of slower actuators than those in its table, unless an override sets them."""
+    rates, servos, gains = steering_rates(vehicle.model, scenario.car.config), setup.gains.servos, setup.gains
+    slower = {
+        name: rate_radps
+        for name, rate_radps in (("rear_rate_radps", rates.rear), ("superposition_rate_radps", rates.superposition))
+        if f"servos.{name}" not in setup.overridden and rate_radps < _SLOWER * getattr(servos, name)
+    }
+    return replace(setup, gains=replace(gains, servos=replace(servos, **slower))) if slower else setup
+
+
+def slow_actuators(plugin: Plugin, scenario: Scenario, vehicle: Vehicle) -> str:
+    """Describe the actuators that are slower than the controller needs by its `rates_radps`; empty if none."""
+    needed = getattr(plugin.origin, "rates_radps", {})
+    rates = steering_rates(vehicle.model, scenario.car.config)._asdict() if needed else {}
+    return "; ".join(
+        f"{name.replace('rear', 'rear steering')} turns the wheels at {math.degrees(rates[name]):.0f} deg/s, "
+        f"{plugin.label} needs {math.degrees(need_radps):.0f} deg/s"
+        for name, need_radps in needed.items()
+        if rates[name] < _SLOWER * need_radps
+    )
 
 
 def about(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
+from activesteer.simulation.control_unit import slow_actuators
 from activesteer.simulation.pacing import Pacer
 from activesteer.simulation.pickling import pickled, unpickled
 from activesteer.simulation.preparation import prepared
@@ -160,6 +161,8 @@ class Simulation:
         self._writer: McapWriter | None = None
         if timestep_s >= _COARSE_S and self.scenario.maneuver.ground.is_steep:
             self._note("note", _COARSE)
+        if slow := slow_actuators(controller, self.scenario, self.loop.vehicle):
+            self._note("note", slow)
 
     @cached_property
     def _recorder(self) -> Recorder:

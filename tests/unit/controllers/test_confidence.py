@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from activesteer.controllers.confidence import ConfidenceMonitor, bounded
+from activesteer.controllers.allocation import angle_range
+from activesteer.controllers.confidence import ConfidenceMonitor
 from activesteer.scenario import resolve
 from activesteer.signals import Estimate
 
@@ -32,11 +33,18 @@ def moving(friction_std: float) -> Estimate:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_against_the_driver_less_is_allowed_than_with_him(side: float):
-    driver = side * 0.1
-    assert bounded(-side * 0.05, driver, AGAINST_RAD, LIMIT_RAD) == -side * AGAINST_RAD
-    assert bounded(side * 0.1, driver, AGAINST_RAD, LIMIT_RAD) == side * LIMIT_RAD
-    assert bounded(-side * 0.01, driver, AGAINST_RAD, LIMIT_RAD) == -side * 0.01
-    assert bounded(-side * 0.1, 0.0, AGAINST_RAD, LIMIT_RAD) == -side * LIMIT_RAD
+    far, driver = 1.0, side * 0.1
+    least, most = angle_range(0.0, LIMIT_RAD, far, True, AGAINST_RAD, driver)
+    assert (least, most) == ((-AGAINST_RAD, LIMIT_RAD) if side > 0.0 else (-LIMIT_RAD, AGAINST_RAD))
+    assert angle_range(0.0, LIMIT_RAD, far, True, AGAINST_RAD, 0.0) == (-LIMIT_RAD, LIMIT_RAD)
+
+
+def test_angles_are_limited_by_what_the_actuator_reaches_and_a_failed_one_stays():
+    assert angle_range(0.01, LIMIT_RAD, 0.02, True, AGAINST_RAD, 0.0) == pytest.approx((-0.01, 0.03))
+    assert angle_range(0.04, LIMIT_RAD, 0.02, True, AGAINST_RAD, 0.0) == pytest.approx((0.02, LIMIT_RAD))
+    assert angle_range(0.07, LIMIT_RAD, 0.02, False, AGAINST_RAD, 0.1) == (0.07, 0.07)
+    # An angle beyond a limit that has shrunk comes back within its rate at once.
+    assert angle_range(-0.03, LIMIT_RAD, 0.02, True, 0.0, 0.1) == pytest.approx((0.0, 0.0))
 
 
 def test_friction_is_certain_as_far_as_its_variance_has_fallen(watched):

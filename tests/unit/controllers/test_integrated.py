@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.axle_slopes import LEAST, AxleSlopes
+from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.quadratic_programme import solver
 from activesteer.controllers.supervised_actuator import SupervisedActuator
-from activesteer.conventions import GRAVITY_MPS2
-from activesteer.errors import ControllerError
+from activesteer.errors import ControllerError, ParameterError
 from activesteer.scenario import resolve
 from activesteer.signals import Estimate
 from tests.raising import raises
@@ -48,27 +50,67 @@ def spinning(side: float, yaw_rate_radps: float = 0.6):
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_spinning_car_gets_the_outer_brakes_where_the_steering_has_given_all(known, side):
+def test_spinning_car_gets_the_outer_front_brake_where_the_steering_has_given_all(known, side):
     answer = load_controller("integrated", known).step(steering(0.0), spinning(side))
     fl, fr, rl, rr = answer.brake_torque_demand_Nm
-    outer, inner = ((fr, rr), (fl, rl)) if side > 0.0 else ((fl, rl), (fr, rr))
-    assert min(outer) > 100.0
-    assert max(inner) < 1.0
+    outer, others = (fr, (fl, rl, rr)) if side > 0.0 else (fl, (fr, rl, rr))
+    assert outer > 100.0
+    # The outer rear wheel would lose side force that holds the car.
+    assert max(others) < outer
     assert answer.rear_steer_demand_rad * side > 0.0 > answer.superposition_demand_rad * side
     assert answer.saturated
 
 
-def test_steering_that_does_more_than_what_is_wished_is_not_braked_against(known):
-    answer = load_controller("integrated", known).step(steering(0.0), measured(0.6, SPEED_MPS))
-    assert max(answer.brake_torque_demand_Nm) < 1.0
+def test_steering_that_suffices_within_its_rates_is_left_alone_and_beyond_it_the_brakes_help(known):
+    # In 0.1 s both axles make some 9 kNm. 0.3 rad/s need 2200 * 0.25 / 0.1 = 5.5 kNm, 0.6 rad/s need 12 kNm.
+    torques_Nm = [
+        max(load_controller("integrated", known).step(steering(0.0), measured(rate, SPEED_MPS)).brake_torque_demand_Nm)
+        for rate in (0.3, 0.6)
+    ]
+    assert torques_Nm[0] == 0.0 < torques_Nm[1]
 
 
-def test_brakes_use_no_more_than_their_part_of_the_friction(known):
+def test_slow_rear_steering_leaves_more_to_the_brakes(known):
+    def braked_Nm(rear_rate_degps: float) -> float:
+        servos = replace(known.gains.servos, rear_rate_radps=math.radians(rear_rate_degps))
+        setup = replace(known, gains=replace(known.gains, servos=servos))
+        return max(load_controller("integrated", setup).step(steering(0.0), measured(0.5, SPEED_MPS))
+                   .brake_torque_demand_Nm)  # fmt: skip
+
+    assert braked_Nm(28.0) < braked_Nm(12.0) < braked_Nm(4.0)
+
+
+def test_moment_for_the_brakes_grows_from_zero_without_a_jump_whatever_the_feedback_wants(known):
+    """The wanted moment may point against that of the feedback, which mostly acts on the sideslip."""
+    controller = Integrated(known)
+    band = known.gains.esc.yaw_rate_band_radps
+    rates = band + np.linspace(-0.02, 0.2, 100)
+    for steered_Nm in (-5000.0, 0.0, 5000.0):
+        missing = [
+            controller._missing_moment(moving()._replace(yaw_rate_radps=rate), 0.0, 0.0, steered_Nm) for rate in rates
+        ]
+        assert missing[0] == 0.0
+        assert np.all(np.diff(missing) <= 0.0)
+        assert np.abs(np.diff(missing)).max() < 300.0
+        assert missing[-1] == pytest.approx(min(-0.2 / 0.1 * 2200.0 - steered_Nm, 0.0), abs=1.0)
+
+
+def test_brakes_use_no_more_than_the_limit_of_the_stability_control(known):
     answer = load_controller("integrated", known).step(steering(0.0), spinning(1.0, 5.0))
-    car = known.estimation
-    weight_N = known.single_track.mass_kg * GRAVITY_MPS2
-    most = known.gains.integrated.brake_fraction * 0.9 * 0.5 * weight_N * car.rolling_radius_m[0]
-    assert 0.3 * most < max(answer.brake_torque_demand_Nm) < most
+    assert max(answer.brake_torque_demand_Nm) == pytest.approx(known.gains.esc.torque_limit_Nm)
+
+
+def test_solvers_last_digits_are_no_demand_on_the_brakes(known):
+    """The anti-lock system lets a wheel slip more that a controller brakes."""
+    controller = load_controller("integrated", known)
+    for rate in (0.0, 0.01, -0.02):
+        assert controller.step(steering(0.002), measured(rate, SPEED_MPS)).brake_torque_demand_Nm == (0.0,) * 4
+
+
+@pytest.mark.parametrize("key", ["ahead_s", "yaw_rate_time_s", "angle_scale_deg", "brake_fraction"])
+def test_former_keys_say_where_they_are_now(key):
+    with pytest.raises(ParameterError, match=r"controllers\.(lqr|esc)"):
+        resolve("straight_line", overrides={f"controllers.integrated.{key}": 0.1})
 
 
 def test_stuck_rear_wheels_are_noticed_and_taken_as_they_are(known):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import ControllerParameters, load_controller
-from activesteer.controllers.lqr import SPEEDS_MPS, STATES, Lqr, feedback, model, schedule, steady_turn
+from activesteer.controllers.allocation import Allocation, allocated
+from activesteer.controllers.lqr import BOTH, SPEEDS_MPS, STATES, Lqr, feedback, model, schedule, steady_turn
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.scenario import resolve
 from activesteer.signals import Estimate
@@ -90,7 +91,8 @@ def test_answers_are_mirrored(known):
 
 
 def test_angles_end_at_their_limits_and_say_so(known):
-    answer = first(known, steering(0.0), measured(1.0))
+    near = {"rear_steer_rad": math.radians(2.0), "superposition_rad": -math.radians(2.0)}
+    answer = first(known, steering(0.0), measured(1.0)._replace(**near))
     limit = known.gains.servos.rear_limit_rad
     assert answer.rear_steer_demand_rad == limit == math.radians(3.0)
     assert answer.superposition_demand_rad == -known.gains.servos.superposition_limit_rad
@@ -165,3 +167,95 @@ def test_moment_of_the_drivers_brakes_is_held_by_both_axles_without_side_force(k
     own_Nm = (estimation.brake_torque_per_pressure_NmpPa[0] * 15e5, 0.0, 0.0, 0.0)
     assert steady(braking, left_Pa, own_Nm) == pytest.approx((0.0, 0.0), abs=1e-12)
     assert steady(steering(0.0), left_Pa) == (0.0, 0.0)
+
+
+def against(known, driver_rad: float, calls: int, controller=None):
+    """Superposition of a regulator that takes a road for slippery, for a constant driver's angle."""
+    controller = Lqr(known) if controller is None else controller
+    slippery = Estimate(25.0, 0.0, 0.0, 0.05, 0.2, *[0.01] * 5)
+
+    class Slippery:
+        innovation = 0.0
+
+        def step(self, _measurement):
+            return slippery
+
+    controller._estimator = Slippery()  # pyright: ignore[reportAttributeAccessIssue]
+    added_rad, found = 0.0, []
+    for _ in range(calls):
+        seen = measured(0.05)._replace(superposition_rad=added_rad)
+        added_rad = controller.step(steering(driver_rad), seen).superposition_demand_rad
+        found.append(added_rad)
+    return controller, found
+
+
+def test_superposition_is_not_held_against_a_driver_who_does_not_steer_back(known):
+    p = known.gains.lqr
+    controller, found = against(known, 0.2, round(3.0 / INTERVAL_S))
+    begun = next(call for call, angle in enumerate(found) if angle < -math.radians(0.5))
+    held_calls, decayed = round(p.hold_s / INTERVAL_S), round((p.hold_s + p.decay_s) / INTERVAL_S)
+    assert found[begun + held_calls // 2] < -math.radians(0.9)
+    assert max(found[begun + decayed + 20 :]) >= 0.0
+    assert min(found[begun + decayed + 20 :]) > -math.radians(0.05)
+    # To the other side it may act anew.
+    _, other = against(known, -0.2, round(0.5 / INTERVAL_S), controller)
+    assert max(other) > math.radians(0.9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_superposition_is_not_against_the_driver_while_the_car_turns_less_than_desired(known, side):
+    def limit_rad(yaw_rate_radps):
+        controller, rate = Lqr(known), side * yaw_rate_radps
+
+        class Certain:
+            innovation = 0.0
+
+            def step(self, _measurement):
+                return Estimate(25.0, 0.0, 0.0, rate, 0.3, *[0.001] * 5)
+
+        controller._estimator = Certain()  # pyright: ignore[reportAttributeAccessIssue]
+        return [controller.turn(steering(0.2 * side), measured(rate)) for _ in range(40)][-1]
+
+    free = limit_rad(1.0)
+    band = known.gains.lqr.lacking_radps
+    desired = abs(free.desired_radps)
+    most = known.gains.servos.superposition_limit_rad
+    assert free.against_rad == pytest.approx(most, rel=0.01)
+    assert limit_rad(desired - 0.5 * band).against_rad == pytest.approx(0.5 * most, rel=0.02)
+    assert limit_rad(desired - 1.1 * band).against_rad == 0.0
+
+
+def test_angles_follow_the_demand_exactly_within_limits_and_rates(known):
+    allocation = Allocation(known)
+    now = Estimate(25.0, 0.0, 0.0, 0.1, 0.9, *[0.0] * 5)
+    demand = 0.011, -0.007
+    found = allocated(allocation, now, 0.02, (0.0, 0.0), demand, 0.05, BOTH)
+    assert found[:2] == pytest.approx(demand, rel=1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_front_wheels_keep_the_moment_when_the_rear_wheels_are_too_slow(known, side):
+    """Both axles to the same side make side force; without the rear ones the front ones would turn the car in."""
+    slow = replace(known.gains.servos, rear_rate_radps=math.radians(4.0))
+    car, demand = known.single_track, (0.02 * side, 0.02 * side)
+    now = Estimate(25.0, 0.0, 0.0, 0.0, 0.9, *[0.0] * 5)
+    allocation = Allocation(replace(known, gains=replace(known.gains, servos=slow)))
+    # One axle takes over with the lag of the actuators.
+    front, rear, moment_Nm = [
+        allocated(allocation, now, 0.0, (0.0, 0.0), demand, 0.05, BOTH)
+        for _ in range(round(10.0 * slow.lag_s / INTERVAL_S))
+    ][-1]
+    assert abs(rear) == pytest.approx(min(known.gains.lqr.ahead_s * slow.rear_rate_radps, abs(demand[1])))
+    front_Nm = car.front_stiffness_Nprad * car.cg_to_front_m
+    rear_Nm = -car.rear_stiffness_Nprad * car.cg_to_rear_m
+    wanted_Nm, careless_Nm = front_Nm * demand[0] + rear_Nm * demand[1], front_Nm * demand[0] + rear_Nm * rear
+    assert moment_Nm == pytest.approx(front_Nm * front + rear_Nm * rear, rel=0.01)
+    assert abs(moment_Nm - wanted_Nm) < 0.2 * abs(careless_Nm - wanted_Nm)
+
+
+def test_no_angle_is_larger_than_its_actuator_removes_while_the_car_answers(known):
+    slow = replace(known.gains.servos, rear_rate_radps=math.radians(12.0))
+    setup = replace(known, gains=replace(known.gains, servos=slow))
+    seen = measured(1.0)._replace(rear_steer_rad=math.radians(1.4))
+    most = known.gains.lqr.removal_s * slow.rear_rate_radps
+    assert first(setup, steering(0.0), seen).rear_steer_demand_rad == pytest.approx(most)

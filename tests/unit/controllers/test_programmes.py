@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import load_controller
-from activesteer.controllers.axle_slopes import AxleSlopes
+from activesteer.controllers.axle_slopes import LEAST, AxleSlopes
 from activesteer.controllers.esc import wheel_torques
 from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.lqr import SPEEDS_MPS, Lqr, _gain, _place, schedule, steady_turn
@@ -41,28 +41,6 @@ def test_rear_wheels_turn_out_of_the_turn_by_what_a_heavily_loaded_axle_needs_mo
     assert side * ay_mps2 > 0.7 * friction * GRAVITY_MPS2
     assert more * side > math.radians(0.05)
     assert more == pytest.approx(slopes.excess_rad(ay_mps2, friction)[1], rel=0.1)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_sliding_car_gets_side_force_against_its_sideslip_the_more_the_sooner_it_is_to_end(known, side):
-    sideslip_rad = 0.04 * side
-
-    class Sliding:
-        def step(self, _measurement):
-            return Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, 0.9, *[0.0] * 5)
-
-    forces_N = []
-    for time_s in (0.1, 10.0):
-        gains = replace(known.gains, integrated=replace(known.gains.integrated, sideslip_time_s=time_s))
-        controller = Integrated(replace(known, gains=gains))
-        controller._lqr._estimator = Sliding()  # pyright: ignore[reportAttributeAccessIssue]
-        answer, car = controller.step(steering(0.0), measured(0.0, SPEED_MPS)), known.single_track
-        forces_N.append(
-            car.front_stiffness_Nprad * answer.superposition_demand_rad
-            + car.rear_stiffness_Nprad * answer.rear_steer_demand_rad
-        )
-    # The steering stays near what the state feedback wants, so that the force changes little, but it does.
-    assert (forces_N[0] - forces_N[1]) * side < -10.0
 
 
 @pytest.mark.parametrize(
@@ -126,20 +104,36 @@ def test_sides_may_not_differ_once_an_actuator_is_known_to_be_stuck(known):
     assert held(controller, steering(0.0), stuck, 60).side_difference_Pa == 0.0
 
 
-def test_brakes_turn_the_car_by_half_the_track_and_angles_by_their_axles_arms(known):
-    controller = Integrated(known)
-    controller.step(steering(0.0), measured(0.0, SPEED_MPS))
-    (per_moment, per_force), effects = controller._weights, controller._effects
-    car, more = known.single_track, known.estimation.two_track
-    stiffness_Nprad = np.array([car.front_stiffness_Nprad, car.rear_stiffness_Nprad])
-    # On the straight line, tyres have their whole cornering stiffness.
-    assert effects[1] / per_force == pytest.approx([*stiffness_Nprad, 0, 0, 0, 0], rel=0.01)
-    assert effects[0, :2] / per_moment == pytest.approx(
-        stiffness_Nprad * (car.cg_to_front_m, -car.cg_to_rear_m), rel=0.01
-    )
-    # Of a force of 1 kN.
+def effects(known, driver_rad: float = 0.0, **motion: float):
+    """Yaw moment per brake force of each wheel [m]."""
+    controller, now = Integrated(known), Estimate(SPEED_MPS, 0.0, 0.0, 0.0, 0.9, *[0.0] * 5)._replace(**motion)
+
+    class Known:
+        def step(self, _measurement):
+            return now
+
+    controller._lqr._estimator = Known()  # pyright: ignore[reportAttributeAccessIssue]
+    controller.step(steering(driver_rad), measured(now.yaw_rate_radps, SPEED_MPS))
+    return controller._effects / controller._per_moment / 1000.0
+
+
+def test_brakes_turn_the_car_by_half_the_track_while_the_tyres_bear_no_side_force(known):
+    more = known.estimation.two_track
     halves_m = 0.5 * np.array([more.front_track_m] * 2 + [more.rear_track_m] * 2)
-    assert effects[0, 2:] / per_moment == pytest.approx(1000.0 * halves_m * (1, -1, 1, -1))
+    assert effects(known) == pytest.approx(halves_m * (1, -1, 1, -1), abs=0.01)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_brake_of_a_sliding_axle_costs_its_side_force(known, side):
+    car, free = known.single_track, effects(known)
+    # Both axles slide: in a left turn the side forces point to the left.
+    sliding = effects(known, yaw_rate_radps=0.6 * side, sideslip_rad=-0.3 * side)
+    loss = known.gains.integrated.brake_side_loss * (1.0 - LEAST) * side
+    shifts_m = np.array([-car.cg_to_front_m * loss] * 2 + [car.cg_to_rear_m * loss] * 2)
+    assert sliding - free == pytest.approx(shifts_m, abs=0.01)
+    # Against the turn the outer front wheel works, with the turn the inner rear wheel.
+    assert int(np.argmin(side * sliding)) == (1 if side > 0.0 else 0)
+    assert int(np.argmax(side * sliding)) == (2 if side > 0.0 else 3)
 
 
 def test_car_that_does_what_is_asked_keeps_the_angles_of_its_turn(known):

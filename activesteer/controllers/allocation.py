@@ -1,0 +1,147 @@
+"""Angles of superposition and rear wheels within their limits and rates, for a wanted yaw moment and side force.
+
+The state feedback of `lqr` wants the angles u_l without limits: a yaw moment M(u_l) and a side force F(u_l), by the
+slopes of the axle curves at the present slip angles. The angles minimise
+
+    ((M(u) - M(u_l)) / M_0)^2 + ((F(u) - F(u_l)) / F_0)^2 + |(u - u_l) / s|^2
+
+within limits and within the angles that the actuators reach in a time ahead. While no limit is active, u = u_l. If an
+actuator is at its limit or too slow, the other one keeps the moment rather than the side force: a car that lacks side
+force slides outwards, a car that lacks the moment spins. One axle takes over from the other one with the lag of the
+actuators, so that the noise of the feedback beyond a limit does not reach it.
+
+No angle is larger than its actuator removes in the time in which the car answers: an angle that stays after the driver
+has steered back turns the car further in.
+
+Source: T. A. Johansen and T. I. Fossen, Control allocation - A survey, Automatica 49 (2013).
+"""
+
+from __future__ import annotations
+
+import math
+
+from activesteer.controllers.axle_slopes import AxleSlopes, slopes
+from activesteer.controllers.parameters import ControllerSetup
+from activesteer.native_blocks import NativeBlock
+from activesteer.shared_laws import shared
+from activesteer.signals import Estimate
+
+
+class Allocation(NativeBlock):
+    """Limits and weights of the angles."""
+
+    _curves: AxleSlopes
+    _front_Nprad: float
+    _rear_Nprad: float
+    _to_front_m: float
+    _to_rear_m: float
+    _per_moment2: float
+    _per_force2: float
+    _front_stay: float
+    _rear_stay: float
+    _front_limit_rad: float
+    _rear_limit_rad: float
+    _front_reach_rad: float
+    _rear_reach_rad: float
+    _fraction: float
+    _front_shift_rad: float
+    _rear_shift_rad: float
+
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Compute the constants."""
+        p, servos, car = setup.gains.lqr, setup.gains.servos, setup.single_track
+        self._curves = AxleSlopes(setup)
+        self._front_Nprad, self._rear_Nprad = car.front_stiffness_Nprad, car.rear_stiffness_Nprad
+        self._to_front_m, self._to_rear_m = car.cg_to_front_m, car.cg_to_rear_m
+        self._per_moment2, self._per_force2 = p.moment_scale_Nm**-2, p.force_scale_N**-2
+        self._front_stay, self._rear_stay = p.superposition_scale_rad**-2, p.rear_scale_rad**-2
+        front_radps, rear_radps = servos.superposition_rate_radps, servos.rear_rate_radps
+        self._front_limit_rad = min(servos.superposition_limit_rad, p.removal_s * front_radps)
+        self._rear_limit_rad = min(servos.rear_limit_rad, p.removal_s * rear_radps)
+        self._front_reach_rad, self._rear_reach_rad = p.ahead_s * front_radps, p.ahead_s * rear_radps
+        self._fraction = -math.expm1(-setup.timestep_s / servos.lag_s)
+        self._front_shift_rad = self._rear_shift_rad = 0.0
+
+    @property
+    def slopes(self) -> AxleSlopes:
+        """Curves of both axles."""
+        return self._curves
+
+
+@shared
+def allocated(
+    block: Allocation,
+    now: Estimate,
+    driver_rad: float,
+    at_rad: tuple[float, float],
+    demand_rad: tuple[float, float],
+    against_rad: float,
+    works: tuple[bool, bool],
+) -> tuple[float, float, float]:
+    """Allocate the demands of the state feedback.
+
+    Args:
+        block: Limits and weights.
+        now: The motion, faster than walking speed.
+        driver_rad: The driver's angle at the road wheels.
+        at_rad: Measured angles of superposition and rear wheels.
+        demand_rad: Angles that the state feedback demands, without limits.
+        against_rad: Limit of the superposition against the driver's angle.
+        works: Whether superposition and rear steering work.
+
+    Returns:
+        Superposition angle and rear angle [rad]; change of the yaw moment that they make [Nm].
+    """
+    front_slope, rear_slope = slopes(block._curves, now, driver_rad + at_rad[0], at_rad[1])
+    front_N, rear_N = abs(front_slope) * block._front_Nprad, abs(rear_slope) * block._rear_Nprad
+    front_Nm, rear_Nm = front_N * block._to_front_m, -rear_N * block._to_rear_m
+    moment = front_Nm * demand_rad[0] + rear_Nm * demand_rad[1]
+    force = front_N * demand_rad[0] + rear_N * demand_rad[1]
+    least_front, most_front = angle_range(
+        at_rad[0], block._front_limit_rad, block._front_reach_rad, works[0], against_rad, driver_rad
+    )
+    least_rear, most_rear = angle_range(
+        at_rad[1], block._rear_limit_rad, block._rear_reach_rad, works[1], math.inf, 0.0
+    )
+    of_moment, of_force = block._per_moment2, block._per_force2
+    h_front = of_moment * front_Nm * front_Nm + of_force * front_N * front_N + block._front_stay
+    h_rear = of_moment * rear_Nm * rear_Nm + of_force * rear_N * rear_N + block._rear_stay
+    h_both = of_moment * front_Nm * rear_Nm + of_force * front_N * rear_N
+    g_front = of_moment * front_Nm * moment + of_force * front_N * force + block._front_stay * demand_rad[0]
+    g_rear = of_moment * rear_Nm * moment + of_force * rear_N * force + block._rear_stay * demand_rad[1]
+    det = h_front * h_rear - h_both * h_both
+    front, rear = (h_rear * g_front - h_both * g_rear) / det, (h_front * g_rear - h_both * g_front) / det
+    if not (least_front <= front <= most_front and least_rear <= rear <= most_rear):
+        # The least is on an edge: one angle at a bound, the best other one.
+        least = math.inf
+        for edge in range(4):
+            if edge < 2:
+                a = least_front if edge == 0 else most_front
+                b = min(max((g_rear - h_both * a) / h_rear, least_rear), most_rear)
+            else:
+                b = least_rear if edge == 2 else most_rear
+                a = min(max((g_front - h_both * b) / h_front, least_front), most_front)
+            cost = h_front * a * a + 2.0 * h_both * a * b + h_rear * b * b - 2.0 * (g_front * a + g_rear * b)
+            if cost < least:
+                least, front, rear = cost, a, b
+    kept_front = min(max(demand_rad[0], least_front), most_front)
+    kept_rear = min(max(demand_rad[1], least_rear), most_rear)
+    block._front_shift_rad += block._fraction * (front - kept_front - block._front_shift_rad)
+    block._rear_shift_rad += block._fraction * (rear - kept_rear - block._rear_shift_rad)
+    front = min(max(kept_front + block._front_shift_rad, least_front), most_front)
+    rear = min(max(kept_rear + block._rear_shift_rad, least_rear), most_rear)
+    return front, rear, front_Nm * (front - at_rad[0]) + rear_Nm * (rear - at_rad[1])
+
+
+@shared
+def angle_range(
+    place_rad: float, most_rad: float, reach_rad: float, works: bool, against_rad: float, driver_rad: float
+) -> tuple[float, float]:
+    """Return least and greatest angle: limits and rate, or the position of a failed actuator [rad]."""
+    if not works:
+        return place_rad, place_rad
+    against = min(against_rad, most_rad)
+    least, most = -against if driver_rad > 0.0 else -most_rad, against if driver_rad < 0.0 else most_rad
+    low = max(least, place_rad - reach_rad)
+    high = max(min(most, place_rad + reach_rad), low)
+    return min(low, most), high
