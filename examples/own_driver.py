@@ -12,7 +12,7 @@ import numpy as np
 
 import activesteer
 from activesteer.driver import OpenLoopDriver
-from activesteer.road.path_search import PathSearch
+from activesteer.road.native_path import PathSearch
 
 
 class PurePursuit:

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from activesteer.analysis.source import RecordingLike, read_footprint
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
-from activesteer.road.course import CONE_RADIUS_M, Course
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import CONE_RADIUS_M, Course, Footprint
 
 
 def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> float:

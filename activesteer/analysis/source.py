@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.errors import RecordingError
-from activesteer.road.course import Course, course_of
-from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.road.course import Course, Footprint, course_of, footprint_of
 
 
 class RecordingLike(Protocol):

@@ -1,13 +1,165 @@
-"""One step of the brakes: demand, control unit at its own rate, pressures."""
+"""One step of the brakes: demand, control unit at its own rate with speed estimate and traction control, pressures.
+
+While no brake acts, the wheels that are not driven give the speed. While a brake acts, the fastest wheel is closest to
+the car's speed, and the acceleration is integrated from the last unbraked instant on. The measured acceleration is the
+specific force along the inclined body; its part from gravity on a slope is learned while the car rolls.
+"""
 
 from __future__ import annotations
 
+from typing import Final
+
 from activesteer.brakes.antilock import antilock
-from activesteer.brakes.hydraulics import ask, flow, pedal_pressure
 from activesteer.brakes.records import NO_LIMIT_NM
-from activesteer.brakes.reference_speed import follow_car, follow_wheels
-from activesteer.brakes.traction import traction
-from activesteer.compilation import compiled
+from activesteer.compilation import compiled, inlined
+
+
+@inlined
+def pedal_pressure(setup, pedal):
+    """Return the pressure that the pedal feeds [Pa]: none within its dead travel, and linear beyond it."""
+    return max(pedal - setup.dead_travel, 0.0) / (1.0 - setup.dead_travel) * setup.full_pedal_pressure_Pa
+
+
+@compiled
+def ask(setup, state, pedal, asked_Nm):
+    """Add the pressures that driver and controller demand, between 0 and the highest.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `demand_Pa` is written.
+        pedal: Brake pedal position, 0 to 1.
+        asked_Nm: Brake torques that the controller demands [Nm], order of `CORNERS`.
+    """
+    highest, fed = setup.full_pedal_pressure_Pa, pedal_pressure(setup, pedal)
+    for wheel in range(4):
+        pressure = fed
+        if asked_Nm[wheel] != 0.0:
+            pressure += asked_Nm[wheel] / setup.torque_per_pressure_NmpPa[wheel]
+        state.demand_Pa[wheel] = min(max(pressure, 0.0), highest)
+
+
+@compiled
+def flow(setup, state, pedal):
+    """Advance the pressures by one step.
+
+    The torque of a brake is its torque per pressure, 2 mu_pad A_piston r_effective, times the pressure.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `pressure_Pa` is advanced.
+        pedal: Brake pedal position, 0 to 1; up to its pressure the pedal feeds a brake, beyond it the pump does.
+    """
+    fed = pedal_pressure(setup, pedal)
+    for wheel in range(4):
+        pressure = state.pressure_Pa[wheel]
+        wanted = max(min(state.demand_Pa[wheel], state.allowed_Pa[wheel]), state.traction_Pa[wheel])
+        rise = setup.rise_Paps if pressure < fed else setup.pump_rise_Paps
+        change = (wanted - pressure) * setup.follow
+        change = min(max(change, -setup.fall_Paps * setup.timestep_s), rise * setup.timestep_s)
+        state.pressure_Pa[wheel] = pressure + change
+
+
+_SLACK_mps2: Final = 0.2
+"""Additional deceleration of the estimate, so that the fastest wheel corrects it upwards [m/s2]."""
+_CATCH_UP_mps2: Final = 2.0
+"""Largest rate of that correction; a wheel that swings on its suspension is for an instant faster than the car [m/s2].
+"""
+_LEARN_S: Final = 0.5
+"""Time constant of the learned offset of the acceleration [s]."""
+_LARGEST_OFFSET_mps2: Final = 3.0
+"""Largest offset; no road is steeper than this [m/s2]."""
+_SMOOTH_S: Final = 0.005
+"""Time constant of the wheel accelerations [s]."""
+
+
+@compiled
+def follow_wheels(setup, state, speeds_radps):
+    """Update circumferential speeds and accelerations of the wheels, and their friction torques, after an interval.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `wheel_mps`, `wheel_mps2` and `friction_Nm` are written.
+        speeds_radps: Rotational speeds of the wheels [rad/s], order of `CORNERS`.
+    """
+    fraction = setup.interval_s / (setup.interval_s + _SMOOTH_S)
+    for wheel in range(4):
+        speed = setup.rolling_radius_m[wheel] * speeds_radps[wheel]
+        rate = (speed - state.wheel_mps[wheel]) / setup.interval_s
+        state.wheel_mps2[wheel] += fraction * (rate - state.wheel_mps2[wheel])
+        state.wheel_mps[wheel] = speed
+        # J d omega/dt = r F_x - T_brake
+        borne = setup.torque_per_pressure_NmpPa[wheel] * state.pressure_Pa[wheel]
+        borne += setup.inertia_kgm2[wheel] / setup.rolling_radius_m[wheel] * state.wheel_mps2[wheel]
+        state.friction_Nm[wheel] += fraction * (borne - state.friction_Nm[wheel])
+
+
+@compiled
+def follow_car(setup, state, ax_mps2, braked):
+    """Update the reference speed after an interval.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `reference_mps` and `offset_mps2` are advanced.
+        ax_mps2: Measured longitudinal acceleration [m/s2].
+        braked: Whether a brake is applied or demanded.
+    """
+    fastest, slowest, rolling, free = -1e9, 1e9, 0.0, 0.0
+    for wheel in range(4):
+        fastest = max(fastest, state.wheel_mps[wheel])
+        slowest = min(slowest, state.wheel_mps[wheel])
+        if setup.drive_fraction[wheel] == 0.0:
+            rolling += state.wheel_mps[wheel]
+            free += 1.0
+    if braked:
+        # Brakes do not make a car faster; if a slope does, the wheels show it.
+        rate_mps2 = min(ax_mps2 - state.offset_mps2, 0.0) - _SLACK_mps2
+        integrated = state.reference_mps + rate_mps2 * setup.interval_s
+        caught_up = min(fastest, integrated + _CATCH_UP_mps2 * setup.interval_s)
+        state.reference_mps = max(integrated, caught_up, 0.0)
+        return
+    before = state.reference_mps
+    state.reference_mps = rolling / free if free > 0.0 else slowest
+    error = ax_mps2 - (state.reference_mps - before) / setup.interval_s
+    offset = state.offset_mps2 + setup.interval_s / _LEARN_S * (error - state.offset_mps2)
+    state.offset_mps2 = min(max(offset, -_LARGEST_OFFSET_mps2), _LARGEST_OFFSET_mps2)
+
+
+@compiled
+def traction(setup, state, torque_Nm, braked):
+    """Decide once.
+
+    The mean speed of the driven wheels may exceed that of the car by a fraction and a constant. A proportional and an
+    integral part reduce the drive torque by the excess; the integral starts from the torque at that instant. Of two
+    wheels behind a differential the faster one is braked, so that the differential passes its torque to the other.
+
+    Args:
+        setup: A `BRAKE_SETUP`.
+        state: Its `BRAKE_STATE`; `drive_limit_Nm`, `traction_Nm` and `traction_Pa` are advanced.
+        torque_Nm: Drive torque that driver and controller demand [Nm].
+        braked: Whether a brake is applied or demanded.
+    """
+    turning, other = 0.0, 0.0
+    for wheel in range(4):
+        turning += setup.drive_fraction[wheel] * state.wheel_mps[wheel]
+    excess = turning - (1.0 + setup.slip) * state.reference_mps - setup.spin_mps
+    if braked or torque_Nm <= 0.0 or (state.drive_limit_Nm == NO_LIMIT_NM and excess <= 0.0):
+        state.drive_limit_Nm = NO_LIMIT_NM
+        state.tcs_active = 0.0
+        state.traction_Pa[:] = 0.0
+        return
+    state.tcs_active = 1.0
+    if state.drive_limit_Nm == NO_LIMIT_NM:
+        state.traction_Nm = torque_Nm
+    state.traction_Nm -= setup.engine_integral_gain_Nmpm * excess * setup.interval_s
+    state.traction_Nm = max(state.traction_Nm, 0.0)
+    state.drive_limit_Nm = max(state.traction_Nm - setup.engine_gain_Nmspm * excess, 0.0)
+    if state.traction_Nm > torque_Nm:
+        state.drive_limit_Nm = NO_LIMIT_NM
+    for wheel in range(4):
+        other = state.wheel_mps[wheel + 1 - 2 * (wheel % 2)]
+        beyond = state.wheel_mps[wheel] - other - setup.spin_mps
+        pressure = setup.brake_gain_Paspm * beyond if setup.differential[wheel] != 0.0 else 0.0
+        state.traction_Pa[wheel] = min(max(pressure, 0.0), setup.brake_limit_Pa)
 
 
 @compiled

@@ -127,7 +127,7 @@ def _tyre(options: argparse.Namespace) -> int:
     params = load_tir(_find(options.file))
     tell(options, key_figures(params), [describe(params)])
     if options.output is not None:
-        from activesteer.tyre.figures import draw
+        from activesteer.tyre.report import draw
 
         tell_files(options, draw(params, options.output))
     return 0

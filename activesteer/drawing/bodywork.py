@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array
 from activesteer.recording import Primitive, ScenePart
 from activesteer.resources import models_dir
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 
 CHASSIS: Final = "chassis"
 """Body that carries the shell and that cameras follow."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.recording import Recording
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from activesteer.units import quantity_of
 
 CHANNELS: Final = tuple(f"{corner}_steer_rad" for corner in CORNERS)

@@ -1,13 +1,11 @@
 """The driver: from the setpoint, and the path ahead, to steering wheel, drive and brake."""
 
-from activesteer.driver.base import Driver, DriverSetup
+from activesteer.driver.base import Driver, DriverParameters, DriverSetup
 from activesteer.driver.constant_radius import ConstantRadiusDriver
 from activesteer.driver.find import DRIVER, find_driver, is_driver_file
 from activesteer.driver.human import HumanDriver
-from activesteer.driver.open_loop import OpenLoopDriver
-from activesteer.driver.parameters import DriverParameters
+from activesteer.driver.open_loop import OpenLoopDriver, SpeedHold
 from activesteer.driver.path_preview import PathPreviewDriver
-from activesteer.driver.speed_hold import SpeedHold
 
 __all__ = [
     "DRIVER",

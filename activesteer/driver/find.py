@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.config import Range
-from activesteer.driver.base import DriverSetup
+from activesteer.driver.base import DriverParameters, DriverSetup
 from activesteer.driver.human import HumanDriver
-from activesteer.driver.parameters import DriverParameters
 from activesteer.errors import DriverError, shown
 from activesteer.plugins import Kind, Plugin, find
 from activesteer.resources import list_drivers

@@ -4,12 +4,132 @@ from __future__ import annotations
 
 from typing import Final
 
-from activesteer.driver.base import DriverSetup
-from activesteer.driver.speed_hold import SpeedHold, drive_torque, take_foot_off
+from activesteer.driver.base import Drive, DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError
 from activesteer.native_blocks import NativeBlock
 from activesteer.shared_laws import shared
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, new_message
+
+_STANDSTILL_MPS: Final = 0.05
+"""Below this speed standing still needs no torque [m/s]."""
+
+
+class SpeedHold(NativeBlock):
+    """Speed control by drive torque and engine braking; the integral stands still while a limit is active.
+
+    A negative speed engages the reverse gear: the engine then drives backwards and brakes forwards.
+
+    If the driven wheels are too fast for the speed of the car, they spin. The driver takes the foot back while they
+    spin, and presses down again slowly when they roll.
+
+    Attributes:
+        drive: Engine and gearbox.
+        saturated: Whether the last step reached a limit of the engine or took the foot back.
+    """
+
+    _gain_Nmspm: float
+    _integral_gain_Nmpm: float
+    _wheel_radius_m: float
+    _spin_mps: float
+    _spin_slip: float
+    _keep: float
+    _return: float
+    _timestep_s: float
+    _integral_Nm: float
+    _pedal: float
+    saturated: bool
+
+    def __init__(
+        self, parameters: DriverParameters, drive: Drive, mass_kg: float, wheel_radius_m: float, timestep_s: float
+    ) -> None:
+        """Make the speed control of one run.
+
+        Args:
+            parameters: Gains.
+            drive: Limits of the engine.
+            mass_kg: Mass of the car, as the driver knows it [kg].
+            wheel_radius_m: Radius that relates the speed of the driven wheels to the speed of the car [m].
+            timestep_s: Time between two steps [s].
+        """
+        self._gain_Nmspm = parameters.speed_gain_1ps * mass_kg * wheel_radius_m
+        self._integral_gain_Nmpm = parameters.speed_integral_gain_1ps2 * mass_kg * wheel_radius_m
+        self.drive = drive
+        self._wheel_radius_m = wheel_radius_m
+        self._spin_mps = parameters.spin_mps
+        self._spin_slip = parameters.spin_slip
+        self._keep = max(0.0, 1.0 - timestep_s / parameters.foot_lag_s)
+        self._return = parameters.foot_return_per_s * timestep_s
+        self._timestep_s = timestep_s
+        self._integral_Nm = 0.0
+        self._pedal = 1.0
+        self.saturated = False
+
+    def step(self, speed_demand_mps: float, measurement: Measurement) -> float:
+        """Return the total torque at the driven wheels for a speed [N m].
+
+        Args:
+            speed_demand_mps: Speed to hold [m/s].
+            measurement: Measurement of the car's sensors.
+        """
+        engine_radps, gear = self.drive.speed_radps(measurement.wheel_speed_radps), 1 if speed_demand_mps >= 0.0 else -1
+        limits_Nm = self.drive.limits_Nm(engine_radps, gear)
+        return drive_torque(self, speed_demand_mps, measurement.speed_mps, engine_radps, *limits_Nm)
+
+    def reset(self) -> None:
+        """Reset the integral, as for a driver who takes the foot off."""
+        take_foot_off(self)
+
+
+@shared
+def drive_torque(
+    hold: SpeedHold, speed_demand_mps: float, speed: float, engine_radps: float, low: float, high: float
+) -> float:
+    """Law of `SpeedHold.step`.
+
+    Args:
+        hold: The cruise control.
+        speed_demand_mps: Speed to hold [m/s].
+        speed: Speed of the car [m/s].
+        engine_radps: Mean speed of the driven wheels [rad/s].
+        low: Least torque of the engine in the gear of the demand [N m].
+        high: Greatest torque of the engine in this gear [N m].
+    """
+    if speed_demand_mps == 0.0 and abs(speed) < _STANDSTILL_MPS:
+        take_foot_off(hold)
+        return 0.0
+    gear = 1 if speed_demand_mps >= 0.0 else -1
+    error = speed_demand_mps - speed
+    torque = hold._gain_Nmspm * error + hold._integral_Nm
+    overspeed = gear * (engine_radps * hold._wheel_radius_m - speed)
+    spins = overspeed > hold._spin_mps + hold._spin_slip * abs(speed)
+    if spins or hold._pedal < 1.0:
+        most, demand = (high, torque) if gear > 0 else (-low, -torque)
+        position = demand / most if most > 0.0 else 1.0
+        # The driver takes the foot back from its position, not from the floor, or lets it return to the floor.
+        held = max(min(hold._pedal, position), 0.0)
+        hold._pedal = hold._keep * held if spins else min(1.0, hold._pedal + hold._return)
+        if gear > 0:
+            high *= hold._pedal
+        else:
+            low *= hold._pedal
+    if torque > high:
+        hold.saturated = True
+        return high
+    if torque < low:
+        hold.saturated = True
+        return low
+    hold.saturated = False
+    hold._integral_Nm += hold._integral_gain_Nmpm * error * hold._timestep_s
+    return torque
+
+
+@shared
+def take_foot_off(hold: SpeedHold) -> None:
+    """Law of `SpeedHold.reset`."""
+    hold._integral_Nm = 0.0
+    hold._pedal = 1.0
+    hold.saturated = False
+
 
 NO_RACK: Final = "the steering wheel of this car drives no rack; give steering_wheel_rad"
 

@@ -14,7 +14,7 @@ from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.setup import EstimatorSetup
 
 if TYPE_CHECKING:
-    from activesteer.sensors.sensor_kinds import Sensor
+    from activesteer.sensors.parameters import Sensor
 
 LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OFFSET, AY_OFFSET, FRICTION, \
     FRONT_STIFFNESS, REAR_STIFFNESS = range(11)  # fmt: skip

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS
 from activesteer.drawing.bodywork import CHASSIS, dressed
 from activesteer.recording import Recording
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from activesteer.simulation.appearance import scene_of
 from activesteer.vehicle import Vehicle
 

@@ -12,14 +12,13 @@ from msgspec import UNSET
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.driver import DriverSetup
-from activesteer.driver.speed_hold import SpeedHold
+from activesteer.driver.open_loop import SpeedHold
 from activesteer.errors import ActiveSteerError
 from activesteer.explore.car_shape import BODIES, shape_of
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Act, Start
 from activesteer.explore.runs import Reply, free_path
-from activesteer.road.course import CONE_RADIUS_M
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import CONE_RADIUS_M, Footprint
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.live_view import Pacer

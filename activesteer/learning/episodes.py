@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, shown
 from activesteer.learning.tasks import ACTUATORS, HANDS, TASKS, Task, bounds, sampled_overrides
-from activesteer.road.path_search import PathSearches
+from activesteer.road.native_path import PathSearches
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, arrays_of, numbers_of
 from activesteer.simulation.batch import Batch
 from activesteer.theory.single_track import SingleTrack, yaw_rate_gain

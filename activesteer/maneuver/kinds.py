@@ -9,19 +9,13 @@ from activesteer.config import Source, build
 from activesteer.errors import ManeuverError, nearest_names, shown
 from activesteer.faults import check_faults
 from activesteer.maneuver.base import Maneuver
-from activesteer.maneuver.brake_in_turn import BrakeInTurn
+from activesteer.maneuver.braking import BrakeInTurn, StraightBraking
 from activesteer.maneuver.constant_radius import ConstantRadius
 from activesteer.maneuver.follow_path import FollowPath
-from activesteer.maneuver.lane_change import LaneChange
+from activesteer.maneuver.lane_changes import LaneChange, Slalom
 from activesteer.maneuver.open_loop import OpenLoop
 from activesteer.maneuver.phases import Phases
-from activesteer.maneuver.random_steer import RandomSteer
-from activesteer.maneuver.sine_sweep import SineSweep
-from activesteer.maneuver.sine_with_dwell import SineWithDwell
-from activesteer.maneuver.slalom import Slalom
-from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
-from activesteer.maneuver.step_steer import StepSteer
-from activesteer.maneuver.straight_braking import StraightBraking
+from activesteer.maneuver.steering_tests import RandomSteer, SineSweep, SineWithDwell, SlowlyIncreasingSteer, StepSteer
 
 KINDS: Final[dict[str, type[Maneuver]]] = {
     "step_steer": StepSteer,

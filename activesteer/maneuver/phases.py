@@ -17,8 +17,7 @@ from typing import Annotated, Any, Final, NamedTuple
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Side, Speed, check_search_speed, within
-from activesteer.maneuver.sine_with_dwell import reference_angle_search
-from activesteer.maneuver.slowly_increasing_steer import RampAngle
+from activesteer.maneuver.steering_tests import RampAngle, reference_angle_search
 from activesteer.signals import Setpoint, new_message
 
 _Pedal = Annotated[float, Range(0.0, 1.0)]

@@ -11,7 +11,7 @@ import numpy as np
 from activesteer.config import Range
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.vehicle.axle_curves import COORDINATES, upper_triangle
+from activesteer.vehicle.curve_axles import COORDINATES, upper_triangle
 
 _TOE, _CAMBER, _SIDE = (COORDINATES.index(name) for name in ("toe", "camber", "y"))
 _ENTRIES: Final = np.triu_indices(5)

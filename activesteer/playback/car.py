@@ -17,7 +17,7 @@ from activesteer.playback.geometry import about_vertical, xyzw
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 from activesteer.recording import Primitive, ScenePart
-from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.road.course import Footprint, footprint_of
 
 _GHOST_OPACITY: Final = 0.4
 _GHOST_EVERY: Final = 5

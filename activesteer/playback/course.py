@@ -14,9 +14,8 @@ from activesteer.drawing.colours import bytes_of, height_colours
 from activesteer.playback.geometry import rotated
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
-from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, course_of
+from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
-from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.road.recorded import LIMIT_M
 from activesteer.road.road import road_of
 

@@ -25,7 +25,7 @@ from activesteer.drawing.wheel_angles import (
 )  # fmt: skip
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
-from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.road.course import Footprint, footprint_of
 
 PLAN: Final = "plan"
 """Parent entity of the plan."""

@@ -4,7 +4,6 @@ from activesteer.recording.channels import ChannelTable
 from activesteer.recording.recording import Recording
 from activesteer.recording.rows import Poses
 from activesteer.recording.scene import Link, Primitive, ScenePart
-from activesteer.recording.target import check_target
-from activesteer.recording.writer import McapWriter
+from activesteer.recording.writer import McapWriter, check_target
 
 __all__ = ["ChannelTable", "Link", "McapWriter", "Poses", "Primitive", "Recording", "ScenePart", "check_target"]

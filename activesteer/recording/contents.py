@@ -1,22 +1,30 @@
-"""Limits and schema of a recording, checked by the writer and by the reader.
+"""What a recording may hold: limits and schema, names of topics, and metadata as text.
 
 A file may come from anywhere. Everything that reads recordings can handle what is accepted here: names are texts, sizes
 are numbers, and a small file cannot fill memory or time.
+
+A file holds, in this order: schemas and topics, attachments, the record of the run, the format record, chunks of about
+a second, the record of the result, metrics. Metadata values are JSON text, metrics are numbers as text.
 """
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
 
 from activesteer import limits
 from activesteer.errors import RecordingError
 from activesteer.recording.events import events_of
 from activesteer.recording.schemas import WORLD
-from activesteer.road.course import course_of
+from activesteer.road.course import course_of, footprint_of
 from activesteer.road.drawn import surface_in
-from activesteer.road.footprint import footprint_of
 from activesteer.road.recorded import fail, table_of, text
 from activesteer.road.road import road_of
 
@@ -209,3 +217,69 @@ def check_numbers(values: Sequence[Any], what: str, low: float, high: float) -> 
     for value in values:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
             raise RecordingError(f"{what}: {value!r:.{_SHOWN}} is no number from {low:g} to {high:g}")
+
+
+FORMAT_VERSION = 1
+"""Version of the format; raised when an older reader could misread a file."""
+
+STATE_TOPIC, TRANSFORMS_TOPIC, SCENE_TOPIC, EVENTS_TOPIC = "/state/", "/tf", "/scene", "/events"
+RUN_RECORD, RESULT_RECORD, METRICS_RECORD = "activesteer.run", "activesteer.result", "activesteer.metrics"
+"""Names of the metadata records: known before the run, known after the run, metrics."""
+
+FORMAT_RECORD = "activesteer.format"
+"""Name of the metadata record that marks a file as ours."""
+
+
+LIBRARY = "activesteer "
+"""Name of the writing program in the header of a file; the version follows."""
+
+
+def is_recording_start(data: bytes) -> bool:
+    """Return whether a file with this beginning is ours, even if damaged or left empty by a full disk."""
+    # Magic, opcode, length of the record, then two texts with their lengths: profile and library.
+    start = len(MCAP0_MAGIC) + 9
+    head = MCAP0_MAGIC + bytes([Opcode.HEADER])
+    profile_end = start + 4 + int.from_bytes(data[start : start + 4], "little")
+    return not data or (data.startswith(head) and data[profile_end + 4 :].startswith(LIBRARY.encode()))
+
+
+def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict[str, str]]:
+    """Convert metadata to the texts of an MCAP file.
+
+    Args:
+        metadata: Values that JSON can represent; numpy numbers and arrays become numbers and lists.
+
+    Returns:
+        The values as JSON text, without the keys `metrics` and `events`; and the metrics, as numbers in text.
+
+    Raises:
+        RecordingError: a value cannot be represented or has the wrong type, or a metric is not a number.
+    """
+    texts: dict[str, str] = {}
+    metrics = metadata.get("metrics", {})
+    if not isinstance(metrics, Mapping):
+        raise RecordingError(
+            f"is a {type(metrics).__name__}, expected numbers by name", file="the metadata", key="metrics"
+        )
+    metrics = {name: value.item() if isinstance(value, np.generic) else value for name, value in metrics.items()}
+    # As in the rows, a value that is too large for a file becomes infinite.
+    metrics |= {name: math.copysign(math.inf, value) for name, value in metrics.items()
+                if isinstance(value, float) and abs(value) > limits.MAX_NUMBER}  # fmt: skip
+    check_metrics(metrics)
+    for key, value in metadata.items():
+        if key in ("metrics", "events"):
+            continue
+        try:
+            texts[str(key)] = json.dumps(value, default=_plain, ensure_ascii=False)
+        except (TypeError, ValueError, RecursionError) as error:
+            raise RecordingError(f"cannot be kept as JSON: {error}", file="the metadata", key=str(key)) from None
+    check_metadata({key: json.loads(text) for key, text in texts.items()})
+    return texts, {name: repr(float(value)) for name, value in metrics.items()}
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"a {type(value).__name__} ({value!r})")

@@ -17,7 +17,7 @@ from activesteer.conventions import Array
 from activesteer.errors import RecordingError, not_installed
 from activesteer.files import finite, replacing
 from activesteer.recording.channels import TIME, ChannelTable
-from activesteer.recording.format import metadata_texts
+from activesteer.recording.contents import metadata_texts
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from activesteer.errors import RecordingError
 from activesteer.recording import export
-from activesteer.recording.arrays import nanoseconds, shaped
-from activesteer.recording.channels import ChannelTable
+from activesteer.recording.channels import ChannelTable, nanoseconds, shaped
 from activesteer.recording.reader import read_mcap
 from activesteer.recording.rows import FileRows, Poses, values_of
 from activesteer.recording.scene import ScenePart

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.recording.decoder import Block, BlockDecoder
+from activesteer.recording.chunks import Block, BlockDecoder
 from activesteer.road.recorded import LIMIT_M
 from activesteer.signals import Channel
 

@@ -1,7 +1,8 @@
-"""Writer of a recording, which streams blocks into an MCAP file during the run."""
+"""Writer of a recording: a target that is locked, and blocks that are streamed into an MCAP file during the run."""
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,24 +10,18 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import BinaryIO, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.files import shown_path
-from activesteer.recording.arrays import nanoseconds, shaped
-from activesteer.recording.channels import ChannelTable
+from activesteer.files import reading, shown_path, writing
+from activesteer.recording.channels import ChannelTable, nanoseconds, shaped
+from activesteer.recording.chunks import BlockEncoder, few_messages
 from activesteer.recording.container import McapFile
 from activesteer.recording.contents import (
-    check_bodies,
-    check_names,
-)
-from activesteer.recording.encoder import BlockEncoder, few_messages
-from activesteer.recording.events import Event, encode_event, events_of
-from activesteer.recording.format import (
     EVENTS_TOPIC,
     FORMAT_RECORD,
     FORMAT_VERSION,
@@ -37,8 +32,12 @@ from activesteer.recording.format import (
     SCENE_TOPIC,
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
+    check_bodies,
+    check_names,
+    is_recording_start,
     metadata_texts,
 )
+from activesteer.recording.events import Event, encode_event, events_of
 from activesteer.recording.scene import ScenePart, encode_scene
 from activesteer.recording.schemas import (
     LOG_SCHEMA,
@@ -48,9 +47,72 @@ from activesteer.recording.schemas import (
     state_schema,
     state_schema_name,
 )
-from activesteer.recording.target import open_target
 from activesteer.signals import Channel
 from activesteer.version import __version__
+
+_START_BYTES: Final = 64
+
+
+def check_target(path: str | Path, *, overwrite: bool = True) -> None:
+    """Check that a recording can be written, without changing anything; only a recording may be replaced.
+
+    Raises:
+        RecordingError: the folder does not exist or is not writeable, or an existing file may not be replaced.
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
+    if path.is_dir():
+        raise RecordingError(f"cannot write {path}: Is a directory", value=path)
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise RecordingError(f"cannot write {path}: Permission denied", value=path)
+    if not path.is_file():  # missing, or a device
+        return
+    if not overwrite:
+        raise RecordingError(f"cannot write {path}: it exists already", value=path)
+    with reading(path, RecordingError), path.open("rb") as stream:
+        ours = is_recording_start(stream.read(_START_BYTES))
+    if not ours:
+        raise RecordingError(
+            f"cannot write {path}: it exists already and is no recording of activesteer; delete or rename it",
+            value=path,
+        )
+
+
+def open_target(path: Path, *, overwrite: bool) -> BinaryIO:
+    """Create a locked file in place of an existing one.
+
+    A process that has opened the old file keeps it, because it is deleted and not changed.
+
+    Raises:
+        RecordingError: see `check_target`; or another program is writing the file.
+    """
+    check_target(path, overwrite=overwrite)
+    with writing(path, RecordingError):
+        if path.is_file():
+            with path.open("rb") as old:
+                _lock(old, path)
+                with suppress(PermissionError):  # a writeable file in a folder that is not
+                    Path(os.path.realpath(path)).unlink()
+        stream = path.open("wb" if overwrite else "xb")
+    try:
+        _lock(stream, path)
+    except RecordingError:
+        stream.close()
+        raise
+    return stream
+
+
+def _lock(stream: BinaryIO, path: Path) -> None:
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise RecordingError(
+            f"cannot write {shown_path(path)}: another run or program is writing it", value=path
+        ) from None
+    except OSError:
+        return  # a file system without locks
+
 
 _ROWS_PER_CHUNK = 1000
 _CHUNK_BYTES = limits.MAX_CHUNK_BYTES // 8

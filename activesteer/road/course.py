@@ -1,18 +1,41 @@
-"""A course for a driver: a path, and the lanes and cones beside it."""
+"""A course for a driver: a path, lanes and cones, and the outline of a car on the ground."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array
-from activesteer.road.lane import Lane
 from activesteer.road.path import MIN_CHORD_M, Path
 from activesteer.road.recorded import fail, number, numbers, sequence, table_of, text
+
+
+class Lane(NamedTuple):
+    """A section between two rows of cones, along the world's x.
+
+    Attributes:
+        name: Its name.
+        start_x_m: Its start [m].
+        end_x_m: Its end [m].
+        right_y_m: Its right edge [m].
+        left_y_m: Its left edge [m].
+    """
+
+    name: str
+    start_x_m: float
+    end_x_m: float
+    right_y_m: float
+    left_y_m: float
+
+    def outline_m(self) -> NDArray[np.float64]:
+        """Return its corners as a closed line: world x and y [m], shape (5, 2)."""
+        (start, end), (right, left) = self[1:3], self[3:]
+        return np.array([(start, right), (end, right), (end, left), (start, left), (start, right)])
+
 
 CONE_RADIUS_M: Final = 0.145
 """Half the side of the square base of a traffic cone of height `CONE_HEIGHT_M` [m]."""
@@ -121,3 +144,57 @@ def _lane(table: object, key: str) -> Lane:
     if not (found.start_x_m <= found.end_x_m and found.right_y_m <= found.left_y_m):
         raise fail(key, f"is {tuple(sides)}: it must end behind its start, and its left edge lie left of its right one")
     return found
+
+
+FRONT_OVERHANG_M: Final = 0.85
+"""Distance from the front axle to the front end of the body [m]; usual for the class, since recordings do not hold it.
+"""
+REAR_OVERHANG_M: Final = 0.75
+"""Distance from the rear axle to the rear end of the body [m]; usual for the class."""
+_RANGE_M: Final = (0.01, 100.0)
+
+
+class Footprint(NamedTuple):
+    """Dimensions of a car. The defaults are usual ones, for drawing a car whose recording holds none.
+
+    Attributes:
+        width_m: Width of the body [m].
+        wheelbase_m: Distance between the axles [m].
+        tyre_width_m: Width of the front and of the rear tyres [m].
+    """
+
+    width_m: float = 1.8
+    wheelbase_m: float = 2.7
+    tyre_width_m: tuple[float, float] = (0.2, 0.2)
+
+    @property
+    def front_m(self) -> float:
+        """Position of the front end of the body, ahead of the front axle [m]."""
+        return FRONT_OVERHANG_M
+
+    @property
+    def rear_m(self) -> float:
+        """Position of the rear end of the body, ahead of the front axle and therefore negative [m]."""
+        return -self.wheelbase_m - REAR_OVERHANG_M
+
+    @classmethod
+    def from_table(cls, table: object) -> Footprint:
+        """Read the dimensions from the table `car` of the metadata.
+
+        Raises:
+            RecordingError: a dimension is missing, of the wrong type or out of range.
+        """
+        car = table_of(table, "car")
+        width, wheelbase = (number(car.get(key), f"car.{key}", *_RANGE_M) for key in ("width_m", "wheelbase_m"))
+        front, rear = numbers(car.get("tyre_width_m"), "car.tyre_width_m", *_RANGE_M, count=2).tolist()
+        return cls(width, wheelbase, (front, rear))
+
+
+def footprint_of(metadata: Mapping[str, Any]) -> Footprint | None:
+    """Return the dimensions of the car of a recorded run; None if they were not recorded.
+
+    Raises:
+        RecordingError: the recorded dimensions are invalid.
+    """
+    table = metadata.get("car")
+    return None if table is None else Footprint.from_table(table)

@@ -29,7 +29,7 @@ import numpy as np
 from activesteer import limits
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, shown
-from activesteer.road.grid import Grid
+from activesteer.road.obstacles import Grid
 from activesteer.road.path import Path
 
 _HIGHEST_M: Final = 1000.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from activesteer.config import Range
 from activesteer.errors import ManeuverError
-from activesteer.road.grid import Grid
+from activesteer.road.obstacles import Grid
 
 STEP_M: Final = 0.05
 """Distance of the samples of a profile [m]."""

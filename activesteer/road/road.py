@@ -21,12 +21,10 @@ from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, RecordingError, nearest_names
 from activesteer.road.course import Course, course_of
 from activesteer.road.crg import unpacked
-from activesteer.road.grid import Grid, summed
-from activesteer.road.obstacle import Obstacle
+from activesteer.road.obstacles import Grid, Obstacle, Roughness, summed
 from activesteer.road.path import Path
 from activesteer.road.profile import ProfileTable
 from activesteer.road.recorded import fail, table_of
-from activesteer.road.roughness import Roughness
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array
-from activesteer.road.grid import Grid
-from activesteer.road.obstacle import OBSTACLE
+from activesteer.road.obstacles import OBSTACLE, Grid
 from activesteer.road.road import Road
 from activesteer.road.surface_kernels import COARSE_M, ENVELOPING, FOUR_POINT, SINGLE_POINT, SURFACE, heights_at
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from activesteer.compilation import compiled
 from activesteer.native_records import numbers_type
-from activesteer.road.obstacle import COSINE_BUMP, CROSS_SLOPE, PLATEAU, SINE
+from activesteer.road.obstacles import COSINE_BUMP, CROSS_SLOPE, PLATEAU, SINE
 
 SURFACE: Final = numbers_type(
     "contact", "blend_m", "start_m", "grid_s_m", "grid_per_s", "rows", "grid_d_m", "grid_per_d", "columns", "slope_s_m",

@@ -1,7 +1,7 @@
 """Scenarios: manoeuvre, car and driver with their overrides."""
 
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, load_car
-from activesteer.scenario.gains import check_gains, read_by, unread_gains
+from activesteer.scenario.overrides import check_gains, read_by, unread_gains
 from activesteer.scenario.scenario import Scenario, check_parts, describe, resolve, value_of
 
 __all__ = [

@@ -13,9 +13,7 @@ from activesteer.errors import ManeuverError, ParameterError
 from activesteer.maneuver import Maneuver
 from activesteer.plugins import Plugin
 from activesteer.road.road import Road
-from activesteer.scenario.gains import check_gains
-from activesteer.scenario.overrides import plain
-from activesteer.scenario.own_parameters import own_controllers, own_values
+from activesteer.scenario.overrides import check_gains, own_controllers, own_values, plain
 from activesteer.scenario.scenario import Scenario, part_of
 
 Part = Literal["road", "maneuver", "controller", "driver"]

@@ -1,16 +1,18 @@
-"""Overrides: single keys of a file replaced for one run, each at most once."""
+"""Overrides: keys of files, of controllers and of users' blocks replaced for one run, each at most once."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from activesteer.config import Source, check_overruled, field_path, merged
+from activesteer.controllers import CONTROLLER, ControllerParameters, find_controller, keys_read
 from activesteer.errors import ParameterError, shown
+from activesteer.plugins import Plugin
 
 
 class Override(NamedTuple):
@@ -59,3 +61,90 @@ def applied(
         table = merged(cls, table, override.path, override.value, given)
     check_overruled(cls, table, Source("", error=ParameterError, overridden=changed), [one.path for one in overrides])
     return dict(table), replace(source, overridden=changed)
+
+
+_BUILT_IN: Final = frozenset(field.name for field in fields(ControllerParameters))
+
+
+def own_path(key: str) -> tuple[str, str] | None:
+    """Return the class and the parameter of a key of a user's controller; None for other keys."""
+    table, _, rest = key.removeprefix("vehicle.").partition(".")
+    name, _, parameter = rest.partition(".")
+    return (name, parameter) if table == "controllers" and name and name not in _BUILT_IN else None
+
+
+def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
+    """Return users' controllers by the names that they have in keys; the same class may drive with other parameters.
+
+    Raises:
+        ParameterError: classes of two files have the same name.
+    """
+    found: dict[str, list[Plugin]] = {}
+    for plugin in map(find_controller, controllers):
+        if not plugin.ours:
+            found.setdefault(plugin.key, []).append(plugin)
+    for name, plugins in found.items():
+        if any(plugin.files != plugins[0].files for plugin in plugins):
+            raise ParameterError("two controllers have this name; rename one of them", key=f"controllers.{name}")
+    return found
+
+
+def own_values(overrides: Mapping[str, Any], controllers: Mapping[str, Sequence[Plugin]]) -> dict[str, dict[str, Any]]:
+    """Return the checked overrides of users' controllers: class -> name -> value."""
+    given: dict[str, dict[str, Any]] = {}
+    for key, value in overrides.items():
+        name, parameter = own_path(key) or ("", "")
+        given.setdefault(name, {})[parameter] = value
+    return {name: plugin.own_values(values) for name, values in given.items() for plugin in controllers[name]}
+
+
+_KEYS: Final = frozenset(field.name for field in fields(ControllerParameters))
+
+
+def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Return the overrides of the table [controllers]: key -> names of the fields on the path to its value."""
+    split = {key: key.removeprefix("vehicle.").split(".") for key in overrides if own_path(key) is None}
+    return {
+        key: field_path(ControllerParameters, rest) for key, (first, *rest) in split.items() if first == "controllers"
+    }
+
+
+def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> dict[str, frozenset[str]]:
+    """Return the overrides that none of these controllers reads: key -> keys of the table [controllers] it replaces."""
+    read = frozenset[str]().union(*map(keys_read, controllers))
+    replaced = {
+        key: _KEYS.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))
+        for key, path in gain_paths(overrides).items()
+    }
+    if own := {key: path[0] for key in overrides if (path := own_path(key))}:
+        replaced |= {key: frozenset({name}) for key, name in own.items()}
+        read |= own_controllers(controllers).keys()
+    return {key: names for key, names in replaced.items() if names and not names & read}
+
+
+def read_by(overrides: Mapping[str, Any], controller: Any) -> dict[str, Any]:
+    """Return the overrides without those of the table [controllers] that only other controllers read."""
+    unread = unread_gains(overrides, [controller])
+    return {key: value for key, value in overrides.items() if key not in unread}
+
+
+def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> None:
+    """Check that every override of the table [controllers] is read by one of these controllers.
+
+    Raises:
+        ParameterError: no controller reads an override; `allowed` has the keys that they read.
+    """
+    for key, names in unread_gains(overrides, controllers).items():
+        readers = [name for name in CONTROLLER.names() if names & keys_read(name)]
+        if own_path(key):
+            problem = f"has no effect: no controller {', '.join(names)} drives here"
+            raise ParameterError(problem, key=key, value=overrides[key], overridden=True)
+        driving = " and ".join(find_controller(given).label for given in controllers)
+        allowed = [f"controllers.{name}" for name in sorted(frozenset[str]().union(*map(keys_read, controllers)))]
+        words = "controller {} reads" if len(controllers) == 1 else "controllers {} read"
+        here = f"{words.format(driving)} {', '.join(allowed)}" if controllers else "no controller drives here"
+        given = ", ".join(f"controllers.{name}" for name in sorted(names))
+        raise ParameterError(
+            f"has no effect: {here}; {given} is read by {', '.join(readers)}",
+            key=key, value=overrides[key], allowed=allowed, overridden=True,
+        )  # fmt: skip

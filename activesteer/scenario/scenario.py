@@ -17,16 +17,14 @@ from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, nearest_names
 from activesteer.faults import fault_table
 from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
-from activesteer.maneuver.road_files import with_road_files
+from activesteer.maneuver.tables import with_road_files
 from activesteer.plugins import Plugin
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
 from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.driver import ChosenDriver, driver_with
 from activesteer.scenario.electric import battery_power_W, split_axles
 from activesteer.scenario.estimation import estimator_setup
-from activesteer.scenario.gains import gain_paths
-from activesteer.scenario.overrides import Override, applied, plain
-from activesteer.scenario.own_parameters import own_controllers, own_path, own_values
+from activesteer.scenario.overrides import Override, applied, gain_paths, own_controllers, own_path, own_values, plain
 from activesteer.scenario.recorded_inputs import is_recording, led, recorded_inputs
 from activesteer.vehicle.powertrain import Drive
 

@@ -1,12 +1,12 @@
 """Sensors between the true motion of the car and its controllers."""
 
 from activesteer.sensors.block import SensorBlock
-from activesteer.sensors.parameters import Sensors
-from activesteer.sensors.sensor_kinds import (
+from activesteer.sensors.parameters import (
     AccelerationSensor,
     AngleSensor,
     PressureSensor,
     RateSensor,
+    Sensors,
     WheelSpeedSensor,
 )
 

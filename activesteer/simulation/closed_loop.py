@@ -24,10 +24,10 @@ from activesteer.scenario import Scenario
 from activesteer.scenario.changing import changed
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint, numbers_in
 from activesteer.simulation.control_unit import control_unit
+from activesteer.simulation.copies import retuned
 from activesteer.simulation.native_cars import NativeCars
 from activesteer.simulation.native_loop import GIVEN, PYTHON
 from activesteer.simulation.recorder import Recorder
-from activesteer.simulation.retuning import retuned
 from activesteer.vehicle import Uncopyable, engine_warnings_held
 from activesteer.vehicle.faults import Faults
 
@@ -288,7 +288,7 @@ class ClosedLoop(Uncopyable):
     def change(self, key: str, value: Any) -> None:
         """Change a key of the manoeuvre, its road, the controller or the driver, from the next step on.
 
-        A controller or driver keeps its memory, see `activesteer.simulation.retuning`.
+        A controller or driver keeps its memory, see `activesteer.simulation.copies`.
 
         Raises:
             ParameterError: there is no such key, it cannot change during a run, or nothing reads it.

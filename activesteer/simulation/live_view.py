@@ -16,7 +16,7 @@ from activesteer.conventions import run_looks
 from activesteer.drawing.direction_of_motion import SLOWEST_MPS
 from activesteer.errors import PlaybackError
 from activesteer.maneuver import Maneuver
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.units import quantity_of

@@ -15,7 +15,7 @@ from activesteer.driver.human import HumanDriver
 from activesteer.driver.native_driver import SetpointTable, setpoint_row, tabulate
 from activesteer.errors import SimulationDiverged
 from activesteer.native_blocks import record_type, take, values
-from activesteer.road.path_search import PathSearch
+from activesteer.road.native_path import PathSearch
 from activesteer.signals import (
     NO_TORQUES,
     ActuatorCommand,
@@ -48,7 +48,7 @@ from activesteer.simulation.native_loop import (
     drive_cars,
 )
 from activesteer.vehicle.car import check_gear
-from activesteer.vehicle.command_row import write_command
+from activesteer.vehicle.recorded_rows import write_command
 from activesteer.vehicle.wheel_set import torque_numbers
 
 _WINDOW: Final = 250

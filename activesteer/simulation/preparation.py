@@ -1,19 +1,269 @@
-"""Searches by driving before a scenario can run: single-track model, amplitude of the steering wheel."""
+"""Searches by driving before a scenario can run: the single-track model, and the amplitude of the steering wheel.
+
+The result is the input for every controller. It is kept under a key of everything that it depends on; see
+`amplitude_store`.
+
+Mass, yaw inertia and axle distances are those of the model at static ride; see `studies.linear.identification`.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
+import math
+import platform
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
+import mujoco
+import numpy as np
+
+from activesteer.analysis.handling import CarGeometry, Handling, evaluate
+from activesteer.analysis.slow_ramp import FIT, angle_at
+from activesteer.analysis.source import RecordingLike
+from activesteer.compilation import content_key, processor
+from activesteer.config import to_table
 from activesteer.controllers import find_controller
-from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
+from activesteer.errors import ManeuverError, ModelError
+from activesteer.maneuver.base import Search
+from activesteer.maneuver.steering_tests import RampAngle, SteadyTurn, StepSteer
 from activesteer.recording import Recording
-from activesteer.scenario import Scenario
-from activesteer.simulation.amplitude_search import amplitude
+from activesteer.scenario import Car, FileOrTable, Scenario, resolve
+from activesteer.simulation import amplitude_store
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.run_context import RunContext
-from activesteer.simulation.single_track_search import with_identified_single_track
-from activesteer.theory.single_track import IDENTIFY
+from activesteer.theory.single_track import IDENTIFIED, IDENTIFY, SingleTrackParameters, characteristic_speed
+from activesteer.vehicle.statics import mass_properties
+from activesteer.version import __version__
+
+_TOLERANCE: Final = 5e-4
+"""Relative error of the lateral acceleration at which the search for a steady turn stops."""
+_RUNS: Final = 8
+_STEADY_S: Final = 0.5
+"""Length of the final part of a run that is averaged as the steady state [s]."""
+_CHUNK_S: Final = 0.25
+"""Interval between two checks of whether a ramp has reached its end [s]."""
+_ROUNDED_RAD: Final = math.radians(0.1)
+"""FMVSS 126 rounds A to 0.1 deg, which also makes A the same on every machine."""
+
+
+def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
+    """Find the steering wheel angle that a manoeuvre needs.
+
+    Args:
+        scenario: Manoeuvre, car and driver.
+        search: Search of the manoeuvre.
+        timestep_s: Step of the simulation [s].
+
+    Returns:
+        Steering wheel angle [rad].
+
+    Raises:
+        ManeuverError: no angle gives the lateral acceleration.
+    """
+    probed = replace(scenario, maneuver=search.probe, driver=scenario.driver.for_searches())
+    key = _key(probed, search, timestep_s)
+    angle = amplitude_store.recall(key)
+    if angle is None:
+        if isinstance(search, RampAngle):
+            angle = _ramp_angle(probed, search, timestep_s)
+        else:
+            assert isinstance(search, SteadyTurn)
+            angle = _steady_turn(probed, search, timestep_s)
+        amplitude_store.keep(key, angle)
+    return angle
+
+
+def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
+    """Digest of everything that the amplitude depends on.
+
+    The compiled model includes the content of all model and tyre files, the road and the step. Controllers have no
+    influence, because the car is driven without control.
+    """
+    model = scenario.car.on(scenario.maneuver.ground, timestep_s).model
+    compiled_model = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, compiled_model)
+    parts = {
+        "model": hashlib.sha256(compiled_model.tobytes()).hexdigest(),
+        "car": to_table(scenario.car.config) | {"controllers": None},
+        "driver": to_table(scenario.driver.parameters) | {"name": "", "title": ""},
+        "search": [type(search).__name__, to_table(search.probe), search.lateral_acceleration_mps2, timestep_s],
+        "code": [__version__, content_key(Path(__file__)), platform.platform(), processor()],
+    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> float:
+    """Secant search over whole step steers."""
+    wanted = search.lateral_acceleration_mps2
+    if wanted == 0.0:
+        return 0.0
+    probe = search.probe
+    car, speed = scenario.car.config.single_track, max(probe.speed_mps, 1.0)
+    # First guess: Ackermann angle with the understeer of a typical car, about 2.5 deg/g.
+    angle = scenario.car.config.steering.ratio * wanted * (car.wheelbase_m / speed**2 + 0.0044)
+    tried: list[tuple[float, float]] = []
+    simulation = ClosedLoop(replace(scenario, maneuver=probe.with_amplitude(angle)), "none", timestep_s)
+    # Until the wheel turns, the runs are the same.
+    simulation.advance(int(probe.steer.start_s / timestep_s))
+    start = simulation.save_state()
+    for _ in range(_RUNS):
+        reached = _steady_acceleration(simulation, probe.with_amplitude(angle), start)
+        if abs(reached / wanted - 1.0) < _TOLERANCE:
+            return angle
+        tried.append((angle, reached))
+        if len(tried) == 1:
+            angle *= wanted / reached if reached * wanted > 0.0 else 1.2
+        else:
+            (a0, r0), (a1, r1) = tried[-2:]
+            if r1 == r0:
+                break
+            angle = a1 + (wanted - r1) * (a1 - a0) / (r1 - r0)
+    best = min(tried, key=lambda pair: abs(pair[1] - wanted))
+    raise ManeuverError(
+        f"{probe.name}: no steering wheel angle found that gives {wanted:.3g} m/s2 in the control-free car; the "
+        f"closest was {np.degrees(best[0]):.1f} deg with {best[1]:.3g} m/s2: is the road too slippery "
+        f"(road.mu {probe.road.mu:g})?",
+        value=wanted,
+    )
+
+
+def _steady_acceleration(simulation: ClosedLoop, maneuver: StepSteer, start: Any) -> float:
+    simulation.restore_state(start)
+    simulation.maneuver = maneuver
+    steady = round(_STEADY_S / simulation.vehicle.timestep_s)
+    simulation.advance(simulation.steps - simulation.step_count - steady)
+    recorder = Recorder(simulation.vehicle, steady)
+    simulation.run(recorder)
+    return float(_rows(recorder, "ay_mps2").mean())
+
+
+def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> float:
+    """Evaluate the regression line of the lateral acceleration over the angle at the required acceleration.
+
+    The model is symmetric, so one side represents both.
+    """
+    wanted, probe = search.lateral_acceleration_mps2, search.probe
+    high = FIT[1] * wanted
+    simulation = ClosedLoop(scenario, "none", timestep_s)
+    recorder = Recorder(simulation.vehicle, simulation.steps)
+    chunk, left = round(_CHUNK_S / timestep_s), simulation.steps
+    # Drive slightly beyond the range of the line, so that all of the range is settled.
+    ay = np.zeros(1)
+    while left > 0 and ay[-1] < 1.05 * high:
+        simulation.advance(min(chunk, left), recorder)
+        left -= chunk
+        ay = _rows(recorder, "ay_mps2")
+    wheel = _rows(recorder, "steering_wheel_rad")
+    if ay.max() < high:
+        raise ManeuverError(
+            f"{probe.name}: the control-free car reaches {ay.max():.3g} m/s2 with {np.degrees(wheel.max()):.0f} deg at "
+            f"the steering wheel, but {high:.3g} m/s2 ({high / GRAVITY_MPS2:.3g} g) are needed: is the road too "
+            f"slippery (road.mu {probe.road.mu:g})? Give the amplitude instead (steering_wheel_deg)",
+            value=high,
+        )
+    return round(angle_at(wheel, ay, wanted) / _ROUNDED_RAD) * _ROUNDED_RAD
+
+
+def _rows(recorder: Recorder, name: str) -> np.ndarray:
+    column = [channel.name for channel in recorder.channels].index(name)
+    return recorder.result()[1][:, column]
+
+
+Run = Callable[[Scenario], RecordingLike]
+"""Function that runs a scenario; an argument, because the runner itself calls this module."""
+
+CONSTANT_SPEED_TESTS: Final = {"80 km/h": 80.0, "100 km/h": 100.0}
+"""Tests at constant speed that give the single-track model: name -> speed [km/h]."""
+_LINEAR: Final = {"duration_s": 12.0, "steer.end_deg": 50.0}
+"""Overrides that limit a test at constant speed to the linear range."""
+
+
+class Body(NamedTuple):
+    """Mass properties of the whole car at static ride.
+
+    Attributes:
+        mass_kg: Mass [kg].
+        yaw_inertia_kgm2: Inertia about the vertical axis through the centre of gravity [kg m2].
+        cg_to_front_m: l_V [m].
+        cg_to_rear_m: l_H [m].
+    """
+
+    mass_kg: float
+    yaw_inertia_kgm2: float
+    cg_to_front_m: float
+    cg_to_rear_m: float
+
+
+def linear_tests(vehicle: FileOrTable, overrides: Mapping[str, Any] | None = None) -> list[Scenario]:
+    """Return the tests at constant speed, limited to the linear range."""
+    return [
+        resolve("slowly_increasing_steer", vehicle, {**(overrides or {}), **_LINEAR, "speed_kmh": speed})
+        for speed in CONSTANT_SPEED_TESTS.values()
+    ]
+
+
+def single_track_of(scenarios: list[Scenario], run: Run) -> SingleTrackParameters:
+    """Return the single-track model that fits the car in the tests."""
+    body = body_of(scenarios[0].car)
+    return fitted(body, [handling_in(scenario, body, run) for scenario in scenarios])
+
+
+def with_identified_single_track(scenario: Scenario, run: Run) -> Scenario:
+    """Return the scenario with the single-track model of the car as it is, including its load.
+
+    Raises:
+        ModelError: the car oversteers, so it has no characteristic speed.
+    """
+    car = scenario.car
+    single_track = single_track_of([replace(test, car=car) for test in linear_tests("compact")], run)
+    return replace(scenario, car=replace(car, config=replace(car.config, single_track=single_track)))
+
+
+def body_of(car: Car) -> Body:
+    """Return the mass properties of the whole car, from the model at static ride."""
+    vehicle = car.on()
+    body = mass_properties(vehicle.model, vehicle.data)
+    front, rear = (vehicle.data.xpos[vehicle.model.body(f"{axle}l_wheel").id, 0] for axle in "fr")
+    x_m = body.cg_m[0]
+    return Body(body.mass_kg, float(body.inertia_kgm2[2, 2]), float(front - x_m), float(x_m - rear))
+
+
+def handling_in(scenario: Scenario, body: Body, run: Run) -> Handling:
+    """Return the steady-state handling of a car in a test."""
+    return evaluate(
+        run(scenario), CarGeometry(body.cg_to_front_m, body.cg_to_rear_m, scenario.car.config.steering.ratio)
+    )
+
+
+def fitted(body: Body, tests: list[Handling]) -> SingleTrackParameters:
+    """Return the model with the mean slip angles and understeer of the tests at constant speed."""
+    wheelbase = body.cg_to_front_m + body.cg_to_rear_m
+
+    def mean(name: str) -> float:
+        return float(np.mean([getattr(test, name) for test in tests]))
+
+    understeer, front, rear = (mean(f"{name}_gradient_radpmps2") for name in ("understeer", "front_slip", "rear_slip"))
+    if understeer <= 0.0:
+        gradient_degpg = math.degrees(understeer) * GRAVITY_MPS2
+        raise ModelError(
+            f"the car oversteers: its understeer gradient is {gradient_degpg:.3g} deg/g, and the characteristic speed "
+            "of the single-track model needs a positive gradient"
+        )
+    return SingleTrackParameters(
+        source=IDENTIFIED,
+        mass_kg=body.mass_kg,
+        yaw_inertia_kgm2=body.yaw_inertia_kgm2,
+        cg_to_front_m=body.cg_to_front_m,
+        cg_to_rear_m=body.cg_to_rear_m,
+        front_stiffness_Nprad=body.mass_kg * body.cg_to_rear_m / wheelbase / front,
+        rear_stiffness_Nprad=body.mass_kg * body.cg_to_front_m / wheelbase / rear,
+        characteristic_speed_mps=characteristic_speed(wheelbase, understeer),
+    )
 
 
 def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:

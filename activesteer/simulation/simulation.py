@@ -29,8 +29,8 @@ from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
 from activesteer.simulation.control_unit import slow_actuators
+from activesteer.simulation.copies import pickled, unpickled
 from activesteer.simulation.pacing import Pacer
-from activesteer.simulation.pickling import pickled, unpickled
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder
 from activesteer.simulation.run_context import RunContext

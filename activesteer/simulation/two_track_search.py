@@ -18,11 +18,11 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.scenario import FileOrTable, resolve
-from activesteer.simulation.single_track_search import Run
+from activesteer.simulation.preparation import Run
 from activesteer.theory.single_track import SingleTrack
 from activesteer.theory.two_track import TwoTrackParameters
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.mass_properties import mass_properties
+from activesteer.vehicle.statics import mass_properties
 
 _SPEED_MPS: Final = 80.0 / 3.6
 _AY_MPS2: Final = 2.0

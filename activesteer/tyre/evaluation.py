@@ -9,8 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from activesteer.errors import ParameterError
-from activesteer.tyre.kernels.limits import Limit
-from activesteer.tyre.kernels.rows import FORCE_COLUMNS, INPUT_COLUMNS, ROLLING_COLUMNS, evaluate_rows, rolling_rows
+from activesteer.tyre.kernels.magic_formula import (
+    FORCE_COLUMNS,
+    INPUT_COLUMNS,
+    ROLLING_COLUMNS,
+    Limit,
+    evaluate_rows,
+    rolling_rows,
+)
 from activesteer.tyre.tyre_parameters import TyreParameters
 
 Values = NDArray[np.float64]

@@ -13,14 +13,14 @@ import numpy as np
 from activesteer.compilation import compiled
 from activesteer.tyre.file.coefficients import BY_NAME
 from activesteer.tyre.kernels.contact import tyre_on_road
-from activesteer.tyre.kernels.record import TYRE_RECORD
-from activesteer.tyre.kernels.rows import (
+from activesteer.tyre.kernels.magic_formula import (
     FORCE_COLUMNS,
     INPUT_COLUMNS,
     ROLLING_COLUMNS,
     evaluate_rows,
     rolling_rows,
 )
+from activesteer.tyre.kernels.record import TYRE_RECORD
 
 _MAX_FORCE: Final = 1e12
 """No result of a tyre exceeds this [N, Nm, m ...]; beyond it, the engine's state soon overflows too."""

@@ -2,10 +2,9 @@
 
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.channels import MAX_VALUE, ChannelMap, RawRows
-from activesteer.vehicle.divergence import engine_warnings_held
+from activesteer.vehicle.divergence import Uncopyable, engine_warnings_held
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.step_bindings import Tape
-from activesteer.vehicle.uncopyable import Uncopyable
 
 __all__ = [
     "MAX_VALUE",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.named_parts import find
-from activesteer.vehicle.toe_link_screws import SCREW
+from activesteer.vehicle.toe_links import SCREW
 
 
 class ActuatorRecords:

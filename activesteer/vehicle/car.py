@@ -31,20 +31,17 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
 from activesteer.vehicle.actuator_records import ActuatorRecords
 from activesteer.vehicle.channels import ChannelMap
-from activesteer.vehicle.chassis_heading import YAW_DOF, turn_chassis_back
-from activesteer.vehicle.command_row import write_estimate
-from activesteer.vehicle.divergence import raise_if_diverged
-from activesteer.vehicle.equilibrium import static_ride
+from activesteer.vehicle.divergence import Uncopyable, raise_if_diverged
+from activesteer.vehicle.electric_drive import ENERGY, ElectricDrive
 from activesteer.vehicle.implicit_plan import ImplicitPlan, drop_metric
 from activesteer.vehicle.loading import load_model
-from activesteer.vehicle.motor_records import ENERGY, ElectricDrive
 from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.recorded_arrays import RecordedArrays
+from activesteer.vehicle.recorded_rows import RecordedArrays, write_estimate
+from activesteer.vehicle.statics import YAW_DOF, static_ride, turn_chassis_back
 from activesteer.vehicle.step_bindings import Tape, bind_step, read_through, record_from
-from activesteer.vehicle.uncopyable import Uncopyable
 from activesteer.vehicle.wheel_set import WheelSet
 
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)

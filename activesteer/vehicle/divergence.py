@@ -1,19 +1,19 @@
-"""Detection of a diverged run, with the engine's warnings."""
+"""A diverged run, and objects that must not be copied because they hold addresses of native memory."""
 
 from __future__ import annotations
 
 import contextlib
 import math
 from collections.abc import Iterator
+from typing import Any, NoReturn
 
 import mujoco
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.errors import SimulationDiverged
-from activesteer.vehicle.command_row import CARRIED_OUT, COMMANDS
+from activesteer.errors import ParameterError, SimulationDiverged
 from activesteer.vehicle.native_step import FASTEST_MPS
-from activesteer.vehicle.recorded_arrays import engine_arrays
+from activesteer.vehicle.recorded_rows import CARRIED_OUT, COMMANDS, engine_arrays
 
 
 @contextlib.contextmanager
@@ -63,3 +63,15 @@ def raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Arra
     for name, live in engine_arrays(data).items():
         if not np.isfinite(live).all():
             raise SimulationDiverged(f"the recorded {name} is not finite at {data.time:.3f} s", value=name)
+
+
+class Uncopyable:
+    """Base of objects that can be neither copied nor pickled."""
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        raise ParameterError(
+            f"a {type(self).__name__} holds native memory and cannot be copied or pickled; copy the Simulation "
+            "(Simulation.copy, copy.deepcopy, pickle)"
+        )
+
+    __copy__ = __deepcopy__ = __reduce_ex__ = _refuse

@@ -19,7 +19,7 @@ from activesteer.faults import ACTUATORS, ANGLE_SENSOR, MOTOR, SENSORS, Fault
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_faults as native
 from activesteer.vehicle.car import Vehicle
-from activesteer.vehicle.motor_records import FULL_TORQUE_NM, HEALTHY
+from activesteer.vehicle.electric_drive import FULL_TORQUE_NM, HEALTHY
 from activesteer.vehicle.named_parts import find
 
 _NEVER: Final = 2**62

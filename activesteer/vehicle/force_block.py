@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.native_records import numbers_type
-from activesteer.road.obstacle import OBSTACLE
+from activesteer.road.obstacles import OBSTACLE
 from activesteer.road.surface_kernels import SURFACE
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle.native_contact import CAM

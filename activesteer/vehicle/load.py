@@ -9,8 +9,8 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError
-from activesteer.vehicle.mass_properties import mass_properties, point_mass_inertia
 from activesteer.vehicle.parameters import Factors, Load, VehicleParameters
+from activesteer.vehicle.statics import mass_properties, point_mass_inertia
 
 _AXLES: Final = (CORNERS[:2], CORNERS[2:])
 _BOOT_M: Final = (0.0, 0.0, 0.6)

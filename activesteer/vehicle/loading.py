@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ModelError
-from activesteer.road.path_coordinates import PathGrid
+from activesteer.road.native_path import PathGrid
 from activesteer.road.road import LaidRoad, Road
 from activesteer.road.surface import surface_of
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.curve_axle_model import curve_axle_records, fit_curve_axles
+from activesteer.vehicle.curve_axles import curve_axle_records, fit_curve_axles
+from activesteer.vehicle.electric_actuators import MOTOR, NAME, fit_motor, motor_record
 from activesteer.vehicle.load import apply_load
 from activesteer.vehicle.named_parts import find
 from activesteer.vehicle.native_contact import cam_record
 from activesteer.vehicle.parameters import VIBRATION_AT_MPS, VehicleParameters
 from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.superposition_actuator import MOTOR, NAME, fit_motor, motor_record
-from activesteer.vehicle.toe_link_screws import fit_screws, screw_records, sensor_range
+from activesteer.vehicle.toe_links import fit_screws, screw_records, sensor_range
 
 _USER_DYNAMICS: Final = int(mujoco.mjtDyn.mjDYN_USER)
 SLIP_RATES: Final = {

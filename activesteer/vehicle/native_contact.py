@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from activesteer.compilation import compiled
 from activesteer.native_records import numbers_type
-from activesteer.road.obstacle import PLATEAU
+from activesteer.road.obstacles import PLATEAU
 from activesteer.road.surface_kernels import (
     COARSE_M,
     ENVELOPING,

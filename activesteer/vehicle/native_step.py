@@ -21,8 +21,11 @@ from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import Measurement, Motion
 from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS
-from activesteer.vehicle.chassis_heading import YAW_DOF
-from activesteer.vehicle.command_row import (
+from activesteer.vehicle.native_actuators import step_motors
+from activesteer.vehicle.native_faults import give_late, keep_demands, misread
+from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
+from activesteer.vehicle.powertrain import CLUTCH_OPEN
+from activesteer.vehicle.recorded_rows import (
     ACTUATOR_COMMAND,
     BRAKES,
     COMMAND_ROW,
@@ -30,10 +33,7 @@ from activesteer.vehicle.command_row import (
     TORQUES,
     write_commands,
 )
-from activesteer.vehicle.native_faults import give_late, keep_demands, misread
-from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
-from activesteer.vehicle.native_motors import step_motors
-from activesteer.vehicle.powertrain import CLUTCH_OPEN
+from activesteer.vehicle.statics import YAW_DOF
 from activesteer.vehicle.step_bindings import ENGINE, MOTOR, N_SOURCES, N_WARNINGS, STEP_BINDINGS, TAPE
 
 FASTEST_MPS: Final = 200.0

@@ -12,11 +12,10 @@ from activesteer.errors import ParameterError
 from activesteer.sensors.parameters import Sensors
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.vehicle.axle_curves import Curves
+from activesteer.vehicle.curve_axles import Curves
+from activesteer.vehicle.electric_actuators import RearActuator, SuperpositionActuator
 from activesteer.vehicle.electric_drive import Battery, Motors
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS
-from activesteer.vehicle.rear_actuator import RearActuator
-from activesteer.vehicle.superposition_actuator import SuperpositionActuator
 
 Positive = Annotated[float, Range(1e-12)]
 NotNegative = Annotated[float, Range(0.0)]

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import mujoco
 
-from activesteer.vehicle.electric_actuator import ElectricActuator, known
+from activesteer.vehicle.electric_actuators import NAME, ElectricActuator, known
 from activesteer.vehicle.parameters import VehicleParameters
-from activesteer.vehicle.superposition_actuator import NAME
-from activesteer.vehicle.toe_link_screws import screw_records
+from activesteer.vehicle.toe_links import screw_records
 
 
 class SteeringRates(NamedTuple):

@@ -14,8 +14,8 @@ from activesteer.native_records import numbers_type
 from activesteer.sensors.block import SensorBlock
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.raw_rows import RawRows
+from activesteer.vehicle.electric_drive import ElectricDrive
 from activesteer.vehicle.engine_layout import engine_layout
-from activesteer.vehicle.motor_records import ElectricDrive
 from activesteer.vehicle.named_parts import find, sensor_columns
 
 N_SOURCES: Final = len(RawRows._fields)

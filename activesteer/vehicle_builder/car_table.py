@@ -15,7 +15,7 @@ from activesteer.config import to_table, toml_text
 from activesteer.conventions import CORNERS, Array
 from activesteer.rigs.kc.result import KcResult
 from activesteer.scenario import Car
-from activesteer.vehicle.mass_properties import mass_properties
+from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.hardware import hardware_tables
 
 _REMARK = (

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from activesteer.conventions import Array
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.rigs.kc.sweep import INWARDS
-from activesteer.vehicle.axle_curves import OVER_RACK, OVER_TRAVEL, AxleCurves
+from activesteer.vehicle.curve_axles import OVER_RACK, OVER_TRAVEL, AxleCurves
 from activesteer.vehicle_builder.design import Axle
 from activesteer.vehicle_builder.trimmed import TrimmedAxle
 

@@ -8,9 +8,8 @@ from typing import Any, Final, Protocol
 
 from activesteer.config import to_table
 from activesteer.sensors.parameters import Sensors
+from activesteer.vehicle.electric_actuators import RearActuator, SuperpositionActuator
 from activesteer.vehicle.electric_drive import Battery, Motors
-from activesteer.vehicle.rear_actuator import RearActuator
-from activesteer.vehicle.superposition_actuator import SuperpositionActuator
 
 _DIGITS: Final = 7
 

@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 from scipy.optimize import least_squares
 
 from activesteer.conventions import Array
-from activesteer.vehicle.axle_curves import COORDINATES, upper_triangle
+from activesteer.vehicle.curve_axles import COORDINATES, upper_triangle
 
 _SCALE: Final = np.array([1e-4, 1e-4, 2e-4, 2e-4, 2e-4])
 """Units of the residuals: 0.1 mm and 0.01 deg."""

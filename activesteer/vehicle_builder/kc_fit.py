@@ -9,7 +9,7 @@ import numpy as np
 
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError
-from activesteer.vehicle.axle_curves import AxleCurves, upper_triangle
+from activesteer.vehicle.curve_axles import AxleCurves, upper_triangle
 from activesteer.vehicle_builder.kc_checks import check_signs, unusual
 from activesteer.vehicle_builder.kc_compliance import Load, fitted
 from activesteer.vehicle_builder.kc_tables import KcTables, Samples, smoothed

@@ -7,7 +7,7 @@ import numpy as np
 
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError
-from activesteer.vehicle.mass_properties import mass_properties, point_mass_inertia
+from activesteer.vehicle.statics import mass_properties, point_mass_inertia
 from activesteer.vehicle_builder.design import Car, Log, Solid
 
 

@@ -17,10 +17,9 @@ from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import read_csv
 from activesteer.sensors.parameters import Sensors
 from activesteer.units import known_unit
+from activesteer.vehicle.electric_actuators import RearActuator, SuperpositionActuator
 from activesteer.vehicle.electric_drive import Battery, Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
-from activesteer.vehicle.rear_actuator import RearActuator
-from activesteer.vehicle.superposition_actuator import SuperpositionActuator
 from activesteer.vehicle_builder.axle_kinds import DEFAULTS, AxleKind, kind_of
 
 Positive = Annotated[float, Range(1e-9)]

@@ -23,8 +23,8 @@ from activesteer.rigs.kc.tyre_stiffness import tyre_stiffness
 from activesteer.scenario import load_car
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.mass_properties import mass_properties
 from activesteer.vehicle.parameters import Friction
+from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.corner_motion import corner_motion
 from activesteer.vehicle_builder.curve_match import NEAR_ENOUGH, match_steering, match_travel
 from activesteer.vehicle_builder.design import Axle, Car, Log

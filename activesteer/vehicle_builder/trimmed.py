@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from activesteer.vehicle.axle_curves import AxleCurves
+from activesteer.vehicle.curve_axles import AxleCurves
 from activesteer.vehicle_builder.design import Solid
 
 

@@ -13,7 +13,7 @@ from activesteer.resources import find_vehicle
 from activesteer.simulation.two_track_search import two_track_lines
 from activesteer.theory.two_track import TwoTrackParameters
 from activesteer.tyre.evaluation import MagicFormula
-from activesteer.vehicle.mass_properties import mass_properties
+from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.design import Car
 from activesteer.vehicle_builder.hardware import hardware_tables, in_degrees
 from activesteer.vehicle_builder.trimmed import Trimmed

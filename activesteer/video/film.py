@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from activesteer.conventions import CORNERS, run_looks
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.recording import Recording
-from activesteer.road.course import course_of
+from activesteer.road.course import Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
-from activesteer.road.footprint import Footprint, footprint_of
 from activesteer.road.road import road_of
 from activesteer.video.cameras import CUTAWAY, view
 from activesteer.video.encoder import check, encoder, frame_rate

@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.colours import bytes_of
 from activesteer.recording import Recording
-from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.road.course import Footprint, footprint_of
 from activesteer.units import quantity_of
 from activesteer.video.lettering import GREY, LEGIBLE, PANEL, WHITE, Colour, font, text_scale, write
 

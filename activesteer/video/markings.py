@@ -14,7 +14,7 @@ from activesteer.conventions import Array
 from activesteer.drawing import tyre_forces, wheel_angles
 from activesteer.drawing.colours import shares_of
 from activesteer.recording import Recording
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from activesteer.video.track import Track
 
 _ABOVE_ROAD_M: Final = 0.05

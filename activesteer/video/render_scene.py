@@ -18,9 +18,8 @@ from activesteer.drawing.colours import shares_of
 from activesteer.drawing.ghosts import share_seen
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
-from activesteer.road.course import Course
+from activesteer.road.course import Course, Footprint
 from activesteer.road.drawn import DrawnSurface
-from activesteer.road.footprint import Footprint
 from activesteer.road.road import Road
 from activesteer.video.road import Edges, add_areas, add_course, add_edges, add_road
 from activesteer.video.sky import SKY, add_sky

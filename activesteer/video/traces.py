@@ -10,7 +10,7 @@ import numpy as np
 from activesteer.conventions import CORNERS, Array
 from activesteer.drawing.colours import shares_of
 from activesteer.recording import Recording
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from activesteer.video.markings import add_geom
 from activesteer.video.track import Track
 

@@ -9,7 +9,7 @@ from activesteer.drawing.bodywork import CHASSIS
 from activesteer.drawing.direction_of_motion import direction_of_motion
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
-from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.road.course import Footprint, footprint_of
 
 
 class Track:

@@ -25,7 +25,7 @@ from activesteer.cli import main
 from activesteer.errors import ActiveSteerError, RecordingError
 from activesteer.playback import runs_of, save
 from activesteer.recording import Poses, Recording
-from activesteer.recording.format import RUN_RECORD
+from activesteer.recording.contents import RUN_RECORD
 from activesteer.video.track import Track
 from tests.unit.recording.records import records_of, write_records
 

@@ -9,8 +9,7 @@ import pytest
 
 from activesteer import Simulation
 from activesteer.faults import fault_table
-from activesteer.sensors.parameters import RANDOM, Sensors
-from activesteer.sensors.sensor_kinds import Sensor
+from activesteer.sensors.parameters import RANDOM, Sensor, Sensors
 from tests.physics.runs import assert_goes_on_bit_by_bit
 
 HARDWARE: dict[str, Any] = {

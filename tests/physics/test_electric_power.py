@@ -7,7 +7,7 @@ import pytest
 
 from activesteer import ActuatorCommand, DriverCommand, Simulation
 from activesteer.conventions import CORNERS
-from activesteer.vehicle.mass_properties import mass_properties
+from activesteer.vehicle.statics import mass_properties
 
 DT_S = 0.001
 CARS = {"compact_electric": (0.92, 150.0, 400.0, ("rl", "rr")), "tesla_model_s": (0.9, 300.0, 500.0, ("front", "rear"))}

@@ -11,8 +11,8 @@ import pytest
 
 from activesteer.controllers import SingleTrackParameters
 from activesteer.scenario import load_car
+from activesteer.simulation.preparation import linear_tests, single_track_of
 from activesteer.simulation.runner import run_scenario
-from activesteer.simulation.single_track_search import linear_tests, single_track_of
 from activesteer.studies.linear.identification import (
     CONSTANT_SPEED_TESTS,
     RADIUS_TEST,

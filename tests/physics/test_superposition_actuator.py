@@ -13,7 +13,7 @@ from activesteer import ActuatorCommand, Recording
 from activesteer.errors import ParameterError
 from activesteer.faults import fault_table
 from activesteer.scenario import load_car
-from activesteer.vehicle.superposition_actuator import STRAIN_WAVE
+from activesteer.vehicle.electric_actuators import STRAIN_WAVE
 from tests.raising import raises
 
 GEARED = {"superposition_actuator.preset": "strain_wave"}

@@ -15,8 +15,8 @@ from activesteer.faults import fault_table
 from activesteer.rigs import kinematics_compliance
 from activesteer.scenario import load_car
 from activesteer.studies.linear.linearisation import linearise
-from activesteer.vehicle.rear_actuator import PRESETS
-from activesteer.vehicle.toe_link_kinematics import evaluated, toe_link_map
+from activesteer.vehicle.electric_actuators import PRESETS
+from activesteer.vehicle.toe_links import evaluated, toe_link_map
 from tests.physics.runs import assert_goes_on_bit_by_bit
 from tests.raising import raises
 

@@ -12,10 +12,10 @@ import activesteer
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged
 from activesteer.recording import Recording
-from activesteer.road.obstacle import Obstacle
+from activesteer.road.obstacles import Obstacle
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
-from activesteer.vehicle.local_state import LocalState
+from activesteer.vehicle.linear_state import LocalState
 from tests.physics.runs import car, corners, last, mass_kg
 
 

@@ -46,10 +46,10 @@ from activesteer.simulation.preparation import prepared
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.corners import design_heights_m
-from activesteer.vehicle.command_row import BRAKES, CARRIED_OUT, COMMANDS
 from activesteer.vehicle.faults import part_of
 from activesteer.vehicle.named_parts import sensor_columns
 from activesteer.vehicle.native_faults import N_HEALTH
+from activesteer.vehicle.recorded_rows import BRAKES, CARRIED_OUT, COMMANDS
 from activesteer.version import __version__
 
 _SOURCES: Final = Path(__file__).parent / "c"

@@ -12,8 +12,8 @@ from activesteer.faults import ACTUATORS
 from activesteer.signals import CORNERS_IN_WORDS, Measurement, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, Column, RawRows
-from activesteer.vehicle.command_row import CARRIED_OUT, COMMANDS
 from activesteer.vehicle.parameters import Factors
+from activesteer.vehicle.recorded_rows import CARRIED_OUT, COMMANDS
 
 INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 FROM_RESULT, FROM_FORCE, FROM_LIMIT, FROM_MOTION, FROM_INPUT = range(17, 22)

@@ -15,7 +15,7 @@ from activesteer.rigs.kc.held_car import MOUNT_ENDINGS
 from activesteer.rigs.kc.metrics_travel import TRAVEL_METRICS, wheelbase_mm
 from activesteer.rigs.kc.modes import NAMES
 from activesteer.rigs.kc.sweep import INWARDS
-from activesteer.vehicle.curve_axle_model import HOLDING_TENDON
+from activesteer.vehicle.curve_axles import HOLDING_TENDON
 
 _ON_CENTRE_RAD: Final = math.radians(20.0)
 _TRAIL_M: Final = 0.03

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from activesteer.tyre.kernels.relaxation import carcass_stiffnesses
+from activesteer.tyre.kernels.slip import carcass_stiffnesses
 from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_force
 from activesteer.tyre.tyre_parameters import TyreParameters
 

@@ -10,7 +10,7 @@ from activesteer.conventions import Array
 from activesteer.errors import ModelError
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.local_state import LocalState
+from activesteer.vehicle.linear_state import LocalState
 
 INPUTS: Final = ("steering_wheel_rad", "rear_steer_rad", "superposition_rad")
 """Demands: steering wheel [rad], rear steering [rad], and superposition at the road wheel [rad]."""

@@ -25,13 +25,13 @@ from activesteer.errors import RecordingError
 from activesteer.metric_table import metric
 from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve
 from activesteer.scenario.vehicle_file import write_values
-from activesteer.simulation.runner import run_scenario
-from activesteer.simulation.single_track_search import (
+from activesteer.simulation.preparation import (
     CONSTANT_SPEED_TESTS,
     body_of,
     fitted,
     handling_in,
 )
+from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.two_track_search import two_track_lines, two_track_of
 from activesteer.theory.single_track import SingleTrack
 from activesteer.theory.two_track import TwoTrackParameters

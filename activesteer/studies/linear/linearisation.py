@@ -36,7 +36,7 @@ from activesteer.errors import ParameterError
 from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.studies.linear.discrete_time_map import INPUTS, OUTPUTS, DiscreteTimeMap
-from activesteer.vehicle.modes import Mode, find_modes
+from activesteer.vehicle.linear_state import Mode, find_modes
 
 if TYPE_CHECKING:
     import control

@@ -36,7 +36,7 @@ from activesteer.controllers.linear_form import has_linear_form, linear_controll
 from activesteer.controllers.response import SIGNALS, pulse_responses, response_of
 from activesteer.conventions import GRAVITY_MPS2, Array
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
-from activesteer.sensors.sensor_kinds import Sensor
+from activesteer.sensors.parameters import Sensor
 from activesteer.signals import Measurement
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.control_unit import interval_s

@@ -30,9 +30,8 @@ import math
 from typing import Final, NamedTuple
 
 from activesteer.compilation import compiled
-from activesteer.tyre.kernels.limits import limit_flags
-from activesteer.tyre.kernels.magic_formula import slip_stiffnesses, steady_state
-from activesteer.tyre.kernels.relaxation import MIN_RELAXATION_LENGTH_M, relaxation_lengths
+from activesteer.tyre.kernels.magic_formula import limit_flags, slip_stiffnesses, steady_state
+from activesteer.tyre.kernels.slip import MIN_RELAXATION_LENGTH_M, relaxation_lengths
 from activesteer.tyre.kernels.vertical import (
     bottoming_force,
     contact_patch,

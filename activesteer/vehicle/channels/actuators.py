@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 
 from activesteer.vehicle.channels.raw_rows import Actuator, Column, Signal, sensor, signal
+from activesteer.vehicle.electric_actuators import MOTOR, NAME
 from activesteer.vehicle.electric_drive import Motors
 from activesteer.vehicle.named_parts import is_there
-from activesteer.vehicle.superposition_actuator import MOTOR, NAME
-from activesteer.vehicle.toe_link_screws import SCREW
+from activesteer.vehicle.toe_links import SCREW
 
 
 def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:

@@ -28,8 +28,8 @@ from activesteer.vehicle.channels.raw_rows import (
     signal,
 )
 from activesteer.vehicle.channels.steering import steering_signals
-from activesteer.vehicle.command_row import COMMAND_CHANNELS, ESTIMATE_CHANNELS
 from activesteer.vehicle.parameters import VehicleParameters
+from activesteer.vehicle.recorded_rows import COMMAND_CHANNELS, ESTIMATE_CHANNELS
 
 MAX_VALUE: Final = float(np.finfo(np.float32).max)
 """Largest recorded value: files store most channels with 32 bits."""

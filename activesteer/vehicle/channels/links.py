@@ -9,7 +9,7 @@ import numpy as np
 
 from activesteer.conventions import Array
 from activesteer.vehicle.channels.raw_rows import AxialForce, Column, Computed, Signal, Values, signal
-from activesteer.vehicle.curve_axle_model import HOLDING_TENDON
+from activesteer.vehicle.curve_axles import HOLDING_TENDON
 
 
 def link_signals(model: mujoco.MjModel) -> Iterator[Signal]:

@@ -15,7 +15,7 @@ from activesteer.scenario import Car
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.mass_properties import mass_properties
+from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.check.findings import Finding, judged
 
 _STEPS: Final = 500

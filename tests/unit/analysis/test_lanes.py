@@ -9,8 +9,7 @@ import pytest
 
 from activesteer.analysis.lanes import cone_distances, lane_overstep, stays_in_lanes
 from activesteer.analysis.source import read_course, read_footprint
-from activesteer.road.course import CONE_RADIUS_M
-from activesteer.road.footprint import FRONT_OVERHANG_M, REAR_OVERHANG_M
+from activesteer.road.course import CONE_RADIUS_M, FRONT_OVERHANG_M, REAR_OVERHANG_M
 from tests.unit.analysis.synthetic import LANES, WHEELBASE_M, WIDTH_M, SyntheticRun, along_path, offset_track
 
 HALF_M = 0.5 * WIDTH_M

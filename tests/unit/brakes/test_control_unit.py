@@ -9,9 +9,8 @@ import pytest
 
 from activesteer.brakes import Brakes
 from activesteer.brakes.antilock import BUILD, HOLD, OFF, antilock
-from activesteer.brakes.control_unit import step_brakes
+from activesteer.brakes.control_unit import follow_car, follow_wheels, step_brakes
 from activesteer.brakes.records import NO_LIMIT_NM
-from activesteer.brakes.reference_speed import follow_car, follow_wheels
 from tests.unit.brakes.test_hydraulics import of
 
 CAR = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0)

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from activesteer.brakes import Brakes
+from activesteer.brakes.control_unit import traction
 from activesteer.brakes.records import NO_LIMIT_NM
-from activesteer.brakes.traction import traction
 from tests.unit.brakes.test_hydraulics import of
 
 CAR = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0, tcs=True)

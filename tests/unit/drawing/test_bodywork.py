@@ -8,7 +8,7 @@ import pytest
 from activesteer.drawing.bodywork import Panel, dressed, without_tail
 from activesteer.recording import Link, Primitive
 from activesteer.resources import models_dir
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from tests.unit.playback.synthetic import scene
 
 COMPACT = Footprint(1.8, 2.637, (0.2, 0.2))

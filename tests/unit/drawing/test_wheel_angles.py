@@ -16,7 +16,7 @@ from activesteer.drawing.wheel_angles import (
     words,
 )  # fmt: skip
 from activesteer.recording import Recording
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from activesteer.signals import Channel
 
 SIZE = Footprint(1.8, 2.6, (0.2, 0.2))

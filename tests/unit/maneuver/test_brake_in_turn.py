@@ -10,8 +10,8 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.brake_in_turn import BrakeInTurn
-from activesteer.maneuver.step_steer import SteadyTurn
+from activesteer.maneuver.braking import BrakeInTurn
+from activesteer.maneuver.steering_tests import SteadyTurn
 from tests.raising import raises
 
 SOURCE = Source("my_turn.toml", error=ManeuverError)

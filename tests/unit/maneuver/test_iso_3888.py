@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from activesteer.maneuver.iso_3888 import cones, lanes
+from activesteer.maneuver.lane_changes import cones, lanes
 
 WIDTHS = (1.6, 1.8, 2.0)
 

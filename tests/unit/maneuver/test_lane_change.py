@@ -10,9 +10,9 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError, ParameterError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.lane_change import LaneChange
+from activesteer.maneuver.lane_changes import LaneChange
 from activesteer.road.course import Course
-from activesteer.road.path_search import PathSearch
+from activesteer.road.native_path import PathSearch
 from activesteer.scenario import resolve
 from tests.raising import raises
 

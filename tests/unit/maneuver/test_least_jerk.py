@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.least_jerk import Bound, least_jerk
+from activesteer.maneuver.lane_changes import Bound, least_jerk
 from tests.raising import raises
 
 

@@ -11,7 +11,7 @@ from scipy import signal
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.random_steer import RandomSteer
+from activesteer.maneuver.steering_tests import RandomSteer
 from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)

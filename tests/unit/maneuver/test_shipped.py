@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from activesteer.maneuver.lane_change import LaneChange
-from activesteer.maneuver.sine_with_dwell import SineWithDwell
-from activesteer.maneuver.slalom import Slalom
+from activesteer.maneuver.lane_changes import LaneChange, Slalom
+from activesteer.maneuver.steering_tests import SineWithDwell
 from activesteer.resources import find_maneuver, list_maneuvers
 from activesteer.scenario import resolve
 

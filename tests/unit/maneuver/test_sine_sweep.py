@@ -10,7 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.sine_sweep import SineSweep
+from activesteer.maneuver.steering_tests import SineSweep
 from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)

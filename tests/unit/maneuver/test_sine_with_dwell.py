@@ -11,8 +11,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.sine_with_dwell import SineWithDwell
-from activesteer.maneuver.slowly_increasing_steer import RampAngle
+from activesteer.maneuver.steering_tests import RampAngle, SineWithDwell
 from activesteer.signals import Setpoint
 from tests.raising import raises
 

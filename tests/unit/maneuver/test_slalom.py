@@ -11,7 +11,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.slalom import Slalom
+from activesteer.maneuver.lane_changes import Slalom
 from tests.raising import raises
 
 SOURCE = Source("my_cones.toml", error=ManeuverError)

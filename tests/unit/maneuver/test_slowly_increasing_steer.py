@@ -10,7 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.slowly_increasing_steer import SlowlyIncreasingSteer
+from activesteer.maneuver.steering_tests import SlowlyIncreasingSteer
 from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)

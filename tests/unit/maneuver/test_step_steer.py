@@ -11,7 +11,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.step_steer import StepSteer
+from activesteer.maneuver.steering_tests import StepSteer
 from tests.raising import raises
 
 SOURCE = Source("my_step.toml", error=ManeuverError)

@@ -10,7 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.straight_braking import StraightBraking
+from activesteer.maneuver.braking import StraightBraking
 from tests.raising import raises
 
 SOURCE = Source("my_stop.toml", error=ManeuverError)

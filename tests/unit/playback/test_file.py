@@ -18,7 +18,7 @@ from activesteer.playback.course import extent, map_bounds
 from activesteer.playback.plots import MOTION, axis_range, views
 from activesteer.playback.tyres import use_colours
 from activesteer.recording import Recording
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from activesteer.signals import Channel
 from tests.raising import raises
 from tests.unit.playback import synthetic

@@ -5,8 +5,15 @@ import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from activesteer.errors import RecordingError
-from activesteer.recording.protobuf import FixedMessage, timestamps, varint
-from activesteer.recording.schemas import state_fields, state_layout, state_schema, state_schema_name
+from activesteer.recording.schemas import (
+    FixedMessage,
+    state_fields,
+    state_layout,
+    state_schema,
+    state_schema_name,
+    timestamps,
+    varint,
+)
 from activesteer.signals import Channel
 from tests.raising import raises
 

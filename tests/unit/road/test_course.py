@@ -14,8 +14,7 @@ from activesteer.config import read_toml
 from activesteer.errors import RecordingError
 from activesteer.maneuver.kinds import build_maneuver
 from activesteer.resources import find_maneuver
-from activesteer.road.course import Course, course_of
-from activesteer.road.footprint import Footprint, footprint_of
+from activesteer.road.course import Course, Footprint, course_of, footprint_of
 from activesteer.road.road import Road, road_of
 from tests.raising import raises
 

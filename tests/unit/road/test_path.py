@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ManeuverError
+from activesteer.road.native_path import PathSearch
 from activesteer.road.path import SPACING_M, Path
-from activesteer.road.path_search import PathSearch
 from tests.raising import raises
 
 

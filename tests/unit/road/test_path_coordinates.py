@@ -9,8 +9,8 @@ import pytest
 
 from activesteer.errors import ManeuverError
 from activesteer.road.course import Course
+from activesteer.road.native_path import PathGrid, along_path
 from activesteer.road.path import Path
-from activesteer.road.path_coordinates import PathGrid, along_path
 from activesteer.road.road import Road, RoadPatch
 
 

@@ -14,10 +14,9 @@ from activesteer.errors import ManeuverError
 from activesteer.road import path as lines
 from activesteer.road.crg import CrgRoad, packed, read_crg, referenced, unpacked
 from activesteer.road.drawn import DrawnSurface, places_to_draw
-from activesteer.road.obstacle import Obstacle
+from activesteer.road.obstacles import CLASSES, STEP_M, Obstacle, Roughness
 from activesteer.road.profile import ProfileTable
 from activesteer.road.road import BankingTable, LaidRoad, Road
-from activesteer.road.roughness import CLASSES, STEP_M, Roughness
 from activesteer.road.surface import Surface, surface_of
 from activesteer.scenario import resolve
 

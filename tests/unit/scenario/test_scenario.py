@@ -21,7 +21,7 @@ from activesteer.conventions import GRAVITY_MPS2
 from activesteer.driver import DriverParameters
 from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, TyreFileError
 from activesteer.maneuver import KINDS
-from activesteer.maneuver.step_steer import StepSteer
+from activesteer.maneuver.steering_tests import StepSteer
 from activesteer.resources import find_vehicle, list_maneuvers, list_vehicles, models_dir
 from activesteer.scenario import VehicleConfig, describe, load_car, resolve
 from activesteer.simulation.preparation import prepared

@@ -11,13 +11,11 @@ import pytest
 import activesteer
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.brake_in_turn import BrakeInTurn
-from activesteer.maneuver.sine_with_dwell import SineWithDwell
-from activesteer.maneuver.step_steer import StepSteer
+from activesteer.maneuver.braking import BrakeInTurn
+from activesteer.maneuver.steering_tests import SineWithDwell, StepSteer
 from activesteer.scenario import describe, resolve
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import linear_tests, prepared, single_track_of
 from activesteer.simulation.runner import run_scenario
-from activesteer.simulation.single_track_search import linear_tests, single_track_of
 from tests.raising import raises
 
 

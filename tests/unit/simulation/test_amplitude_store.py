@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from activesteer.scenario import resolve
-from activesteer.simulation import amplitude_search, amplitude_store
+from activesteer.simulation import amplitude_store, preparation
 from activesteer.simulation.preparation import prepared
 
 KEY, ANGLE_RAD = "0123456789abcdef" * 4, 0.1 + 0.2
@@ -26,7 +26,7 @@ def folder(monkeypatch, tmp_path):
 def searches(monkeypatch):
     """Angles found by searches, which do not drive."""
     made = []
-    monkeypatch.setattr(amplitude_search, "_steady_turn", lambda *_: made.append(ANGLE_RAD + len(made)) or made[-1])
+    monkeypatch.setattr(preparation, "_steady_turn", lambda *_: made.append(ANGLE_RAD + len(made)) or made[-1])
     return made
 
 
@@ -41,7 +41,7 @@ def test_changed_car_gain_processor_or_version_gives_a_new_amplitude(searches, m
     changes = {"factors.mass": 1.01, "single_track.mass_kg": 1501.0, "driver.speed_gain_1ps": 1.0, "road.mu": 0.8}
     found = {first, angle(vehicle="sedan"), *(angle({key: value}) for key, value in changes.items())}
     for name, other in (("__version__", "x"), ("processor", lambda *_: "x"), ("content_key", lambda *_: "x")):
-        monkeypatch.setattr(amplitude_search, name, other)
+        monkeypatch.setattr(preparation, name, other)
         found.add(angle())
     assert len(found) == len(searches) == 9
 

@@ -22,7 +22,7 @@ from activesteer.signals import (
     numbers_of,
     widths_of,
 )
-from activesteer.vehicle.command_row import (
+from activesteer.vehicle.recorded_rows import (
     CARRIED_OUT,
     COMMANDS,
     ESTIMATE_CHANNELS,

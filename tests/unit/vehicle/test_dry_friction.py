@@ -14,7 +14,7 @@ from activesteer.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
 from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.dry_friction import friction_rate
+from activesteer.vehicle.native_actuators import friction_rate
 from tests.raising import raises
 from tests.unit.vehicle.cars import activation, actuator, changed_model, dof, floating, standing, step
 

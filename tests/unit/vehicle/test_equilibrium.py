@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ModelError
-from activesteer.vehicle.equilibrium import static_ride
+from activesteer.vehicle.statics import static_ride
 from tests.raising import raises
 from tests.unit.vehicle.cars import standing
 

@@ -13,7 +13,7 @@ from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.mass_properties import mass_properties, point_mass_inertia
+from activesteer.vehicle.statics import mass_properties, point_mass_inertia
 from tests.raising import raises
 from tests.unit.vehicle.cars import dof, record
 

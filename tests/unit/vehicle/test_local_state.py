@@ -11,7 +11,7 @@ import pytest
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.vehicle.local_state import LocalState
+from activesteer.vehicle.linear_state import LocalState
 
 ROLLING = {"kind": "open_loop", "speed_kmh": 80, "duration_s": 1.0, "settle_s": 0.5}
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import block_diag, expm
 
 from activesteer.errors import ModelError
-from activesteer.vehicle.modes import find_modes
+from activesteer.vehicle.linear_state import find_modes
 from tests.raising import raises
 
 STEP_S = 0.001

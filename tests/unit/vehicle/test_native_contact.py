@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.road.obstacle import Obstacle
+from activesteer.road.obstacles import Obstacle
 from activesteer.road.road import Road
 from activesteer.road.surface import Surface, surface_of
 from activesteer.tyre.evaluation import MagicFormula

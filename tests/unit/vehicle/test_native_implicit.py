@@ -11,8 +11,7 @@ import pytest
 from activesteer.scenario import load_car
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.direct_solution_limits import handed_over
-from activesteer.vehicle.implicit_plan import ImplicitPlan
+from activesteer.vehicle.implicit_plan import ImplicitPlan, handed_over
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 from tests.unit.vehicle.cars import dof, tilted_and_moving
 from tests.unit.vehicle.random_models import STATE, differences

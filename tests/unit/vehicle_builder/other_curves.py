@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from activesteer.vehicle.axle_curves import OVER_RACK, OVER_TRAVEL, AxleCurves, Curves
+from activesteer.vehicle.curve_axles import OVER_RACK, OVER_TRAVEL, AxleCurves, Curves
 
 _POINTS = tuple(np.linspace(-0.08, 0.08, 7).tolist())
 _STIFFNESS = (np.diag([5e5, 5e6, 2e5, 2e4, 1e5]) + 100.0)[np.triu_indices(5)]

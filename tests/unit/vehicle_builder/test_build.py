@@ -14,7 +14,7 @@ from activesteer.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError, TyreFileError
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
-from activesteer.vehicle.mass_properties import mass_properties
+from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder import build, new_vehicle
 from tests.raising import raises
 from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eigh
 
 from activesteer.conventions import Array
-from activesteer.vehicle.axle_curves import COORDINATES
+from activesteer.vehicle.curve_axles import COORDINATES
 from activesteer.vehicle_builder.kc_compliance import Load, fitted
 
 INERTIA = np.diag([35.0, 35.0, 0.9, 0.26, 0.4])

@@ -8,8 +8,7 @@ import pytest
 
 from activesteer.errors import PlaybackError, RecordingError
 from activesteer.recording import Primitive
-from activesteer.road.course import Course
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Course, Footprint
 from activesteer.road.road import Road, RoadPatch
 from activesteer.video import Car, Film, RenderScene, Settings
 from activesteer.video.road import Edges

@@ -6,7 +6,7 @@ import pytest
 
 from activesteer.conventions import CORNERS
 from activesteer.recording import Poses, Recording
-from activesteer.road.footprint import Footprint
+from activesteer.road.course import Footprint
 from activesteer.signals import Channel
 from activesteer.video.road import edges_beside
 from activesteer.video.traces import Traces

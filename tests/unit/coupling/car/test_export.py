@@ -22,7 +22,7 @@ from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.command_row import CARRIED_OUT, COMMANDS
+from activesteer.vehicle.recorded_rows import CARRIED_OUT, COMMANDS
 
 fmpy = pytest.importorskip("fmpy")
 fmi1, fmi2, validation = (importlib.import_module(f"fmpy.{name}") for name in ("fmi1", "fmi2", "validation"))

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.rigs.tyre_rig import Motion, RigForces, TyreRig
 from activesteer.tyre.kernels.contact import WheelForces, tyre_on_road
-from activesteer.tyre.kernels.relaxation import carcass_stiffnesses
+from activesteer.tyre.kernels.slip import carcass_stiffnesses
 from activesteer.tyre.kernels.vertical import free_radius
 from tests.unit.tyre.tyres import tyre
 

@@ -6,8 +6,12 @@ import math
 
 import pytest
 
-from activesteer.tyre.kernels.pure_slip import cornering_stiffness, longitudinal_stiffness
-from activesteer.tyre.kernels.relaxation import carcass_stiffnesses, relaxation_lengths
+from activesteer.tyre.kernels.slip import (
+    carcass_stiffnesses,
+    cornering_stiffness,
+    longitudinal_stiffness,
+    relaxation_lengths,
+)
 from tests.unit.tyre.tyres import tyre
 
 PRESSURE_PA = 240e3

@@ -11,8 +11,7 @@ from math import atan, cos, sin
 import numpy as np
 import pytest
 
-from activesteer.tyre.kernels.pure_slip import cornering_stiffness
-from activesteer.tyre.kernels.turn_slip import rolling_speed, turn_slip_factors
+from activesteer.tyre.kernels.slip import cornering_stiffness, rolling_speed, turn_slip_factors
 from tests.unit.tyre.tyres import tyre
 
 EVERY_TERM = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from activesteer.tyre import MagicFormula
-from activesteer.tyre.kernels.relaxation import relaxation_lengths
+from activesteer.tyre.kernels.slip import relaxation_lengths
 from activesteer.tyre.kernels.vertical import (
     deflection_under_load,
     effective_rolling_radius,

@@ -1,0 +1,149 @@
+"""Braking straight ahead (ISO 21994, ISO 14512) and in a turn (ISO 7975)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Final
+
+from activesteer.config import Range
+from activesteer.errors import ManeuverError
+from activesteer.maneuver.base import Maneuver, check_search_speed, within
+from activesteer.maneuver.steering_tests import SteadyTurn, StepInput, StepSteer
+from activesteer.road.course import Course
+from activesteer.road.path import Path
+from activesteer.signals import Setpoint
+
+
+@dataclass(frozen=True)
+class TurnInput(StepInput):
+    """The steering wheel at the entry of the turn."""
+
+    rate_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(60.0)
+    """Steering wheel rate [rad/s]."""
+
+
+@dataclass(frozen=True)
+class BrakeInput:
+    """The brake pedal."""
+
+    pedal: Annotated[float, Range(0.0, 1.0)]
+    """Pedal position [-]."""
+    start_s: Annotated[float, Range(0.0)] = 6.0
+    """Time at which the driver begins to press the pedal and releases the throttle [s]."""
+    rise_s: Annotated[float, Range(0.01, 5.0)] = 0.2
+    """Time until the pedal is in position [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrakeInTurn(Maneuver):
+    """A turn at constant speed and steering wheel angle, then braking."""
+
+    turn: TurnInput
+    """The entry of the turn."""
+    brake: BrakeInput
+    """The brake."""
+
+    def __post_init__(self) -> None:
+        """Check that turn and brake follow each other within the run."""
+        turn, brake = self.turn, self.brake
+        if brake.start_s <= turn.start_s:
+            raise ManeuverError(
+                f"is {brake.start_s:g} s; it must be above turn.start_s, {turn.start_s:g} s",
+                key="brake.start_s",
+                value=brake.start_s,
+            )
+        if brake.start_s + brake.rise_s >= self.duration_s:
+            end = brake.start_s + brake.rise_s
+            raise ManeuverError(
+                f"the brake is pressed down at {end:g} s, but the run ends at {self.duration_s:g} s",
+                key="brake.start_s",
+            )
+        if turn.steering_wheel_rad is None:
+            check_search_speed(self.speed_mps, "turn.lateral_acceleration_mps2", "turn.steering_wheel_deg")
+
+    @property
+    def search(self) -> SteadyTurn | None:
+        """Search for the angle by a step steer, if only the lateral acceleration is given."""
+        wanted = self.turn.lateral_acceleration_mps2
+        if self.turn.steering_wheel_rad is not None or wanted is None:
+            return None
+        step = StepSteer(
+            kind="step_steer", name=self.name, speed_mps=self.speed_mps, duration_s=self.duration_s,
+            settle_s=self.settle_s, road=self.road, steer=StepInput(lateral_acceleration_mps2=wanted),
+        )  # fmt: skip
+        search = step.search
+        return None if search is None else dataclasses.replace(search, accept=self.with_amplitude)
+
+    def with_amplitude(self, steering_wheel_rad: float) -> BrakeInTurn:
+        """Return the manoeuvre with a steering wheel angle [rad]; the lateral acceleration stays on record."""
+        return dataclasses.replace(self, turn=dataclasses.replace(self.turn, steering_wheel_rad=steering_wheel_rad))
+
+    def setpoint(self, time_s: float) -> Setpoint:
+        """Ramp of the steering wheel, then ramp of the brake; see the base class."""
+        turn, brake = self.turn, self.brake
+        amplitude = turn.steering_wheel_rad or 0.0
+        turned = within((time_s - turn.start_s) * turn.rate_radps, abs(amplitude))
+        angle = math.copysign(turned, amplitude)
+        if time_s < brake.start_s:
+            return self.at_speed(angle)
+        pressed = within((time_s - brake.start_s) / brake.rise_s, 1.0)
+        return Setpoint(angle, self.speed_mps, pressed * brake.pedal, False)
+
+
+_MIN_SPEED_MPS: Final = 10.0 / 3.6
+"""Lowest speed from which braking can be evaluated [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StraightBraking(Maneuver):
+    """Driving straight ahead, then braking with an open clutch until the car stands."""
+
+    brake: BrakeInput
+    """The brake."""
+    hold_line: bool = True
+    """Whether the driver keeps the car on a straight line; otherwise the steering wheel is held straight."""
+
+    def __post_init__(self) -> None:
+        """Check that the car drives forwards and brakes within the run."""
+        if self.speed_mps < _MIN_SPEED_MPS:
+            min_kmh = 3.6 * _MIN_SPEED_MPS
+            raise ManeuverError(
+                f"is {3.6 * self.speed_mps:g} km/h; braking begins at {min_kmh:g} km/h or more, forwards",
+                key="speed_kmh",
+                value=3.6 * self.speed_mps,
+                allowed=Range(min_kmh),
+            )
+        pressed_s = self.brake.start_s + self.brake.rise_s
+        if pressed_s >= self.duration_s:
+            raise ManeuverError(
+                f"the brake is pressed down at {pressed_s:g} s, but the run ends at {self.duration_s:g} s",
+                key="brake.start_s",
+                value=self.brake.start_s,
+            )
+
+    @property
+    def course(self) -> Course | None:
+        """The straight line that the driver keeps; None if the steering wheel is held."""
+        return self._course if self.hold_line else None
+
+    @cached_property
+    def _course(self) -> Course:
+        return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0]))
+
+    def setpoint(self, time_s: float) -> Setpoint:
+        """Speed, then the ramp of the brake; see the base class."""
+        brake, (before, after) = self.brake, self._ends
+        if time_s < brake.start_s:
+            return before
+        pressed = (time_s - brake.start_s) / brake.rise_s
+        return after if pressed >= 1.0 else after._replace(brake_pedal=pressed * brake.pedal)
+
+    @cached_property
+    def _ends(self) -> tuple[Setpoint, Setpoint]:
+        """Setpoints before and after the ramp of the brake."""
+        course = self.course
+        before = self.settling_setpoint()._replace(path=None if course is None else course.path)
+        return before, before._replace(brake_pedal=self.brake.pedal, hold_speed=False)

@@ -1,0 +1,258 @@
+"""Position of a car along a path, and distances from it: native code, since a driver needs them in every step.
+
+A place belongs to the nearest point of the path, so a place has one distance, also where the path crosses itself. Where
+a later pass lies on an earlier one, the earlier pass counts. A grid over the road holds the nearest point of each
+cell's centre; from there the kernel walks along the path to the nearest point of the place itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.compilation import compiled
+from activesteer.conventions import Array
+from activesteer.road.path import SPACING_M, Path
+
+
+class PathSearch:
+    """Positions along a path, also before its start and beyond its end.
+
+    Attributes:
+        line: The path as `nearest` and `point_at` take it: distance of its points [m], their world x and y [m], heading
+            at both ends [rad].
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Prepare the arguments of the kernels.
+
+        Args:
+            path: The path; its points have equal distances.
+        """
+        spacing = path.length_m / (len(path.s_m) - 1)
+        self.line = spacing, path.x_m, path.y_m, float(path.heading_rad[0]), float(path.heading_rad[-1])
+
+    def at(self, s_m: Array) -> tuple[Array, Array]:
+        """Return points at arc lengths, also before the start and beyond the end.
+
+        Args:
+            s_m: Arc lengths [m], shape (k,).
+
+        Returns:
+            World x and y [m], shape (k,) each.
+        """
+        return _points_at(s_m, *self.line)
+
+    def nearest(self, x_m: float, y_m: float, around_m: float, window_m: float) -> float:
+        """Find the arc length of the point of the path nearest to a given point, near its last position.
+
+        Args:
+            x_m: World x of the point [m].
+            y_m: World y of the point [m].
+            around_m: Arc length to search around [m].
+            window_m: Search distance to either side [m].
+
+        Returns:
+            Arc length [m]; below 0 or above the length on the straight continuation of the path.
+        """
+        return nearest(x_m, y_m, around_m, window_m, *self.line)
+
+
+class PathSearches:
+    """Positions of many cars, each along its own path; see `PathSearch`."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        """Prepare the arguments of the kernel.
+
+        Args:
+            paths: The path of each car.
+        """
+        different = {id(path): path for path in paths}
+        places = {key: place for place, key in enumerate(different)}
+        self._path = np.array([places[id(path)] for path in paths])
+        lines = [PathSearch(path).line for path in different.values()]
+        spacings, xs, ys, firsts, lasts = zip(*lines, strict=True)
+        self._starts = np.cumsum([0, *map(len, xs)])
+        self._points = np.concatenate(xs), np.concatenate(ys)
+        self._ends = np.array([spacings, firsts, lasts]).T.copy()
+
+    def ahead(
+        self, cars: NDArray[np.intp], x_m: Array, y_m: Array, around_m: Array, window_m: float, ahead_m: Array
+    ) -> tuple[Array, Array, Array]:
+        """Find the nearest points of the paths, and points ahead of them.
+
+        Args:
+            cars: Numbers of the cars, shape (n,).
+            x_m: Their world x [m], shape (n,).
+            y_m: Their world y [m], shape (n,).
+            around_m: Arc lengths to search around [m], shape (n,).
+            window_m: Search distance to either side [m].
+            ahead_m: Distances from the nearest point along the path [m], shape (n, k).
+
+        Returns:
+            Arc lengths of the nearest points [m], shape (n,); world x and y of the points ahead [m], shape (n, k) each.
+        """
+        return _ahead(self._path[cars], x_m, y_m, around_m, window_m, ahead_m, self._starts, *self._points, self._ends)
+
+
+@compiled
+def point_at(s, spacing, xs, ys, heading_first, heading_last):
+    """Return one point: linear between points, straight beyond the ends."""
+    last = len(xs) - 1
+    place = s / spacing
+    if place <= 0.0:
+        return xs[0] + s * math.cos(heading_first), ys[0] + s * math.sin(heading_first)
+    if place >= last:
+        beyond = s - last * spacing
+        return xs[last] + beyond * math.cos(heading_last), ys[last] + beyond * math.sin(heading_last)
+    index = min(int(place), last - 1)
+    fraction = place - index
+    return xs[index] + fraction * (xs[index + 1] - xs[index]), ys[index] + fraction * (ys[index + 1] - ys[index])
+
+
+@compiled
+def _points_at(s, spacing, xs, ys, heading_first, heading_last):
+    """`PathSearch.at` as native code."""
+    x, y = np.empty(len(s)), np.empty(len(s))
+    for index in range(len(s)):
+        x[index], y[index] = point_at(s[index], spacing, xs, ys, heading_first, heading_last)
+    return x, y
+
+
+@compiled
+def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
+    """`PathSearch.nearest` as native code."""
+    count = math.ceil(2.0 * window / SPACING_M) + 1
+    best, minimum, before, after = 0, math.inf, math.inf, math.inf
+    previous = math.inf
+    for index in range(count):
+        px, py = point_at(around - window + index * SPACING_M, spacing, xs, ys, heading_first, heading_last)
+        distance = (px - x) ** 2 + (py - y) ** 2
+        if index == best + 1:
+            after = distance
+        if distance < minimum:
+            best, minimum, before, after = index, distance, previous, math.inf
+        previous = distance
+    # A parabola through the three nearest points, so that the result moves smoothly between points.
+    bend = before - 2.0 * minimum + after
+    shift = 0.5 * (before - after) / bend if 0.0 < bend < math.inf else 0.0
+    return around - window + (best + min(max(shift, -1.0), 1.0)) * SPACING_M
+
+
+@compiled
+def _ahead(path, x, y, around, window, ahead, starts, xs, ys, ends):
+    """`PathSearches.ahead` as native code."""
+    along, px, py = np.empty(len(path)), np.empty(ahead.shape), np.empty(ahead.shape)
+    for car, own in enumerate(path):
+        own_xs, own_ys = xs[starts[own] : starts[own + 1]], ys[starts[own] : starts[own + 1]]
+        spacing, first, last = ends[own]
+        along[car] = nearest(x[car], y[car], around[car], window, spacing, own_xs, own_ys, first, last)
+        for place in range(ahead.shape[1]):
+            s = along[car] + ahead[car, place]
+            px[car, place], py[car, place] = point_at(s, spacing, own_xs, own_ys, first, last)
+    return along, px, py
+
+
+_BESIDE_M: Final = 20.0
+"""Width of the road beside the path that the grid covers [m]; places outside use the nearest cell."""
+_CELL_M: Final = 2.0
+_MAX_CELLS: Final = 65536
+"""Largest number of cells; on a larger area the cells are larger [-]."""
+_SAME_PASS: Final = 20
+"""Points of the path further apart than this belong to different passes [-]."""
+_ON_EARLIER_M: Final = 1.0
+"""A later pass nearer to an earlier one than this lies on it [m]."""
+
+
+class PathGrid(NamedTuple):
+    """Arguments of `along_path`.
+
+    Attributes:
+        x0_m: World x of the grid's corner [m].
+        y0_m: World y of the grid's corner [m].
+        cell_m: Side of a cell [m].
+        columns: Number of cells along x.
+        rows: Number of cells along y.
+        spacing_m: Distance between two points of the path [m].
+        points: World x and y of the points in turn [m], shape (2 n,).
+        cells: Index of the point nearest to each cell's centre, row by row, shape (rows x columns,).
+    """
+
+    x0_m: float
+    y0_m: float
+    cell_m: float
+    columns: int
+    rows: int
+    spacing_m: float
+    points: Array
+    cells: Array
+
+    @classmethod
+    def of(cls, path: Path) -> PathGrid:
+        """Lay the grid over a path."""
+        from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
+
+        points = np.column_stack([path.x_m, path.y_m])
+        low, high = points.min(axis=0) - _BESIDE_M, points.max(axis=0) + _BESIDE_M
+        size = high - low
+        cell = max(_CELL_M, math.sqrt(size[0] * size[1] / _MAX_CELLS))
+        columns, rows = (max(1, math.floor(length / cell)) for length in size)
+        earliest = np.array([min(near) for near in KDTree(points).query_ball_point(points, _ON_EARLIER_M)])
+        kept = np.flatnonzero(np.arange(len(points)) - earliest <= _SAME_PASS)
+        x, y = np.meshgrid(low[0] + cell * (np.arange(columns) + 0.5), low[1] + cell * (np.arange(rows) + 0.5))
+        _, nearest = KDTree(points[kept]).query(np.column_stack([x.ravel(), y.ravel()]))
+        spacing = path.length_m / (len(points) - 1)
+        return cls(low[0], low[1], cell, columns, rows, spacing, points.ravel(), kept[nearest].astype(np.float64))
+
+
+@compiled
+def _direction_at(points, at):
+    """Return the direction of the path at one of its points, a unit vector: that of its neighbours."""
+    before, after = max(at - 1, 0), min(at + 1, points.size // 2 - 1)
+    x, y = points[2 * after] - points[2 * before], points[2 * after + 1] - points[2 * before + 1]
+    length = math.sqrt(x * x + y * y)
+    return x / length, y / length
+
+
+@compiled
+def along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells):
+    """Return the place x, y [m] on a path: distance along it and to its left [m], its direction, its curvature [1/m].
+
+    The direction is that of the tangent, a unit vector. Between two points of the path the direction turns evenly, so
+    that a place moves evenly too. The path continues straight beyond its ends. The other arguments are the fields of
+    `PathGrid`.
+    """
+    column = min(max(int((x - x0) / cell), 0), int(columns) - 1)
+    row = min(max(int((y - y0) / cell), 0), int(rows) - 1)
+    at, last = int(cells[row * int(columns) + column]), points.size // 2 - 1
+    best = (points[2 * at] - x) ** 2 + (points[2 * at + 1] - y) ** 2
+    for step in (1, -1):
+        while 0 <= at + step <= last:
+            distance = (points[2 * at + 2 * step] - x) ** 2 + (points[2 * at + 2 * step + 1] - y) ** 2
+            if distance >= best:
+                break
+            at, best = at + step, distance
+    tx, ty = _direction_at(points, at)
+    dx, dy = x - points[2 * at], y - points[2 * at + 1]
+    ahead = dx * tx + dy * ty
+    if (at == 0 and ahead <= 0.0) or (at == last and ahead >= 0.0):
+        return at * spacing + ahead, tx * dy - ty * dx, tx, ty, 0.0
+    if ahead < 0.0:
+        at -= 1
+        tx, ty = _direction_at(points, at)
+        dx, dy = x - points[2 * at], y - points[2 * at + 1]
+        ahead = dx * tx + dy * ty
+    ux, uy = _direction_at(points, at + 1)
+    behind = (x - points[2 * at + 2]) * ux + (y - points[2 * at + 3]) * uy
+    part = min(max(ahead / (ahead - behind), 0.0), 1.0) if ahead != behind else 0.0
+    curvature = (tx * uy - ty * ux) / spacing
+    dx -= part * (points[2 * at + 2] - points[2 * at])
+    dy -= part * (points[2 * at + 3] - points[2 * at + 1])
+    tx, ty = tx + part * (ux - tx), ty + part * (uy - ty)
+    length = math.sqrt(tx * tx + ty * ty)
+    tx, ty = tx / length, ty / length
+    return (at + part) * spacing, tx * dy - ty * dx, tx, ty, curvature

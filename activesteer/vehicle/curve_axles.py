@@ -1,0 +1,363 @@
+"""Axles described by the curves of a K&C rig, in place of links: the file, and the parts of the model.
+
+The wheel centre's height is free. Its other five coordinates (forwards, outwards, camber, caster, toe) follow curves
+over the height and, at a steered axle, over the rack. Forces deflect the wheel from the curves against a 5 x 5
+stiffness. Path and forces are consistent by virtual work: the slope of a curve passes part of the lateral force to the
+springs, and the rack feels the trail. `native_curve_axle` has the forces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.config import Range
+from activesteer.conventions import CORNERS
+from activesteer.errors import ModelError, ParameterError
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.named_parts import find, tendon_arms
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+
+COORDINATES: Final = ("x", "y", "camber", "caster", "toe")
+"""Order of the five coordinates in every array: slides along x and y, hinges about x, y and z."""
+OVER_TRAVEL: Final = ("forward_m", "outwards_m", "camber_rad", "caster_rad", "toe_rad")
+OVER_RACK: Final = ("rack_forward_m", "rack_outwards_m", "rack_camber_rad", "rack_caster_rad", "rack_steer_rad")
+"""Fields with the curves of these coordinates over the rack."""
+_TRAVEL_SIGNS: Final = np.array([1.0, 1.0, -1.0, -1.0, -1.0])
+_RACK_SIGNS: Final = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
+"""Signs from the file to the left wheel's joints, where camber and toe-in are negative rotations."""
+_POINTS: Final = Range(5, 41)
+_ENTRIES: Final = 15
+
+
+@dataclass(frozen=True)
+class AxleCurves:
+    """The curves of one axle: left wheel, cubic splines through the points, straight beyond their ends."""
+
+    travel_m: tuple[float, ...]
+    """Height of the wheel centre above the design position, positive in bump, increasing [m]."""
+    toe_rad: tuple[float, ...]
+    """Toe angle of one wheel, positive toe-in, static toe included [rad]."""
+    camber_rad: tuple[float, ...]
+    """Camber, negative with the top inwards, static camber included [rad]."""
+    outwards_m: tuple[float, ...]
+    """Displacement of the wheel centre outwards: half of the track change at the wheel centres [m]."""
+    forward_m: tuple[float, ...]
+    """Displacement of the wheel centre forwards [m]."""
+    caster_rad: tuple[float, ...]
+    """Rotation of the knuckle in side view, positive with the top to the rear, from the design position [rad]."""
+    load_N: tuple[float, ...]
+    """Measured wheel load less the loads of spring, stops and anti-roll bar [N]."""
+    stiffness: tuple[float, ...]
+    """Stiffness of the left wheel at its centre, against forces along x and y and moments about x, y and z: upper
+    triangle of the symmetric 5 x 5 matrix, row by row [N/m, N, N m/rad]."""
+    hardening: tuple[float, ...] = ()
+    """Directions a of additional hardening springs, none or two, five numbers each. A wheel displacement e lengthens
+    such a spring by t = a . e, and the spring pushes back with a (s t2 + t3), as a soft bushing along a does."""
+    hardening_square: tuple[float, ...] = (0.0, 0.0)
+    """Coefficient s of both; it makes them softer to one side than to the other."""
+    damping_ratio: Annotated[float, Range(0.0, 0.5)] = 0.2
+    """Damping ratio of each mode of the wheel on the elastic part; rubber and joints of the compact have 0.1 to 0.35.
+    """
+    rack_m: tuple[float, ...] = ()
+    """Travel of the rack, positive steers left, increasing; empty if the rack does not steer the axle [m]."""
+    rack_steer_rad: tuple[float, ...] = ()
+    """Steer angle of the left wheel from straight ahead, positive to the left [rad]."""
+    rack_camber_rad: tuple[float, ...] = ()
+    """Change of the left wheel's camber [rad]."""
+    rack_outwards_m: tuple[float, ...] = ()
+    """Displacement of the left wheel's centre outwards [m]."""
+    rack_forward_m: tuple[float, ...] = ()
+    """Displacement of the left wheel's centre forwards [m]."""
+    rack_caster_rad: tuple[float, ...] = ()
+    """Rotation of the left knuckle in side view [rad]."""
+
+    def __post_init__(self) -> None:
+        """Check lengths, order, and that the stiffness holds the wheel."""
+        _check_curves(self, "travel_m", (*OVER_TRAVEL, "load_N"))
+        if self.is_steered or any(getattr(self, name) for name in OVER_RACK):
+            _check_curves(self, "rack_m", OVER_RACK)
+        for name, counts in (("stiffness", (_ENTRIES,)), ("hardening", (0, 10)), ("hardening_square", (2,))):
+            given = getattr(self, name)
+            if len(given) not in counts:
+                raise ParameterError(f"{len(given)} numbers given; {counts[-1]} are needed", key=name)
+        least = float(np.linalg.eigvalsh(_scaled(self.stiffness_matrix())).min())
+        if least <= 0.0:
+            raise ParameterError(
+                "does not hold the wheel: the matrix is not positive definite "
+                f"(least eigenvalue {least:.3g} N/m with rotations at 0.3 m)",
+                key="stiffness",
+            )
+
+    @property
+    def is_steered(self) -> bool:
+        """True if the rack steers the axle."""
+        return bool(self.rack_m)
+
+    def stiffness_matrix(self) -> NDArray[np.float64]:
+        """Stiffness of the left wheel in the order of `COORDINATES`, shape (5, 5)."""
+        matrix = np.zeros((5, 5))
+        matrix[np.triu_indices(5)] = self.stiffness
+        return matrix + np.triu(matrix, 1).T
+
+    def over_travel(self) -> NDArray[np.float64]:
+        """Return the left wheel's joints, and `load_N`, at the points of travel, shape (6, n)."""
+        return np.array([*_joints(self, OVER_TRAVEL, _TRAVEL_SIGNS), self.load_N])
+
+    def over_rack(self) -> NDArray[np.float64]:
+        """Return the left wheel's joints at the points of the rack, shape (5, n)."""
+        return np.array(_joints(self, OVER_RACK, _RACK_SIGNS))
+
+
+def _joints(curves: AxleCurves, names: tuple[str, ...], signs: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    return [sign * np.array(getattr(curves, name)) for name, sign in zip(names, signs, strict=True)]
+
+
+def _scaled(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Scale rotations by an arm of 0.3 m, so that all entries have one unit."""
+    arms = np.array([1.0, 1.0, 0.3, 0.3, 0.3])
+    return matrix / np.outer(arms, arms)
+
+
+def upper_triangle(matrix: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return a symmetric 5 x 5 matrix in the form of `AxleCurves.stiffness`."""
+    return tuple(float(f"{value:.7g}") for value in matrix[np.triu_indices(5)])
+
+
+def _check_curves(curves: AxleCurves, over: str, names: tuple[str, ...]) -> None:
+    points = np.array(getattr(curves, over))
+    if not _POINTS.low <= len(points) <= _POINTS.high:
+        raise ParameterError(f"{len(points)} points given; allowed are {_POINTS.low:g} to {_POINTS.high:g}", key=over)
+    if not (np.diff(points) > 0.0).all():
+        raise ParameterError("the points do not increase", key=over)
+    if not points[0] < 0.0 < points[-1]:
+        raise ParameterError(f"runs from {points[0]:g} to {points[-1]:g} m; it must contain 0", key=over)
+    for name in names:
+        if len(getattr(curves, name)) != len(points):
+            raise ParameterError(f"{len(getattr(curves, name))} values for {len(points)} points of {over}", key=name)
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Curve axles of a car."""
+
+    front: AxleCurves | None = None
+    """The front axle; default the links of the model."""
+    rear: AxleCurves | None = None
+    """The rear axle; default the links of the model."""
+
+    def __post_init__(self) -> None:
+        """Check that the rack steers in front."""
+        if self.front is not None and not self.front.is_steered:
+            raise ParameterError("the rack must steer the front wheels: curves over rack_m are needed", key="front")
+        if self.rear is not None and self.rear.is_steered:
+            raise ParameterError("the rack steers the front wheels only", key="rear.rack_m")
+
+    def axle(self, corner: str) -> AxleCurves | None:
+        """Return the curves of a corner's axle."""
+        return self.front if corner.startswith("f") else self.rear
+
+
+JOINTS: Final = ("x", "y", "z", "toe", "camber", "caster")
+"""Joints of a curve axle's knuckle in the order of the model. The wheel's steer angle and inclination are exactly `toe`
+and `camber`, since the joints turn about z first, then about x, then about y."""
+HOLDING_TENDON: Final = "_guide"
+"""Suffix of the tendons that hold such a wheel: CORNER_NUMBER_guide."""
+_HELD: Final = 0.05
+"""Square of natural frequency times step above which a tendon of the engine holds a mode: 36 Hz at 1 ms. Each tendon
+costs time; below it the explicit native forces are stable and as accurate."""
+_INTERVALS: Final = 32
+
+
+def fit_curve_axles(spec: mujoco.MjSpec, curves: Curves) -> None:
+    """Add tendons to each wheel of a curve axle, for the fast natural modes of its knuckle.
+
+    Args:
+        spec: The model; changed.
+        curves: The curves of its axles.
+
+    Raises:
+        ModelError: the model's joints are not those of a curve axle's knuckle.
+    """
+    corners = [corner for corner in CORNERS if curves.axle(corner) is not None]
+    if not corners:
+        return
+    model = spec.compile()
+    for corner in corners:
+        axle = curves.axle(corner)
+        assert axle is not None
+        squares, along = _modes(model, corner, axle)
+        rows = along @ _strains(model, corner, axle)
+        # Frequency with everything else free to move, above all the light rack.
+        fast = squares * np.sum((rows @ _mobility(model)) * rows, axis=1) * model.opt.timestep**2
+        for number in np.flatnonzero(fast >= _HELD):
+            tendon = spec.add_tendon(name=f"{corner}_{number}{HOLDING_TENDON}", springlength=[0.0, 0.0])
+            tendon.stiffness = [float(squares[number]), 0.0, 0.0]
+            tendon.damping = [_damping(axle, squares[number]), 0.0, 0.0]
+            for dof in np.flatnonzero(rows[number]):
+                tendon.wrap_joint(model.joint(int(model.dof_jntid[dof])).name, float(rows[number, dof]))
+
+
+def curve_axle_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDArray[Any]], list[NDArray[np.float64]]]:
+    """Return the records of all wheels of curve axles, and the tables of their curves.
+
+    Args:
+        model: The car with its tendons, compiled.
+        curves: The curves of its axles.
+
+    Returns:
+        `CURVE_AXLE_WHEEL` records and consecutive tables; both empty without curve axles.
+    """
+    records: list[NDArray[Any]] = []
+    tables: list[NDArray[np.float64]] = []
+    places: dict[str, tuple[int, int]] = {}
+    for corner in CORNERS:
+        axle = curves.axle(corner)
+        if axle is None:
+            continue
+        if corner[0] not in places:
+            start = sum(table.size for table in tables)
+            travel, rack = _table(axle.travel_m, axle.over_travel()), _table(axle.rack_m, axle.over_rack())
+            places[corner[0]] = start, start + travel.size
+            tables += [travel, rack]
+        records.append(_record(model, corner, axle, places[corner[0]]))
+    return records, tables
+
+
+def _joints_of_model(model: mujoco.MjModel, corner: str) -> tuple[int, int]:
+    """Return the addresses of a corner's first coordinate and velocity; the others follow."""
+    joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_{name}") for name in JOINTS]
+    qpos, dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    if (np.diff(qpos) != 1).any() or (np.diff(dofs) != 1).any():
+        wanted = ", ".join(f"{corner}_{name}" for name in JOINTS)
+        raise ModelError(f"a curve axle needs the joints {wanted} on its knuckle, in this order, and no other")
+    return int(qpos[0]), int(dofs[0])
+
+
+def _side(corner: str) -> float:
+    return 1.0 if corner.endswith("l") else -1.0
+
+
+def _mirror(side: float) -> NDArray[np.float64]:
+    """Return the signs that turn the coordinates of a wheel into those of the left one."""
+    return np.array([1.0, side, side, 1.0, side])
+
+
+def _spline(points: tuple[float, ...], values: NDArray[np.float64]) -> CubicSpline:
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to import, and only curve axles need it
+
+    return CubicSpline(points, values, axis=1)
+
+
+def _slopes(axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the slopes of the five curves in the design position, over travel and over the rack."""
+    by_travel = _spline(axle.travel_m, axle.over_travel())(0.0, 1)[: len(COORDINATES)]
+    by_rack = _spline(axle.rack_m, axle.over_rack())(0.0, 1) if axle.is_steered else np.zeros(len(COORDINATES))
+    return by_travel, by_rack
+
+
+def _table(points: tuple[float, ...], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lay a spline through the points and return it on even intervals, as cubics of the place in each interval."""
+    if not points:
+        return np.zeros(0)
+    spline = _spline(points, values)
+    ends = np.linspace(points[0], points[-1], _INTERVALS + 1)
+    step = ends[1] - ends[0]
+    value, slope = spline(ends), step * spline(ends, 1)
+    rise = np.diff(value, axis=1)
+    first, last = slope[:, :-1], slope[:, 1:]
+    cubics = np.stack([value[:, :-1], first, 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise], axis=-1)
+    head = fb.filled(fb.CURVE_TABLE, start_m=points[0], per_m=1.0 / step, intervals=_INTERVALS, count=len(values))
+    return np.concatenate([head.view(np.float64), cubics.transpose(1, 0, 2).ravel()])
+
+
+def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[int, int]) -> NDArray[Any]:
+    qpos, dof = _joints_of_model(model, corner)
+    side = _side(corner)
+    rack, rack_dof = -1.0, -1.0
+    if axle.is_steered:
+        joint = find(model, mujoco.mjtObj.mjOBJ_JOINT, "rack")
+        rack, rack_dof = float(model.jnt_qposadr[joint]), float(model.jnt_dofadr[joint])
+    held, held_damping, damping = np.zeros((5, 5)), np.zeros((5, 5)), np.zeros((5, 5))
+    for number, (square, along) in enumerate(zip(*_modes(model, corner, axle), strict=True)):
+        arms = tendon_arms(model, name := f"{corner}_{number}{HOLDING_TENDON}")
+        if not arms:
+            damping += _damping(axle, square) * np.outer(along, along)
+            continue
+        tendon = find(model, mujoco.mjtObj.mjOBJ_TENDON, name)
+        row = _mirror(side) * [arms[f"{corner}_{name}"] for name in COORDINATES]
+        held += model.tendon_stiffness[tendon] * np.outer(row, row)
+        held_damping += model.tendon_damping[tendon] * np.outer(row, row)
+    # The engine's step is implicit in its tendons, which is a damping of step times stiffness along them. Where a curve
+    # is no longer as steep as in the design position, the difference would damp the wheel's travel, so it is included.
+    held_damping += model.opt.timestep * held
+    by_travel, by_rack = _slopes(axle)
+    return fb.filled(
+        fb.CURVE_AXLE_WHEEL,
+        qpos=qpos,
+        dof=dof,
+        side=side,
+        rack=rack,
+        rack_dof=rack_dof,
+        travel_table=tables[0],
+        rack_table=tables[1],
+        stiffness=axle.stiffness_matrix().ravel(),
+        damping=(damping + held_damping).ravel(),
+        held_stiffness=held.ravel(),
+        held_damping=held_damping.ravel(),
+        square=axle.hardening_square,
+        hardening=np.ravel(axle.hardening),
+        travel_slope=by_travel,
+        rack_slope=by_rack,
+    )
+
+
+def _damping(axle: AxleCurves, square: float) -> float:
+    """Return the damping of a mode of unit inertia with a given square of its frequency [1/s, 1/s2]."""
+    return 2.0 * axle.damping_ratio * float(np.sqrt(square))
+
+
+def _mobility(model: mujoco.MjModel) -> NDArray[np.float64]:
+    """Return the inverse of the inertia of all degrees of freedom in the design position, shape (nv, nv)."""
+    data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, full)
+    return np.asarray(np.linalg.inv(full), dtype=np.float64)
+
+
+def _strains(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> NDArray[np.float64]:
+    """Return the deflections from the curves, mirrored to the left wheel, per degree of freedom, shape (5, nv)."""
+    rows, side = np.zeros((len(COORDINATES), model.nv)), _side(corner)
+    _, first = _joints_of_model(model, corner)
+    by_travel, by_rack = _slopes(axle)
+    rows[:, [first + JOINTS.index(name) for name in COORDINATES]] = np.diag(_mirror(side))
+    rows[:, first + JOINTS.index("z")] = -by_travel
+    if axle.is_steered:
+        rows[:, model.jnt_dofadr[find(model, mujoco.mjtObj.mjOBJ_JOINT, "rack")]] = -side * by_rack
+    return rows
+
+
+def _modes(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the squared frequencies of a knuckle on the stiffness about the curves, and the deflection of each mode.
+
+    The inertia is that of a fast motion of the five coordinates with the rest free to move. A wheel that turns on its
+    bearing takes no part in the rotation of its knuckle in side view.
+
+    Returns:
+        Squares, shape (5,), rising [1/s2]; one row for each mode, shape (5, 5), the left wheel's.
+    """
+    from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only curve axles need it
+
+    _, first = _joints_of_model(model, corner)
+    dofs = [first + JOINTS.index(name) for name in COORDINATES]
+    mirror = _mirror(_side(corner))
+    mass = np.linalg.inv(_mobility(model)[np.ix_(dofs, dofs)]) * np.outer(mirror, mirror)
+    squares, modes = eigh(axle.stiffness_matrix(), mass)
+    return squares, (mass @ modes).T

@@ -1,0 +1,159 @@
+"""The car at rest: static ride, mass properties, load, and its position on the road."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import Final, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.conventions import Array
+from activesteer.errors import ModelError
+
+_ITERATIONS: Final = 40
+_DIFFERENCE: Final = 1e-7
+"""Step of the finite differences [m, rad]: links of 1e7 N/m change their force by 1 N."""
+_LARGEST_STEP: Final = 0.02
+"""Largest change of a coordinate in one iteration [m, rad], so that stops are approached from outside."""
+_ROUNDING_N: Final = 1e-4
+"""Residual force below which a step without improvement ends the search [N, N m]."""
+_TOLERANCE_N: Final = 1e-7
+"""Residual force at which the search ends [N, N m]; weight is 1.4e4."""
+
+
+def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.intp]) -> None:
+    """Move the car into static equilibrium, by Newton's method on the forces at rest.
+
+    The car must stand near the equilibrium. Velocities and activations are set to zero: the tyres carry their load, and
+    no lateral force except that of their own asymmetry.
+
+    Args:
+        model: The model.
+        data: Its state; `qpos` is the first guess and becomes the result.
+        held: Fixed degrees of freedom: position and heading on the road, rotation of the wheels.
+
+    Raises:
+        ModelError: no equilibrium was found.
+    """
+    free = np.setdiff1d(np.arange(model.nv), held)
+    data.qvel[:] = 0.0
+    if model.na:
+        data.act[:] = 0.0
+    residual = _residual(model, data, free)
+    for _ in range(_ITERATIONS):
+        if np.abs(residual).max() < _TOLERANCE_N:
+            return
+        start = data.qpos.copy()
+        stiffness = np.empty((free.size, free.size))
+        move = np.zeros(model.nv)
+        for column, dof in enumerate(free):
+            move[:] = 0.0
+            move[dof] = _DIFFERENCE
+            mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+            stiffness[:, column] = (_residual(model, data, free) - residual) / _DIFFERENCE
+            data.qpos[:] = start
+        try:
+            step = np.linalg.lstsq(stiffness, -residual, rcond=None)[0]
+        except np.linalg.LinAlgError as reason:
+            bad = free[~np.isfinite(residual + stiffness.sum(axis=1))]
+            joint = model.joint(int(model.dof_jntid[bad[0]])).name if bad.size else "unknown"
+            raise ModelError(f"no static equilibrium: the force at joint {joint!r} is not finite") from reason
+        largest = np.abs(step).max()
+        step *= min(1.0, _LARGEST_STEP / largest) if largest > 0.0 else 0.0
+        move[:] = 0.0
+        move[free] = step
+        mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+        smaller = _residual(model, data, free)
+        if np.abs(residual).max() < _ROUNDING_N and (
+            largest < 1e-12 or np.abs(smaller).max() >= np.abs(residual).max()
+        ):
+            # Only rounding is left; no step improves the result.
+            return
+        residual = smaller
+    worst = int(free[np.abs(residual).argmax()])
+    joint = model.joint(int(model.dof_jntid[worst])).name
+    raise ModelError(
+        f"no static equilibrium found in {_ITERATIONS} iterations: {np.abs(residual).max():.3g} N (or N m) remain at "
+        f"joint {joint!r}; are the springs' free lengths right for the car's weight?",
+        value=joint,
+    )
+
+
+def _residual(model: mujoco.MjModel, data: mujoco.MjData, free: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the generalised force that is not balanced, at rest, shape (free.size,)."""
+    mujoco.mj_forward(model, data)
+    return data.qfrc_smooth[free].copy()
+
+
+class MassProperties(NamedTuple):
+    """Mass properties of a group of bodies.
+
+    Attributes:
+        mass_kg: Mass [kg].
+        cg_m: Centre of gravity in the world frame, shape (3,) [m].
+        inertia_kgm2: Inertia tensor about it, world axes, shape (3, 3) [kg m2].
+    """
+
+    mass_kg: float
+    cg_m: Array
+    inertia_kgm2: Array
+
+
+def mass_properties(
+    model: mujoco.MjModel, data: mujoco.MjData | None = None, *, without: Collection[str] = ()
+) -> MassProperties:
+    """Return the mass properties of a car.
+
+    Args:
+        model: The car.
+        data: State with the positions of its bodies; default the design position.
+        without: Names of bodies that are left out.
+
+    Returns:
+        Mass properties of the other bodies together.
+    """
+    placed = _in_design_position(model) if data is None else data
+    places, frames = placed.xipos, placed.ximat
+    left_out = {0, *(model.body(name).id for name in without)}
+    bodies = [body for body in range(model.nbody) if body not in left_out]
+    mass = float(sum(model.body_mass[body] for body in bodies))
+    cg = np.sum([model.body_mass[body] * places[body] for body in bodies], axis=0) / mass
+    inertia = np.zeros((3, 3))
+    for body in bodies:
+        axes = frames[body].reshape(3, 3)
+        inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T
+        inertia += float(model.body_mass[body]) * point_mass_inertia(places[body] - cg)
+    return MassProperties(mass, cg, inertia)
+
+
+def point_mass_inertia(offset_m: Array) -> Array:
+    """Return the inertia tensor, per mass, of a point mass at a distance `offset_m` from a point [m2] (Steiner)."""
+    return np.asarray(offset_m @ offset_m * np.eye(3) - np.outer(offset_m, offset_m))
+
+
+def _in_design_position(model: mujoco.MjModel) -> mujoco.MjData:
+    data = mujoco.MjData(model)
+    mujoco.mj_fwdPosition(model, data)
+    return data
+
+
+YAW_DOF: Final = 5
+"""Place of the yaw rate among the velocities, in a model whose first joint is the free joint of the chassis."""
+
+
+def turn_chassis_back(data: mujoco.MjData, half_rad: float) -> None:
+    """Turn orientation and velocity of the chassis about the world's z axis; its position stays.
+
+    Args:
+        data: State of the car, whose first joint is the free joint of the chassis; changed.
+        half_rad: Half the angle, positive clockwise [rad].
+    """
+    turned = np.empty(4)
+    mujoco.mju_mulQuat(turned, np.array([math.cos(half_rad), 0.0, 0.0, -math.sin(half_rad)]), data.qpos[3:7])
+    data.qpos[3:7] = turned
+    vx, vy = data.qvel[:2]
+    cos, sin = math.cos(2 * half_rad), math.sin(2 * half_rad)
+    data.qvel[:2] = cos * vx + sin * vy, cos * vy - sin * vx
