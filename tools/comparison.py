@@ -33,7 +33,7 @@ from activesteer.metric_table import metric as declared
 from activesteer.plotting import Heat, Picture, draw
 from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, resolve
-from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.engine.workers import in_parallel
 from activesteer.studies.reproduction import Progress, drive
 from activesteer.theory.proportions import percent
 from tools.population_results import NONE, STEERING_EFFORT, TOTAL, Population, SystemEffect, asked

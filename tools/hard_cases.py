@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 
 from activesteer import simulate
 from activesteer.errors import ModelError, SimulationDiverged
-from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.engine.workers import in_parallel
 
 CARS: Final[dict[str, dict[str, Any]]] = {
     "nominal": {},

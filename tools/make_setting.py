@@ -26,9 +26,8 @@ from activesteer.analysis.claims import stored as setting_file
 from activesteer.analysis.claims.stored import PAPER, Number, Setting, read_setting
 from activesteer.config import toml_value
 from activesteer.resources import find_study
-from activesteer.studies.engine.factor_values import FactorValues, label_of
+from activesteer.studies.engine.factor_values import FactorValues, Prior, label_of
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.prior import Prior
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.tuning import Tuning, read_tuning
 from activesteer.studies.reproduction import reproduce

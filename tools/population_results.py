@@ -25,12 +25,11 @@ from activesteer.errors import ParameterError, StudyError
 from activesteer.files import finite
 from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.scenario import FileOrTable
-from activesteer.studies.engine.dependence import strongest
+from activesteer.studies.engine.analysis import strongest
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.run_command import run_command
-from activesteer.studies.engine.run_identity import versions
 from activesteer.studies.engine.run_task import CLAIM, CURVE, Row
+from activesteer.studies.engine.runs import run_command, versions
 from activesteer.studies.engine.study import StudyProgress, study
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.reproduction import nominal_claims

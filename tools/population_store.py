@@ -34,7 +34,7 @@ from activesteer.studies.engine.run_task import CLAIM, CURVE, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import read_study
-from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.engine.workers import in_parallel
 from activesteer.theory.proportions import percent
 from tools.make_setting import AROUND
 from tools.population_results import (

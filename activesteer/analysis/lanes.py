@@ -1,4 +1,4 @@
-"""Lanes and cones: distances of the outline of the car's body from them.
+"""Lanes, cones and the track of a car: distances of its outline and of its front axle.
 
 The body is a rectangle of the car's width with a usual overhang beyond the axles (`Footprint`).
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from contextlib import suppress
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from activesteer.analysis.source import RecordingLike, read_footprint
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.road.course import CONE_RADIUS_M, Course, Footprint
+from activesteer.road.path import Path
 
 
 def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> float:
@@ -108,3 +110,138 @@ def _pose(recording: RecordingLike) -> tuple[Array, Array, Array, Array]:
         np.asarray(recording[name], dtype=np.float64) for name in ("front_axle_x_m", "front_axle_y_m", "yaw_rad")
     )
     return x, y, np.cos(yaw), np.sin(yaw)
+
+
+_NEAR: Final = 10
+"""Points of a path to either side of the last place in which a car is looked for: 5 m."""
+
+
+def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
+    """Return world x and y of the front axle centre over time [m], shape (n,) each."""
+    x, y = (np.asarray(recording[f"front_axle_{axis}_m"], dtype=np.float64) for axis in "xy")
+    return x, y
+
+
+def first_at(recording: RecordingLike, x_m: float) -> int | None:
+    """Return the index of the first sample at which the front axle centre has reached an x; None if it never does."""
+    reached = np.flatnonzero(front_axle(recording)[0] >= x_m)
+    return int(reached[0]) if reached.size else None
+
+
+def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> Array:
+    """Return the distance of points from a path of straight pieces, which continues straight beyond both of its ends.
+
+    The nearest point of the path lies on a piece beside the nearest corner point.
+
+    Args:
+        x_m: World x of the points [m], shape (n,).
+        y_m: World y of the points [m], shape (n,).
+        path_x_m: World x of the path [m], shape (m,), m >= 2.
+        path_y_m: World y of the path [m], shape (m,).
+
+    Returns:
+        Distance [m], shape (n,), positive for a point to the left of the path; nan for a point that is not finite.
+    """
+    from scipy.spatial import KDTree  # noqa: PLC0415 - takes a while to import
+
+    points = np.column_stack([x_m, y_m])
+    corners = np.column_stack([path_x_m, path_y_m])
+    # For a point that is not finite, or whose distance is not, the tree returns a corner that does not exist.
+    nearest = np.minimum(KDTree(corners).query(np.nan_to_num(points))[1], len(corners) - 1)
+    pieces = np.diff(corners, axis=0)
+    lengths = np.linalg.norm(pieces, axis=1)
+    last = len(pieces) - 1
+    best = np.full(len(points), math.inf)
+    signed = np.full(len(points), math.nan)
+    for piece in (np.maximum(nearest - 1, 0), np.minimum(nearest, last)):
+        along, start = pieces[piece] / lengths[piece, None], points - corners[piece]
+        along_m = np.einsum("ij,ij->i", start, along)
+        low = np.where(piece == 0, -math.inf, 0.0)
+        high = np.where(piece == last, math.inf, lengths[piece])
+        offset = start - np.clip(along_m, low, high)[:, None] * along
+        distance = np.linalg.norm(offset, axis=1)
+        left = along[:, 0] * start[:, 1] - along[:, 1] * start[:, 0]
+        closer = distance < best
+        best = np.where(closer, distance, best)
+        signed = np.where(closer, np.copysign(distance, left), signed)
+    return signed
+
+
+def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -> float:
+    """Return the heading of the car at the end of a run against the nearest piece of a path, -pi to pi [rad].
+
+    A car that turned around several times has its whole turns left out.
+    """
+    x, y = (channel[-1] for channel in front_axle(recording))
+    nearest = int(np.argmin(np.hypot(path_x_m - x, path_y_m - y)))
+    begin = min(nearest, len(path_x_m) - 2)
+    along = math.atan2(path_y_m[begin + 1] - path_y_m[begin], path_x_m[begin + 1] - path_x_m[begin])
+    return math.remainder(float(recording["yaw_rad"][-1]) - along, 2.0 * math.pi)
+
+
+def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
+    """Return distance along a path and distance to its left [m] of a car that follows it; the path may cross itself."""
+    along, beside = np.empty(len(x_m)), np.empty(len(x_m))
+    at = 0
+    for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):
+        low = max(at - _NEAR, 0)
+        dx, dy = x - path.x_m[low : at + _NEAR + 1], y - path.y_m[low : at + _NEAR + 1]
+        nearest = int(np.argmin(dx**2 + dy**2))
+        at = low + nearest
+        cos, sin = math.cos(path.heading_rad[at]), math.sin(path.heading_rad[at])
+        along[row] = path.s_m[at] + dx[nearest] * cos + dy[nearest] * sin
+        beside[row] = dy[nearest] * cos - dx[nearest] * sin
+    return along, beside
+
+
+def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
+    """Return world y of the front axle centre at its first passage of each x, interpolated [m], shape (n,).
+
+    The values of x ascend; y is nan where the run never gets there.
+    """
+    x, y = front_axle(recording)
+    # A car that spins may go back: only samples ahead of all earlier ones count.
+    ahead = np.concatenate([[True], x[1:] > np.maximum.accumulate(x)[:-1]])
+    return np.interp(x_m, x[ahead], y[ahead], left=math.nan, right=math.nan)
+
+
+def largest_difference(first: RecordingLike, second: RecordingLike, from_x_m: float, to_x_m: float) -> float:
+    """Return the largest lateral distance between two tracks at the same x [m]; nan if one does not cover the range."""
+    x = np.linspace(from_x_m, to_x_m, max(2, math.ceil((to_x_m - from_x_m) / 0.1) + 1))
+    return float(np.abs(track_over_x(first, x) - track_over_x(second, x)).max())
+
+
+BEFORE_M: Final = 20.0
+AFTER_M: Final = 50.0
+"""Length of the road before the first gate and after the last gate [m]."""
+BESIDE_M: Final = 2.0
+"""Width of the road beside the course [m]; a car further off is outside the picture."""
+
+
+class CourseView(NamedTuple):
+    """A course as it is drawn.
+
+    Attributes:
+        x_m: Limits of x [m].
+        y_m: Limits of y [m].
+        path_x_m: World x of the path, extended straight to the ends of the picture [m], shape (n,).
+        path_y_m: World y of the path [m], shape (n,).
+    """
+
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+    path_x_m: Array
+    path_y_m: Array
+
+
+def view_of(course: Course) -> CourseView:
+    """Return the view from before the first gate to behind the last gate, or of the whole path without gates."""
+    path = course.path
+    sides = [y for lane in course.lanes for y in (lane.right_y_m, lane.left_y_m)]
+    every_y = np.concatenate([path.y_m, course.cones_m[:, 1], sides])
+    low, high = float(every_y.min()) - BESIDE_M, float(every_y.max()) + BESIDE_M
+    if course.last_gate_x_m is None:
+        left, right = float(path.x_m.min()) - BESIDE_M, float(path.x_m.max()) + BESIDE_M
+    else:
+        left, right = course.first_gate_x_m - BEFORE_M, course.last_gate_x_m + AFTER_M
+    return CourseView((left, right), (low, high), *path.extended(right - left))

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.analysis import lanes, track
+from activesteer.analysis import lanes
 from activesteer.analysis.series import Array, counted_sideslip, lag, largest_rate, rate_rms, rms, timestep
 from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
 from activesteer.conventions import CORNERS
@@ -154,9 +154,9 @@ def find_windows(recording: RecordingLike, course: Course) -> Windows:
     nothing = slice(0, 0)
     if course.last_gate_x_m is None:
         return Windows(slice(None), nothing, nothing, ())
-    first, last = (track.first_at(recording, x) for x in (course.first_gate_x_m, course.last_gate_x_m))
+    first, last = (lanes.first_at(recording, x) for x in (course.first_gate_x_m, course.last_gate_x_m))
     if first is None or last is None:
-        furthest_m = float(track.front_axle(recording)[0].max())
+        furthest_m = float(lanes.front_axle(recording)[0].max())
         note = f"the car gets to x = {furthest_m:.1f} m, the last gate ends at {course.last_gate_x_m:.1f} m"
         return Windows(nothing, nothing, nothing, (note,))
     time_s = recording.time_s
@@ -180,14 +180,14 @@ def _steering_effort(wheel: Array, step_s: float) -> dict[str, float]:
 
 def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
     """Return the metrics of the car's distances from path, lanes and cones."""
-    x, y = track.front_axle(recording)
+    x, y = lanes.front_axle(recording)
     if course.last_gate_x_m is None:  # such a path may cross itself
         every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
-        deviation = track.places_along(x[::every], y[::every], course.path)[1]
+        deviation = lanes.places_along(x[::every], y[::every], course.path)[1]
     else:
-        deviation = track.path_distance(x, y, course.path.x_m, course.path.y_m)
+        deviation = lanes.path_distance(x, y, course.path.x_m, course.path.y_m)
     values = {"track_deviation_max_m": float(np.abs(deviation).max()), "track_deviation_rms_m": rms(deviation)}
-    values["heading_end_rad"] = track.heading_at_end(recording, course.path.x_m, course.path.y_m)
+    values["heading_end_rad"] = lanes.heading_at_end(recording, course.path.x_m, course.path.y_m)
     if not course.lanes and not len(course.cones_m):
         return values
     car = read_footprint(recording)
@@ -204,8 +204,8 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
 def _lap(recording: RecordingLike, course: Course) -> dict[str, float]:
     """Return the time to the end of a path, and the largest overstep of its edges; nan for a path without its end."""
     every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
-    x, y, time_s = (np.asarray(values)[::every] for values in (*track.front_axle(recording), recording.time_s))
-    along, beside = track.places_along(x, y, course.path)
+    x, y, time_s = (np.asarray(values)[::every] for values in (*lanes.front_axle(recording), recording.time_s))
+    along, beside = lanes.places_along(x, y, course.path)
     length_m = course.path.length_m
     end_m = length_m + along[0]  # the front axle starts ahead of the path's beginning
     ended = np.flatnonzero(along >= end_m)
@@ -224,8 +224,8 @@ def _slalom(recording: RecordingLike, course: Course) -> dict[str, float]:
     if not len(row):
         return {"track_amplitude_m": math.nan, "cone_distance_mean_m": math.nan, "cones_missed": math.nan}
     x = np.linspace(row[:, 0].min(), row[:, 0].max(), 1000)
-    y = track.track_over_x(recording, x)
-    sides = np.sign(track.track_over_x(recording, row[:, 0]) - row[:, 1])
+    y = lanes.track_over_x(recording, x)
+    sides = np.sign(lanes.track_over_x(recording, row[:, 0]) - row[:, 1])
     asked = np.sign(np.interp(row[:, 0], course.path.x_m, course.path.y_m) - row[:, 1])
     distances = lanes.cone_distances(recording, replace(course, cones_m=row), read_footprint(recording))
     return {

@@ -1,4 +1,9 @@
-"""Sampled signals: smoothing, crossings, and the response to a step. Plain functions on arrays."""
+"""Sampled signals: smoothing, filters, offsets, crossings, loops, and the response to a step.
+
+Source: 49 CFR 571.126 (FMVSS 126), S7.11.4 and S7.11.5; UN Regulation 140, 9.11.
+
+Source: ISO 13674-1, Road vehicles - Test method for the quantification of on-centre handling - Weave test.
+"""
 
 from __future__ import annotations
 
@@ -221,3 +226,152 @@ def step_response(time_s: Array, values: Array, step_time_s: float, window_s: fl
         peak_time_s = math.nan
         notes.append(f"no peak stands out: the largest value is {100.0 * overshoot:.2g} % above the steady-state value")
     return StepResponse(steady_state, response_time_s, peak, peak_time_s, overshoot, tuple(notes))
+
+
+_ENDS_PERIODS: Final = 6.0
+"""Time in which the filter dies away, in periods of the cut-off frequency."""
+
+
+def low_pass(
+    values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float, poles: int = 12
+) -> NDArray[np.float64]:
+    """Apply a Butterworth filter without phase: half of its poles forwards, the same backwards.
+
+    Both passes have the given cut-off frequency; together they halve a sine of this frequency.
+
+    Args:
+        values: Samples at equal distances, shape (n,).
+        timestep_s: Interval between the samples [s].
+        cut_off_Hz: Cut-off frequency [Hz], below half the sampling frequency.
+        poles: Number of poles of both passes together, even.
+
+    Returns:
+        Filtered samples, shape (n,).
+
+    Raises:
+        RecordingError: the signal is sampled too slowly or too short to be filtered.
+
+    Source: 49 CFR 571.126 (FMVSS 126), S7.11; UN Regulation 140: 12-pole phaseless Butterworth.
+    """
+    from scipy.signal import butter, sosfiltfilt  # noqa: PLC0415 - takes half a second to import
+
+    if cut_off_Hz * timestep_s > 0.499:
+        raise RecordingError(
+            f"a filter of {cut_off_Hz:g} Hz needs samples less than {0.5 / cut_off_Hz:.3g} s apart; "
+            f"the recording has one every {timestep_s:.3g} s",
+            value=timestep_s,
+            allowed=0.5 / cut_off_Hz,
+        )
+    # The signal is mirrored at both end points, for as long as a pass needs to die away.
+    ends = min(len(values) - 1, round(_ENDS_PERIODS / (cut_off_Hz * timestep_s)))
+    if ends * timestep_s * cut_off_Hz < 1.0:
+        raise RecordingError(
+            f"{len(values)} samples are too few for a filter of {cut_off_Hz:g} Hz; "
+            f"it needs {1.0 / cut_off_Hz:.3g} s of signal",
+            value=len(values),
+        )
+    sections = butter(poles // 2, cut_off_Hz, fs=1.0 / timestep_s, output="sos")
+    filtered = sosfiltfilt(sections, np.asarray(values, dtype=np.float64), padlen=ends)
+    return np.asarray(filtered, dtype=np.float64)
+
+
+FAST_RADPS: Final = math.radians(75.0)
+"""Rate of the steering wheel at the end of the range [rad/s]."""
+FAST_FOR_S: Final = 0.2
+"""Least duration of this rate [s]."""
+THRESHOLD_RAD: Final = math.radians(5.0)
+"""Steering wheel angle whose first passing is the beginning of steer [rad]; the range ends before it."""
+RANGE_S: Final = 1.0
+"""Length of the range [s]."""
+_AVERAGED_S: Final = 0.1
+"""Window of the moving average of the rate [s]."""
+
+
+def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
+    """Return the second before the steering wheel turns fast.
+
+    Args:
+        time_s: Time of the samples [s], equidistant, shape (n,).
+        steering_rad: Filtered steering wheel angle [rad], shape (n,).
+
+    Returns:
+        Samples of the range, as far as the run has them; none if the wheel never turns faster than 75 deg/s for 200 ms.
+    """
+    step_s = timestep(time_s)
+    width = max(1, round(_AVERAGED_S / step_s))
+    rate = np.convolve(np.gradient(steering_rad, step_s), np.full(width, 1.0 / width), mode="same")
+    fast = np.concatenate(([False], np.abs(rate) > FAST_RADPS, [False])).astype(np.int8)
+    begins, ends = np.flatnonzero(np.diff(fast) > 0), np.flatnonzero(np.diff(fast) < 0)
+    before = np.abs(steering_rad[begins] - steering_rad[0]) < THRESHOLD_RAD
+    long = begins[before & (ends - begins >= FAST_FOR_S / step_s)]
+    if long.size == 0:
+        return slice(0, 0)
+    end = int(long[0])
+    return slice(max(0, end - round(RANGE_S / step_s)), end)
+
+
+def offset(values: Array, samples: slice) -> float:
+    """Return the mean of a signal over some samples; 0 for no samples.
+
+    The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
+    """
+    return float(np.mean(values[samples], dtype=np.float64)) if samples.stop > samples.start else 0.0
+
+
+AROUND: Final = 0.2
+"""Range of the gradient around zero, as a fraction of the largest abscissa."""
+
+
+class Loop(NamedTuple):
+    """Properties of a loop at its passages through zero, means of all periods.
+
+    Attributes:
+        gradient: Slope of the ordinate over the abscissa around abscissa zero, mean of both branches.
+        ordinate_dead_band: Height of the loop at abscissa zero; positive if the ordinate lags behind the abscissa.
+        abscissa_dead_band: Width of the loop at ordinate zero, with the same sign.
+    """
+
+    gradient: float
+    ordinate_dead_band: float
+    abscissa_dead_band: float
+
+
+def loop(x: Array, y: Array) -> Loop:
+    """Evaluate a loop.
+
+    Args:
+        x: Abscissa, which oscillates about zero, shape (n,).
+        y: Ordinate, shape (n,).
+
+    Raises:
+        RecordingError: a signal does not pass through zero both upwards and downwards.
+    """
+    up, down = (crossings(x, y, rising=rising) for rising in (True, False))
+    right, left = (crossings(y, x, rising=rising) for rising in (True, False))
+    rate = np.gradient(x)
+    near = np.abs(x) < AROUND * float(np.abs(x).max())
+    slopes = [
+        float(np.polynomial.Polynomial.fit(x[part], y[part], 1).convert().coef[1])
+        for part in (near & (rate > 0.0), near & (rate < 0.0))
+    ]
+    return Loop(
+        gradient=0.5 * sum(slopes),
+        ordinate_dead_band=float(np.mean(down) - np.mean(up)),
+        abscissa_dead_band=float(np.mean(right) - np.mean(left)),
+    )
+
+
+def crossings(x: Array, y: Array, *, rising: bool) -> Array:
+    """Return the interpolated values of y where x passes through zero, upwards or downwards."""
+    sign = 1.0 if rising else -1.0
+    places = np.flatnonzero((sign * x[:-1] < 0.0) & (sign * x[1:] >= 0.0))
+    if places.size == 0:
+        raise RecordingError("the signals make no loop: one of them does not pass through zero")
+    fraction = x[places] / (x[places] - x[places + 1])
+    return y[places] + fraction * (y[places + 1] - y[places])
+
+
+def slope_at_zero(x: Array, y: Array, within: float) -> float:
+    """Return the slope of the line through the points near abscissa zero; nan for fewer than three points."""
+    near = np.abs(x) <= within
+    return float(np.polynomial.Polynomial.fit(x[near], y[near], 1).convert().coef[1]) if near.sum() > 2 else math.nan

@@ -21,10 +21,16 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.filters import low_pass
-from activesteer.analysis.series import counted_sideslip, crossing_time, timestep
+from activesteer.analysis.series import (
+    THRESHOLD_RAD,
+    counted_sideslip,
+    crossing_time,
+    low_pass,
+    offset,
+    timestep,
+    zeroing_range,
+)
 from activesteer.analysis.source import RecordingLike
-from activesteer.analysis.zeroing import THRESHOLD_RAD, offset, zeroing_range
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 

@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 
 from activesteer.analysis import handling
-from activesteer.analysis.filters import low_pass
-from activesteer.analysis.series import Array, timestep
+from activesteer.analysis.series import Array, low_pass, timestep
 from activesteer.analysis.sine_with_dwell import MOTION_CUT_OFF_Hz, STEERING_CUT_OFF_Hz
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import GRAVITY_MPS2

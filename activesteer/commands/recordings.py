@@ -200,7 +200,7 @@ def _recordings(options: argparse.Namespace) -> int:
         noise=options.noise != "none",
     )  # fmt: skip
     if options.output is not None:
-        from activesteer.measured.comparison_page import comparison_page
+        from activesteer.measured.pages import comparison_page
         from activesteer.pages import write_page
 
         names = [file.stem for file in options.files]
@@ -212,8 +212,7 @@ def _recordings(options: argparse.Namespace) -> int:
 
 
 def _compared_lines(files: Sequence[Path], found: Comparison) -> Iterator[str]:
-    from activesteer.measured.comparison import words
-    from activesteer.measured.noise import FILTERS
+    from activesteer.measured.comparison import FILTERS, words
 
     for file, shift_s in zip(files, found.shifts_s, strict=False):
         later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"

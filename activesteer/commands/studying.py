@@ -308,7 +308,7 @@ def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: 
     from activesteer.measured.circle import SAMPLES, validate_circle
     from activesteer.measured.folder import validate_measured
     from activesteer.measured.folder_file import measured_folder, read_measured
-    from activesteer.measured.folder_page import measured_page
+    from activesteer.measured.pages import measured_page
     from activesteer.pages import write_page
 
     file = read_measured(measured_folder(name))

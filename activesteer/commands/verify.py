@@ -173,8 +173,7 @@ def _print_settings(results: Mapping[str, Reproduction]) -> None:
 )  # fmt: skip
 def _test(options: argparse.Namespace) -> int:
     from activesteer.pages import write_page
-    from activesteer.standards.examination import examine
-    from activesteer.standards.examination_page import examination_page
+    from activesteer.standards.examination import examination_page, examine
 
     if options.output is not None:
         options.how_to_resume = "; the same command resumes it"

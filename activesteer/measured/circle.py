@@ -22,7 +22,7 @@ from activesteer.errors import ParameterError
 from activesteer.measured.circle_changes import Case, ChangeTable
 from activesteer.measured.folder_file import STEERING, MeasuredFile
 from activesteer.simulation.simulation import Simulation
-from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.engine.workers import in_parallel
 
 SAMPLES: Final = 200
 """Default number of samples of the values that vary from lap to lap."""

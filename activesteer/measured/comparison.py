@@ -1,4 +1,4 @@
-"""Comparison of measured runs with a simulated one: time shift, residuals, tolerance corridors, verdict.
+"""Comparison of measured runs with a simulated one: time shift, noise, residuals, tolerance corridors.
 
 ISO 19364 (steady-state circular driving) and ISO 19365 (sine with dwell) define a corridor around the simulation that
 must contain the measurement. The first uses cross plots over the lateral acceleration, the second plots over time.
@@ -14,14 +14,190 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
-from activesteer.analysis.series import rms
+from activesteer.analysis.series import low_pass, rms
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
-from activesteer.measured.alignment import time_shift
-from activesteer.measured.motion import at_sensor
-from activesteer.measured.noise import FILTERS, allowance, filter_table, smooth
+from activesteer.measured.signals import at_sensor
 from activesteer.recording import Recording
 from activesteer.units import quantity_of
+
+INPUTS: Final = ("steering_wheel_rad", "rack_m")
+"""Channels that align the clocks if both runs have them: the response of another car may lag, its input may not."""
+RESPONSES: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
+_STEP_S: Final = 0.01
+"""Step of the search [s]; the result is found between its instants."""
+_NEARLY: Final = 0.01
+"""Among shifts this close to the best correlation, such as all periods of a sine, the shortest one is taken."""
+
+
+def time_shift(measured: Recording, simulated: Recording) -> float:
+    """Return the delay of the measured run [s]: measured(t) is simulated(t - shift).
+
+    The search maximises the normalised cross-correlation over all shifts at which the runs overlap by half of the
+    shorter run. Between the steps of the search, the mean square of the difference is minimised.
+
+    Returns:
+        The shift [s]; nan if no signal moves in both runs.
+    """
+    pairs = _pairs(measured, simulated, INPUTS) or _pairs(measured, simulated, RESPONSES)
+    if not pairs:
+        return math.nan
+    own_s, other_s = (np.arange(time_s[0], time_s[-1], _STEP_S) for time_s in (measured.time_s, simulated.time_s))
+    shortest = min(len(own_s), len(other_s))
+    if shortest < 4:
+        return math.nan
+    alike = _alike(
+        [(np.interp(own_s, measured.time_s, one), np.interp(other_s, simulated.time_s, other)) for one, other in pairs],
+        shortest // 2,
+    )
+    tops = np.flatnonzero((alike[1:-1] >= alike[:-2]) & (alike[1:-1] > alike[2:])) + 1
+    if not len(tops):
+        return math.nan
+    shifts = (np.arange(len(alike)) - (len(other_s) - 1)) * _STEP_S + own_s[0] - other_s[0]
+    best = tops[alike[tops] > alike[tops].max() - _NEARLY]
+    coarse = float(shifts[best[np.argmin(np.abs(shifts[best]))]])
+    return _refined(coarse, measured.time_s, simulated.time_s, pairs)
+
+
+def _pairs(measured: Recording, simulated: Recording, names: tuple[str, ...]) -> list[tuple[Array, Array]]:
+    """Return signals of both runs, each without the mean of the simulation and relative to its range."""
+    pairs = []
+    for name in names:
+        if name not in measured or name not in simulated:
+            continue
+        one, other = (np.asarray(run[name], np.float64) for run in (measured, simulated))
+        size, mean = float(other.std()), float(other.mean())
+        if size > 1e-9 and float(one.std()) > 1e-9:
+            pairs.append(((one - mean) / size, (other - mean) / size))
+    return pairs
+
+
+def _alike(pairs: list[tuple[Array, Array]], least: int) -> Array:
+    """Return the normalised cross-correlation over all shifts; -1 where fewer than `least` samples overlap."""
+    from scipy.signal import correlate  # noqa: PLC0415 - slow to import
+
+    product, first, second = 0.0, 0.0, 0.0
+    for one, other in pairs:
+        product = product + correlate(one, other, method="fft")
+        first = first + correlate(one**2, np.ones_like(other), method="fft")
+        second = second + correlate(np.ones_like(one), other**2, method="fft")
+    overlap = correlate(np.ones_like(pairs[0][0]), np.ones_like(pairs[0][1]), method="fft")
+    size = np.sqrt(np.maximum(first, 1e-9) * np.maximum(second, 1e-9))
+    return np.where(overlap > least - 0.5, product / size, -1.0)
+
+
+def _refined(coarse_s: float, own_s: Array, other_s: Array, pairs: list[tuple[Array, Array]]) -> float:
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415 - slow to import
+
+    # The same samples at every shift, so that their number does not matter.
+    kept = (own_s - coarse_s >= other_s[0] + _STEP_S) & (own_s - coarse_s <= other_s[-1] - _STEP_S)
+
+    def difference(shift_s: float) -> float:
+        return sum(
+            float(np.mean((one[kept] - np.interp(own_s[kept] - shift_s, other_s, other)) ** 2)) for one, other in pairs
+        )
+
+    bounds = (coarse_s - _STEP_S, coarse_s + _STEP_S)
+    optimum: Any = minimize_scalar(difference, bounds=bounds, method="bounded", options={"xatol": 1e-7})
+    return float(optimum.x)
+
+
+_MEDIAN_TO_STD: Final = 1.4826
+"""Standard deviation over median absolute deviation of a normal distribution."""
+_TWO_SIDED_95: Final = 1.96
+"""Half of the 95 % interval of a normal distribution, in standard deviations."""
+
+
+class Filter(NamedTuple):
+    """A low-pass filter without phase.
+
+    Attributes:
+        poles: Poles of both passes together.
+        cut_off_Hz: Cut-off frequency of the steering wheel angle, and of all other channels [Hz].
+        source: Standard.
+    """
+
+    poles: int
+    cut_off_Hz: tuple[float, float]
+    source: str
+
+    def of(self, channel: str) -> float:
+        """Return the cut-off frequency of a channel [Hz]."""
+        return self.cut_off_Hz[0 if channel == "steering_wheel_rad" else 1]
+
+    def words(self) -> str:
+        """Describe the filter."""
+        wheel, others = self.cut_off_Hz
+        cut = f"{others:g} Hz" if wheel == others else f"{others:g} Hz, steering wheel {wheel:g} Hz"
+        return f"Butterworth, {self.poles} poles, zero phase, {cut} ({self.source})"
+
+
+FILTERS: Final[dict[str, Filter | None]] = {
+    "iso15037": Filter(8, (10.1, 10.1), "ISO 15037-1, as ISO 7401 requires"),
+    "fmvss126": Filter(12, (10.0, 6.0), "FMVSS 126, UN R140: 12 poles"),
+    "none": None,
+}
+"""Name -> filter. ISO 15037-1 requires a filter of fourth order or higher with -3 dB at 9 Hz or above, and at most
+0.5 % of error up to 5 Hz: this one has -3 dB at 9.05 Hz and 0.36 % at 5 Hz."""
+
+
+class Smooth(NamedTuple):
+    """A filtered channel.
+
+    Attributes:
+        values: Filtered values; the given ones if they cannot be filtered.
+        noise: Standard deviation of the noise that remains in them.
+        problem: Reason for which they are not filtered; empty if they are.
+    """
+
+    values: Array
+    noise: float
+    problem: str = ""
+
+
+def smooth(recording: Recording, channel: str, chosen: Filter | None) -> Smooth:
+    """Filter a channel, and estimate the noise that remains.
+
+    What a low-pass filter at a quarter of the sampling rate or lower removes is taken for noise: its median absolute
+    deviation, which the short edges of a manoeuvre do not move. The noise is assumed white: below the cut-off frequency
+    it is as dense as above. A signal that the logger has filtered already shows no noise.
+    """
+    values = np.asarray(recording[channel], np.float64)
+    step_s = float(np.median(np.diff(recording.time_s)))
+    nyquist_Hz = 0.5 / step_s
+    split_Hz = min(chosen.of(channel) if chosen else math.inf, 0.5 * nyquist_Hz)
+    try:
+        poles = chosen.poles if chosen else 8
+        rest = values - low_pass(values, step_s, split_Hz, poles)
+        std = _MEDIAN_TO_STD * float(np.median(np.abs(rest - np.median(rest))))
+        density = std / math.sqrt(nyquist_Hz - split_Hz)
+        if chosen is None:
+            return Smooth(values, density * math.sqrt(nyquist_Hz))
+        cut_Hz = chosen.of(channel)
+        return Smooth(low_pass(values, step_s, cut_Hz, poles), density * math.sqrt(min(cut_Hz, nyquist_Hz)))
+    except RecordingError as reason:
+        return Smooth(values, 0.0, reason.problem if chosen else "")
+
+
+def allowance(noises: list[float]) -> float:
+    """Return half of the 95 % interval of the noise in the mean of several runs."""
+    return _TWO_SIDED_95 * math.sqrt(sum(noise**2 for noise in noises)) / len(noises)
+
+
+def filter_table(name: str) -> dict[str, Any]:
+    """Return a filter of `FILTERS` as JSON values."""
+    chosen = FILTERS[name]
+    if chosen is None:
+        return {"name": name}
+    wheel, others = chosen.cut_off_Hz
+    return {
+        "name": name,
+        "poles": chosen.poles,
+        "steering_cut_off_Hz": wheel,
+        "cut_off_Hz": others,
+        "source": chosen.source,
+    }
+
 
 STANDARDS: Final = {
     "iso19364": "ISO 19364: cross plots over the lateral acceleration",

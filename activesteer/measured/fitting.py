@@ -1,36 +1,274 @@
-"""Fit of car parameters: recordings are driven again with their inputs until the differences are smallest."""
+"""Fit of car parameters: recordings are driven again with their inputs until the differences are smallest.
+
+All values are relative: differences to the noise of their channel, parameters to their range, 0 to 1.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.config import Range, build, field_in_unit
 from activesteer.conventions import Array
 from activesteer.driver import is_driver_file
-from activesteer.errors import ActiveSteerError
-from activesteer.measured.fit_data import measured_of, noise_of
-from activesteer.measured.fit_file import FitTable, read_fit
-from activesteer.measured.fit_result import Compared, Fit, Parameter, notes_of
-from activesteer.measured.intervals import intervals, told_apart, without_effect
-from activesteer.measured.least_squares import AT_END, Answer, Found, search
-from activesteer.measured.motion import at_sensor
+from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
+from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, notes_of, told_apart, without_effect
+from activesteer.measured.signals import at_sensor
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
-from activesteer.scenario.recorded_inputs import led, open_loop_of
+from activesteer.scenario.recorded_inputs import is_recording, led, open_loop_of
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_settings import Settings, prepare, scenario_of
-from activesteer.studies.engine.study_file import StudyFile
-from activesteer.studies.engine.task_queue import TaskQueue
-from activesteer.studies.engine.workers import Workers, workers_for
+from activesteer.studies.engine.runs import Settings, prepare, scenario_of
+from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.engine.workers import TaskQueue, Workers, workers_for
+
+
+@dataclass(frozen=True)
+class FitTable:
+    """Table [fit] of a study file."""
+
+    noise: dict[str, Annotated[float, Range(1e-12)]]
+    """Channel -> standard deviation of its noise, in the unit of the key, such as `yaw_rate_degps`; the scale of its
+    differences."""
+    start: dict[str, float] = field(default_factory=dict)
+    """Factor -> start of the search; by default the value of the files, or the middle of the range."""
+    from_s: float | None = None
+    """Start of the compared part of the recordings [s]; inputs are driven from the first row."""
+    until_s: float | None = None
+    """End of the compared part [s]."""
+    windows: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    """Recording -> its own start and end of the compared part [s]."""
+    intervals: Literal["residuals", "noise"] = "residuals"
+    """Basis of the intervals: the final residuals with their autocorrelation, or the stated `noise`."""
+
+
+def read_fit(given: FileOrTable) -> tuple[StudyFile, FitTable]:
+    """Read a study file with a table [fit].
+
+    Args:
+        given: Name or path of the file, or its table.
+
+    Raises:
+        StudyError: the file cannot be read, a key or value is wrong, or the study cannot be fitted.
+    """
+    study = read_study(given, "fit")
+    fail = study.source.fail
+    table = build(FitTable, study.fit or {}, study.source, ("fit",))
+    if not table.noise:
+        raise fail(("fit", "noise"), "is empty; give at least one channel, such as yaw_rate_degps = 0.2")
+    if study.case_list is not None or not study.factors:
+        raise fail(("factors",), "a fit needs factors with ranges")
+    for key in ("vehicles", "controllers"):
+        if len(getattr(study, key)) != 1:
+            raise fail((key,), f"a fit needs exactly one, not {len(getattr(study, key))}")
+    for maneuver in study.maneuvers:
+        if not is_recording(maneuver):
+            raise fail(("maneuvers",), f"{maneuver!r} is no recording (.mcap) with inputs to drive", maneuver)
+    for factor in study.factors:
+        if factor.kind != "uniform":
+            raise fail(("factors", factor.key, factor.kind), "a fit needs a range: uniform = [low, high]")
+    ranges = {factor.key: Range(factor.low, factor.high) for factor in study.factors}
+    for key, value in table.start.items():
+        if key not in ranges:
+            raise fail(("fit", "start", key), f"is no factor; factors are {', '.join(ranges)}", value, list(ranges))
+        if not ranges[key].low <= value <= ranges[key].high:
+            raise fail(
+                ("fit", "start", key), f"{value:g} is out of its range; that is {ranges[key]}", value, ranges[key]
+            )
+    return study, table
+
+
+_FEWEST: Final = 20
+"""Smallest number of samples of a channel in a recording."""
+
+
+class Measured(NamedTuple):
+    """Recording in the time of its manoeuvre.
+
+    Attributes:
+        name: Name of its file.
+        begin_s: Time of the recording at which the manoeuvre starts [s].
+        time_s: Times at which channels are compared [s], shape (n,).
+        channels: Measured values there, SI; not finite where missing.
+    """
+
+    name: str
+    begin_s: float
+    time_s: Array
+    channels: dict[str, Array]
+
+
+def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[str, float]:
+    """Return the standard deviation of the noise of each channel of the table [fit], SI.
+
+    Raises:
+        StudyError: a channel is not among the `known` ones, or is given twice.
+    """
+    found: dict[str, float] = {}
+    for key, value in table.noise.items():
+        name, factor = field_in_unit(key, known)
+        if name is None:
+            raise study.source.fail(
+                ("fit", "noise", key), f"there is no such channel; {nearest_names(key, known)}", key
+            )
+        if name in found:
+            raise study.source.fail(("fit", "noise", key), "is given twice, in two units", key)
+        found[name] = value * factor
+    return found
+
+
+def measured_of(
+    recording: Recording, name: str, study: StudyFile, table: FitTable, channels: Collection[str]
+) -> Measured:
+    """Return the data of a recording that are compared.
+
+    Raises:
+        StudyError: the recording lacks a channel.
+        RecordingError: a channel has too few samples.
+    """
+    for channel in channels:
+        if channel not in recording:
+            have = [each.name for each in recording.channels]
+            key = next(key for key in table.noise if field_in_unit(key, (channel,))[0])
+            raise study.source.fail(
+                ("fit", "noise", key), f"{name} has no such channel; {nearest_names(channel, have)}", channel, have
+            )
+    if not len(recording):
+        raise RecordingError("has no rows", file=f"{name}.mcap")
+    begin_s = float(recording.time_s[0])
+    time_s = np.asarray(recording.time_s, np.float64)
+    # The last row of a run is one step before its end.
+    inside = time_s <= time_s[-1] - study.timestep_s
+    from_s, until_s = table.windows.get(name, (table.from_s, table.until_s))
+    if from_s is not None:
+        inside &= time_s >= from_s
+    if until_s is not None:
+        inside &= time_s <= until_s
+    values = {channel: np.asarray(recording[channel], np.float64)[inside] for channel in channels}
+    for channel, each in values.items():
+        if np.count_nonzero(np.isfinite(each)) < _FEWEST:
+            raise RecordingError(
+                f"has {np.count_nonzero(np.isfinite(each))} samples to compare, and {_FEWEST} are needed; it is "
+                f"recorded from {time_s[0]:g} to {time_s[-1]:g} s, and compared from fit.from_s to fit.until_s",
+                file=f"{name}.mcap", key=channel,
+            )  # fmt: skip
+    return Measured(name, begin_s, time_s[inside] - begin_s, values)
+
+
+STEP: Final = 1e-3
+"""Step of the derivatives, relative to the range: far above rounding, far below the curvature of a run."""
+_SETTLED: Final = 1e-4
+"""The search ends when no parameter moves further than this fraction of its range. Gauss-Newton steps shrink
+quadratically, so the remaining error is far smaller."""
+_LESS: Final = 1e-8
+"""The search also ends when the sum of squares decreases by no more than this fraction."""
+_MOST_ROUNDS: Final = 40
+AT_END: Final = 1e-3
+"""A parameter this close to an end of its range is at that end."""
+
+Answer = list[Array] | str
+"""Differences of every channel of every recording for a set of parameters; or the reason why it cannot be driven."""
+
+
+class Found(NamedTuple):
+    """End of the search.
+
+    Attributes:
+        place: Parameters, shape (p,).
+        before: Differences at the start, a series per channel and recording.
+        after: Differences at the end.
+        slopes: Derivatives at the end, shape (n, p) each.
+        rounds: Number of parameter sets tried.
+        settled: Whether the search converged.
+    """
+
+    place: Array
+    before: list[Array]
+    after: list[Array]
+    slopes: list[Array]
+    rounds: int
+    settled: bool
+
+
+def search(
+    answers: Callable[[list[Array]], Sequence[Answer]], start: Array, check: Callable[[list[Array]], None]
+) -> Found:
+    """Minimise the sum of squares of all differences (trust region reflective, SciPy).
+
+    Args:
+        answers: Function that drives several sets of parameters at once.
+        start: Start of the search, shape (p,).
+        check: Called with the derivatives at the start; an exception ends the search.
+
+    Raises:
+        StudyError: the first set, or a set beside a drivable one, cannot be driven.
+    """
+    from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
+
+    rounds: dict[bytes, tuple[list[Array], list[Array]] | None] = {}
+
+    def tried(place: Array) -> tuple[list[Array], list[Array]] | None:
+        """Return differences and derivatives; None if the parameters cannot be driven."""
+        name = place.tobytes()
+        if name not in rounds:
+            rounds[name] = _tried(answers, place, first=not rounds)
+            if len(rounds) == 1:
+                check(rounds[name][1])  # type: ignore[index] - the first one is there, or an error was raised
+        return rounds[name]
+
+    def differences(place: Array) -> Array:
+        found = tried(place)
+        # The search shortens its step if a value is not finite.
+        return np.full(size, np.nan) if found is None else np.concatenate(found[0])
+
+    def slopes(place: Array) -> Array:
+        found = tried(place)
+        assert found is not None
+        return np.concatenate(found[1])
+
+    # Away from the ends of a range, so that the search can step to both sides.
+    start = np.clip(start, STEP, 1.0 - STEP)
+    begun = tried(start)
+    assert begun is not None
+    size = sum(map(len, begun[0]))
+    derivatives, unused = cast(Any, slopes), cast(Any, None)  # SciPy declares no types for them
+    found = least_squares(
+        differences, start, derivatives, (0.0, 1.0), xtol=_SETTLED, ftol=_LESS, gtol=unused, max_nfev=_MOST_ROUNDS
+    )
+    last = tried(found.x)
+    assert last is not None
+    return Found(found.x, begun[0], *last, len(rounds), found.status > 0)
+
+
+def _tried(
+    answers: Callable[[list[Array]], Sequence[Answer]], place: Array, *, first: bool
+) -> tuple[list[Array], list[Array]] | None:
+    steps = np.where(place + STEP > 1.0, -STEP, STEP)
+    here, *there = answers([place, *(place + step for step in np.diag(steps))])
+    if isinstance(here, str):
+        if first:
+            raise StudyError(f"the car cannot be driven at the start of the search: {here}", value=here)
+        return None
+    sides: list[list[Array]] = []
+    for beside in there:
+        if isinstance(beside, str):
+            raise StudyError(f"the car cannot be driven beside drivable parameters: {beside}")
+        sides.append(beside)
+    slopes = [
+        np.column_stack([(side[number] - series) / step for side, step in zip(sides, steps, strict=True)])
+        for number, series in enumerate(here)
+    ]
+    return here, slopes
+
 
 SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
 """Gains that hold the recorded speed to 0.1 %, unless the study sets them. A driver's gains leave 0.3 %, which the fit

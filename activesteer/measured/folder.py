@@ -27,7 +27,7 @@ from activesteer.measured.folder_file import MeasuredFile, RunTable
 from activesteer.measured.importing import import_file
 from activesteer.recording import Recording
 from activesteer.simulation.runner import simulate
-from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.engine.workers import in_parallel
 
 PARTS: Final = ("fit", "check")
 _LEAST_SAMPLES: Final = 10

@@ -10,9 +10,7 @@ import rerun as rr
 
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed
-from activesteer.drawing.colours import bytes_of
-from activesteer.drawing.direction_of_motion import direction_of_motion
-from activesteer.drawing.ghosts import share_seen
+from activesteer.drawing.cars import bytes_of, direction_of_motion, share_seen
 from activesteer.playback.geometry import about_vertical, xyzw
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times

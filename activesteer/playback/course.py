@@ -10,7 +10,7 @@ import rerun as rr
 
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS
-from activesteer.drawing.colours import bytes_of, height_colours
+from activesteer.drawing.cars import bytes_of, height_colours
 from activesteer.playback.geometry import rotated
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times

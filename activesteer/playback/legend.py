@@ -8,7 +8,7 @@ from typing import Final
 import rerun as rr
 import rerun.blueprint as rrb
 
-from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.cars import bytes_of
 
 LEGEND: Final = "legend"
 """Parent entity of the legends."""

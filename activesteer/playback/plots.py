@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from activesteer.conventions import CORNERS
-from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.cars import bytes_of
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
 from activesteer.units import quantity_of

@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from activesteer.conventions import CORNERS, Array
-from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.cars import bytes_of
 from activesteer.drawing.wheel_angles import (
     CHANNELS,
     SLICES,

@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Final, NamedTuple, Protocol
 
 from activesteer.conventions import run_looks
-from activesteer.drawing.direction_of_motion import SLOWEST_MPS
+from activesteer.drawing.cars import SLOWEST_MPS
 from activesteer.errors import PlaybackError
 from activesteer.maneuver import Maneuver
 from activesteer.road.course import Footprint

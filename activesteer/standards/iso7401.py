@@ -8,15 +8,22 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.analysis.frequency_response import INPUT, FrequencyResponse, HIGHEST_Hz, LOWEST_Hz, frequency_response
-from activesteer.analysis.random_response import RandomResponse, random_response
+from activesteer.analysis.frequency_response import (
+    INPUT,
+    FrequencyResponse,
+    HIGHEST_Hz,
+    LOWEST_Hz,
+    RandomResponse,
+    frequency_response,
+    random_response,
+)
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import metrics_table, time_panels
+from activesteer.standards.proving_ground import steering_wheel_at
 from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
-from activesteer.standards.steering_angle import steering_wheel_at
 from activesteer.units import DisplayUnit, display_unit
 
 SPEED_KMH: Final = 80.0

@@ -31,8 +31,7 @@ from activesteer.rigs.kc import rear_camber_figure
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.engine.task_queue import TaskQueue, in_parallel
-from activesteer.studies.engine.workers import workers_for
+from activesteer.studies.engine.workers import TaskQueue, in_parallel, workers_for
 from activesteer.studies.linear.identification import single_track_response
 from activesteer.studies.linear.linearisation import linear_response, linearise
 

@@ -26,12 +26,10 @@ from activesteer.vehicle_builder.design import Assumption, Car, Log
 from activesteer.vehicle_builder.kc_tables import KcTables, read_kc
 from activesteer.vehicle_builder.keyframe import keyframe_xml
 from activesteer.vehicle_builder.mjcf import mjcf_files
-from activesteer.vehicle_builder.readme import readme_text
 from activesteer.vehicle_builder.table import CarTable, chosen_kinds, in_vehicle_axes, read_table
 from activesteer.vehicle_builder.table_checks import check_points
-from activesteer.vehicle_builder.trim import trim
-from activesteer.vehicle_builder.trimmed import Trimmed
-from activesteer.vehicle_builder.vehicle_text import vehicle_text
+from activesteer.vehicle_builder.texts import readme_text, vehicle_text
+from activesteer.vehicle_builder.trim import Trimmed, trim
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from activesteer.conventions import CORNERS, Array
 from activesteer.rigs.kc.result import KcResult
 from activesteer.scenario import Car
 from activesteer.vehicle.statics import mass_properties
-from activesteer.vehicle_builder.hardware import hardware_tables
+from activesteer.vehicle_builder.design import hardware_tables
 
 _REMARK = (
     "# {name} as a table for `activesteer vehicle new NAME --kc FOLDER`: written by `activesteer kc --tables FOLDER`.\n"

@@ -11,8 +11,8 @@ import numpy as np
 from activesteer.vehicle_builder import mjcf_tendons as tendons
 from activesteer.vehicle_builder.design import Car
 from activesteer.vehicle_builder.mjcf_axles import axle_file
-from activesteer.vehicle_builder.numbers import num, sig, vec
-from activesteer.vehicle_builder.trimmed import Trimmed
+from activesteer.vehicle_builder.texts import num, sig, vec
+from activesteer.vehicle_builder.trim import Trimmed
 
 _TEMPLATES = Path(__file__).resolve().parent / "templates"
 _NO_KEYFRAMES = "<mujocoinclude>\n  <keyframe/>\n</mujocoinclude>\n"

@@ -7,8 +7,8 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.vehicle_builder.design import Axle, Car, Solid
 from activesteer.vehicle_builder.levers import Mount
-from activesteer.vehicle_builder.numbers import num, vec
-from activesteer.vehicle_builder.trimmed import Trimmed, TrimmedAxle
+from activesteer.vehicle_builder.texts import num, vec
+from activesteer.vehicle_builder.trim import Trimmed, TrimmedAxle
 
 _ON_RACK = "tie_rod"
 _LINKED = """  <!-- {words} {axle} axle, a fragment of the chassis body. Every position is a

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from activesteer.vehicle_builder.design import Axle, Car
 from activesteer.vehicle_builder.mjcf_axles import corner_name
-from activesteer.vehicle_builder.numbers import num, sig
 from activesteer.vehicle_builder.steering_geometry import rack_per_steer_m
-from activesteer.vehicle_builder.trimmed import Trimmed
+from activesteer.vehicle_builder.texts import num, sig
+from activesteer.vehicle_builder.trim import Trimmed
 
 _VIEWER_GUIDES = (
     ("x", "5e5", "3e3"),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.cars import bytes_of
 from activesteer.video.lettering import PANEL, WHITE, font, text_scale, write
 
 _TITLE, _TEXT, _LINE, _MARGIN, _BAR = 17.0, 12.0, 20.0, 16.0, 5.0

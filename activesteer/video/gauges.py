@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from activesteer.drawing import wheel_angles
-from activesteer.drawing.colours import bytes_of
+from activesteer.drawing.cars import bytes_of
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, footprint_of
 from activesteer.units import quantity_of

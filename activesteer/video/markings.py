@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import Array
 from activesteer.drawing import tyre_forces, wheel_angles
-from activesteer.drawing.colours import shares_of
+from activesteer.drawing.cars import shares_of
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
 from activesteer.video.track import Track

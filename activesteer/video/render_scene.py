@@ -14,8 +14,7 @@ import numpy as np
 
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed, without_tail
-from activesteer.drawing.colours import shares_of
-from activesteer.drawing.ghosts import share_seen
+from activesteer.drawing.cars import share_seen, shares_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course, Footprint

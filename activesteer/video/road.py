@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.drawing.colours import height_colours
+from activesteer.drawing.cars import height_colours
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course
 from activesteer.road.drawn import DrawnSurface
 from activesteer.road.path import Path

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import CORNERS, Array
-from activesteer.drawing.colours import shares_of
+from activesteer.drawing.cars import shares_of
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
 from activesteer.video.markings import add_geom

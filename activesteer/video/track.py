@@ -6,7 +6,7 @@ import numpy as np
 
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS
-from activesteer.drawing.direction_of_motion import direction_of_motion
+from activesteer.drawing.cars import direction_of_motion
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, footprint_of

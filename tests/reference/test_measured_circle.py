@@ -19,7 +19,7 @@ from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.measured.circle import CircleValidation, steering_wheel_deg, validate_circle
 from activesteer.measured.circle_changes import Case
 from activesteer.measured.folder_file import MeasuredFile, read_measured
-from activesteer.measured.folder_page import measured_page
+from activesteer.measured.pages import measured_page
 from activesteer.resources import find_vehicle, models_dir
 from tests.raising import raises
 

@@ -14,9 +14,9 @@ from activesteer.errors import ActiveSteerError
 from activesteer.measured.example_folder import write_template
 from activesteer.measured.folder import validate_measured
 from activesteer.measured.folder_file import measured_folder, read_measured
-from activesteer.measured.folder_page import measured_page
 from activesteer.measured.importing import import_file
-from activesteer.measured.motion import at_sensor
+from activesteer.measured.pages import measured_page
+from activesteer.measured.signals import at_sensor
 from activesteer.pages import render_page
 from activesteer.recording import Recording
 from activesteer.resources import models_dir

@@ -24,7 +24,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.analysis import path_following, sine_with_dwell, step_response, track
+from activesteer.analysis import lanes, path_following, sine_with_dwell, step_response
 from activesteer.analysis.claims.judge import (
     ALL,
     SYSTEMS,
@@ -492,7 +492,7 @@ def _tracks(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool)
         return {}
     return {
         TOGETHER: {
-            name: track.largest_difference(recordings[one], recordings[other], first_m, last_m)
+            name: lanes.largest_difference(recordings[one], recordings[other], first_m, last_m)
             for name, (one, other) in TRACKS.items()
         }
     }

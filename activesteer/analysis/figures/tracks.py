@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis import lanes, track
+from activesteer.analysis import lanes
 from activesteer.analysis.bands import TRACK
-from activesteer.analysis.course_view import CourseView, view_of
 from activesteer.analysis.figures import style, time_panels
 from activesteer.analysis.figures.style import DrawnRun
+from activesteer.analysis.lanes import CourseView, view_of
 from activesteer.analysis.source import RecordingLike, read_course, read_footprint
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure
@@ -84,7 +84,7 @@ def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
     drawn = style.curves(recordings)
     for curve in drawn:
         style.draw_band(axis, curve, TRACK[1])
-        x, y = (style.thinned(values) for values in track.front_axle(curve.recording))
+        x, y = (style.thinned(values) for values in lanes.front_axle(curve.recording))
         axis.plot(
             x, y, color=curve.look.colour, linewidth=style.LINE_PT, linestyle=curve.linestyle, label=curve.look.label
         )
@@ -103,10 +103,10 @@ def _draw_cars(axis: Axes, curve: DrawnRun) -> None:
         front_left, front_right, rear_left, rear_right = lanes.corners(curve.recording, read_footprint(curve.recording))
     except RecordingError:
         return
-    x, _ = track.front_axle(curve.recording)
+    x, _ = lanes.front_axle(curve.recording)
     left, right = axis.get_xlim()
     for place in np.linspace(left, right, CARS, endpoint=False)[1:]:
-        row = track.first_at(curve.recording, float(place))
+        row = lanes.first_at(curve.recording, float(place))
         if row is not None and np.isfinite(x[row]):
             outline = [(float(xs[row]), float(ys[row])) for xs, ys in (front_left, front_right, rear_right, rear_left)]
             axis.add_patch(Polygon(outline, closed=True, fill=False, edgecolor=curve.look.colour, linewidth=0.6))

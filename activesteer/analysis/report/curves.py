@@ -10,11 +10,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.analysis import sine_with_dwell
-from activesteer.analysis.course_view import view_of
-from activesteer.analysis.lanes import struck_cones
+from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
 from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.source import read_course, read_footprint
-from activesteer.analysis.track import front_axle, path_distance
 from activesteer.conventions import CORNERS, Array
 from activesteer.drawing import wheel_angles
 from activesteer.errors import RecordingError

@@ -16,8 +16,7 @@ from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, 
 from activesteer.scenario import Scenario, check_gains, describe, resolve
 from activesteer.studies.engine.design import Samples
 from activesteer.studies.engine.factor_values import FactorValues, label_of
-from activesteer.studies.engine.run_identity import digest
-from activesteer.studies.engine.run_settings import Request, Settings, present_inputs
+from activesteer.studies.engine.runs import Request, Settings, digest, present_inputs
 from activesteer.studies.engine.study_file import SEARCHES, StudyFile
 
 _LABELS: Final = ("name", "title")

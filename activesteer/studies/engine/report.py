@@ -19,12 +19,11 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import write_text
 from activesteer.metric_table import recorded_metric
 from activesteer.pages import render
+from activesteer.studies.engine.analysis import MAX_SAMPLES, indices
 from activesteer.studies.engine.factor_values import FactorValues, label_of
-from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
-from activesteer.studies.engine.run_command import run_command
 from activesteer.studies.engine.run_task import CURVE
-from activesteer.studies.engine.sensitivity import MAX_SAMPLES, indices
-from activesteer.studies.engine.store import Store
+from activesteer.studies.engine.runs import run_command
+from activesteer.studies.engine.store import IDENTITY, OUTCOME, Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.units import parameter_label
 

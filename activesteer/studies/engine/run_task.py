@@ -24,8 +24,16 @@ from activesteer.scenario import Scenario
 from activesteer.simulation import amplitude_store
 from activesteer.simulation.preparation import prepared
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.engine.run_identity import digest, files_digest, run_id
-from activesteer.studies.engine.run_settings import Request, Settings, differences, files_key, scenario_of
+from activesteer.studies.engine.runs import (
+    Request,
+    Settings,
+    differences,
+    digest,
+    files_digest,
+    files_key,
+    run_id,
+    scenario_of,
+)
 
 _ERROR_CHARACTERS: Final = 500
 """Largest length of an error message in a row."""

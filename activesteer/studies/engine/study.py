@@ -12,15 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from activesteer.scenario import FileOrTable
-from activesteer.studies.engine.effects import MAX_ROWS, without_effect
+from activesteer.studies.engine.analysis import MAX_ROWS, without_effect
 from activesteer.studies.engine.plan import Plan, task_size
-from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
-from activesteer.studies.engine.run_settings import Request, prepare
 from activesteer.studies.engine.run_task import CURVE, Status, drive, failed_row
-from activesteer.studies.engine.store import Store
+from activesteer.studies.engine.runs import Request, prepare
+from activesteer.studies.engine.store import IDENTITY, OUTCOME, Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.engine.task_queue import TaskQueue, WorkerDied
-from activesteer.studies.engine.workers import Workers, workers_for
+from activesteer.studies.engine.workers import TaskQueue, WorkerDied, Workers, workers_for
 
 if TYPE_CHECKING:
     import pyarrow as pa

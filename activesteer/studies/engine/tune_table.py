@@ -17,11 +17,11 @@ from activesteer.analysis.requirement import ANY, Expression, Names, Requirement
 from activesteer.config import Range, build
 from activesteer.errors import nearest_names, shown
 from activesteer.metric_table import METRICS
+from activesteer.studies.engine.factor_values import Prior
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.prior import Prior
-from activesteer.studies.engine.row_table import IDENTITY, OUTCOME
 from activesteer.studies.engine.run_task import DISTANCE, Row, Status
+from activesteer.studies.engine.store import IDENTITY, OUTCOME
 from activesteer.studies.engine.study_file import StudyFile
 
 TABLE: Final = "tune"

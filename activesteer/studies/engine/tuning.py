@@ -21,18 +21,16 @@ from activesteer.analysis.requirement import ANY, Names, Requirement
 from activesteer.errors import ParameterError, StudyError, nearest_names, not_installed
 from activesteer.files import file_word, finite, make_folder, reading, write_text
 from activesteer.scenario import FileOrTable
-from activesteer.studies.engine.effects import without_effect
+from activesteer.studies.engine.analysis import without_effect
+from activesteer.studies.engine.factor_values import Plausibility
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.prior import Plausibility
-from activesteer.studies.engine.run_command import run_command
-from activesteer.studies.engine.run_settings import Request, prepare
 from activesteer.studies.engine.run_task import Row, Status, drive
+from activesteer.studies.engine.runs import Request, prepare, run_command
 from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import StudyFile, label_of, read_study
-from activesteer.studies.engine.task_queue import TaskQueue
 from activesteer.studies.engine.tune_table import TABLE, Goal, Judge, TuneTable, read_table
-from activesteer.studies.engine.workers import Workers, workers_for
+from activesteer.studies.engine.workers import TaskQueue, Workers, workers_for
 
 _STARTUP: Final = 0.2
 """Fraction of the sets that the sampler draws at random before it learns to violate a requirement."""

@@ -16,8 +16,7 @@ from activesteer.scenario import FileOrTable, check_gains
 from activesteer.studies.engine.plan import Plan, task_size
 from activesteer.studies.engine.study import StudyProgress
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.engine.task_queue import in_parallel
-from activesteer.studies.engine.workers import workers_for
+from activesteer.studies.engine.workers import in_parallel, workers_for
 from activesteer.studies.linear.margins import SPEEDS_KMH, LoopMargins, margins_of_cars, straight_on, weakest
 
 

@@ -15,7 +15,7 @@ from activesteer.files import make_folder, replacing, shown_path
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import simulate
-from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.engine.workers import in_parallel
 from tests.reference.chrono.comparison import Comparison
 from tests.reference.chrono.kinematics import Curves, compare_kinematics
 from tests.reference.chrono.our_runs import compare_run

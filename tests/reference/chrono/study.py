@@ -9,7 +9,7 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.simulation.runner import simulate
-from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.engine.workers import in_parallel
 from tests.reference.chrono.reference import ReferenceData
 from tests.reference.chrono.reference_columns import reference_columns
 

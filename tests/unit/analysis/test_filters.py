@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.analysis.filters import low_pass
+from activesteer.analysis.series import low_pass
 from activesteer.errors import RecordingError
 from tests.raising import raises
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.hysteresis import loop, slope_at_zero
+from activesteer.analysis.series import loop, slope_at_zero
 from activesteer.errors import RecordingError
 from tests.raising import raises
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from activesteer.analysis.random_response import random_response
+from activesteer.analysis.frequency_response import random_response
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun

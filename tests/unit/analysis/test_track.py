@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.track import first_at, largest_difference, path_distance, track_over_x
+from activesteer.analysis.lanes import first_at, largest_difference, path_distance, track_over_x
 from tests.unit.analysis.synthetic import along_path
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.zeroing import offset, zeroing_range
+from activesteer.analysis.series import offset, zeroing_range
 
 TIME_S = np.arange(4000) * 1e-3
 RATE_RADPS = math.radians(150.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.conventions import Array
-from activesteer.drawing.direction_of_motion import direction_of_motion
+from activesteer.drawing.cars import direction_of_motion
 
 TIME_S: Array = np.linspace(0.0, 10.0, 1001)
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import RecordingError
-from activesteer.measured.comparison import TOLERANCES, compare
-from activesteer.measured.noise import FILTERS, smooth
+from activesteer.measured.comparison import FILTERS, TOLERANCES, compare, smooth
 from activesteer.recording import Recording
 from activesteer.signals import Channel
 from tests.raising import raises

@@ -13,10 +13,9 @@ from scipy.io import savemat
 
 from activesteer.errors import RecordingError
 from activesteer.measured import foreign_files
-from activesteer.measured.columns import find, read_columns
-from activesteer.measured.csv_columns import csv_columns
+from activesteer.measured.columns import csv_columns, find, read_columns
 from activesteer.measured.importing import import_file
-from activesteer.measured.plausibility import suspicions
+from activesteer.measured.signals import suspicions
 from activesteer.playback.runs import runs_of
 from activesteer.recording import Recording
 from activesteer.scenario.recorded_inputs import open_loop_of

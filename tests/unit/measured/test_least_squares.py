@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from activesteer.errors import StudyError
-from activesteer.measured.intervals import autocorrelation_time, intervals, told_apart, without_effect
-from activesteer.measured.least_squares import search
+from activesteer.measured.fit_result import autocorrelation_time, intervals, told_apart, without_effect
+from activesteer.measured.fitting import search
 from tests.raising import raises
 
 TIME_S = np.arange(0.0, 4.0, 0.01)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from activesteer.conventions import run_looks
-from activesteer.drawing.colours import shares_of
+from activesteer.drawing.cars import shares_of
 from activesteer.scenario import resolve
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.live_view import FRAME_S, Keys, Pacer, drive, scene_for

@@ -15,8 +15,7 @@ from activesteer.errors import ManeuverError
 from activesteer.files import json_text
 from activesteer.pages import render_page
 from activesteer.standards import fmvss126
-from activesteer.standards.examination import examine
-from activesteer.standards.examination_page import examination_page
+from activesteer.standards.examination import examination_page, examine
 from activesteer.standards.fmvss126 import STANDARD, amplitudes, verdict
 from activesteer.standards.proving_ground import ProvingGround
 from activesteer.standards.standard import Findings, Ground

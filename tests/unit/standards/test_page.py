@@ -8,8 +8,7 @@ import pytest
 
 from activesteer.pages import Table, render_page
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.examination import Examination
-from activesteer.standards.examination_page import _together, examination_page
+from activesteer.standards.examination import Examination, _together, examination_page
 from activesteer.standards.standard import Findings, Standard
 
 EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'

@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 
 from activesteer.conventions import Array
 from activesteer.vehicle.curve_axles import COORDINATES
-from activesteer.vehicle_builder.kc_compliance import Load, fitted
+from activesteer.vehicle_builder.kc_fit import Load, fitted
 
 INERTIA = np.diag([35.0, 35.0, 0.9, 0.26, 0.4])
 """Of a wheel with hub and knuckle [kg, kg m2]."""

@@ -10,8 +10,7 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.vehicle_builder import new_vehicle
-from activesteer.vehicle_builder.kc_checks import check_signs, unusual
-from activesteer.vehicle_builder.kc_tables import KcTables, Samples, read_kc, smoothed
+from activesteer.vehicle_builder.kc_tables import KcTables, Samples, check_signs, read_kc, smoothed, unusual
 from tests.raising import raises
 from tests.unit.vehicle_builder.tables import COMPACT
 

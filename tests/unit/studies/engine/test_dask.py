@@ -20,8 +20,7 @@ import pytest
 from activesteer import simulate, study
 from activesteer.errors import StudyError
 from activesteer.measured.fitting import fit
-from activesteer.studies.engine.task_queue import TaskQueue, in_parallel
-from activesteer.studies.engine.workers import Workers, workers_for
+from activesteer.studies.engine.workers import TaskQueue, Workers, in_parallel, workers_for
 from tests.raising import raises
 from tests.unit.studies.short import RATIO, short_study, write_controller
 

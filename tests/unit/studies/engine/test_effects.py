@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from activesteer import study
-from activesteer.studies.engine.effects import without_effect
+from activesteer.studies.engine.analysis import without_effect
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.store import Store
 from activesteer.studies.engine.study_file import read_study

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from activesteer.studies.engine.analysis import indices
 from activesteer.studies.engine.design import draw
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.sensitivity import indices
 
 pytest.importorskip("SALib")
 WIDE = Factor("wide", "uniform", low=1.0, high=3.0)

@@ -11,10 +11,10 @@ import pytest
 from activesteer import study
 from activesteer.cli import main
 from activesteer.errors import StudyError
+from activesteer.studies.engine.analysis import indices
 from activesteer.studies.engine.design import draw
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.report import write_report
-from activesteer.studies.engine.sensitivity import indices
 from tests.raising import raises
 from tests.unit.studies.short import RATIO, short_study, write_controller
 

@@ -8,8 +8,8 @@ import pyarrow as pa
 import pytest
 
 from activesteer.scenario import resolve
-from activesteer.studies.engine.row_table import joined_schema, table_of
-from activesteer.studies.engine.run_identity import run_id
+from activesteer.studies.engine.runs import run_id
+from activesteer.studies.engine.store import joined_schema, table_of
 
 
 def column(*values):

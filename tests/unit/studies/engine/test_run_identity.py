@@ -9,7 +9,7 @@ import pytest
 from activesteer.errors import ActiveSteerError
 from activesteer.scenario.car import model_files
 from activesteer.studies.engine.factor_values import label_of
-from activesteer.studies.engine.run_identity import controller_digest
+from activesteer.studies.engine.runs import controller_digest
 from tests.raising import raises
 
 

@@ -146,16 +146,16 @@ def test_another_study_in_the_same_folder_is_refused(serial):
 
 def test_results_of_another_version_are_not_gone_on_with(tmp_path, monkeypatch):
     study(short_study(*MU), output=tmp_path, jobs=1, limit=1)
-    monkeypatch.setattr("activesteer.studies.engine.run_identity.source_digest", lambda: "another")
-    from activesteer.studies.engine import run_identity  # noqa: PLC0415
+    monkeypatch.setattr("activesteer.studies.engine.runs.source_digest", lambda: "another")
+    from activesteer.studies.engine import runs  # noqa: PLC0415
 
-    run_identity.versions.cache_clear()
+    runs.versions.cache_clear()
     try:
         with raises(StudyError, value=tmp_path):
             study(short_study(*MU), output=tmp_path, jobs=1)
     finally:
         monkeypatch.undo()
-        run_identity.versions.cache_clear()
+        runs.versions.cache_clear()
 
 
 def test_two_processes_do_not_work_on_one_study(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 from activesteer.cli import main
 from activesteer.errors import ActiveSteerError, StudyError
-from activesteer.studies.engine.prior import Plausibility, Prior
+from activesteer.studies.engine.factor_values import Plausibility, Prior
 from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.engine.tuning import _searches, read_tuning, tune

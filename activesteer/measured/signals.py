@@ -1,0 +1,415 @@
+"""Measured signals: names, units and axes, suspicious values, resampling, and the path of the car."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Collection, Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from activesteer.config import field_in_unit
+from activesteer.conventions import Array
+from activesteer.errors import RecordingError
+from activesteer.recording import Poses, Recording
+from activesteer.units import Unit, find_unit, known_unit
+from activesteer.vehicle import Vehicle
+
+TIME_WORDS: Final = frozenset({"time", "times", "t", "zeit", "timestamp", "timestamps", "tstamp", "tstart"})
+
+TURNED_IN_SAE: Final = (
+    "y_m", "z_m", "yaw_rad", "pitch_rad", "vy_mps", "vz_mps", "yaw_rate_radps", "pitch_rate_radps", "ay_mps2",
+    "az_mps2", "sideslip_rad", "steering_wheel_rad", "steering_wheel_demand_rad", "hand_torque_Nm", "front_steer_rad",
+    "rear_steer_rad", "superposition_rad", "rack_m", "front_axle_y_m",
+)  # fmt: skip
+"""Channels that are positive to the left or upwards here, and to the right or downwards in the axes of SAE J670 (x
+forward, y right, z down): all except those along or about x."""
+
+
+class Known(NamedTuple):
+    """Meaning of a column.
+
+    Attributes:
+        channel: Channel that the column fills.
+        unit: Unit, if the file states none.
+        sign: -1 if the exporter uses the sign opposite to ISO 8855.
+        sure: Whether the unit is the exporter's; otherwise SI is assumed.
+    """
+
+    channel: str
+    unit: str = ""
+    sign: float = 1.0
+    sure: bool = True
+
+
+_WORDS: Final = {
+    "steering_wheel_rad": "steeringwheelangle steerwheelangle swa handwheelangle lenkradwinkel lwi lws steeringangle "
+    "lenkwinkel deltah",
+    "yaw_rate_radps": "yawrate yawvelocity gierrate giergeschwindigkeit psidot psip angularratez gyroz r",
+    "ay_mps2": "lateralacceleration latacc lateralacc querbeschleunigung accy accely ay",
+    "ax_mps2": "longitudinalacceleration longacc laengsbeschleunigung längsbeschleunigung accx accelx ax",
+    "speed_mps": "speed velocity vehiclespeed vehspeed geschwindigkeit fahrgeschwindigkeit v vehv",
+    "vx_mps": "vx longitudinalvelocity velforward",
+    "vy_mps": "vy lateralvelocity vellateral",
+    "sideslip_rad": "sideslip sideslipangle schwimmwinkel beta slipangle",
+    "roll_rad": "roll rollangle wankwinkel phi",
+    "pitch_rad": "pitch pitchangle nickwinkel theta",
+    "yaw_rad": "yaw yawangle heading gierwinkel psi",
+    "x_m": "x posx positionx", "y_m": "y posy positiony",
+    "hand_torque_Nm": "steeringwheeltorque handtorque lenkmoment",
+    "brake_pedal": "brakepedal brakepedalposition bremspedal",
+}  # fmt: skip
+_BY_WORD: Final = {word: channel for channel, words in _WORDS.items() for word in words.split()}
+
+_EXPORTERS: Final[tuple[tuple[str, dict[str, Known]], ...]] = (
+    # IPG CarMaker writes SI and ISO 8855.
+    ("Car.YawRate", {
+        "Steer.WhlAng": Known("steering_wheel_rad", "rad"), "Driver.Steer.Ang": Known("steering_wheel_rad", "rad"),
+        "Car.YawRate": Known("yaw_rate_radps", "rad/s"), "Car.ay": Known("ay_mps2", "m/s2"),
+        "Car.ax": Known("ax_mps2", "m/s2"), "Car.v": Known("speed_mps", "m/s"), "Car.Roll": Known("roll_rad", "rad"),
+        "Car.Pitch": Known("pitch_rad", "rad"), "Car.Yaw": Known("yaw_rad", "rad"),
+        "Car.SideSlipAngle": Known("sideslip_rad", "rad"), "Car.tx": Known("x_m", "m"), "Car.ty": Known("y_m", "m"),
+    }),
+    # Mechanical Simulation CarSim: degrees, km/h and g, ISO 8855.
+    ("AVz", {
+        "Steer_SW": Known("steering_wheel_rad", "deg"), "AVz": Known("yaw_rate_radps", "deg/s"),
+        "Ay": Known("ay_mps2", "g"), "Ax": Known("ax_mps2", "g"), "Vx": Known("vx_mps", "km/h"),
+        "Vy": Known("vy_mps", "km/h"), "Beta": Known("sideslip_rad", "deg"), "Roll": Known("roll_rad", "deg"),
+        "Pitch": Known("pitch_rad", "deg"), "Yaw": Known("yaw_rad", "deg"), "Xcg_TM": Known("x_m", "m"),
+        "Ycg_TM": Known("y_m", "m"),
+    }),
+    # Runs of Project Chrono, as `tools/validate.py` compares them: SI, and a rack that steers right.
+    ("delta_FL", {"rack": Known("rack_m", "m", -1.0), "vx": Known("vx_mps", "m/s"), "vy": Known("vy_mps", "m/s"),
+        "r": Known("yaw_rate_radps", "rad/s"), "ax": Known("ax_mps2", "m/s2"), "ay": Known("ay_mps2", "m/s2"),
+        "beta": Known("sideslip_rad", "rad"), "roll": Known("roll_rad", "rad"), "pitch": Known("pitch_rad", "rad"),
+        "x": Known("x_m", "m"), "y": Known("y_m", "m"), "psi": Known("yaw_rad", "rad"),
+    }),
+)  # fmt: skip
+"""Name that identifies an exporter, and the names that it writes."""
+
+
+def written_unit(unit: str) -> Unit | None:
+    """Return a unit as a file writes it; None if it is unknown."""
+    return find_unit(unit.strip().strip("[]()").strip().replace("**", "^"), any_case=True)
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Split a name and the unit in brackets behind it."""
+    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
+    return (found[1], found[2]) if found and written_unit(found[2]) else (name, "")
+
+
+def before_bracket(name: str) -> str:
+    """Return the part of a column's name before a bracket at its end; empty if there is none."""
+    found = re.fullmatch(r"(.*?)\s*[\[(][^\])]*[\])]\s*", name)
+    return found[1] if found else ""
+
+
+def is_time(name: str) -> bool:
+    """Return whether a column is named like a time."""
+    return name == "time_s" or _word(split_unit(name)[0]) in TIME_WORDS
+
+
+def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> Known | None:
+    """Return the meaning of a column by its name, the names of all columns and the channels of a car, or None."""
+    for mark, names in _EXPORTERS:
+        if mark in columns and name in names:
+            return names[name]
+    if name in channels:
+        return Known(name)
+    channel, _ = field_in_unit(name, channels)
+    if channel is not None:
+        return Known(channel, name.rsplit("_", 1)[1])
+    words, unit = split_unit(name)
+    channel = _BY_WORD.get(_word(words))
+    return None if channel is None else Known(channel, unit, sure=bool(unit))
+
+
+def _word(name: str) -> str:
+    return re.sub(r"[\W_]", "", name.lower())
+
+
+_ALIKE: Final = 0.7
+"""Correlation above which two signals belong to the same motion."""
+_MISTAKES: Final = {
+    name: (known_unit(right).factor / known_unit(wrong).factor, wrong, right)
+    for name, wrong, right in (
+        ("yaw_rate_radps", "deg/s", "rad/s"),
+        ("speed_mps", "km/h", "m/s"),
+        ("ay_mps2", "g", "m/s2"),
+    )
+}
+"""Channel -> factor of the error if the first unit was taken for the second."""
+_NEAR: Final = math.log(1.5)
+"""Ratios within this range count as equal: ay/(v yaw rate) is 1 except for the change of the sideslip angle."""
+_LONGEST_STEP_S: Final = 1.0
+"""Step from which a motion of the car cannot be seen [s]."""
+_STEER_RANGE: Final = (0.001, 0.15)
+"""Plausible yaw rate over speed and steering wheel angle [1/m]. The value 1/(wheelbase x ratio) is 0.02, divided by 1
++ (v/v_ch)^2, and less at the limit. Degrees taken as radians are off by a factor of 57."""
+_SHORTEST_M: Final = 2.4
+"""Wheelbase of a short car [m]. With the angle of the road wheels, yaw rate over speed and angle is 1/wheelbase in a
+neutral car and less in one that understeers."""
+_FASTEST_RADPS: Final = 4.0
+"""Yaw rate that no car on its wheels reaches [rad/s]."""
+
+
+def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]:
+    """Return signs of a wrong unit or sign, one line each.
+
+    Args:
+        channels: Values by channel name, SI, of equal length.
+        step_s: Time between two values [s].
+    """
+    rate, ay, wheel = (channels.get(name) for name in ("yaw_rate_radps", "ay_mps2", "steering_wheel_rad"))
+    speed = channels.get("speed_mps", channels.get("vx_mps"))
+    found: list[str] = []
+    if step_s >= _LONGEST_STEP_S:
+        found.append(f"the time has steps of {step_s:g} s: it looks like ms or us that were taken as s (time_unit)")
+    if speed is not None and rate is not None and ay is not None:
+        found += _against_acceleration(speed * rate, ay, wheel)
+    elif rate is not None and np.abs(rate).max() > _FASTEST_RADPS:
+        found.append(f"yaw_rate_radps reaches {np.abs(rate).max():.0f} rad/s: it looks like deg/s")
+    roll = channels.get("roll_rad")
+    signed = any("sign" in line for line in found)
+    if roll is not None and ay is not None and _alike(roll, ay) < -_ALIKE and not signed:
+        found.append(
+            "roll_rad and ay_mps2 are of opposite sign: a car rolls to the outside of the turn, so roll_rad is "
+            'positive to the left, or all are in axes of SAE J670 (axes = "sae_j670" in a map)'
+        )
+    opposite = rate is not None and wheel is not None and _alike(wheel, rate) < -_ALIKE
+    if opposite and not any("sign" in line for line in found):
+        found.append(
+            "steering_wheel_rad and yaw_rate_radps are of opposite sign: one of them is positive to the right, the "
+            "steering wheel where ay_mps2 agrees with the yaw rate"
+        )
+    if speed is not None and rate is not None and wheel is not None and not found:
+        found += _against_steering(speed, rate, wheel)
+    return found
+
+
+def _against_acceleration(product: Array, ay: Array, wheel: Array | None) -> list[str]:
+    alike = _alike(product, ay)
+    if abs(alike) < _ALIKE:
+        return []
+    found = []
+    if alike < 0.0:
+        guilty = "one of them is"
+        if wheel is not None and abs(_alike(wheel, ay)) > _ALIKE:
+            guilty = "ay_mps2 is" if _alike(wheel, ay) < 0.0 else "yaw_rate_radps is"
+        found.append(f"ay_mps2 and yaw_rate_radps are of opposite sign: {guilty} positive to the right")
+    found += _unit_words(abs(float(product @ ay / (product @ product))))
+    return found
+
+
+def _unit_words(ratio: float) -> list[str]:
+    """Explain the ratio of lateral acceleration to speed x yaw rate by the fewest wrong units."""
+    if abs(math.log(ratio)) < _NEAR:
+        return []
+    guesses = []
+    for powers in itertools.product((0, 1, -1), repeat=len(_MISTAKES)):
+        would = math.prod(
+            size ** (power if name == "ay_mps2" else -power)
+            for power, (name, (size, _, _)) in zip(powers, _MISTAKES.items(), strict=True)
+        )
+        if abs(math.log(ratio / would)) < _NEAR:
+            guesses.append((sum(map(abs, powers)), abs(math.log(ratio / would)), powers))
+    if not guesses:
+        return [f"ay_mps2 is {ratio:.2g} times speed x yaw rate, nearly 1 in a car: a unit of the three is wrong"]
+    return [_unit_word(name, power) for power, name in zip(min(guesses)[2], _MISTAKES, strict=True) if power]
+
+
+def _unit_word(name: str, power: int) -> str:
+    size, wrong, right = _MISTAKES[name]
+    if power < 0:
+        size, wrong, right = 1.0 / size, right, wrong
+    times = f"{size:.2g} times too large" if size > 1.0 else f"{1.0 / size:.2g} times too small"
+    return f"{name} is {times}: it looks like {wrong} that were taken as {right}"
+
+
+def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:
+    product = speed * wheel
+    if abs(_alike(product, rate)) < _ALIKE:
+        return []
+    gain = abs(float(product @ rate / (product @ product)))
+    if gain < _STEER_RANGE[0]:
+        return [
+            f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
+            "steering_wheel_rad looks like deg that were taken as rad"
+        ]
+    if gain > 1.0 / _SHORTEST_M:
+        return [
+            f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
+            "steering_wheel_rad is too small even for the angle of the road wheels (0.1 to 0.4); it looks like rad "
+            "that were taken as deg (0.2 to 1.7), or has a scale of its own: give its `factor` in a map, or fit "
+            "steering.factor"
+        ]
+    if gain > _STEER_RANGE[1]:
+        return [
+            f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
+            "steering_wheel_rad looks like the angle of the road wheels, or rad that were taken as deg"
+        ]
+    return []
+
+
+def _alike(one: Array, other: Array) -> float:
+    """Return the cosine between two signals; 0 if one of them is zero."""
+    size = math.sqrt(float(one @ one) * float(other @ other))
+    return float(one @ other) / size if size > 0.0 else 0.0
+
+
+class Samples(NamedTuple):
+    """Signal as measured.
+
+    Attributes:
+        time_s: Times [s], increasing, shape (n,).
+        values: Values, finite, shape (n,).
+    """
+
+    time_s: Array
+    values: Array
+
+
+def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
+    """Return the finite samples in the order of their times; the last of several at one instant is kept.
+
+    Raises:
+        RecordingError: time and values differ in length, fewer than two samples are left, or the time goes backwards.
+    """
+    if time_s.shape != values.shape or time_s.ndim != 1:
+        raise RecordingError(
+            f"{name} has {values.shape} values at {time_s.shape} times; one value a time is needed", file=file
+        )
+    known = np.isfinite(time_s) & np.isfinite(values)
+    time_s, values = time_s[known], values[known]
+    steps = np.diff(time_s)
+    if len(time_s) and (steps < 0.0).any():
+        row = int(np.argmax(steps < 0.0))
+        raise RecordingError(
+            f"the time of {name} goes backwards, from {time_s[row]:g} to {time_s[row + 1]:g} s; split several runs "
+            "in one file, or cut them with start_s and end_s of a map",
+            file=file,
+        )
+    last = np.append(steps > 0.0, True) if len(time_s) else known[:0]
+    if np.count_nonzero(last) < 2:
+        raise RecordingError(f"{name} has fewer than two samples that are numbers", file=file)
+    return Samples(time_s[last], values[last])
+
+
+def gaps(signal: Samples, longest_s: float, start_s: float, end_s: float) -> list[tuple[float, float]]:
+    """Return gaps between samples that are longer than `longest_s`, from start to end."""
+    inside = (signal.time_s[1:] > start_s) & (signal.time_s[:-1] < end_s)
+    wide = inside & (np.diff(signal.time_s) > longest_s)
+    return [(float(signal.time_s[row]), float(signal.time_s[row + 1])) for row in np.flatnonzero(wide)]
+
+
+def resampled(signal: Samples, grid_s: Array) -> Array:
+    """Resample a signal to a uniform grid, with straight lines between samples.
+
+    If the samples are closer than the grid, their mean over a grid step is taken, which prevents aliasing.
+
+    Args:
+        signal: The samples.
+        grid_s: Times within the signal [s], shape (m,).
+
+    Returns:
+        Values, shape (m,).
+    """
+    step_s = float(grid_s[1] - grid_s[0])
+    if float(np.median(np.diff(signal.time_s))) > 0.75 * step_s:
+        return np.interp(grid_s, signal.time_s, signal.values)
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - slow to import
+
+    integral = make_interp_spline(signal.time_s, signal.values, k=1).antiderivative()
+    # Towards the ends, the window shrinks on both sides, so that its centre does not move.
+    half = np.minimum(0.5 * step_s, np.minimum(grid_s - signal.time_s[0], signal.time_s[-1] - grid_s))
+    wide = half > 1e-3 * step_s
+    values = np.interp(grid_s, signal.time_s, signal.values)
+    values[wide] = (integral((grid_s + half)[wide]) - integral((grid_s - half)[wide])) / (2.0 * half[wide])
+    return values
+
+
+_MOVING_MPS: Final = 1.0
+"""Speed below which a sideslip angle is not defined [m/s]."""
+
+
+def with_motion(time_s: Array, channels: Mapping[str, Array]) -> dict[str, Array]:
+    """Add derived channels: speed, sideslip angle, yaw angle and path.
+
+    Without a position, the path starts at the origin along x. Its direction is the yaw angle, plus the sideslip angle
+    if measured.
+
+    Args:
+        time_s: Time, uniform [s], shape (n,).
+        channels: Measured values by channel name, SI.
+
+    Returns:
+        The channels, with `speed_mps`, `sideslip_rad`, `yaw_rad`, `x_m` and `y_m` where they can be derived.
+    """
+    from scipy.integrate import cumulative_trapezoid  # noqa: PLC0415 - slow to import
+
+    found = dict(channels)
+    if "speed_mps" not in found and "vx_mps" in found:
+        found["speed_mps"] = np.hypot(found["vx_mps"], found.get("vy_mps", 0.0))
+    if "sideslip_rad" not in found and {"vx_mps", "vy_mps"} <= set(found):
+        found["sideslip_rad"] = _sideslip(found["vx_mps"], found["vy_mps"])
+    if "yaw_rad" not in found and "yaw_rate_radps" in found:
+        found["yaw_rad"] = cumulative_trapezoid(found["yaw_rate_radps"], time_s, initial=0.0)
+    if not {"x_m", "y_m"} <= set(found) and {"speed_mps", "yaw_rad"} <= set(found):
+        course = found["yaw_rad"] + found.get("sideslip_rad", 0.0)
+        found["x_m"] = cumulative_trapezoid(found["speed_mps"] * np.cos(course), time_s, initial=0.0)
+        found["y_m"] = cumulative_trapezoid(found["speed_mps"] * np.sin(course), time_s, initial=0.0)
+    return found
+
+
+def _sideslip(vx: Array, vy: Array) -> Array:
+    return np.where(np.abs(vx) > _MOVING_MPS, np.arctan2(vy, np.abs(vx)), 0.0)
+
+
+def at_sensor(run: Recording) -> Recording:
+    """Return the run with the motion of the point that `sensor_ahead_m` of its manoeuvre names.
+
+    The point is on the centre line of a rigid body, ahead of the centre of gravity by x: v_y + x r, a_y + x dr/dt,
+    a_x - x r^2 with the yaw rate r.
+
+    Args:
+        run: A simulated run. Without the key, or with zero, it is returned itself.
+    """
+    ahead_m = run.metadata.get("maneuver", {}).get("sensor_ahead_m", 0.0)
+    if ahead_m == 0.0:
+        return run
+    rate = run["yaw_rate_radps"]
+    vx, vy = run["vx_mps"], run["vy_mps"] + ahead_m * rate
+    moved = {
+        "vy_mps": vy,
+        "speed_mps": np.hypot(vx, vy),
+        "sideslip_rad": _sideslip(vx, vy),
+        "ay_mps2": run["ay_mps2"] + ahead_m * np.gradient(rate, run.time_s),
+        "ax_mps2": run["ax_mps2"] - ahead_m * rate**2,
+    }
+    values = [moved.get(channel.name, run[channel.name]) for channel in run.channels]
+    return Recording(run.channels, run.time_s, np.column_stack(values), metadata=run.metadata)
+
+
+def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) -> Poses | None:
+    """Return poses of a car in its design position, moved along the path, for replay; None without a path.
+
+    Args:
+        vehicle: Vehicle whose bodies are shown.
+        time_s: Time [s], shape (n,).
+        channels: Values by channel name.
+    """
+    if not {"x_m", "y_m", "yaw_rad"} <= set(channels):
+        return None
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import
+
+    rows = np.arange(0, len(time_s), max(1, round(0.01 / float(time_s[1] - time_s[0]))))
+    turns = Rotation.from_euler("z", channels["yaw_rad"][rows, None])
+    centre = vehicle.data.site("cg").xpos
+    bodies = [vehicle.data.body(name) for name in vehicle.body_names]
+    path = np.column_stack([channels["x_m"][rows], channels["y_m"][rows], np.zeros(len(rows))])
+    positions = [path + turns.apply(body.xpos - [centre[0], centre[1], 0.0]) for body in bodies]
+    turned = [(turns * Rotation.from_quat(body.xquat, scalar_first=True)).as_quat(scalar_first=True) for body in bodies]
+    return Poses(time_s[rows], vehicle.body_names, np.stack(positions, axis=1), np.stack(turned, axis=1))

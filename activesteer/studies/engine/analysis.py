@@ -1,0 +1,257 @@
+"""Analysis of a study's rows: sensitivities, dependence, and factors without an effect.
+
+A Saltelli design gives first-order and total indices (Saltelli et al. 2010), a Morris design mean and spread of
+elementary effects (Campolongo et al. 2007), and any other sample the first-order indices by RBD-FAST (Tarantola et al.
+2006), which needs no design of its own.
+
+The outcome, yes or no, is fitted by least squares with every factor and its square, so that a factor with its optimum
+in the middle is found too. A factor counts if leaving it out worsens the fit by more than chance (F test, 5 % for all
+factors together, Bonferroni). Interactions are not examined.
+
+Source: A. Saltelli et al., Global Sensitivity Analysis (2008), section 1.2.5, on regression of Monte Carlo samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.errors import StudyError, not_installed
+from activesteer.studies.engine.design import FOR_INDICES, MORRIS_LEVELS
+from activesteer.studies.engine.factors import Factor
+from activesteer.studies.engine.plan import Plan
+from activesteer.studies.engine.run_task import Row, Status, drive
+from activesteer.studies.engine.store import IDENTITY, OUTCOME
+
+MAX_SAMPLES: Final = 16384
+"""Largest number of rows used: more rows change the indices by less than their confidence intervals."""
+_MAX_RBD_SAMPLES: Final = 4096
+_RBD_RESAMPLES: Final = 30
+_MIN_SAMPLES: Final = 42
+"""Smallest number of rows for RBD-FAST: it compares 2 * 10 harmonics, also in each half of the samples that its
+confidence interval draws, so a half needs more than 20."""
+
+
+class Index(NamedTuple):
+    """An index of one factor.
+
+    Attributes:
+        factor: Its key.
+        name: `S1`, `ST`, or `mu*`.
+        value: The index; `mu*` is in the unit of the metric.
+        confidence: Half width of its 95 % confidence interval.
+        spread: Standard deviation of the elementary effects (Morris); nan for others.
+    """
+
+    factor: str
+    name: str
+    value: float
+    confidence: float
+    spread: float = np.nan
+
+
+def indices(
+    kind: str, factors: Sequence[Factor], columns: Mapping[str, Sequence[object]], values: NDArray[np.float64]
+) -> list[Index]:
+    """Return the indices of one metric of one controller in one manoeuvre with one vehicle.
+
+    Columns and values are in the order of the design. There are no indices for a grid or a list, for failed runs in a
+    design that needs all of them, or for a metric that does not vary.
+    """
+    finite = np.isfinite(values)
+    discrete = kind in ("grid", "list") or any(factor.kind in ("grid", "choice") for factor in factors)
+    if discrete or not finite.any() or np.ptp(values[finite]) == 0.0:
+        return []
+    if kind in FOR_INDICES and not finite.all():
+        return []
+    keys = [factor.key for factor in factors]
+    points = np.column_stack([np.asarray(columns[key], dtype=np.float64) for key in keys])
+    # Scale to the whole range of each factor, so that factors of different units can be compared.
+    unit = (points - [factor.low for factor in factors]) / [factor.high - factor.low for factor in factors]
+    problem = {"num_vars": len(keys), "names": keys, "bounds": [[0.0, 1.0]] * len(keys)}
+    try:
+        return _computed(kind, problem, unit, values)
+    except ImportError as reason:
+        raise not_installed(StudyError, "a sensitivity index", "SALib", "study") from reason
+
+
+def _computed(
+    kind: str, problem: dict[str, Any], unit: NDArray[np.float64], values: NDArray[np.float64]
+) -> list[Index]:
+    from SALib.analyze import morris, rbd_fast, sobol  # noqa: PLC0415 - an extra
+
+    keys = problem["names"]
+    if kind == "saltelli":
+        block = len(keys) + 2
+        used = values[: block * (1 << ((len(values) // block).bit_length() - 1))]
+        # The estimators assume a metric around zero.
+        found = sobol.analyze(problem, (used - used.mean()) / used.std(), calc_second_order=False, seed=0)
+        return [
+            Index(key, name, float(found[name][place]), float(found[f"{name}_conf"][place]))
+            for name in ("S1", "ST")
+            for place, key in enumerate(keys)
+        ]
+    if kind == "morris":
+        whole = len(values) // (len(keys) + 1) * (len(keys) + 1)
+        unit, values = unit[:whole], values[:whole]
+        found = morris.analyze(problem, unit, values, num_levels=MORRIS_LEVELS, seed=0)
+        return [
+            Index(key, "mu*", *(float(found[name][place]) for name in ("mu_star", "mu_star_conf", "sigma")))
+            for place, key in enumerate(keys)
+        ]
+    finite = np.isfinite(values)
+    rows = np.flatnonzero(finite)[:_MAX_RBD_SAMPLES]
+    if len(rows) < _MIN_SAMPLES:
+        return []
+    found = rbd_fast.analyze(problem, unit[rows], values[rows], num_resamples=_RBD_RESAMPLES, seed=0)
+    return [
+        Index(key, "S1", float(found["S1"][place]), float(found["S1_conf"][place])) for place, key in enumerate(keys)
+    ]
+
+
+SIGNIFICANCE: Final = 0.05
+"""Probability at which chance alone would name a factor."""
+_SAMPLES_PER_COEFFICIENT: Final = 3
+"""Smallest number of samples: in a short Sobol' sequence the factors correlate with each other's squares."""
+
+
+class Dependence(NamedTuple):
+    """The factor that explains most of an outcome.
+
+    Attributes:
+        factor: Its key.
+        explained: Fraction of the outcome's variance that is lost without the factor, 0 to 1.
+        direction: 1 if a larger factor makes the outcome more frequent, -1 if a smaller one does, 0 if the middle or
+            the ends of its range do.
+    """
+
+    factor: str
+    explained: float
+    direction: int
+
+
+def strongest(
+    factors: Mapping[str, Sequence[float] | NDArray[np.float64]], outcome: Sequence[bool] | NDArray[np.bool_]
+) -> Dependence | None:
+    """Return the factor that an outcome depends on most; None if none is significant or there are too few samples."""
+    happened = np.asarray(outcome, dtype=np.float64)
+    if happened.size == 0:
+        return None
+    columns = {key: np.asarray(values, dtype=np.float64) for key, values in factors.items()}
+    columns = {key: (values - values.mean()) / values.std() for key, values in columns.items() if np.ptp(values) > 0.0}
+    number = 2 * len(columns) + 1
+    spare = len(happened) - number
+    if not columns or len(happened) < _SAMPLES_PER_COEFFICIENT * number or np.ptp(happened) == 0.0:
+        return None
+    from scipy.stats import f as f_distribution  # noqa: PLC0415 - slow to import
+
+    left, coefficients = _fit(list(columns.values()), happened)
+    total = float(np.sum((happened - happened.mean()) ** 2))
+    found: list[Dependence] = []
+    for place, key in enumerate(columns):
+        without, _ = _fit([values for other, values in columns.items() if other != key], happened)
+        lost = max(0.0, without - left)
+        chance = float(f_distribution.sf(0.5 * lost / max(left / spare, 1e-300), 2, spare))
+        if chance * len(columns) < SIGNIFICANCE:
+            linear, square = coefficients[1 + 2 * place], coefficients[2 + 2 * place]
+            # Over a uniform sample, x spans 3.5 and x^2 3 standard units: the larger change counts.
+            direction = int(np.sign(linear)) if abs(linear) * 3.46 > abs(square) * 3.0 else 0
+            found.append(Dependence(key, lost / total, direction))
+    return max(found, key=lambda dependence: dependence.explained, default=None)
+
+
+def _fit(columns: Sequence[NDArray[np.float64]], outcome: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return the residual sum of squares and the coefficients: constant, then each column and its square."""
+    design = np.column_stack([np.ones_like(outcome), *(part for x in columns for part in (x, x * x))])
+    coefficients = np.asarray(np.linalg.lstsq(design, outcome, rcond=None)[0], dtype=np.float64)
+    return float(np.sum((outcome - design @ coefficients) ** 2)), coefficients
+
+
+MAX_ROWS: Final = 20_000
+"""Most rows to compare."""
+
+Place = tuple[int, int, int]
+"""Numbers of manoeuvre, vehicle and controller."""
+Point = tuple[Any, ...]
+"""Values of all factors."""
+
+
+def without_effect(plan: Plan, rows: Iterable[Row]) -> list[str]:
+    """Return the factors without effect: changing one of them alone leaves every metric the same to the last bit.
+
+    Rows that differ in one factor only are compared. If there are none for a factor, as in a random sample, the first
+    sample is driven again with the ends of the factor's range.
+    """
+    keys = plan.study.keys
+    known: dict[Place, dict[Point, str]] = {}
+    for row in rows:
+        if row["status"] == Status.OK:
+            known.setdefault(_place(plan, row), {})[tuple(row[key] for key in keys)] = _metrics(row, keys)
+    return [
+        factor.key
+        for number, factor in enumerate(plan.study.factors)
+        if known
+        and not any(isinstance(value, (list, dict)) for value in factor.values)
+        and not _has_effect(plan, number, known)
+    ]
+
+
+def _has_effect(plan: Plan, number: int, known: Mapping[Place, Mapping[Point, str]]) -> bool:
+    factor, compared = plan.study.factors[number], False
+    for found in known.values():
+        for point in found if factor.values else ():
+            pairs = [found[other] for other in _others(factor, number, point) if other in found]
+            compared = compared or bool(pairs)
+            if any(other != found[point] for other in pairs):
+                return True
+    if compared:
+        return False
+    for place, found in known.items():
+        point, metrics = next(iter(found.items()))
+        driven = {_driven(plan, place, other) for other in _others(factor, number, point)} - {None}
+        compared = compared or bool(driven)
+        if driven - {metrics}:
+            return True
+    return not compared  # if every run failed, nothing is known
+
+
+def _others(factor: Factor, number: int, point: Point) -> Iterator[Point]:
+    """Yield the point with the other values of a factor."""
+    for value in factor.extremes:
+        if value != point[number]:
+            yield (*point[:number], value, *point[number + 1 :])
+
+
+def _driven(plan: Plan, place: Place, point: Point) -> str | None:
+    """Return the metrics of a run with these values; None if it is incomplete."""
+    study = replace(plan.settings.study, recordings="none", curves=(), claims=False)
+    settings = replace(plan.settings, study=study, folder=None)
+    # A table may hold a whole number of the study as a float.
+    values = {
+        factor.key: next((known for known in factor.values if known == value), value)
+        for factor, value in zip(plan.study.factors, point, strict=True)
+    }
+    (row,) = drive(settings, [plan.request_with(0, 0, place, values)])
+    return _metrics(row, plan.study.keys) if row["status"] == Status.OK else None
+
+
+def _place(plan: Plan, row: Row) -> Place:
+    shared = plan.settings
+    maneuver, vehicle, controller = (
+        [label for label, _ in items].index(row[part])
+        for part, items in (
+            ("maneuver", shared.maneuvers), ("vehicle", shared.vehicles), ("controller", shared.controllers),
+        )
+    )  # fmt: skip
+    return maneuver, vehicle, controller
+
+
+def _metrics(row: Row, keys: Sequence[str]) -> str:
+    """Return all metrics of a row in a form that is equal for identical runs only."""
+    others = {*IDENTITY, *OUTCOME, *keys}
+    found = sorted((name, value) for name, value in row.items() if name not in others and isinstance(value, float))
+    return repr([(name, value) for name, value in found if not name.startswith("claim")])
