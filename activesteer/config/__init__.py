@@ -13,6 +13,7 @@ without effect while other keys have certain values: key -> {other key: its valu
 from __future__ import annotations
 
 from activesteer.config.keys import (
+    check_overruled,
     dataclass_in,
     element_of,
     field_in_unit,
@@ -20,9 +21,9 @@ from activesteer.config.keys import (
     key_hint,
     key_paths,
     leaf_keys,
+    merged,
     spellings,
 )
-from activesteer.config.merging import check_overruled, merged
 from activesteer.config.source import Range, Source
 from activesteer.config.toml import parse_value, read_toml, toml_text, toml_value
 from activesteer.config.values import build, checked_number, convert, to_table

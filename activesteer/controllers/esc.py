@@ -20,8 +20,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from activesteer.controllers.file_gains import EscParameters
-from activesteer.controllers.parameters import ControllerSetup
+from activesteer.controllers.parameters import ControllerSetup, EscParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 

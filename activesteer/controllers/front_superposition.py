@@ -5,8 +5,16 @@ from __future__ import annotations
 import math
 from types import MappingProxyType
 
-from activesteer.controllers.corrector import Corrector, corrected, cut_off, rear_direction, reset
-from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS, DesiredYawRate, desired_yaw_rate
+from activesteer.controllers.corrector import (
+    MIN_SPEED_MPS,
+    Corrector,
+    DesiredYawRate,
+    corrected,
+    cut_off,
+    desired_yaw_rate,
+    rear_direction,
+    reset,
+)
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
 from activesteer.native_blocks import NativeBlock
 from activesteer.shared_laws import law_of

@@ -1,4 +1,4 @@
-"""One controller for rear steering, front superposition and brakes: steering first, brakes for what it cannot give.
+"""One controller for rear steering, front superposition and brakes: steering first, brakes for what is missing.
 
 The angles are those of `lqr` with its allocation, within their limits and rates (`controllers/allocation.py`). The law
 of `esc` gives the yaw moment that the car needs to stay under control, beyond its bands:
@@ -41,20 +41,92 @@ Years of Experience, SAE 2000-01-1633, on the wheels that brake.
 
 from __future__ import annotations
 
+import functools
 import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
+from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.esc import stabilising
-from activesteer.controllers.file_gains import IntegratedParameters
 from activesteer.controllers.lqr import Lqr, Turn
-from activesteer.controllers.parameters import ControllerSetup
-from activesteer.controllers.quadratic_programme import solver
-from activesteer.controllers.split_axles import SplitTorques
-from activesteer.controllers.supervised_actuator import SupervisedActuator
+from activesteer.controllers.parameters import ControllerSetup, IntegratedParameters
+from activesteer.controllers.torque_vectoring import SplitTorques
 from activesteer.controllers.turn_reference import BorneTurnReference
+from activesteer.conventions import Array
+from activesteer.errors import ControllerError, not_installed
 from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
+
+Solve = Callable[[Array, Array, Array, Array, Array], Array]
+"""Function from H, f, A, lower and upper to the x that minimises x' H x / 2 + f' x; first the bounds of x,
+then the bounds of A x."""
+
+
+def solver() -> Solve:
+    """Return the dual active-set method of DAQP, with a cold start in every call so that it has no state.
+
+    Raises:
+        ControllerError: DAQP is not installed.
+    """
+    try:
+        import daqp  # noqa: PLC0415 - an extra
+    except ImportError as error:
+        raise not_installed(ControllerError, "this controller", "daqp", "control") from error
+    return functools.partial(_solve, daqp.solve)
+
+
+def _solve(solve_once: Any, h: Array, f: Array, a: Array, lower: Array, upper: Array) -> Array:
+    x, _, flag, _ = solve_once(h, f, a, upper, lower, np.zeros(len(upper), dtype=np.int32))
+    if flag <= 0:
+        raise ControllerError(f"DAQP finds no solution (exit flag {flag})")
+    return x
+
+
+class SupervisedActuator:
+    """An actuator that must approach its demand.
+
+    An actuator is suspected if its distance from the demand was larger than a tolerance and it has not approached by a
+    tenth of this distance within a window. It counts as failed, until the end of the run, once it is suspected for as
+    long as the window. A slow actuator, a weak supply or a delayed bus still approach; an actuator that is stuck,
+    floats or runs away does not.
+
+    Attributes:
+        failed: Whether the actuator has failed.
+    """
+
+    def __init__(self, tolerance_rad: float, window_s: float, interval_s: float) -> None:
+        """Begin with a sound actuator.
+
+        Args:
+            tolerance_rad: Distance from the demand that is tolerated [rad].
+            window_s: Time in which the actuator must approach its demand [s].
+            interval_s: Time between two steps [s].
+        """
+        self._tolerance_rad = tolerance_rad
+        self._steps = max(1, round(window_s / interval_s))
+        self._seen: deque[tuple[float, float]] = deque(maxlen=self._steps + 1)
+        self._suspected = 0
+        self.failed = False
+
+    def step(self, demand_rad: float, position_rad: float) -> bool:
+        """Add a sample of demand and position [rad], and return whether the actuator has failed."""
+        self._seen.append((demand_rad, position_rad))
+        if len(self._seen) <= self._steps:
+            return self.failed
+        demand_then_rad, position_then_rad = self._seen[0]
+        gap_rad = demand_then_rad - position_then_rad
+        moved_rad = position_rad - position_then_rad
+        if gap_rad < 0.0:
+            gap_rad, moved_rad = -gap_rad, -moved_rad
+        if gap_rad > self._tolerance_rad and moved_rad < 0.1 * gap_rad:
+            self._suspected += 1
+            self.failed = self.failed or self._suspected > self._steps
+        else:
+            self._suspected = 0
+        return self.failed
+
 
 _BRAKES = 4
 """Number of brake forces; after them come the differences of electric axles."""

@@ -48,12 +48,16 @@ import numpy as np
 
 from activesteer.controllers.allocation import Allocation, allocated
 from activesteer.controllers.axle_slopes import AxleSlopes, excess
-from activesteer.controllers.confidence import ConfidenceMonitor, confidence
-from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
+from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.esc import brake_levers
-from activesteer.controllers.file_gains import LqrParameters
-from activesteer.controllers.parameters import ControllerSetup
-from activesteer.controllers.turn_reference import TurnReference, desired_ahead, desired_turn
+from activesteer.controllers.parameters import ControllerSetup, LqrParameters
+from activesteer.controllers.turn_reference import (
+    ConfidenceMonitor,
+    TurnReference,
+    confidence,
+    desired_ahead,
+    desired_turn,
+)
 from activesteer.conventions import Array
 from activesteer.estimation.estimator import Estimator
 from activesteer.native_blocks import NativeBlock, Table, table

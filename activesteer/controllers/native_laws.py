@@ -12,10 +12,24 @@ import numpy as np
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, call_at, compiled_call
-from activesteer.controllers.law_interface import CALL
 from activesteer.native_blocks import NativeBlock, record_type
 from activesteer.native_memory import f64_pointer, pointer_to
-from activesteer.signals import DriverCommand, Measurement, record_of
+from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, numbers_of, record_of
+
+N_STEERING: Final = 6
+"""Numbers of an `ActuatorCommand` that a controller with a native law decides; the others are 0."""
+N_COMMAND: Final = len(numbers_of(ActuatorCommand))
+"""Numbers of an `ActuatorCommand`."""
+N_HELD: Final = N_COMMAND + len(Estimate._fields) + 1
+"""Numbers of a decision: those of the command, of its estimate, and 1 if there is an estimate."""
+CALL: Final = (types.intp, types.intp, types.intp, types.intp)
+"""Arguments of a law: addresses of its block, of the numbers of a `DriverCommand` and of a `Measurement`, and of the
+`N_HELD` numbers to write."""
+assert [number.name for number in numbers_of(ActuatorCommand)[:N_STEERING]] == [
+    "rear_steer_demand_rad", "superposition_demand_rad", "yaw_rate_desired_radps", "prediction_rad", "correction_rad",
+    "saturated",
+]  # fmt: skip
+
 
 call_law: Final = call_at(types.void, *CALL)
 """`call_law(address, (block, command, measurement, held))` in compiled code."""

@@ -7,8 +7,8 @@ from typing import Any, Final
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, compiled_call
-from activesteer.controllers.law_interface import CALL, N_COMMAND, N_HELD
 from activesteer.controllers.lqr import Lqr, regulated
+from activesteer.controllers.native_laws import CALL, N_COMMAND, N_HELD
 from activesteer.estimation.advance import advance
 from activesteer.estimation.records import KNOWN, MEMORY, SAID
 from activesteer.estimation.setup import GRID

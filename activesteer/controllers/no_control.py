@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from activesteer.controllers.desired_yaw_rate import DesiredYawRate, desired_yaw_rate
+from activesteer.controllers.corrector import DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.native_blocks import NativeBlock
 from activesteer.shared_laws import law_of

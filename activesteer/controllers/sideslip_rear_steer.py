@@ -11,9 +11,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
-from activesteer.controllers.file_gains import SideslipRearSteerParameters
-from activesteer.controllers.parameters import ControllerSetup
+from activesteer.controllers.corrector import MIN_SPEED_MPS
+from activesteer.controllers.parameters import ControllerSetup, SideslipRearSteerParameters
 from activesteer.controllers.rear_steer import RearSteer
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 

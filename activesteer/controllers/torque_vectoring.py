@@ -27,19 +27,187 @@ torque-vectoring differentials, IEEE Trans. Vehicular Technology 63 (2014); the 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
+import numpy as np
+
+from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.esc import beyond
-from activesteer.controllers.file_gains import TorqueVectoringParameters
-from activesteer.controllers.parameters import ControllerSetup
-from activesteer.controllers.split_axles import SplitTorques
+from activesteer.controllers.parameters import ControllerSetup, TorqueVectoringParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
+from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ControllerError
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.signals import NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement, PerWheel
 
 if TYPE_CHECKING:
     from activesteer.estimation.estimator import Estimator
+
+
+_SIDES: Final = (-1.0, 1.0, -1.0, 1.0)
+"""Sign of a torque that turns the car to the left, order of `CORNERS`."""
+_FREE_SLIP: Final = 0.03
+"""Slip up to which a wheel gets all of its torque [-]: that of a rear wheel of the compact at 1.7 kN."""
+_MOST_SLIP: Final = 0.06
+"""Slip from which a wheel gets nothing [-]: further slip costs more side force than it gives drive force."""
+_LEAST_RADPS: Final = 1.0
+"""Wheel speed below which a motor's power sets no limit [rad/s]."""
+
+
+class Range(NamedTuple):
+    """Differences that an axle can make, right less left.
+
+    Attributes:
+        place: Its left wheel, 0 or 2.
+        lever: Yaw moment per difference [-].
+        low: Lowest torque that can be added at the left and at the right wheel [Nm].
+        high: Highest torques [Nm].
+        most_Nm: Largest difference that the differential allows [Nm].
+    """
+
+    place: int
+    lever: float
+    low: tuple[float, float]
+    high: tuple[float, float]
+    most_Nm: float
+
+    def largest_Nm(self, side: float) -> float:
+        """Return the largest difference to a side, 1 left or -1 right [Nm]."""
+        (low_left, low_right), (high_left, high_right) = self.low, self.high
+        wide = high_right - low_left if side > 0.0 else high_left - low_right
+        return min(max(wide, 0.0), self.most_Nm)
+
+    def torques(self, difference_Nm: float) -> tuple[float, float]:
+        """Return the added torques of left and right wheel, with a sum of 0 unless one of them is at its limit."""
+        half = 0.5 * difference_Nm
+        left = min(max(-half, self.low[0]), self.high[0])
+        right = min(max(difference_Nm + left, self.low[1]), self.high[1])
+        return min(max(right - difference_Nm, self.low[0]), self.high[0]), right
+
+
+def _left_by(slip: float) -> float:
+    """Return the fraction of a torque that a wheel may get which slips in its direction already."""
+    return min(max((_MOST_SLIP - slip) / (_MOST_SLIP - _FREE_SLIP), 0.0), 1.0)
+
+
+class SplitTorques:
+    """Electric axles of a car as a controller knows them."""
+
+    def __init__(self, setup: ControllerSetup, friction_fraction: float, least_fraction: float) -> None:
+        """Compute the constants.
+
+        Args:
+            setup: The car.
+            friction_fraction: Fraction of the friction that a wheel may use in all directions [-].
+            least_fraction: Fraction of the friction that stays for the torque in a turn at the limit [-].
+        """
+        self._axles, self._battery = setup.split_axles, setup.battery_power_W
+        self._fractions = friction_fraction, least_fraction
+        if not self._axles:
+            return
+        known, car = setup.estimation, setup.single_track
+        assert known is not None  # an estimator exists
+        self._radius_m, self._drive = known.rolling_radius_m, known.drive_fractions
+        tracks_m = known.two_track.front_track_m, known.two_track.rear_track_m
+        weight_N = car.mass_kg * GRAVITY_MPS2 / (car.cg_to_front_m + car.cg_to_rear_m)
+        shares = known.two_track.front_load_transfer_fraction, 1.0 - known.two_track.front_load_transfer_fraction
+        self._load_N = 0.5 * weight_N * car.cg_to_rear_m, 0.5 * weight_N * car.cg_to_front_m
+        self._shift_kg = [
+            car.mass_kg * known.two_track.load_height_m * share / track_m
+            for share, track_m in zip(shares, tracks_m, strict=True)
+        ]
+        self._arms_m = [
+            0.5 * side * track_m for side, track_m in zip(_SIDES, np.repeat(tracks_m, 2).tolist(), strict=True)
+        ]
+        self._levers = [0.5 * track_m / self._radius_m[2 * axle] for axle, track_m in enumerate(tracks_m)]
+
+    def ranges(self, command: DriverCommand, measurement: Measurement, now: Estimate) -> list[Range]:
+        """Return the ranges of the electric axles for the present motion.
+
+        Args:
+            command: Command of the driver, whose torque counts first.
+            measurement: Measurement of the car's sensors.
+            now: Estimated motion.
+        """
+        if not self._axles:
+            return []
+        if command.brake_pedal > 0.0:
+            # The brakes use the friction, and the anti-lock system needs wheels that nothing else drives.
+            nothing = 0.0, 0.0
+            return [Range(axle.place, self._levers[axle.place // 2], nothing, nothing, 0.0) for axle in self._axles]
+        use, least = self._fractions
+        # On a sudden change the estimate may exceed the friction in the tyre files, which no road does.
+        friction = min(max(now.friction, 0.05), 1.0)
+        used = measurement.ay_mps2 / (GRAVITY_MPS2 * friction)
+        grip = friction * max(math.sqrt(max(use**2 - used**2, 0.0)), least)
+        drive_Nm = command.drive_torque_demand_Nm if command.gear else 0.0
+        found = []
+        for axle in self._axles:
+            low, high = [0.0, 0.0], [0.0, 0.0]
+            for side in (0, 1):
+                wheel = axle.place + side
+                shift_N = self._shift_kg[axle.place // 2] * measurement.ay_mps2 * _SIDES[wheel]
+                road_Nm = self._radius_m[wheel] * grip * max(self._load_N[axle.place // 2] + shift_N, 0.0)
+                speed = measurement.wheel_speed_radps[wheel]
+                most = min(axle.torque_Nm, axle.power_W / max(abs(speed), _LEAST_RADPS))
+                driver = self._drive[wheel] * drive_Nm
+                drives, absorbs = (most, axle.regeneration * most) if speed >= 0.0 else (axle.regeneration * most, most)
+                travel_mps = now.speed_mps + self._arms_m[wheel] * now.yaw_rate_radps
+                slip = self._radius_m[wheel] * speed / max(travel_mps, 1.0) - 1.0
+                high[side] = _left_by(slip) * max(min(drives, road_Nm) - driver, 0.0)
+                low[side] = _left_by(-slip) * min(-min(absorbs, road_Nm) - driver, 0.0)
+            lever = self._levers[axle.place // 2]
+            found.append(Range(axle.place, lever, (low[0], low[1]), (high[0], high[1]), axle.difference_Nm))
+        return found
+
+    def for_moment(
+        self, moment_Nm: float, command: DriverCommand, measurement: Measurement, now: Estimate
+    ) -> tuple[PerWheel, float]:
+        """Return the torques to add at the wheels for a yaw moment, and the moment that they make.
+
+        Args:
+            moment_Nm: Yaw moment, left positive [Nm].
+            command: Command of the driver.
+            measurement: Measurement of the car's sensors.
+            now: Estimated motion.
+        """
+        ranges, side = self.ranges(command, measurement, now), math.copysign(1.0, moment_Nm)
+        possible = sum(each.lever * each.largest_Nm(side) for each in ranges)
+        if possible <= 0.0 or moment_Nm == 0.0:
+            return NO_TORQUES, 0.0
+        share = side * min(abs(moment_Nm) / possible, 1.0)
+        torques = self.of_differences([share * each.largest_Nm(side) for each in ranges], ranges, command, measurement)
+        reached = sum(each.lever * (torques[each.place + 1] - torques[each.place]) for each in ranges)
+        return torques, reached
+
+    def of_differences(
+        self, differences_Nm: Sequence[float], ranges: Sequence[Range], command: DriverCommand, measurement: Measurement
+    ) -> PerWheel:
+        """Return the torques to add at the wheels for differences of the axles, within the limits of the battery."""
+        if not any(differences_Nm):
+            return NO_TORQUES
+        torques = [0.0, 0.0, 0.0, 0.0]
+        for each, difference in zip(ranges, differences_Nm, strict=True):
+            torques[each.place : each.place + 2] = each.torques(difference)
+        # Power is convex in the torques: along the chord it is at most what the chord says.
+        drive_Nm = command.drive_torque_demand_Nm if command.gear else 0.0
+        driver = [fraction * drive_Nm for fraction in self._drive]
+        speeds = measurement.wheel_speed_radps
+        before = self._power_W(driver, speeds)
+        after = self._power_W([own + added for own, added in zip(driver, torques, strict=True)], speeds)
+        charge, discharge = self._battery
+        if after > max(discharge, before):
+            torques = [torque * max(discharge - before, 0.0) / (after - before) for torque in torques]
+        elif after < min(-charge, before):
+            torques = [torque * max(before + charge, 0.0) / (before - after) for torque in torques]
+        fl, fr, rl, rr = torques
+        return fl, fr, rl, rr
+
+    def _power_W(self, torques_Nm: Sequence[float], speeds_radps: Sequence[float]) -> float:
+        """Return the electric power of wheel torques [W]."""
+        efficiency = self._axles[0].efficiency
+        powers = [torque * speed for torque, speed in zip(torques_Nm, speeds_radps, strict=True)]
+        return sum(power / efficiency if power > 0.0 else power * efficiency for power in powers)
 
 
 class TorqueVectoring:

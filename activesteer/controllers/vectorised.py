@@ -10,8 +10,7 @@ from numba import types
 
 from activesteer.compilation import compiled_call
 from activesteer.controllers.find import find_controller
-from activesteer.controllers.law_interface import N_COMMAND, N_HELD
-from activesteer.controllers.native_laws import call_law, law_address
+from activesteer.controllers.native_laws import N_COMMAND, N_HELD, call_law, law_address
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import Array
 from activesteer.native_blocks import record_type, values

@@ -1,14 +1,21 @@
-"""A class or function in a user's Python file, named as `my_file.py:MyController?gain=2`."""
+"""A class or function in a user's file, `my_file.py:MyController?gain=2`, or a file of another format, such as an FMU.
+
+The group `activesteer.formats` maps the ending of a file to a function of the file and the kind of block, which returns
+a `Plugin`. Another distribution can add a format.
+"""
 
 from __future__ import annotations
 
 import ast
+import functools
 import importlib.util
+import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, ClassVar, Final, NamedTuple, NoReturn
 
@@ -205,3 +212,16 @@ def parse_parameters(text: str, fail: Any) -> dict[str, Any]:
             raise fail(f"the parameter {pair[1]} is given twice", pair[1])
         parameters[pair[1]] = parse_value(pair[2])
     return parameters
+
+
+@functools.cache
+def _formats() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group="activesteer.formats")}
+
+
+def format_of(given: Any) -> EntryPoint | None:
+    """Return the format of a block that is given as a file, with `?name=value` for parameters; None for others."""
+    if not isinstance(given, (str, os.PathLike)):
+        return None
+    name, dot, ending = os.fspath(given).partition("?")[0].lower().rpartition(".")
+    return _formats().get(ending) if name and dot and ending.isalnum() else None

@@ -15,8 +15,7 @@ from typing import Any, Final
 from activesteer.config import Source, field_in_unit
 from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.plugins.declared import SETUP, Declared, declared_by, has_argument, read_values, takes_any
-from activesteer.plugins.file import from_file, is_user_module
-from activesteer.plugins.formats import format_of
+from activesteer.plugins.file import format_of, from_file, is_user_module
 from activesteer.plugins.kind import Kind, in_one_line
 
 _PLAIN: Final = (bool, int, float, str)

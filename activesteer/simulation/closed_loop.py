@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from activesteer.config import Source, build
 from activesteer.controllers import find_controller
-from activesteer.controllers.law_interface import N_HELD
+from activesteer.controllers.native_laws import N_HELD
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import Driver
 from activesteer.errors import ManeuverError, ParameterError, shown

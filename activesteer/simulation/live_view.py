@@ -17,8 +17,8 @@ from activesteer.drawing.cars import SLOWEST_MPS
 from activesteer.errors import PlaybackError
 from activesteer.maneuver import Maneuver
 from activesteer.road.course import Footprint
-from activesteer.simulation.appearance import scene_of
 from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.simulation.run_context import scene_of
 from activesteer.units import quantity_of
 from activesteer.video import Car, RenderScene
 from activesteer.video.cameras import CUTAWAY

@@ -8,8 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.controllers.law_interface import N_COMMAND, N_HELD
-from activesteer.controllers.native_laws import law_address
+from activesteer.controllers.native_laws import N_COMMAND, N_HELD, law_address
 from activesteer.conventions import Array
 from activesteer.driver.human import HumanDriver
 from activesteer.driver.native_driver import SetpointTable, setpoint_row, tabulate

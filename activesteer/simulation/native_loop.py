@@ -12,8 +12,7 @@ import numpy as np
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, call_at, compiled_call, inlined
-from activesteer.controllers.law_interface import N_COMMAND, N_HELD
-from activesteer.controllers.native_laws import call_law
+from activesteer.controllers.native_laws import N_COMMAND, N_HELD, call_law
 from activesteer.driver.human import HumanDriver
 from activesteer.driver.native_driver import LINE, SETPOINT, follow
 from activesteer.native_blocks import ARRAY, record_type

@@ -1,29 +1,420 @@
-"""An FMU given as a controller or driver: `controller.fmu`, `controller.fmu?gain=2&isolate=5`."""
+"""An FMU given as a controller or driver, its signals, and the block that the loop calls."""
 
 from __future__ import annotations
 
 import functools
 import itertools
+import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+import sys
+import threading
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, NamedTuple, get_args, get_origin, get_type_hints
 
 from activesteer.config import Source, read_toml
-from activesteer.coupling.fmu.archive import Archive
-from activesteer.coupling.fmu.block import FmuBlock, Wiring
-from activesteer.coupling.fmu.description import Variable, describe_fmu
-from activesteer.coupling.fmu.instance import Group, Spec
-from activesteer.coupling.fmu.signals import Link, linked, signals_of
+from activesteer.conventions import CORNERS
+from activesteer.coupling.fmu.description import Archive, Variable, describe_fmu
+from activesteer.coupling.fmu.instance import FmuFault, Group, Instance, Spec, make_instance
 from activesteer.errors import nearest_names, shown
 from activesteer.files import is_file, shown_path, user_path, why_no_file
 from activesteer.plugins import Kind, Plugin
 from activesteer.plugins.declared import read_values
 from activesteer.plugins.file import parse_parameters
 from activesteer.plugins.plugin import allowed
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
+from activesteer.signals import DriverCommand, Measurement, Motion, PerWheel, Setpoint, new_message
+from activesteer.units import UNIT_NAMES, find_unit, split_ending
+
+_NO_SIGNAL: Final = "none"
+"""Signal of a map for a variable that is left alone."""
+_KEYS: Final = ("signal", "unit")
+
+
+class Place(NamedTuple):
+    """A number within the messages of a block.
+
+    Attributes:
+        message: Place of the message among them.
+        field: Place of its field.
+        wheel: Place in a field of the four wheels; None for a single number.
+    """
+
+    message: int
+    field: int
+    wheel: int | None
+
+
+class Link(NamedTuple):
+    """A variable of an FMU and its signal: signal = factor times element + offset.
+
+    Attributes:
+        variable: The variable.
+        signal: Name of the signal.
+        places: Number of each element.
+        factor: Factor from the FMU's unit to ours.
+        offset: Offset, in our unit.
+    """
+
+    variable: Variable
+    signal: str
+    places: tuple[Place, ...]
+    factor: float
+    offset: float
+
+
+class Signals(NamedTuple):
+    """Signals of some messages.
+
+    Attributes:
+        places: Name -> its numbers.
+        others: Names of fields that are no numbers.
+        words: The messages, in words.
+    """
+
+    places: Mapping[str, tuple[Place, ...]]
+    others: frozenset[str]
+    words: str
+
+    def full(self, name: str) -> str | None:
+        """Return the name of a signal that is given with or without its unit; None if there is none."""
+        known = (other for other in self.places if other == name or split_ending(other)[0] == name)
+        return next(known, None)
+
+
+def signals_of(messages: Sequence[type[Any]]) -> Signals:
+    """Return the signals of messages.
+
+    A field of the four wheels is one signal of four numbers, and four signals of one number. If several messages have
+    a field, its name means the first of them; `message.field` means any of them.
+
+    Args:
+        messages: Message classes, in the order of a block's arguments.
+    """
+    places: dict[str, tuple[Place, ...]] = {}
+    others = set()
+    for index, message in enumerate(messages):
+        hints = get_type_hints(message, localns={"Path": object}, include_extras=True)
+        for field, (name, hint) in enumerate(hints.items()):
+            kind = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+            own: dict[str, tuple[Place, ...]] = {}
+            if kind == PerWheel:
+                own[name] = tuple(Place(index, field, wheel) for wheel in range(len(CORNERS)))
+                own |= {f"{corner}_{name}": (place,) for corner, place in zip(CORNERS, own[name], strict=True)}
+                own |= {f"{name}[{wheel + 1}]": (place,) for wheel, place in enumerate(own[name])}
+            elif {kind, *get_args(kind)} & {float, int, bool} and get_origin(kind) is not tuple:
+                own[name] = (Place(index, field, None),)
+            else:
+                others.add(name)
+            for key, value in own.items():
+                places.setdefault(key, value)
+                places[f"{message.__name__.lower()}.{key}"] = value
+    return Signals(places, frozenset(others), ", ".join(message.__name__ for message in messages))
+
+
+def linked(
+    variables: Mapping[str, Variable], signals: Signals, given: Mapping[str, Any], source: Source
+) -> tuple[list[Link], list[str]]:
+    """Match variables with signals.
+
+    Args:
+        variables: Inputs or outputs of the FMU.
+        signals: The signals.
+        given: The map: name of a variable -> table of signal and unit.
+        source: The map's file.
+
+    Returns:
+        The links, and the names of the variables without a signal.
+
+    Raises:
+        ActiveSteerError: of the type of the source: an entry of the map is wrong, a unit does not fit or is unknown, or
+            a signal is no number.
+    """
+    links, left = [], []
+    for name, variable in variables.items():
+        entry = given.get(name)
+        wanted = name if entry is None else _entry(name, entry, signals, source)
+        if wanted == _NO_SIGNAL:
+            continue
+        if wanted in signals.others:
+            message = f'{wanted} is no number and cannot be a signal of an FMU; signal = "none" leaves {name} alone'
+            raise source.fail((name,), message, wanted)
+        if (signal := signals.full(wanted)) is None:
+            left.append(name)
+            continue
+        unit_name = (entry or {}).get("unit", variable.unit_name)
+        links.append(_link(name, variable, signal, signals.places[signal], unit_name, entry, source.fail))
+    return links, left
+
+
+def _entry(name: str, entry: Any, signals: Signals, source: Source) -> str:
+    """Return the signal of an entry of the map."""
+    if not isinstance(entry, Mapping) or not entry or not all(isinstance(value, str) for value in entry.values()):
+        problem = f'is {shown(entry)}; write {name} = {{ signal = "yaw_rate_radps", unit = "deg/s" }}'
+        raise source.fail((name,), problem, entry)
+    for key in entry:
+        if key not in _KEYS:
+            raise source.fail((name, key), f"there is no such key; {nearest_names(key, _KEYS)}", key, _KEYS)
+    wanted = entry.get("signal", name)
+    if wanted not in (_NO_SIGNAL, *signals.others) and signals.full(wanted) is None:
+        near = nearest_names(wanted, signals.places)
+        problem = f"{signals.words} has no signal {shown(wanted)}; {near}"
+        raise source.fail((name, "signal"), problem, wanted, list(signals.places))
+    if (unit := entry.get("unit")) is not None and find_unit(unit) is None:
+        problem = f"{shown(unit)} is no known unit; {nearest_names(unit, UNIT_NAMES)}"
+        raise source.fail((name, "unit"), problem, unit, UNIT_NAMES)
+    return wanted
+
+
+def _link(
+    name: str, variable: Variable, signal: str, places: tuple[Place, ...], unit_name: str | None, entry: Any,
+    fail: Callable[..., Exception],
+) -> Link:  # fmt: skip
+    bare = signal.partition("[")[0]
+    ours = split_ending(bare)[1]
+    unit = find_unit(unit_name) if entry and "unit" in entry and unit_name else variable.unit
+    if unit is None:
+        if unit_name is not None:
+            problem = f"{name} has the unit {shown(unit_name)}, which its description does not define"
+            raise fail((name,), f'{problem}; give it in a map: {name} = {{ unit = "deg/s" }}', unit_name)
+        unit = ours
+    if unit.dimension[:3] != ours.dimension[:3]:  # angles count as numbers
+        problem = f"{name} is in {unit_name}, but {signal} is in {ours.name or '1'}; these cannot be converted"
+        raise fail((name,), problem, unit_name, ours.name)
+    if len(places) != variable.size:
+        problem = f"{name} has {variable.size} elements, but {signal} has {len(places)}"
+        raise fail((name,), problem, variable.size, len(places))
+    return Link(variable, signal, places, unit.factor / ours.factor, unit.offset)
+
+
+_LARGEST: Final = sys.float_info.max
+_ANY: Final = (-_LARGEST, _LARGEST)
+"""Range of a number that only has to be finite."""
+
+
+class Wiring(NamedTuple):
+    """An FMU and its connection with the messages of a block.
+
+    Attributes:
+        spec: The instance.
+        inputs: Links of the inputs, by type.
+        outputs: Links of the outputs, by type.
+        every: Steps of the block's caller between two steps of the FMU, whose outputs are held between.
+        isolate_s: Time limit of a call, in a process of its own [s]; None for an instance in this process.
+        keeps: Flag of an FMU that can save its state; `serialises` also turns it into bytes.
+        serialises: See `keeps`.
+    """
+
+    spec: Spec
+    inputs: list[Link]
+    outputs: list[Link]
+    every: int
+    isolate_s: float | None
+    keeps: bool
+    serialises: bool
+
+
+class FmuBlock:
+    """A driver or controller that an FMU computes.
+
+    FMI restores a state only in the instance that saved it. Copies of a block therefore share one instance and take
+    turns with it.
+    """
+
+    def __init__(self, wiring: Wiring, kind: Kind, name: str, setup: Any, revive: Callable[[Any], FmuBlock]) -> None:
+        """Instantiate and initialise the FMU.
+
+        Args:
+            wiring: The FMU and its connection.
+            kind: Controllers or drivers.
+            name: Name in messages.
+            setup: Argument from which the block is made.
+            revive: Function that makes such a block from `setup`, also in another process.
+
+        Raises:
+            ActiveSteerError: of the kind's type: the FMU fails.
+        """
+        self._about = wiring, kind, name, setup, revive
+        try:
+            shared = _Shared(make_instance(wiring.spec, wiring.isolate_s))
+        except FmuFault as fault:
+            raise kind.fail(name, str(fault)) from fault
+        self._bind(shared, None, 0)
+
+    def _bind(self, shared: _Shared, held: Any, steps: int) -> None:
+        """Join the users of an instance."""
+        wiring, kind, *_ = self._about
+        self._shared, self._block = shared, shared.add()
+        self._held, self._steps, self._every = held, steps, wiring.every
+        self._reads: list[Any] = [
+            (*place, 1.0 / link.factor, link.offset) for link in wiring.inputs for place in link.places
+        ]
+        self._default: tuple[Any, ...] = tuple(kind.result())
+        names = kind.result._fields
+        self._writes = [
+            (place.field, place.wheel, link.factor, link.offset, *kind.ranges.get(names[place.field], _ANY))
+            for link in wiring.outputs
+            for place in link.places
+        ]
+        fields = {field for field, *_ in self._writes}
+        whole = (field for field in sorted(fields) if isinstance(self._default[field], int))
+        self._whole = [(field, type(self._default[field])) for field in whole]
+        self._unchecked = kind.completes or any(names[field] in kind.unchecked for field in fields)
+
+    def step(self, *messages: Any) -> Any:
+        """Return the command of the FMU; see `Controller.step` and `Driver.step`.
+
+        Raises:
+            ActiveSteerError: of the kind's type: the FMU fails, or its outputs are no command.
+        """
+        self._steps += 1
+        if self._every > 1 and (self._steps - 1) % self._every:
+            return self._held
+        shared = self._shared
+        command: list[Any] = [*self._default]
+        _, kind, name, setup, _ = self._about
+        try:
+            values = []
+            for message, field, wheel, factor, offset in self._reads:
+                value = messages[message][field]
+                values.append(((value if wheel is None else value[wheel]) - offset) * factor)
+            with shared.lock:
+                if shared.user != self._block:
+                    shared.turn_to(self._block)
+                results = shared.instance.step(values)
+        except FmuFault as fault:
+            raise kind.fail(name, f"{fault}{self._when()}") from fault
+        except TypeError as reason:
+            raise self._unread(messages) from reason
+        for (field, wheel, factor, offset, low, high), result in zip(self._writes, results, strict=True):
+            value = result * factor + offset
+            if not low <= value <= high:
+                raise self._refused(results, field, value)
+            if wheel is None:
+                command[field] = value
+            else:
+                before: list[Any] = [*command[field]]
+                before[wheel] = value
+                command[field] = tuple(before)
+        for field, whole in self._whole:
+            command[field] = whole(round(command[field]))
+        self._held = new_message(kind.result, command)
+        if self._unchecked:
+            self._held = kind.checked(self._held, name, setup)
+        return self._held
+
+    def _when(self) -> str:
+        """The time of the present step, in words."""
+        return f", {(self._steps - 1) // self._every * self._about[0].spec.step_s:g} s after its initialisation"
+
+    def _unread(self, messages: Sequence[Any]) -> Exception:
+        """Return the error for an input without a value, such as the curvature of a manoeuvre that has none."""
+        wiring, kind, name, *_ = self._about
+        empty = [
+            link.signal for link in wiring.inputs for place in link.places
+            if messages[place.message][place.field] is None
+        ]  # fmt: skip
+        return kind.fail(name, f"this manoeuvre gives no {' or '.join(dict.fromkeys(empty))}, which the FMU needs")
+
+    def _refused(self, results: Sequence[float], field: int, value: float) -> Exception:
+        """Return the error for an output that is not finite or out of its range."""
+        wiring, kind, name, setup, _ = self._about
+        if math.isfinite(value):
+            try:
+                kind.checked(kind.result()._replace(**{kind.result._fields[field]: value}), name, setup)
+            except kind.error as reason:
+                return reason
+        names = [link.variable.name for link in wiring.outputs for _ in link.places]
+        bad = [f"{out} = {value!r}" for out, value in zip(names, results, strict=True) if not math.isfinite(value)]
+        return kind.fail(name, f"returned {', '.join(bad)}{self._when()}; finite numbers are needed", results)
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> FmuBlock:
+        other = FmuBlock.__new__(FmuBlock)
+        other._about = self._about
+        self._call(lambda shared: other._bind(shared, self._held, self._steps))
+        self._call(lambda shared: shared.states.__setitem__(other._block, shared.instance.save()))
+        return other
+
+    def __reduce__(self) -> Any:
+        *_, revive = self._about
+        if not self._about[0].serialises:
+            raise self._stateless("turn its state into bytes (canSerializeFMUstate), as another process needs it")
+        content = self._call(lambda shared: _serialised(shared.instance))
+        return _revived, (revive, self._about[3], content, self._held, self._steps)
+
+    def _call(self, use: Callable[[_Shared], Any]) -> Any:
+        """Use the instance in the state of this block."""
+        wiring, kind, name, *_ = self._about
+        if not wiring.keeps:
+            raise self._stateless("save its state (canGetAndSetFMUstate)")
+        try:
+            with self._shared.lock:
+                self._shared.turn_to(self._block)
+                return use(self._shared)
+        except FmuFault as fault:
+            raise kind.fail(name, f"its state cannot be copied: {fault}") from fault
+
+    def _stateless(self, able: str) -> Exception:
+        _, kind, name, *_ = self._about
+        return kind.fail(name, f"this FMU cannot {able}; a run with it can be neither saved nor copied: {shown(name)}")
+
+    def __del__(self) -> None:
+        if (shared := getattr(self, "_shared", None)) is not None:
+            shared.gone.append(self._block)
+
+
+class _Shared:
+    """An instance, and the states of the blocks that take turns with it."""
+
+    def __init__(self, instance: Instance) -> None:
+        self.instance, self.lock = instance, threading.Lock()
+        self.user: int | None = None
+        self.states: dict[int, int] = {}
+        self.gone: list[int] = []
+        self._blocks = 0
+
+    def add(self) -> int:
+        self._blocks += 1
+        return self._blocks
+
+    def turn_to(self, block: int) -> None:
+        """Give the instance the state of a block."""
+        while self.gone:
+            last = self.gone.pop()
+            if (state := self.states.pop(last, None)) is not None:
+                self.instance.forget(state)
+            self.user = None if self.user == last else self.user
+        if self.user != block:
+            if self.user is not None:
+                self.states[self.user] = self.instance.save()
+            if (state := self.states.pop(block, None)) is not None:
+                self.instance.restore(state)
+                self.instance.forget(state)
+            self.user = block
+
+
+def _serialised(instance: Instance) -> bytes:
+    state = instance.save()
+    try:
+        return instance.serialise(state)
+    finally:
+        instance.forget(state)
+
+
+def _revived(revive: Callable[[Any], FmuBlock], setup: Any, content: bytes, held: Any, steps: int) -> FmuBlock:
+    """Return a block in a state that another process has saved."""
+    block = revive(setup)
+
+    def restore(shared: _Shared) -> None:
+        state = shared.instance.deserialise(content)
+        shared.instance.restore(state)
+        shared.instance.forget(state)
+
+    block._call(restore)
+    block._held, block._steps = held, steps
+    return block
+
 
 ENDING: Final = ".fmu"
 ISOLATE: Final = "isolate"

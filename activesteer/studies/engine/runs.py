@@ -21,8 +21,7 @@ from activesteer.config import toml_value
 from activesteer.controllers import find_controller, is_variant, read_variant
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import make_folder, writing
-from activesteer.plugins.file import source_of
-from activesteer.plugins.formats import format_of
+from activesteer.plugins.file import format_of, source_of
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, describe, resolve
 from activesteer.studies.engine.study_file import StudyFile

@@ -32,8 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.controllers import Controller, ControllerSetup, find_controller
-from activesteer.controllers.linear_form import has_linear_form, linear_controller
-from activesteer.controllers.response import SIGNALS, pulse_responses, response_of
+from activesteer.controllers.linear_form import (
+    SIGNALS,
+    has_linear_form,
+    linear_controller,
+    pulse_responses,
+    response_of,
+)
 from activesteer.conventions import GRAVITY_MPS2, Array
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from activesteer.controllers.allocation import angle_range
-from activesteer.controllers.confidence import ConfidenceMonitor
+from activesteer.controllers.turn_reference import ConfidenceMonitor
 from activesteer.scenario import resolve
 from activesteer.signals import Estimate
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from activesteer.controllers import SingleTrack
-from activesteer.controllers.desired_yaw_rate import DesiredYawRate
+from activesteer.controllers.corrector import DesiredYawRate
 from activesteer.controllers.parameters import DesiredYawRateParameters
 from tests.unit.controllers.cars import CAR
 

@@ -11,9 +11,7 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.axle_slopes import LEAST, AxleSlopes
-from activesteer.controllers.integrated import Integrated
-from activesteer.controllers.quadratic_programme import solver
-from activesteer.controllers.supervised_actuator import SupervisedActuator
+from activesteer.controllers.integrated import Integrated, SupervisedActuator, solver
 from activesteer.errors import ControllerError, ParameterError
 from activesteer.scenario import resolve
 from activesteer.signals import Estimate

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import load_controller
-from activesteer.controllers.linear_form import linear_controller
-from activesteer.controllers.response import pulse_responses, response_of
+from activesteer.controllers.linear_form import linear_controller, pulse_responses, response_of
 from activesteer.errors import ControllerError
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand

@@ -8,9 +8,8 @@ import pytest
 
 from activesteer import simulate
 from activesteer.controllers import load_controller
-from activesteer.controllers.desired_yaw_rate import MIN_SPEED_MPS
-from activesteer.controllers.split_axles import Range, SplitTorques
-from activesteer.controllers.torque_vectoring import TorqueVectoring
+from activesteer.controllers.corrector import MIN_SPEED_MPS
+from activesteer.controllers.torque_vectoring import Range, SplitTorques, TorqueVectoring
 from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ControllerError

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.config import Source, build
 from activesteer.controllers import CONTROLLERS, ControllerParameters, load_controller, read_variant
-from activesteer.controllers.file_gains import LqrParameters
+from activesteer.controllers.parameters import LqrParameters
 from activesteer.errors import ControllerError
 from activesteer.resources import find_controller_variant
 from activesteer.scenario import resolve

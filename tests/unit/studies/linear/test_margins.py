@@ -10,8 +10,7 @@ import pytest
 
 from activesteer.cli import main
 from activesteer.controllers import load_controller
-from activesteer.controllers.linear_form import linear_controller
-from activesteer.controllers.response import SIGNALS, pulse_responses
+from activesteer.controllers.linear_form import SIGNALS, linear_controller, pulse_responses
 from activesteer.errors import ControllerError, ParameterError, StudyError
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand
