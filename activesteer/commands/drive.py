@@ -334,6 +334,7 @@ def _explore(options: argparse.Namespace) -> int:
             f"explore needs {error.name}, which is not installed: pip install 'activesteer[explore]'"
         ) from error
     server = ExploreServer(Path(options.output), port)
+    options.saved = server.saved  # other programs may write into the same folder
 
     def listening() -> None:
         if options.json:

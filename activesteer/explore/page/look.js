@@ -3,7 +3,7 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const root = document.documentElement;
 const watchers = [];
 
-export const courses = data.courses;
+export const courses = data.courses, mostControllers = data.mostControllers;
 export const onTheme = (watcher) => watchers.push(watcher);
 export const dark = () => root.classList.contains("dark");
 export const paint = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();

@@ -24,7 +24,8 @@ def test_a_run_of_the_page_is_the_run_of_its_command(tmp_path: Path) -> None:
     assert replies[-1].header["command"] == "activesteer run step_steer -c none -c ars --set speed_kmh=90"
     again = activesteer.simulate("step_steer", "ars", overrides={"speed_kmh": 90.0})
     runs.save()
-    saved = activesteer.Recording.open(tmp_path / "step_steer_ars.mcap")
+    saved = activesteer.Recording.open(tmp_path / "step_steer-ars.mcap")
+    assert replies[0].header["title"] == saved.metadata["maneuver"]["title"] == "Step steer, 90 km/h, 0.4 g, dry"
     np.testing.assert_allclose(saved["yaw_rate_radps"], again["yaw_rate_radps"], atol=1e-6)  # stored with 32 bits
     yaw = next(panel for panel in replies[1].header["plots"]["panels"] if panel["title"] == "Yaw rate")
     assert yaw["series"][0]["values"][-1] == pytest.approx(math.degrees(again["yaw_rate_radps"][-1]), abs=0.05)
