@@ -164,6 +164,23 @@ def test_key_figures_are_better_or_worse_only_where_one_could_tell(metric, first
     assert found["none"].figures[0].difference == ""
 
 
+def test_no_change_is_good_or_bad_next_to_a_run_that_is_lost():
+    lost, kept = {"sideslip_peak_rad": 0.9}, {"sideslip_peak_rad": 0.1}
+    for runs in ({"none": lost, "ars": kept}, {"none": kept, "ars": lost}):
+        (figure,) = told(through_cones(**runs))["ars"].figures
+        assert figure.difference
+        assert figure.change is Change.OTHER
+
+
+def test_no_change_is_good_or_bad_next_to_a_run_that_ended_early():
+    runs = {
+        "none.mcap": recording_of(step_steer(), "none", metrics={"yaw_rate_overshoot": 0.4}),
+        "ars.mcap": recording_of(step_steer(), "ars", metrics={"yaw_rate_overshoot": 0.1}, complete=False, error="x"),
+    }
+    (figure,) = told(groups_of(runs)[0])["ars"].figures
+    assert figure.change is Change.OTHER
+
+
 def test_numbers_are_whole_where_they_count_and_shares_are_of_something():
     assert number("cones_hit", 8.0) == "8"
     assert (number("stays_in_lanes", 1.0), number("stays_in_lanes", 0.0)) == ("yes", "no")
