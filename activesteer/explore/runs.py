@@ -199,5 +199,6 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
             metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
             size = abs(value) if metric.better is Better.SMALLER else value
             shown = size if math.isfinite(size) else None
-            found.append({"title": figure.title, "unit": metric.unit_name, "value": shown})
+            digits = 0 if metric.whole else None  # by size
+            found.append({"title": figure.title, "unit": metric.unit_name, "value": shown, "digits": digits})
     return found

@@ -49,6 +49,8 @@ def test_values_are_written_with_the_digits_of_their_quantity(channel, value, te
         ("vehicle.controllers.ars.corrector.deadband_end_degps", "ARS corrector: deadband end [deg/s]"),
         ("load.cg_height_change_m", "load: centre of gravity height change [m]"),
         ("sensors.preset", "sensors: preset"),
+        ("steer.lateral_acceleration_mps2", "steer: lateral acceleration [m/s²]"),
+        ("controllers.ars.corrector.derivative_gain_s2", "ARS corrector: derivative gain [s²]"),
     ],
 )
 def test_parameters_are_called_by_the_words_of_their_keys(key, title):

@@ -140,7 +140,7 @@ function showFigures() {
   const rows = runs.map((run) => element("tr", {}, element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), run.label), ...titles.map((title) => {
     const now = run.figures.find((figure) => figure.title === title), before = state.ghosts.get(run.name)?.figures?.find((figure) => figure.title === title);
     const change = now?.value != null && before?.value != null ? now.value - before.value : null;
-    return element("td", {}, number(now?.value), element("span", {}, change == null || Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change)}`));
+    return element("td", {}, number(now?.value, now?.digits), element("span", {}, change == null || Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change, now.digits)}`));
   })));
   $("figures").replaceChildren(head, ...rows);
 }

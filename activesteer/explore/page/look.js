@@ -22,4 +22,4 @@ export const element = (name, attributes = {}, ...children) => {
   made.append(...children);
   return made;
 };
-export const number = (value, digits) => (value == null ? "–" : value.toFixed(digits ?? (Math.abs(value) < 10 ? 2 : Math.abs(value) < 1000 ? 1 : 0)).replace("-", "−"));
+export { number } from "./number.js";

@@ -20,6 +20,7 @@ from activesteer.analysis.report.results import Result, results
 from activesteer.analysis.report.significance import Change
 from activesteer.analysis.report.tables import difference_text, number
 from activesteer.errors import ParameterError, RecordingError
+from activesteer.metric_table import recorded_metric
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M
 from activesteer.signals import Channel
@@ -184,6 +185,7 @@ def test_no_change_is_good_or_bad_next_to_a_run_that_ended_early():
 def test_numbers_are_whole_where_they_count_and_shares_are_of_something():
     assert number("cones_hit", 8.0) == "8"
     assert (number("stays_in_lanes", 1.0), number("stays_in_lanes", 0.0)) == ("yes", "no")
+    assert (number("ay_peak_mps2", -1e-5), recorded_metric("ay_peak_mps2").text(-1e-5)) == ("0.000", "0.000")
     assert number("ay_peak_mps2", -3.0) == "\N{MINUS SIGN}3.000"
     assert difference_text("cones_hit", 10.0, 8.0) == ("+2", "")
     assert difference_text("sideslip_gates_rms_rad", 0.0002, 0.0001).percent == ""  # 0.006 deg are nearly nothing

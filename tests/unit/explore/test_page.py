@@ -15,12 +15,14 @@ PAGE = Path(str(resources.files("activesteer.explore"))) / "page"
 
 
 def script(tmp_path: Path, text: str) -> Any:
-    """Return what a script that imports the page's module prints as JSON."""
+    """Return what a script that imports modules of the page prints as JSON."""
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed: apt-get install nodejs")
-    (tmp_path / "asking.mjs").write_text((PAGE / "asking.js").read_text("utf-8"))
-    (tmp_path / "test.mjs").write_text(f'import {{ Asking, untickBeyond }} from "./asking.mjs";\n{text}')
+    for name in ("asking", "number"):
+        (tmp_path / f"{name}.mjs").write_text((PAGE / f"{name}.js").read_text("utf-8"))
+    imports = 'import { Asking, untickBeyond } from "./asking.mjs";\nimport { number } from "./number.mjs";\n'
+    (tmp_path / "test.mjs").write_text(f"{imports}{text}")
     done = subprocess.run([node, tmp_path / "test.mjs"], capture_output=True, text=True, timeout=60, check=True)
     return json.loads(done.stdout)
 
@@ -77,3 +79,9 @@ def test_four_controllers_stay_ticked(tmp_path: Path) -> None:
 
 def test_enter_in_a_field_cannot_submit_the_page() -> None:
     assert "<form" not in (PAGE / "index.html").read_text("utf-8")
+
+
+def test_numbers_are_whole_where_they_count_and_zero_has_no_sign(tmp_path: Path) -> None:
+    values = "[[0, 0], [-0.04, 1], [-0.06, 1], [2.5], [-123.45], [null]]"
+    texts = script(tmp_path, f"console.log(JSON.stringify({values}.map(([value, digits]) => number(value, digits))));")
+    assert texts == ["0", "0.0", "\N{MINUS SIGN}0.1", "2.50", "\N{MINUS SIGN}123.5", "\N{EN DASH}"]

@@ -52,3 +52,14 @@ def test_the_shape_of_the_car_covers_its_length_and_stands_on_four_wheels(tmp_pa
     body = np.concatenate([at for panel, at in zip(panels, points, strict=True) if panel["body"] == "chassis"])
     assert 3.5 < np.ptp(body[:, 0]) < 5.2
     assert {panel["body"] for panel in panels} >= {"fl_wheel", "fr_wheel", "rl_wheel", "rr_wheel"}
+
+
+def test_a_count_has_no_decimals_and_groups_of_gains_are_named_in_words(tmp_path: Path) -> None:
+    choice: dict[str, Any] = {"maneuver": "slalom", "controllers": ("ars",)}
+    runs = Runs(Folder(tmp_path))
+    figures = next(iter(runs.run(Run(**choice), lambda: False))).header["figures"]
+    assert {figure["title"]: figure["digits"] for figure in figures}["Cones hit"] == 0
+    assert {figure["title"]: figure["digits"] for figure in figures}["Peak sideslip"] is None
+    groups = {slider["group"] for slider in runs.describe(Describe(**choice)).header["sliders"]}
+    assert {"ARS", "desired yaw rate"} <= groups
+    assert not any("_" in group for group in groups)
