@@ -231,12 +231,13 @@ def parameter_title(key: str) -> str:
 
 
 _POWER: Final = re.compile(r"(?<=[a-z])2\b")
+_NEGATIVE_ZERO: Final = re.compile(r"(?<![\w.)\]-])-(?=0(?:\.0+)?(?![\d.]))")
 _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 
 def typeset(text: str) -> str:
-    """Return a text of numbers for a page: minus signs instead of hyphens, and m/s² with its superscript."""
-    return _NEGATIVE.sub("\N{MINUS SIGN}", text).replace("m/s2", "m/s²")
+    """Return a text of numbers for a page: minus signs instead of hyphens, none before zero, and m/s² as such."""
+    return _NEGATIVE.sub("\N{MINUS SIGN}", _NEGATIVE_ZERO.sub("", text)).replace("m/s2", "m/s²")
 
 
 def _row(
