@@ -345,6 +345,15 @@ def test_instants_of_the_standard_are_marked(page):
     assert step["marks"] == cones["marks"] == []
 
 
+def test_phases_of_a_manoeuvre_are_marked():
+    run = recording_of(step_steer())
+    run.metadata["events"] = [
+        {"time_s": at, "kind": "phase", "what": name} for name, at in (("go", 0.0), ("turn", 1.0))
+    ]
+    (shown,) = data_of(report_page({"a.mcap": run}))
+    assert shown["marks"] == [{"time_s": 0.0, "text": "go"}, {"time_s": 1.0, "text": "turn"}]
+
+
 def test_what_is_not_finite_is_left_out():
     run = step_steer()
     run.channels["yaw_rate_radps"] = np.where(run.time_s > 3.0, math.nan, run.channels["yaw_rate_radps"])
