@@ -113,7 +113,8 @@ class Metric(NamedTuple):
             return "-"
         if self.form is Form.YES_OR_NO:
             return "yes" if value else "no"
-        return f"{value:.0f}" if self.form is Form.COUNT else f"{value * self.unit.factor:.3f}"
+        text = f"{value:.0f}" if self.form is Form.COUNT else f"{value * self.unit.factor:.3f}"
+        return text.lstrip("-") if float(text) == 0.0 else text
 
     def cost(self, value: float) -> float:
         """Return what shall be small [SI]; the value itself where the metric has no preferred direction."""

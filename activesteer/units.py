@@ -50,7 +50,7 @@ _ROWS: Final = (
     ("deg/s", "degps", _DEG, (0, 0, -1, 1), "deg/s", "°/s,deg/sec,degps,dps,grad/s"),
     ("rpm", "", _TURN / 60.0, (0, 0, -1, 1), "rpm", "1/min,u/min,r/min,rev/min"),
     ("Hz", "Hz", _TURN, (0, 0, -1, 1), "Hz", "rev/s"),
-    ("rad/s2", "radps2", 1.0, (0, 0, -2, 1), "rad/s2", ""),
+    ("rad/s2", "radps2", 1.0, (0, 0, -2, 1), "rad/s²", "rad/s²"),
     ("m", "m", 1.0, (0, 1, 0, 0), "m", ""),
     ("mm", "mm", 1e-3, (0, 1, 0, 0), "mm", ""),
     ("cm", "", 1e-2, (0, 1, 0, 0), "cm", ""),
@@ -64,9 +64,9 @@ _ROWS: Final = (
     ("s", "s", 1.0, (0, 0, 1, 0), "s", ""),
     ("ms", "", 1e-3, (0, 0, 1, 0), "ms", ""),
     ("us", "", 1e-6, (0, 0, 1, 0), "us", ""),
-    ("s2", "s2", 1.0, (0, 0, 2, 0), "s2", ""),
+    ("s2", "s2", 1.0, (0, 0, 2, 0), "s²", "s²"),
     ("kg", "kg", 1.0, (1, 0, 0, 0), "kg", ""),
-    ("kg m2", "kgm2", 1.0, (1, 2, 0, 0), "kg m2", ""),
+    ("kg m2", "kgm2", 1.0, (1, 2, 0, 0), "kg m²", "kg m²"),
     ("N", "N", 1.0, (1, 1, -2, 0), "N", ""),
     ("kN", "", 1e3, (1, 1, -2, 0), "kN", ""),
     ("N/m", "Npm", 1.0, (1, 0, -2, 0), "N/m", ""),
@@ -214,11 +214,14 @@ def parameter_label(key: str) -> tuple[str, str]:
     """
     stem, unit = split_ending(key)
     *tables, name = stem.split(".")
-    within, what = (
-        " ".join(_PARAMETER_WORDS.get(word, word) for part in parts for word in part.split("_"))
-        for parts in ([table for table in tables if table not in _FILES], [name])
-    )
-    return f"{within}: {what}" if within else what, unit.name
+    within = " ".join(parameter_words(table) for table in tables if table not in _FILES)
+    what = parameter_words(name)
+    return f"{within}: {what}" if within else what, _POWER.sub("²", unit.name)
+
+
+def parameter_words(name: str) -> str:
+    """Return the words of one part of a key, such as `desired yaw rate` or `ARS`."""
+    return " ".join(_PARAMETER_WORDS.get(word, word) for word in name.split("_"))
 
 
 def parameter_title(key: str) -> str:
@@ -227,12 +230,14 @@ def parameter_title(key: str) -> str:
     return f"{words} [{unit}]" if unit else words
 
 
+_POWER: Final = re.compile(r"(?<=[a-z])2\b")
+_NEGATIVE_ZERO: Final = re.compile(r"(?<![\w.)\]-])-(?=0(?:\.0+)?(?![\d.]))")
 _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 
 def typeset(text: str) -> str:
-    """Return a text of numbers for a page: minus signs instead of hyphens, and m/s² with its superscript."""
-    return _NEGATIVE.sub("\N{MINUS SIGN}", text).replace("m/s2", "m/s²")
+    """Return a text of numbers for a page: minus signs instead of hyphens, none before zero, and m/s² as such."""
+    return _NEGATIVE.sub("\N{MINUS SIGN}", _NEGATIVE_ZERO.sub("", text)).replace("m/s2", "m/s²")
 
 
 def _row(

@@ -42,7 +42,17 @@ def is_lost(metrics: Metrics) -> bool:
     A car is lost if it spins, if it does not keep to the lanes of its course, or if it passes a cone of a slalom on the
     wrong side or not at all. A cone that is touched does not count.
     """
-    if has_spun(metrics) or (STAYS_IN_LANES in metrics and _number(metrics, STAYS_IN_LANES) != 1.0):
+    return has_spun(metrics) or _leaves_course(metrics)
+
+
+def is_controlled(metrics: Metrics) -> bool:
+    """Return whether nothing tells that the car was lost; a manoeuvre may have no metric that could."""
+    tells = any(name in metrics for name in (*SIDESLIP_PEAKS, "heading_end_rad"))
+    return not ((tells and has_spun(metrics)) or _leaves_course(metrics))
+
+
+def _leaves_course(metrics: Metrics) -> bool:
+    if STAYS_IN_LANES in metrics and _number(metrics, STAYS_IN_LANES) != 1.0:
         return True
     return CONES_MISSED in metrics and _number(metrics, CONES_MISSED) != 0.0
 

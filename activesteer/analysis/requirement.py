@@ -1,14 +1,15 @@
 """Requirements on runs, with a graded distance: expressions over metrics.
 
 An example is `max(0, lane_overstep_m(lqr)) - max(0, lane_overstep_m(none)) <= 0.05`. `METRIC(CONTROLLER, MANEUVER)` is
-the metric of that run [SI]; the manoeuvre may be left out if there is only one.
+the metric of that run; the manoeuvre may be left out if there is only one. The ending of the name gives the unit: SI
+units, or those of keys in files, such as `sideslip_peak_abs_deg`.
 `harm(CONTROLLER)` is the largest growth of a measure of harm against `none`, in multiples of its size
 (`analysis.harm`). `+ - * /`, `min`, `max` and `abs` are allowed; comparisons may be joined by `and` and `or`.
 `claim(S1)` is a statement of the paper.
 
-The *margin* of a comparison is its distance to the limit, in multiples of the limit, or in SI units if the limit is 0.
-It is negative if the comparison is violated, and not defined (nan) if a metric is not. `and` takes the smallest margin,
-`or` the largest.
+The *margin* of a comparison is its distance to the limit, in multiples of the limit, or in its own unit for a limit of
+0. It is negative if the comparison is violated, and not defined (nan) if a metric is not. `and` takes the smallest
+margin, `or` the largest.
 
 Sources: G. Fainekos, G. Pappas, Robustness of temporal logic specifications for continuous-time signals, Theoretical
 Computer Science 410 (2009); Y. Annpureddy et al., S-TaLiRo, TACAS 2011; A. Donze, Breach, CAV 2010.
@@ -23,7 +24,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from activesteer.analysis.harm import changes, severity
-from activesteer.config import Source
+from activesteer.config import Source, field_in_unit
 from activesteer.errors import nearest_names, shown
 from activesteer.metric_table import METRICS
 
@@ -146,7 +147,8 @@ class Expression:
     def _metric(self, name: str, controller: str, maneuver: str = "") -> _Number:
         names = self._names
         known = [HARM, CLAIMS_FAILED, *METRICS]
-        if name not in known:
+        metric, factor = field_in_unit(name, known)
+        if metric is None:
             raise self._fail(f"{name}: {nearest_names(name, known)};")
         if controller == ANY and names.examined:
             controller = names.examined
@@ -162,11 +164,12 @@ class Expression:
             )
             raise self._fail(f"{problem}; {nearest_names(maneuver, names.maneuvers)};")
         run, base = Run(controller, maneuver), Run(NONE, maneuver)
-        self.metrics[name, run] = None
-        if name == HARM:
-            self.metrics[name, base] = None
+        self.metrics[metric, run] = None
+        if metric == HARM:
+            self.metrics[metric, base] = None
             return lambda runs: severity(changes(runs[base], runs[run]))
-        return _value_of(name, run)
+        value = _value_of(metric, run)
+        return value if factor == 1.0 else lambda runs: value(runs) / factor
 
 
 class Requirement(Expression):

@@ -9,8 +9,9 @@ from activesteer.analysis.loss_of_control import LOST, shown
 from activesteer.metric_table import TYRE_USE, recorded_metric
 from activesteer.text_table import text_table, wrapped_line
 
-Paint = Callable[[str, float, float, str], str]
-"""Function from the name of a metric, its value in a run and in the first run, and its text to the text as shown."""
+Paint = Callable[[str, str, float, float, str], str]
+"""Function from label of a run, name of a metric, its value in this and in the first run, and its text to the text
+as shown."""
 
 TYRE_USE_NOTE: Final = (
     "tyre use is the force of a tyre relative to its peaks along and across, each alone; combined slip and shifts of "
@@ -36,9 +37,9 @@ def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = No
         numbers = [
             shown(name, metrics, metric.text(metrics[name])) if name in metrics else "" for metrics in runs.values()
         ]
-        for place, (metrics, text) in enumerate(zip(list(runs.values())[1:], numbers[1:], strict=True), start=1):
-            if paint is not None and name in metrics and name in first and LOST not in numbers:
-                numbers[place] = paint(name, metrics[name], first[name], text)
+        for place, (run, metrics) in enumerate(runs.items()):
+            if paint is not None and place and name in metrics and name in first and LOST not in numbers:
+                numbers[place] = paint(run, name, metrics[name], first[name], numbers[place])
         rows.append([metric.label, metric.unit.name, *numbers])
     return "\n".join((*text_table(rows, text=2, repeat=2, least=8), *notes(runs)))
 

@@ -7,6 +7,7 @@ import sys
 import webbrowser
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -220,7 +221,8 @@ def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
 
     metrics = {label: recording.metrics for label, recording in recordings.items()}
     names = [metric.name for metric in evaluation_of(next(iter(recordings.values()))).key_metrics]
-    print(comparison(metrics if every else {run: _chosen(found, names) for run, found in metrics.items()}, _paint))
+    told = metrics if every else {run: _chosen(found, names) for run, found in metrics.items()}
+    print(comparison(told, partial(_paint, metrics)))
     _print_outcomes(metrics)
     total = len({name for found in metrics.values() for name in found})
     if not every and total > len(names):
@@ -231,10 +233,15 @@ def _chosen(metrics: Mapping[str, float], names: Sequence[str]) -> dict[str, flo
     return {name: metrics[name] for name in names if name in metrics}
 
 
-def _paint(name: str, value: float, first: float, text: str) -> str:
-    """Return a value in green if it is better than in the first run, in red if it is worse."""
+def _paint(
+    metrics: Mapping[str, Mapping[str, float]], run: str, name: str, value: float, first: float, text: str
+) -> str:
+    """Return a value in green if it is better than in the first run, in red if it is worse; plain if a run is lost."""
+    from activesteer.analysis.loss_of_control import is_controlled
     from activesteer.analysis.report.significance import Change, significance
 
+    if not (is_controlled(metrics[run]) and is_controlled(next(iter(metrics.values())))):
+        return text
     colour = {Change.BETTER: GOOD, Change.WORSE: BAD}.get(significance(name, value, first))
     return text if colour is None else painted(text, colour)
 
@@ -334,6 +341,7 @@ def _explore(options: argparse.Namespace) -> int:
             f"explore needs {error.name}, which is not installed: pip install 'activesteer[explore]'"
         ) from error
     server = ExploreServer(Path(options.output), port)
+    options.saved = server.saved  # other programs may write into the same folder
 
     def listening() -> None:
         if options.json:

@@ -36,8 +36,8 @@ class StopSignals:
 
     Attributes:
         number: Number of the signal that arrived; None before.
-        options: Options of the command. `output` is the file or folder that it writes; `how_to_resume`, if set,
-            follows the list of saved files.
+        options: Options of the command. `output` is the file or folder that it writes; `saved`, if set, lists the
+            only files in a folder that are its own; `how_to_resume`, if set, follows the list of saved files.
         finished: Whether the command is done and only the interpreter has to end.
     """
 
@@ -130,7 +130,11 @@ class StopSignals:
     def _saved(self, *, in_order: bool) -> str:
         """Return the files that the command has written, in words."""
         output: Path | None = getattr(self.options, "output", None)
-        files = [path for path in _files(output) if path.stat().st_mtime_ns >= self._begun_ns]
+        own: list[Path] | None = getattr(self.options, "saved", None)
+        if own is None:
+            files = [path for path in _files(output) if path.stat().st_mtime_ns >= self._begun_ns]
+        else:
+            files = [path for path in own if path.is_file()]
         if not files:
             return "nothing was saved"
         parts = {path: _part(path, in_order=in_order) for path in files}

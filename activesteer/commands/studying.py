@@ -199,7 +199,7 @@ def _tune(options: argparse.Namespace) -> int:
 def _lines(found: Tuning) -> Iterator[str]:
     yield f"{found.done} sets tried, {found.failed} with a failed run; the best:"
     for trial in found.front:
-        yield "  ".join(f"{name} {value:.4g}" for name, value in trial.objectives.items()) or _held(trial)
+        yield "  ".join(f"{name} {value:.6g}" for name, value in trial.objectives.items()) or _held(trial)
         if found.plausibility is None or trial is found.front[0]:
             yield from _values(trial)
     if pairs := found.never_together:
@@ -222,9 +222,9 @@ def _worst(found: Tuning) -> Iterator[str]:
         return
     yield f"  {verdict} in {found.violations} of {len(found.trials)} sets ({found.runs} runs{failed})"
     falls = found.fall
-    yield f"  least margin {falls[-1][1]:.4g}"
+    yield f"  least margin {falls[-1][1]:.6g}"
     shown = falls if len(falls) <= _SHOWN_FALLS else [*falls[:1], *falls[1 - _SHOWN_FALLS :]]
-    yield "  fell: " + ", ".join(f"{value:.3g} after {runs} runs" for runs, value in shown)
+    yield "  fell: " + ", ".join(f"{value:.4g} after {runs} runs" for runs, value in shown)
     yield from _values(found.front[0], "    ")
     yield from (f"  {command}" for command in found.commands.values())
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -109,6 +109,7 @@ def _tell(
         _print_settings(results)
     else:
         _print_scenarios(next(iter(results.values())))
+    _print_hints(options, results)
 
 
 def _json(result: Reproduction) -> dict[str, Any]:
@@ -118,18 +119,30 @@ def _json(result: Reproduction) -> dict[str, Any]:
 
 
 def _print_scenarios(result: Reproduction) -> None:
-    """Print a line for each scenario: how many claims are reproduced, and the verdicts of all others."""
+    """Print how many claims are reproduced, by scenario and in all, with the texts of the others."""
     from activesteer.analysis.claims.scorecard import Verdict
 
+    words = {Verdict.FAILED: "FAILED", Verdict.NOT_REPRODUCED: "not reproduced"}
     width = max(map(len, result.paths), default=0)
     for scenario in result.paths:
         judged = _judged(result, scenario)
-        passed = sum(item.claim.passed for item in judged)
-        words = f"{passed} of {len(judged)} claims reproduced" if judged else "not judged: a run failed"
-        for verdict, name in ((Verdict.FAILED, "FAILED"), (Verdict.NOT_REPRODUCED, "not")):
-            if claims := [item.claim.id for item in judged if item.verdict is verdict]:
-                words += f"; {name}: {' '.join(claims)}"
-        print_entry(f"{scenario:{width}}  ", words, hanging=width + 2)
+        print(f"{scenario:{width}}  {_reproduced(judged) if judged else 'not judged: a run failed'}")
+        for item in judged:
+            if item.verdict in words:
+                print_entry(f"  {item.claim.id}  {coloured(words[item.verdict])}  ", item.claim.text, hanging=6)
+    print(f"{'all':{width}}  {_reproduced(result.scorecard.judged)}")
+
+
+def _reproduced(judged: Sequence[Judged]) -> str:
+    return f"{sum(item.claim.passed for item in judged)} of {len(judged)} claims reproduced"
+
+
+def _print_hints(options: argparse.Namespace, settings: Collection[str]) -> None:
+    """Print which options show more."""
+    if not options.all:
+        print("--all prints every claim with its numbers")
+    if "paper" not in settings and options.vehicle == "compact":
+        print("--setting paper drives the most plausible numbers for what the paper leaves open")
 
 
 def _judged(result: Reproduction, scenario: str) -> list[Judged]:

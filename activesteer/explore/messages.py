@@ -13,7 +13,7 @@ from activesteer.resources import DEFAULT_DRIVER
 
 MAX_MESSAGE_BYTES: Final = 20_000
 """Largest message of the page; its choices have some hundred bytes."""
-MAX_CONTROLLERS: Final = 3
+MAX_CONTROLLERS: Final = 4
 MAX_WAITING: Final = 100
 """Largest number of messages that wait; the newest choice and the newest hands replace older ones."""
 _MAX_NUMBERS: Final = 300

@@ -17,6 +17,7 @@ from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.results import KEY_FIGURES
 from activesteer.analysis.report.run_page import write_report
+from activesteer.controllers import find_controller
 from activesteer.conventions import run_looks
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.car_shape import poses_of, shape_of
@@ -24,6 +25,7 @@ from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import Choice, Describe, Run
 from activesteer.explore.sliders import Slider, sliders
 from activesteer.metric_table import Better, recorded_metric
+from activesteer.plugins import Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import Scenario, resolve
@@ -53,7 +55,7 @@ class Runs:
         """Start without a run."""
         self.folder = folder
         self._held_rad: dict[tuple[str, str], float] = {}
-        self._kept: dict[str, Recording] = {}
+        self._kept: dict[str, tuple[str, Recording]] = {}  # name -> label and recording of its last run
         self._choice: tuple[Choice, dict[str, float]] | None = None
 
     def describe(self, choice: Describe) -> Reply:
@@ -88,14 +90,16 @@ class Runs:
         for name in choice.controllers:
             look = looks[name]
             run = {"kind": "run", "name": name, "label": look.label, "place": look.place, "dashes": look.dashes}
+            run["title"] = scenario.maneuver.title or choice.maneuver
             try:
-                recording = self._driven(scenario, self.folder.located(name), stale)
+                controller = find_controller(self.folder.located(name))
+                recording = self._driven(scenario, controller, stale)
             except ActiveSteerError as error:
                 yield Reply({**run, "error": str(error)})
                 continue
             if recording is None:
                 return
-            self._kept[name] = recording
+            self._kept[name] = controller.label, recording
             step_s, poses = poses_of(recording)
             shown = plots(groups_of({f"{name}.mcap": recording})[0])
             yield Reply({**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}, (poses,))
@@ -104,25 +108,21 @@ class Runs:
     def save(self) -> Reply:
         """Write the last runs as recordings."""
         paths = []
-        for name, recording in self._runs().items():
-            path = self._free(f"{recording.metadata['maneuver']['name']}_{_plain(name)}", ".mcap")
+        for label, recording in self._runs().values():
+            path = free_path(self.folder.path, f"{recording.metadata['maneuver']['name']}-{label}", ".mcap")
             recording.save(path)
             paths.append(path)
         return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": str(self.folder.path)})
 
     def report(self, path: Path) -> Reply:
         """Write a report of the last runs."""
-        write_report({f"{_plain(name)}.mcap": recording for name, recording in self._runs().items()}, path)
+        write_report({f"{_plain(name)}.mcap": recording for name, (_, recording) in self._runs().items()}, path)
         return Reply({"kind": "report"})
 
-    def _runs(self) -> dict[str, Recording]:
+    def _runs(self) -> dict[str, tuple[str, Recording]]:
         if not self._kept:
             raise ParameterError("there is no run to save yet; move a slider or choose a manoeuvre")
         return self._kept
-
-    def _free(self, stem: str, suffix: str) -> Path:
-        """Return a path in the folder that does not exist yet."""
-        return free_path(self.folder.path, stem, suffix)
 
     def _resolved(self, choice: Choice, overrides: Mapping[str, float]) -> Scenario:
         maneuver, vehicle, driver = map(self.folder.located, (choice.maneuver, choice.vehicle, choice.driver))
@@ -147,7 +147,7 @@ class Runs:
         self._held_rad[key] = steer.steer.steering_wheel_rad
         return ready
 
-    def _driven(self, scenario: Scenario, controller: str, stale: Callable[[], bool]) -> Recording | None:
+    def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
         """Return the recording of a run; None if a newer choice has come."""
         if stale():
             return None
@@ -199,5 +199,6 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
             metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
             size = abs(value) if metric.better is Better.SMALLER else value
             shown = size if math.isfinite(size) else None
-            found.append({"title": figure.title, "unit": metric.unit_name, "value": shown})
+            digits = 0 if metric.whole else None  # by size
+            found.append({"title": figure.title, "unit": metric.unit_name, "value": shown, "digits": digits})
     return found

@@ -31,7 +31,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from activesteer.errors import ActiveSteerError
 from activesteer.explore.drive import COURSES
-from activesteer.explore.messages import MAX_MESSAGE_BYTES, End, Message, add, read
+from activesteer.explore.messages import MAX_CONTROLLERS, MAX_MESSAGE_BYTES, End, Message, add, read
 from activesteer.explore.worker import work
 from activesteer.files import finite
 from activesteer.version import __version__
@@ -55,6 +55,9 @@ class ExploreServer:
         Args:
             folder: Folder of the user's own files and of recordings.
             port: Port; 0 for any free one.
+
+        Attributes:
+            saved: Files of the folder that the page has saved.
         """
         self._socket = socket.socket()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -70,7 +73,8 @@ class ExploreServer:
         self._host = f"{HOST}:{self._socket.getsockname()[1]}"
         self.url = f"http://{self._host}/{self._token}/"
         self._report = ""
-        self._folder = str(folder.resolve())
+        self._given_folder, self._folder = folder, str(folder.resolve())
+        self.saved: list[Path] = []
         self._waiting: deque[Message] = deque()
         self._came = asyncio.Event()
         self._ready: tuple[dict[str, Any], list[Any]] | None = None
@@ -136,7 +140,7 @@ class ExploreServer:
         text = (resources.files("activesteer.explore") / "page" / "index.html").read_text("utf-8")
         colours = {
             "light": RUN_COLOURS, "dark": RUN_COLOURS_ON_DARK, "version": __version__,
-            "courses": {name: course.title for name, course in COURSES.items()},
+            "mostControllers": MAX_CONTROLLERS, "courses": {name: course.title for name, course in COURSES.items()},
         }  # fmt: skip
         text = text.replace("{{ data }}", json.dumps(colours).replace("<", "\\u003c"))
         return HTMLResponse(text, headers={"Content-Security-Policy": _POLICY.format(host=self._host)})
@@ -220,6 +224,9 @@ class ExploreServer:
                 continue
             if header["kind"] == "ready":
                 self._ready = header, arrays
+            if header["kind"] in {"saved", "drive"}:
+                names = header["files"] if header["kind"] == "saved" else [header["file"]]
+                self.saved += [self._given_folder / name for name in names]
             if header["kind"] == "report":
                 self._report = header.pop("html")
             await self._deliver(header, arrays)

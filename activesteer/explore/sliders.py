@@ -12,7 +12,7 @@ from activesteer.controllers import declared_parameters
 from activesteer.errors import ParameterError
 from activesteer.plugins import Declared
 from activesteer.scenario import Scenario, value_of
-from activesteer.units import parameter_label
+from activesteer.units import parameter_label, parameter_words
 
 _MANEUVER: Final = {
     "speed_kmh": (20.0, 160.0, 1.0),
@@ -48,7 +48,7 @@ class Slider(NamedTuple):
         key: Key as `--set` takes it.
         label: Label in words.
         unit: Unit of its value; empty for a pure number.
-        group: `manoeuvre`, `car`, or the name of a controller.
+        group: `manoeuvre`, `car`, or the name of a controller or of a table of gains, in words.
         low: Least value.
         high: Greatest value.
         step: Distance between two values.
@@ -110,7 +110,7 @@ def _gain(key: str, declared: Declared) -> Slider | None:
     bottom = max(low, 0.0 if value >= 0.0 else -top)
     digits = 4 - math.floor(math.log10(max(top - bottom, 1e-9)))
     label, unit = _label(f"{tables}.{shown}")
-    group = tables.split(".")[1] if "." in tables else tables
+    group = parameter_words(tables.split(".")[1] if "." in tables else tables)
     return Slider(
         f"{tables}.{shown}", label, unit or declared.unit, group, bottom, round(top, digits),
         round((top - bottom) / _STEPS, digits), value,

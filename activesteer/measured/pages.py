@@ -34,10 +34,9 @@ def comparison_page(found: Comparison, measured: list[str], simulated: str) -> P
     Raises:
         ParameterError: matplotlib is not installed.
     """
-    shifts = ", ".join("unknown" if math.isnan(shift_s) else f"{1e3 * shift_s:.1f} ms" for shift_s in found.shifts_s)
     lead = [
         f"Measured: {', '.join(measured)}. Simulated: {simulated}. {STANDARDS[found.standard]}.",
-        f"Measured later than simulated by {shifts}; the runs are shown without this shift.",
+        f"Measured {', '.join(map(_shift, found.shifts_s))} than simulated; the runs are shown without this shift.",
     ]
     columns = ["quantity", "rms of the residual", "tolerance", "share inside", ""]
     outside = frozenset(number for number, each in enumerate(found.quantities) if not each.inside)
@@ -46,6 +45,13 @@ def comparison_page(found: Comparison, measured: list[str], simulated: str) -> P
     heading = "Measured and simulated: " + (passed("inside") if found.inside else failed("outside"))
     sections = [Section(tables=[table]), Section(pictures=pictures), Section("Assumptions", points=assumptions(found))]
     return Page(f"activesteer compare: {simulated}", heading, lead, sections)
+
+
+def _shift(shift_s: float) -> str:
+    """Return in words how much later a measured run is."""
+    if math.isnan(shift_s):
+        return "by an unknown time later"
+    return f"{1e3 * abs(shift_s):.1f} ms {'earlier' if shift_s < 0.0 else 'later'}"
 
 
 def picture(found: Compared, standard: str, runs: int, more: Sequence[Area] = ()) -> Picture:

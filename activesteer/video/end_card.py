@@ -34,17 +34,20 @@ def end_card(
     margin, line, bar = (value * scale for value in (_MARGIN, _LINE, _BAR))
     large, text = font(_TITLE * scale), font(_TEXT * scale)
     room = size[0] - 4.0 * margin - 2.0 * bar
+    heads = _wrapped(title, lambda part: large.getlength(part) <= size[0] - 4.0 * margin) or [""]
+    above = margin + (0.6 + len(heads)) * line
     rows = [
         (part, colour if number == 0 else "")
         for words, colour in zip(lines, [*colours, *[""] * len(lines)], strict=False)
         for number, part in enumerate(_wrapped(words, lambda part: text.getlength(part) <= room))
     ]
-    height = min(round(2.0 * margin + 1.6 * line + line * len(rows)), size[1])
+    height = min(round(above + line * len(rows) + margin), size[1])
     card = Image.new("RGBA", (max(round(size[0] - 2.0 * margin), 1), height), _SHADE)
-    write(card, (margin, margin + 0.5 * line), title, WHITE, large)
+    for number, head in enumerate(heads):
+        write(card, (margin, margin + (number + 0.5) * line), head, WHITE, large)
     pen = ImageDraw.Draw(card)
     for number, (words, colour) in enumerate(rows):
-        top = margin + 1.6 * line + number * line
+        top = above + number * line
         if colour:
             pen.rectangle((margin, top + 0.1 * line, margin + bar, top + 0.9 * line), (*bytes_of(colour), 255))
         write(card, (margin + 2.0 * bar, top + 0.5 * line), words, WHITE, text)

@@ -168,15 +168,19 @@ class Gauges:
         gap = round(_GAP * self._scale)
         right = f"{self._note}   {time}" if self._note else time
         room = self._size[0] - 4 * gap - self._text.getlength(right)
+        # A title that does not fit is written smaller, and is cut only if it still does not fit.
+        letters = self._text if self._text.getlength(self._title) <= room else self._small
         title, whole = self._title, len(self._title)
-        while whole and self._text.getlength(title) > room:
+        while whole and letters.getlength(title) > room:
             whole -= 1
             title = self._title[:whole].rstrip(" .,-") + "..." if whole > 2 else ""
         # The width is the same at any other time: all figures of this font have the same width.
-        ends = gap + self._text.getlength(title) + (2 * gap if title else 0)
+        ends = gap + letters.getlength(title) + (2 * gap if title else 0)
+        if title != self._title:
+            ends = max(ends, self._size[0] - gap - self._text.getlength(right))
         width = min(round(ends + self._text.getlength(right) + gap), self._size[0])
         layer = Image.new("RGBA", (width, self._title_row), PANEL)
-        write(layer, (gap, self._title_row / 2), title, WHITE, self._text)
+        write(layer, (gap, self._title_row / 2), title, WHITE, letters)
         write(layer, (ends, self._title_row / 2), right, GREY, self._text)
         picture.paste(layer, (0, 0), layer)
 

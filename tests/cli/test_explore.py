@@ -41,9 +41,14 @@ def url(folder: Path) -> Iterator[str]:
         url = json.loads(server.stdout.readline())["url"]
         SERVER[:] = [server.pid]
         yield url
+        (folder / "of_another_program.mcap").write_bytes(b"")
         server.send_signal(signal.SIGINT)
         assert server.wait(20) == 130
-        assert "Traceback" not in server.stderr.read()
+        (line,) = server.stderr.read().splitlines()
+        drives = [str(path) for path in folder.glob("drive_*.mcap")]
+        assert line.startswith(f"activesteer: stopped by Ctrl-C; {'saved: ' if drives else 'nothing was saved'}")
+        assert all(drive in line for drive in drives)
+        assert "another" not in line  # a file that this process did not save
 
 
 def status(url: str, path: str, host: str | None = None) -> tuple[int, bytes]:

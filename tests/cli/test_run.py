@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -253,18 +254,31 @@ def test_a_pipe_has_colours_only_where_they_are_forced(monkeypatch, environment,
     assert ("\x1b[" in painted("lost", BAD)) is colours
 
 
-def test_metrics_that_are_better_than_in_the_first_run_are_green_and_worse_ones_red(monkeypatch, capsys):
+def test_metrics_that_are_better_than_in_the_first_run_are_green_and_worse_ones_red(monkeypatch):
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("FORCE_COLOR", "1")
-    none = {"sideslip_peak_abs_rad": 0.8, "cones_hit": 0.0, "yaw_rate_peak_abs_radps": 0.5}
+    none = {"sideslip_peak_abs_rad": 0.3, "cones_hit": 0.0, "yaw_rate_peak_abs_radps": 0.5}
     ars = {"sideslip_peak_abs_rad": 0.1, "cones_hit": 2.0, "yaw_rate_peak_abs_radps": 0.6}
-    table = comparison({"none": none, "ars": ars}, run_command._paint)
+    runs = {"none": none, "ars": ars}
+    table = comparison(runs, partial(run_command._paint, runs))
     assert "\x1b[32m5.730\x1b[0m" in table
     assert "\x1b[31m2\x1b[0m" in table
     assert table.count("\x1b[0m") == 2
-    run_command._print_outcomes({"none": none, "ars": ars})
+    monkeypatch.delenv("FORCE_COLOR")
+    assert comparison(runs, partial(run_command._paint, runs)) == comparison(runs)
+
+
+def test_nothing_is_better_or_worse_next_to_a_run_that_is_lost(monkeypatch, capsys):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    lost = {"sideslip_peak_abs_rad": 0.8, "cones_hit": 0.0}
+    kept = {"sideslip_peak_abs_rad": 0.1, "cones_hit": 2.0}
+    better = {"sideslip_peak_abs_rad": 0.05, "cones_hit": 0.0}
+    for runs in ({"none": lost, "ars": kept}, {"none": kept, "ars": lost}):
+        assert comparison(runs, partial(run_command._paint, runs)) == comparison(runs)
+    runs = {"none": kept, "ars": lost, "afs": better}
+    assert comparison(runs, partial(run_command._paint, runs)).count("\x1b[32m") == 2
+    run_command._print_outcomes({"none": lost, "ars": kept})
     told = capsys.readouterr().out
     assert "none: \x1b[31mlost at 46 deg of sideslip\x1b[0m" in told
     assert "ars: \x1b[31mhits 2 cones\x1b[0m" in told
-    monkeypatch.delenv("FORCE_COLOR")
-    assert comparison({"none": none, "ars": ars}, run_command._paint) == comparison({"none": none, "ars": ars})

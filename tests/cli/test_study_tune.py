@@ -69,6 +69,9 @@ def test_a_search_goes_on_where_it_was(file, tmp_path, call):
     assert told.status == 0
     assert told.out.startswith("3 sets tried, 0 with a failed run; the best:")
     assert "road.mu = " in told.out
+    # Sets that differ by little can be told apart.
+    best = call("tune", str(file), "-o", folder, "--jobs", "1", "--json").json["front"][0]["objectives"]
+    assert told.out.splitlines()[1] == "  ".join(f"{name} {value:.6g}" for name, value in best.items())
 
 
 GRID = """

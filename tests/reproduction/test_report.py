@@ -20,10 +20,19 @@ def test_reproduce_writes_a_report_of_all_runs(
     main(["reproduce", "-o", str(tmp_path)])
     lines = capsys.readouterr().out.splitlines()
     assert f"report: {tmp_path / 'report.html'}" in lines
-    assert [line.split()[0] for line in lines[-5:]] == list(reproduced.paths)
-    assert all(re.fullmatch(r"\w+ +\d of \d claims reproduced(; not: [A-Z\d ]+)?", line) for line in lines[-5:])
+    counts = [found for line in lines if (found := re.fullmatch(r"(\w+) +(\d+) of (\d+) claims reproduced", line))]
+    assert [found[1] for found in counts] == [*reproduced.paths, "all"]
+    for place in (2, 3):
+        assert sum(int(found[place]) for found in counts[:-1]) == int(counts[-1][place])
+    others = [item.claim for item in reproduced.scorecard.judged if not item.claim.passed]
+    assert len(others) == int(counts[-1][3]) - int(counts[-1][2])
+    told = " ".join(" ".join(lines).split())
+    assert all(re.search(rf"{claim.id} (not reproduced|FAILED) {re.escape(claim.text)}", told) for claim in others)
+    assert lines[-2].startswith("--all ")
+    assert lines[-1].startswith("--setting paper ")
     main(["reproduce", "-o", str(tmp_path), "--all"])
     told = capsys.readouterr().out.splitlines()
+    assert not [line for line in told if line.startswith("--all ")]
     assert all(any(line.startswith(f"{number}  ") for line in told) for number in STATEMENTS)
     assert not [line for line in told if len(line) > 80 and str(tmp_path) not in line]
     page = (tmp_path / "report.html").read_text(encoding="utf-8")

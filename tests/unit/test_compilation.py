@@ -95,7 +95,7 @@ def test_an_edit_in_the_formula_of_a_tyre_counts(tmp_path: Path) -> None:
         "print(slip_stiffnesses(record, 4000.0, 0.0, 2.2e5)[1])"
     )
     before, _ = _run(call, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
-    edited = tmp_path / _PACKAGE.name / "tyre" / "kernels" / "pure_slip.py"
+    edited = tmp_path / _PACKAGE.name / "tyre" / "kernels" / "slip.py"
     text = edited.read_text()
     head, name, body = text.partition("def cornering_stiffness(")
     assert name

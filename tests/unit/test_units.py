@@ -7,7 +7,7 @@ import math
 import pytest
 
 from activesteer.metric_table import METRICS
-from activesteer.units import parameter_title, quantity_of
+from activesteer.units import parameter_title, quantity_of, typeset
 
 
 def test_the_channel_of_a_corner_is_shown_as_that_of_any_other():
@@ -49,7 +49,22 @@ def test_values_are_written_with_the_digits_of_their_quantity(channel, value, te
         ("vehicle.controllers.ars.corrector.deadband_end_degps", "ARS corrector: deadband end [deg/s]"),
         ("load.cg_height_change_m", "load: centre of gravity height change [m]"),
         ("sensors.preset", "sensors: preset"),
+        ("steer.lateral_acceleration_mps2", "steer: lateral acceleration [m/s²]"),
+        ("controllers.ars.corrector.derivative_gain_s2", "ARS corrector: derivative gain [s²]"),
     ],
 )
 def test_parameters_are_called_by_the_words_of_their_keys(key, title):
     assert parameter_title(key) == title
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("-0.0 deg", "0.0 deg"),
+        ("-0", "0"),
+        ("-0.05 m", "\N{MINUS SIGN}0.05 m"),
+        ("-1 to -0.00", "\N{MINUS SIGN}1 to 0.00"),
+    ],
+)
+def test_zero_has_no_minus_sign_on_a_page(text, shown):
+    assert typeset(text) == shown

@@ -47,6 +47,7 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     style.plain(axes[0], YAW_RATE.axis_title)
     style.plain(axes[1], FRONT.axis_title)
     time_panels.fill_panels(axes[2:], curves, (LATERAL, SIDESLIP, ROLL))
+    time_panels.shade_friction(axes, curves)
     figure.align_ylabels(axes)
     style.name_curves(
         figure, axes[0], [("desired", 1.0, style.DOTTED), ("front wheels", 0.8, "-"), ("added by a system", 2.2, "-")]

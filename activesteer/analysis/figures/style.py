@@ -38,6 +38,10 @@ DOTTED: Final[LineStyle] = (0.0, (1.0, 1.6))
 BAND_ALPHA: Final = 0.16
 BAND_LABEL: Final = "80 % of the population"
 """The band lies between 10 and 90 %."""
+FRONT_LABEL: Final = "added in front"
+"""Legend of the dotted line of a run that adds angles at both axles."""
+PATCH_COLOUR: Final = "#c3d9ec"
+"""Colour of a place with another friction."""
 MAX_POINTS: Final = 5000
 """Most samples of a curve: a picture cannot show more, and its file would be large."""
 
@@ -127,9 +131,15 @@ def added_channels(curve: DrawnRun) -> list[str]:
 
 
 def draw_added(axis: Axes, curve: DrawnRun, width: float = LINE_PT) -> None:
-    """Draw the angles that a system adds."""
-    for channel in added_channels(curve):
-        draw(axis, curve, ADDED._replace(channel=channel), width=width)
+    """Draw the angles that a system adds; if it adds two, the one in front is dotted."""
+    for place, channel in enumerate(added_channels(curve)):
+        label, dots = (f"_{FRONT_LABEL}", DOTTED) if place else ("", None)
+        draw(axis, curve, ADDED._replace(channel=channel), label=label, width=width, style=dots)
+
+
+def friction_label(low: float, high: float) -> str:
+    """Return the label of places with another friction, which keeps them out of the legend of their own axis."""
+    return f"_friction {low:.2g}" + (f" to {high:.2g}" if f"{low:.2g}" != f"{high:.2g}" else "")
 
 
 def present(panels: Sequence[Quantity], drawn: Sequence[DrawnRun]) -> list[Quantity]:
@@ -154,7 +164,10 @@ def plain(axis: Axes, title: str = "") -> None:
 
 
 def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, LineStyle]] = ()) -> None:
-    """Draw the legend of the runs above all axes, with further kinds of line by text, width and style."""
+    """Draw the legend of the runs above all axes, with further kinds of line by text, width and style.
+
+    Angles added in front, places with another friction and bands of the population get an entry if they are drawn.
+    """
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Patch  # noqa: PLC0415
 
@@ -162,6 +175,15 @@ def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, Li
     for text, width, style in lines:
         handles.append(Line2D([], [], color="#777777", linewidth=width, linestyle=style))
         labels.append(text)
+    everywhere = figure.get_axes()
+    lines_drawn = [line for axes in everywhere for line in axes.lines]
+    if front := [line.get_linewidth() for line in lines_drawn if line.get_label() == f"_{FRONT_LABEL}"]:
+        handles.append(Line2D([], [], color="#777777", linewidth=front[0], linestyle=DOTTED))
+        labels.append(FRONT_LABEL)
+    hidden = {str(patch.get_label()) for axes in everywhere for patch in axes.patches}
+    for label in sorted(label for label in hidden if label.startswith("_friction ")):
+        handles.append(Patch(color=PATCH_COLOUR, linewidth=0.0))
+        labels.append(label[1:])
     if any(collection.get_label() == f"_{BAND_LABEL}" for collection in axis.collections):
         handles.append(Patch(color="#777777", alpha=2.0 * BAND_ALPHA, linewidth=0.0))
         labels.append(BAND_LABEL)

@@ -60,7 +60,7 @@ def figure_24(recordings: Recordings) -> Figure:
 
 def general(recordings: Recordings) -> Figure:
     """Draw the main channels of any manoeuvre."""
-    return time_panels.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, LATERAL, SIDESLIP, ROLL, SPEED))
+    return time_panels.time_figure(recordings, (STEERING_WHEEL, YAW_RATE, ADDED, LATERAL, SIDESLIP, ROLL, SPEED))
 
 
 def _mark_instants(figure: Figure, recordings: Recordings) -> None:

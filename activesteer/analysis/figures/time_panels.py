@@ -11,6 +11,7 @@ import numpy as np
 from activesteer.analysis.figures.style import (
     ADDED,
     COLUMN_IN,
+    PATCH_COLOUR,
     SIDESLIP,
     SPEED,
     TEXT_PT,
@@ -19,12 +20,16 @@ from activesteer.analysis.figures.style import (
     curves,
     draw,
     draw_added,
+    friction_label,
     name_curves,
     plain,
     present,
 )
 from activesteer.analysis.source import RecordingLike
+from activesteer.conventions import CORNERS
+from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure
+from activesteer.recording.events import events_of
 from activesteer.units import Quantity
 
 if TYPE_CHECKING:
@@ -41,6 +46,13 @@ _INSET_CAPTION: Final = 0.16
 """Sizes of the inset, as fractions of the axis."""
 _SETTLED: Final = 0.05
 """Distance from the last value within which a signal has settled, as a fraction of its range."""
+_SAME_BORDER: Final = 0.002
+"""Largest distance between borders of runs that share a line, as a fraction of the time shown."""
+_SAME_FRICTION: Final = 1e-3
+_LETTER_IN: Final = 0.066
+"""Mean width of a letter of 8 pt, with some room [in]."""
+_SIDES_IN: Final = 0.6
+"""Width of the labels beside the axes [in]."""
 _BEFORE: Final = 0.08
 _AFTER: Final = 0.2
 """Time shown before and after the transient, as fractions of its duration."""
@@ -136,6 +148,55 @@ def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Quantity) -> 
     inset.grid(visible=True, axis="y", color="#dddddd", linewidth=0.5)
 
 
+def mark_phases(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
+    """Draw the borders of the manoeuvre's phases, with their names above the first axis.
+
+    Runs that reach a border at different times have their own lines. The figure is as wide as a column.
+    """
+    listed = [[e for e in events_of(curve.recording.metadata) if e.kind == "phase"] for curve in drawn]
+    left, right = axes[0].get_xlim()
+    for curve, events in zip(drawn, listed, strict=True):
+        for place, event in enumerate(events):
+            times = [others[place].time_s for others in listed if place < len(others)]
+            same = max(times) - min(times) <= _SAME_BORDER * (right - left)
+            if left < event.time_s < right and not (same and curve is not drawn[0]):
+                for axis in axes:
+                    axis.axvline(
+                        event.time_s, color="#777777" if same else curve.look.colour, linewidth=0.8, linestyle=":",
+                        zorder=1,
+                    )  # fmt: skip
+    width_in = COLUMN_IN - _SIDES_IN
+    ends: list[float] = []
+    for event in (event for event in listed[0] if event.time_s < right):
+        at_in = max(0.0, (event.time_s - left) / (right - left)) * width_in
+        row = next((row for row, end in enumerate(ends) if end <= at_in), len(ends))
+        ends[row : row + 1] = [at_in + _LETTER_IN * (len(event.what) + 1)]
+        axes[0].annotate(
+            event.what, (max(event.time_s, left), 1.0), (0, 2 + (TEXT_PT + 1.0) * row),
+            xycoords=("data", "axes fraction"), textcoords="offset points", va="bottom", fontsize=TEXT_PT,
+            color="#555555", ha="right" if ends[row] > width_in + _LETTER_IN else "left",
+        )  # fmt: skip
+
+
+def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
+    """Shade the times at which a wheel stands on another friction than at the start; one shade for each run."""
+    for curve in drawn:
+        try:
+            mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])
+        except RecordingError:  # a recording of another program
+            continue
+        changed = np.abs(mu - mu[:, :1]) > _SAME_FRICTION
+        edges = np.flatnonzero(np.diff(changed.any(axis=0).astype(int), prepend=0, append=0))
+        time_s = curve.recording.time_s.tolist()
+        label = friction_label(float(mu[changed].min()), float(mu[changed].max())) if edges.size else ""
+        for begin, end in edges.reshape(-1, 2).tolist():
+            for axis in axes:
+                axis.axvspan(
+                    time_s[begin], time_s[end - 1], color=PATCH_COLOUR, alpha=1.0 / len(drawn), linewidth=0.0,
+                    zorder=0, label=label,
+                )  # fmt: skip
+
+
 def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Quantity]) -> Figure:
     """Draw panels over one time axis, as wide as a column."""
     drawn = curves(recordings)
@@ -143,6 +204,8 @@ def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Quanti
     figure = new_figure(width_in=COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))
     axes: list[Axes] = list(figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0])
     fill_panels(axes, drawn, shown)
+    shade_friction(axes, drawn)
+    mark_phases(axes, drawn)
     figure.align_ylabels(axes)
     name_curves(figure, axes[0])
     return figure

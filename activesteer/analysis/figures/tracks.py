@@ -17,6 +17,7 @@ from activesteer.analysis.source import RecordingLike, read_course, read_footpri
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure
 from activesteer.road.course import CONE_RADIUS_M, Course
+from activesteer.road.road import road_of
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -72,6 +73,7 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     axes: list[Axes] = [figure.add_subplot(grid[1])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(2, 1 + len(panels))]
     time_panels.fill_panels(axes, drawn, panels)
+    time_panels.shade_friction(axes, drawn)
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     figure.align_ylabels(axes)
@@ -91,6 +93,7 @@ def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
     course = read_course(drawn[0].recording)
     struck = lanes.struck_cones([curve.recording for curve in drawn], course)
     _draw_course(axis, course, TRACK_ASPECT, struck)
+    _draw_friction(axis, drawn[0])
     for curve in drawn:
         _draw_cars(axis, curve)
 
@@ -110,6 +113,22 @@ def _draw_cars(axis: Axes, curve: DrawnRun) -> None:
         if row is not None and np.isfinite(x[row]):
             outline = [(float(xs[row]), float(ys[row])) for xs, ys in (front_left, front_right, rear_right, rear_left)]
             axis.add_patch(Polygon(outline, closed=True, fill=False, edgecolor=curve.look.colour, linewidth=0.6))
+
+
+def _draw_friction(axis: Axes, curve: DrawnRun) -> None:
+    """Draw the places of the road with another friction, behind everything."""
+    from matplotlib.patches import Polygon  # noqa: PLC0415 - an extra, and slow to import
+
+    road = road_of(curve.recording.metadata)
+    pieces = road.pieces(*axis.get_xlim(), *axis.get_ylim())
+    mu = {piece.area: [other.mu for other in pieces if other.area == piece.area] for piece in pieces}
+    for piece in pieces:
+        axis.add_patch(
+            Polygon(
+                piece.corners_m, closed=True, facecolor=style.PATCH_COLOUR, edgecolor="none", zorder=-1,
+                label=style.friction_label(min(mu[piece.area]), max(mu[piece.area])),
+            )
+        )  # fmt: skip
 
 
 def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.bool_] | None = None) -> None:

@@ -11,12 +11,13 @@ import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
-from activesteer.analysis.report.groups import Group, Run
+from activesteer.analysis.report.groups import Group, Run, entry
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.conventions import CORNERS, Array
 from activesteer.drawing import wheel_angles
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
+from activesteer.recording.events import events_of
 from activesteer.road.course import CONE_RADIUS_M, Course
 from activesteer.units import ESTIMATED, MEASURED, Quantity, quantity_of
 
@@ -206,13 +207,11 @@ def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
 
 
 def _marks(group: Group) -> list[dict[str, Any]]:
-    """Return the instants of a standard's criterion."""
+    """Return the instants of a standard's criterion, or those at which phases begin in the first run."""
     recording = group.runs[0].recording
-    if (
-        not isinstance(maneuver := recording.metadata.get("maneuver"), dict)
-        or maneuver.get("kind") != "sine_with_dwell"
-    ):
-        return []
+    if entry(recording, "maneuver", "kind") != "sine_with_dwell":
+        events = events_of(recording.metadata)
+        return [{"time_s": event.time_s, "text": event.what} for event in events if event.kind == "phase"]
     try:
         completion_s = sine_with_dwell.steering(recording).completion_s
     except RecordingError:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from activesteer.analysis.loss_of_control import LOST, kept, losses, shown
+from activesteer.analysis.loss_of_control import LOST, is_controlled, kept, losses, shown
 from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.report.significance import Change, is_near, significance
 from activesteer.analysis.report.tables import difference_text, number
@@ -111,8 +111,15 @@ def results(group: Group) -> list[Result]:
         metrics = run.recording.metrics
         well = tuple(kept(metrics)) or (("keeps the car",) if any(lost) and not lost[place] else ())
         figures = [_figure(name, metrics, first if place else None) for _, name in chosen]
+        if not (_is_judged(group.runs[0]) and _is_judged(run)):
+            figures = [figure._replace(change=Change.OTHER) for figure in figures]
         found.append(Result(run, lost[place], well, tuple(figures)))
     return found
+
+
+def _is_judged(run: Run) -> bool:
+    """Return whether a change from or to this run can be good or bad: it is complete, and the car is controlled."""
+    return not run.problem and is_controlled(run.recording.metrics)
 
 
 def _chosen(group: Group) -> Iterator[tuple[KeyFigure, str]]:

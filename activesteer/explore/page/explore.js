@@ -1,12 +1,13 @@
 // The page: messages of the worker, the tab Explore, and the tabs themselves.
+import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { dark, element, number, onTheme, runColour, setTheme } from "./look.js";
+import { dark, element, mostControllers, number, onTheme, runColour, setTheme } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
 const $ = (id) => document.getElementById(id);
-const MOST_CONTROLLERS = 3, DRAG_MS = 40, FIRST = { maneuver: "sine_with_dwell", controllers: ["none", "ars", "afs"] };
+const FIRST = { maneuver: "sine_with_dwell", controllers: ["none", "ars", "afs"] };
 
 export function say(text) {
   $("message").textContent = text;
@@ -23,35 +24,31 @@ const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(
 const drive = new Drive(socket, say);
 
 const choice = () => ({ maneuver: $("maneuver").value, vehicle: $("vehicle").value, driver: $("driver").value, controllers: chosen() });
-const chosen = () => {
-  const names = [...$("controllers").querySelectorAll("input:checked")].map((box) => box.value), own = $("own").value.trim();
-  return own ? [...names.slice(0, MOST_CONTROLLERS - 1), own] : names;
-};
+const boxes = () => [...$("controllers").querySelectorAll("input")];
+const own = () => $("own").value.trim();
+const chosen = () => [...boxes().filter((box) => box.checked).map((box) => box.value), ...(own() ? [own()] : [])];
 
-function describe() {
+function describe(ticked) {
+  const unticked = untickBeyond(mostControllers, boxes(), own(), ticked);
   if (!chosen().length) { say("Choose at least one controller."); return; }
-  say("");
+  say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "");
+  asking.stop();
   state.values = {};
   state.runs = new Map();
   state.ghosts = new Map();
   socket.send({ kind: "describe", id: ++state.id, ...choice() });
 }
 
-let waiting = null;
-function ask(dragging) {
-  if (waiting) clearTimeout(waiting);
-  waiting = setTimeout(() => {
-    waiting = null;
-    if (!dragging || !state.dragged) keepGhosts();
-    state.dragged = dragging;
-    state.asked = performance.now();
-    state.first = null;
-    $("state").textContent = "driving …";
-    state.busy = true;
-    if (drive.shown) return;
-    socket.send({ kind: "run", id: ++state.id, ...choice(), dragging, values: state.values });
-  }, dragging ? DRAG_MS : 0);
-}
+const asking = new Asking((dragging) => {
+  if (!dragging || !state.dragged) keepGhosts();
+  state.dragged = dragging;
+  state.released = false;
+  state.asked = performance.now();
+  state.first = null;
+  $("state").textContent = "driving …";
+  if (drive.shown) return;
+  socket.send({ kind: "run", id: ++state.id, ...choice(), dragging, values: state.values });
+});
 
 // The result before this change stays as a pale curve until the slider is let go and moved again.
 function keepGhosts() {
@@ -73,11 +70,7 @@ const hear = {
     for (const name of header.controllers) {
       const box = element("input", { type: "checkbox", value: name });
       box.checked = first.includes(name);
-      box.addEventListener("change", () => {
-        const most = MOST_CONTROLLERS - ($("own").value.trim() ? 1 : 0), on = [...$("controllers").querySelectorAll("input:checked")];
-        if (on.length > most) (on.find((other) => other !== box) ?? box).checked = false;
-        describe();
-      });
+      box.addEventListener("change", () => describe(box));
       $("controllers").append(element("label", {}, box, ` ${name}`));
     }
     drive.offer(header);
@@ -90,11 +83,12 @@ const hear = {
     state.sliders = header.sliders;
     showSliders();
     scene.setShape(header.shape, arrays);
-    ask(false);
+    asking.ask(false);
   },
 
   run(header, arrays) {
     if (header.id !== state.id) return;
+    $("title").textContent = header.title;
     if (state.first == null) { state.first = performance.now() - state.asked; state.runs = new Map(); }
     if (header.error) say(`${header.name}: ${header.error}`);
     state.runs.set(header.name, { ...header, poses: arrays[0] });
@@ -104,16 +98,22 @@ const hear = {
   finished(header) {
     if (header.id !== state.id) return;
     state.released = !state.dragged;
-    state.busy = false;
     state.all = performance.now() - state.asked;
     $("state").textContent = `first curve after ${Math.round(state.first)} ms, all after ${Math.round(state.all)} ms`;
     $("command").textContent = header.command;
     $("python").textContent = header.python;
+    asking.finished();
   },
 
-  saved(header) { $("state").textContent = `saved ${header.files.join(", ")} in ${header.folder}`; },
+  saved(header) { $("saved").textContent = `saved ${header.files.join(", ")} in ${header.folder}`; },
   report() { window.open("report", "_blank"); },
-  error(header) { say(header.text); $("state").textContent = ""; if (header.about === "start") drive.failed(); },
+  error(header) {
+    say(header.text);
+    $("state").textContent = "";
+    if (header.about === "start") drive.failed();
+    if (header.about === "run") asking.finished();
+    if (header.about === "save") $("saved").textContent = header.text;
+  },
   drive: (header, arrays) => drive.begin(header, arrays),
   frame: (header, arrays) => drive.frame(header, arrays),
   driven: (header) => drive.ended(header),
@@ -140,7 +140,7 @@ function showFigures() {
   const rows = runs.map((run) => element("tr", {}, element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), run.label), ...titles.map((title) => {
     const now = run.figures.find((figure) => figure.title === title), before = state.ghosts.get(run.name)?.figures?.find((figure) => figure.title === title);
     const change = now?.value != null && before?.value != null ? now.value - before.value : null;
-    return element("td", {}, number(now?.value), element("span", {}, change == null || Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change)}`));
+    return element("td", {}, number(now?.value, now?.digits), element("span", {}, change == null || Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change, now.digits)}`));
   })));
   $("figures").replaceChildren(head, ...rows);
 }
@@ -161,6 +161,8 @@ function showSliders() {
   }));
 }
 
+const wayOf = (event) => ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 })[event.key];
+
 function sliderOf(slider) {
   const digits = Math.max(0, -Math.floor(Math.log10(slider.step)));
   const shown = element("output", {}), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": slider.label, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
@@ -171,7 +173,7 @@ function sliderOf(slider) {
     if (Math.abs(value - slider.value) < 1e-9) delete state.values[slider.key];
     else state.values[slider.key] = +value.toPrecision(9);
     write();
-    ask(dragging);
+    asking.ask(dragging);
   };
   input.value = slider.value;
   input.addEventListener("input", () => moved(true));
@@ -179,12 +181,13 @@ function sliderOf(slider) {
   input.addEventListener("dblclick", () => { input.value = slider.value; moved(false); });
   // Without this, a step of the keyboard is a hundredth of the range, whatever the step of the slider.
   input.addEventListener("keydown", (event) => {
-    const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
+    const way = wayOf(event);
     if (!way) return;
     event.preventDefault();
     input.value = +input.value + way * slider.step;
-    moved(false);
+    moved(true);
   });
+  input.addEventListener("keyup", (event) => { if (wayOf(event)) moved(false); });
   write();
   return box;
 }
@@ -227,11 +230,11 @@ const player = {
   },
 };
 
-for (const id of ["maneuver", "vehicle", "driver", "own"]) $(id).addEventListener("change", describe);
-$("reset").addEventListener("click", () => { state.values = {}; showSliders(); ask(false); });
+for (const id of ["maneuver", "vehicle", "driver", "own"]) $(id).addEventListener("change", () => describe());
+$("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
 $("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });
-$("save").addEventListener("click", () => socket.send({ kind: "save" }));
+$("save").addEventListener("click", () => { $("saved").textContent = "saving …"; socket.send({ kind: "save" }); });
 $("report").addEventListener("click", () => socket.send({ kind: "report" }));
 for (const what of ["command", "python"]) $(`copy-${what}`).addEventListener("click", () => navigator.clipboard.writeText($(what).textContent));
 $("theme").addEventListener("click", () => setTheme(!dark()));
@@ -241,7 +244,7 @@ for (const name of ["explore", "drive"]) {
     for (const other of ["explore", "drive"]) { $(other).hidden = other !== name; $(`tab-${other}`).setAttribute("aria-selected", String(other === name)); }
     drive.show(name === "drive");
     scene.fit();
-    if (name === "explore" && state.busy) ask(false);
+    if (name === "explore" && asking.busy) asking.ask(false);
   });
 }
 requestAnimationFrame((now) => player.tick(now));

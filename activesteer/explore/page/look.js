@@ -3,7 +3,7 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const root = document.documentElement;
 const watchers = [];
 
-export const courses = data.courses;
+export const courses = data.courses, mostControllers = data.mostControllers;
 export const onTheme = (watcher) => watchers.push(watcher);
 export const dark = () => root.classList.contains("dark");
 export const paint = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
@@ -22,4 +22,4 @@ export const element = (name, attributes = {}, ...children) => {
   made.append(...children);
   return made;
 };
-export const number = (value, digits) => (value == null ? "–" : value.toFixed(digits ?? (Math.abs(value) < 10 ? 2 : Math.abs(value) < 1000 ? 1 : 0)).replace("-", "−"));
+export { number } from "./number.js";

@@ -39,26 +39,47 @@ function range(values) {
   return [low - margin, high + margin];
 }
 
-// A frame with axes; returns the svg and the scales. An axis is {label, range} or {label, levels}.
-function frame(parent, width, height, x, y) {
-  const left = 62, right = 12, top = 10, bottom = 42;
-  const svg = element(parent, "svg", { width, height, role: "img", "aria-label": `${y.label} over ${x.label}` });
+const LETTER = 6.2, LINE = 14;
+const textWidth = (text) => LETTER * text.length;
+
+// A text in lines that fit into the room [px]; a word that is longer stays whole.
+function wrapped(text, room) {
+  const lines = [];
+  for (const word of text.split(" ")) {
+    const longer = `${lines.at(-1)} ${word}`;
+    if (lines.length && textWidth(longer) <= room) lines[lines.length - 1] = longer;
+    else lines.push(word);
+  }
+  return lines;
+}
+
+function picture(parent, width, height, label) {
+  return element(parent, "svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });
+}
+
+// A frame with axes; returns the svg and the scales. An axis is {label, range} or {label, levels}. Labels of any length fit.
+function frame(parent, least, height, x, y) {
+  const marks = (axis, count) => axis.levels ? axis.levels.map((level, i) => [i, String(level)]) : ticks(...axis.range, count).map((v) => [v, short(v)]);
+  const right = 12, top = 10, beside = marks(y, 5);
+  const named = wrapped(y.label, height - top - 42), widest = Math.max(0, ...beside.map(([, text]) => textWidth(text)));
+  const left = Math.max(62, LINE * named.length + 12 + widest), width = Math.max(least, left + least - 62);
+  const below = wrapped(x.label, width - 8), bottom = 28 + LINE * below.length;
+  const svg = picture(parent, width, height, `${y.label} over ${x.label}`);
   const span = (axis) => (axis.levels ? [-0.5, axis.levels.length - 0.5] : axis.range);
   const [x0, x1] = span(x), [y0, y1] = span(y);
   const sx = (v) => left + ((v - x0) / (x1 - x0)) * (width - left - right);
   const sy = (v) => height - bottom - ((v - y0) / (y1 - y0)) * (height - top - bottom);
   element(svg, "rect", { x: left, y: top, width: width - left - right, height: height - top - bottom, fill: "none", stroke: "#888" });
-  const marks = (axis, count) => axis.levels ? axis.levels.map((level, i) => [i, String(level)]) : ticks(...axis.range, count).map((v) => [v, short(v)]);
   for (const [v, text] of marks(x, width < 320 ? 4 : 5)) {
     element(svg, "line", { x1: sx(v), x2: sx(v), y1: height - bottom, y2: height - bottom + 4, stroke: "#888" });
     element(svg, "text", { x: sx(v), y: height - bottom + 16, "text-anchor": "middle" }, text);
   }
-  for (const [v, text] of marks(y, 5)) {
+  for (const [v, text] of beside) {
     element(svg, "line", { x1: left - 4, x2: left, y1: sy(v), y2: sy(v), stroke: "#888" });
     element(svg, "text", { x: left - 7, y: sy(v) + 4, "text-anchor": "end" }, text);
   }
-  element(svg, "text", { x: (left + width - right) / 2, y: height - 8, "text-anchor": "middle" }, x.label);
-  element(svg, "text", { transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, y.label);
+  below.forEach((line, i) => element(svg, "text", { x: width / 2, y: height - bottom + 34 + LINE * i, "text-anchor": "middle" }, line));
+  named.forEach((line, i) => element(svg, "text", { transform: `translate(${13 + LINE * i} ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, line));
   return { svg, sx, sy };
 }
 
@@ -78,7 +99,6 @@ function histogram(parent, metric, found, width, height) {
 }
 
 const factorTitle = (factor) => withUnit(factor.label, factor.unit);
-const textWidth = (text) => 6.2 * text.length;
 
 function factorAxis(factor) {
   const label = factorTitle(factor);
@@ -102,8 +122,23 @@ function scatter(parent, factor, points, label) {
   }
 }
 
+const shade = (depth) => `hsl(210 60% ${97 - 37 * depth}%)`;
+
+// The colours of heat maps, with the values that they stand for.
+function colourBar(parent, low, high, label) {
+  const width = 80, height = 300, top = 10, bottom = 42, steps = 60, tall = height - top - bottom;
+  const svg = picture(parent, width, height, `colours of ${label}: ${short(low)} to ${short(high)}`);
+  const sy = (v) => height - bottom - ((v - low) / (high - low)) * tall;
+  for (let i = 0; i < steps; i++) element(svg, "rect", { x: 4, y: top + (tall * i) / steps, width: 16, height: tall / steps, fill: shade(1 - (i + 0.5) / steps), "shape-rendering": "crispEdges" });
+  for (const v of ticks(low, high, 5)) element(svg, "text", { x: 25, y: sy(v) + 4 }, short(v));
+}
+
 function heat(parent, metric, found, keyed) {
   const all = found.heat.maps.flat(2).filter((v) => v !== null), low = Math.min(...all), high = Math.max(...all);
+  if (!(high - low > 1e-3 * Math.max(Math.abs(low), Math.abs(high)))) {
+    html(parent, "p", all.length ? `${metricAxis(metric)} is ${short(low)} in every field, within 0.1 %.` : `${metricAxis(metric)} has no value in any field.`);
+    return;
+  }
   found.heat.maps.forEach((map, c) => {
     const axes = found.heat.keys.map((key, i) => ({ label: factorTitle(keyed[key]), levels: found.heat.levels[i] }));
     const box = html(parent, "div");
@@ -111,11 +146,14 @@ function heat(parent, metric, found, keyed) {
     const f = frame(box, 400, 300, axes[0], axes[1]);
     map.forEach((line, i) => line.forEach((v, j) => {
       if (v === null) return;
-      const depth = high > low ? (v - low) / (high - low) : 0.5;
-      element(f.svg, "rect", { x: f.sx(i - 0.5), y: f.sy(j + 0.5), width: f.sx(0.5) - f.sx(-0.5), height: f.sy(-0.5) - f.sy(0.5), fill: `hsl(210 60% ${97 - 37 * depth}%)`, "shape-rendering": "crispEdges" });
+      const depth = (v - low) / (high - low);
+      element(f.svg, "rect", { x: f.sx(i - 0.5), y: f.sy(j + 0.5), width: f.sx(0.5) - f.sx(-0.5), height: f.sy(-0.5) - f.sy(0.5), fill: shade(depth), "shape-rendering": "crispEdges" });
       if (map.length <= 12) element(f.svg, "text", { x: f.sx(i), y: f.sy(j) + 4, "text-anchor": "middle", class: "on-shade" }, short(v));
     }));
   });
+  const box = html(parent, "div");
+  html(box, "div", "mean");
+  colourBar(box, low, high, metricAxis(metric));
 }
 
 // The mean in fields of the first two numeric factors, for designs without grids.
@@ -161,7 +199,7 @@ function parallel(parent, metric, rows) {
   const step = Math.max(190, ...axes.map((axis) => textWidth(axis.label)));
   const margin = 0.5 * Math.max(160, ...axes.map((axis) => textWidth(axis.label)));
   const width = Math.max(420, step * (axes.length - 1) + 2 * margin), height = 320, top = 30, bottom = 20;
-  const svg = element(parent, "svg", { width, height, role: "img", "aria-label": "parallel coordinates" });
+  const svg = picture(parent, width, height, "parallel coordinates");
   const x = (n) => margin + (n * (width - 2 * margin)) / Math.max(axes.length - 1, 1);
   const y = (axis, v) => { const [low, high] = axis.levels ? [-0.5, axis.levels.length - 0.5] : axis.range; return height - bottom - ((v - low) / (high - low)) * (height - top - bottom); };
   for (const i of rows.slice(0, 600)) {

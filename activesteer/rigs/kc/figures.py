@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from activesteer.conventions import Array
-from activesteer.pages import Page, Section, Table, failed, passed, write_page
+from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, save_all
 from activesteer.plotting import draw as drawn
 from activesteer.rigs.kc.definitions import Axle
@@ -86,7 +86,7 @@ def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
 
 def _pictures(result: KcResult) -> dict[str, Callable[[], Picture]]:
     pictures: dict[str, Callable[[KcResult], Picture]] = {
-        "targets": _targets,
+        **({"targets": _targets} if result.targeted else {}),
         "rear_camber": _rear_camber,
         **{name: partial(_drawn_grid, grid=grid) for name, grid in _GRIDS.items()},
         "opposite_travel": _opposite_travel,
@@ -98,29 +98,35 @@ def _pictures(result: KcResult) -> dict[str, Callable[[], Picture]]:
 
 
 def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> Path:
-    targeted = [entry for entry in result.metrics if entry.inside is not None]
-    met = sum(entry.inside is True for entry in targeted)
-    lead = [f"{met} of {len(targeted)} target bands are met." if targeted else "The car has no target bands."]
-    rows = [
-        (
-            entry.axle,
-            Markup('<span title="{}">{}</span>').format(entry.definition, entry.name.replace("_", " ")),
-            f"{entry.value:.4g}" if math.isfinite(entry.value) else "none",
-            entry.unit,
-            f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else "",
-            {None: "", True: passed("inside", chip=True), False: failed("outside", chip=True)}[entry.inside],
-            entry.remark or entry.source,
-        )
-        for entry in result.metrics
-    ]
+    met = len(result.targeted) - len(result.outside)
+    lead = [f"{met} of {len(result.targeted)} target bands are met."] if result.targeted else []
+    rows = [_metric_row(entry, banded=bool(result.targeted)) for entry in result.metrics]
+    columns = ["axle", "metric", "value", "unit", *(["target band", "", "remark or source"] if result.targeted else [])]
     outside = frozenset(number for number, entry in enumerate(result.metrics) if entry.inside is False)
-    metrics = Table("", ["axle", "metric", "value", "unit", "target band", "", "remark or source"], rows, outside)
-    first, *others = (as_svg(drawn(picture._replace(title=""))) for picture in pictures)
-    heads = [picture.title[0].upper() + picture.title[1:] for picture in pictures]
-    sections = [Section(heads[0], pictures=[first]), Section("Metrics", tables=[metrics])]
-    sections += [Section(head, pictures=[other]) for head, other in zip(heads[1:], others, strict=True)]
+    metrics = Section("Metrics", tables=[Table("", columns, rows, outside)])
+    sections = [
+        Section(picture.title[0].upper() + picture.title[1:], pictures=[as_svg(drawn(picture._replace(title="")))])
+        for picture in pictures
+    ]
+    sections.insert(1 if result.targeted else 0, metrics)  # the bands, if there are any, stand first
     title = f"Kinematics and compliance: {result.vehicle}"
     return write_page(Page(f"activesteer kc: {result.vehicle}", title, lead, sections), folder / "kc.html")
+
+
+def _metric_row(entry: KcMetric, *, banded: bool) -> list[Text]:
+    """Return the cells of a metric; those about bands only if the car has any."""
+    value = [
+        entry.axle,
+        Markup('<span title="{}">{}</span>').format(entry.definition, entry.name.replace("_", " ")),
+        f"{entry.value:.4g}" if math.isfinite(entry.value) else "none",
+        entry.unit,
+    ]
+    band = [
+        f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else "",
+        {None: "", True: passed("inside", chip=True), False: failed("outside", chip=True)}[entry.inside],
+        entry.remark or entry.source,
+    ]
+    return [*value, *(band if banded else [])]
 
 
 def rear_camber_figure(result: KcResult) -> Figure:
@@ -321,7 +327,7 @@ def _targets(result: KcResult) -> Picture:
     band = Area([0.0, 1.0], -0.7, len(rows) - 0.3, "", "#d5ead9")
     names = [_row_name(entry) for entry in rows]
     panel = Panel(x_label, "", curves, areas=[band], names=names, x_range=(-0.7, 1.7))
-    return Picture("target bands", [panel], width_in=8.5, height_in=1.2 + 0.24 * max(len(rows), 1))
+    return Picture("target bands", [panel], width_in=8.5, height_in=1.2 + 0.24 * len(rows))
 
 
 def _place(entry: KcMetric) -> float:

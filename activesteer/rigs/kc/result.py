@@ -73,6 +73,11 @@ class KcResult:
         )
 
     @property
+    def targeted(self) -> tuple[KcMetric, ...]:
+        """The metrics with a target band."""
+        return tuple(entry for entry in self.metrics if entry.inside is not None)
+
+    @property
     def outside(self) -> tuple[KcMetric, ...]:
         """The metrics outside their bands."""
         return tuple(entry for entry in self.metrics if entry.inside is False)
@@ -83,16 +88,18 @@ class KcResult:
         return {"metrics": [{name: getattr(entry, name) for name in names} for entry in self.metrics]}
 
     def table(self) -> str:
-        """Return the metrics as text of 80 columns, a line each, with their target bands."""
-        lines = [f"{'metric':31} {'axle':5} {'value':>7} {'unit':9} {'target band':>14}"]
+        """Return the metrics as text of 80 columns, a line each, with their target bands if there are any."""
+        band = f"{'target band':>14}" if self.targeted else ""
+        lines = [f"{'metric':31} {'axle':5} {'value':>7} {'unit':9} {band}".rstrip()]
         for entry in self.metrics:
             band = f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else ""
             verdict = "" if entry.inside is None else "inside" if entry.inside else "OUTSIDE"
             lines.append(
                 f"{entry.name:31} {entry.axle:5} {_number(entry.value):>7} {entry.unit:9} {band:>14} {verdict}".rstrip()
             )
-        targeted = [entry for entry in self.metrics if entry.inside is not None]
-        lines += ["", f"{sum(entry.inside is True for entry in targeted)} of {len(targeted)} target bands met"]
+        if self.targeted:
+            met = len(self.targeted) - len(self.outside)
+            lines += ["", f"{met} of {len(self.targeted)} target bands met"]
         for entry in self.outside:
             remark = f": {entry.remark}" if entry.remark else ""
             lines += textwrap.wrap(f"outside: {entry.axle} {entry.name}{remark}", 80, subsequent_indent="  ")

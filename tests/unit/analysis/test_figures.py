@@ -264,3 +264,69 @@ def test_missing_parameters_are_named(draw, key):
     run.metadata["vehicle"] = {name: table for name, table in VEHICLE.items() if name != key.partition(".")[0]}
     with raises(RecordingError, value=f"vehicle.{key}"):
         draw(run)
+
+
+def named(figure):
+    """Return the texts of the legend above all axes."""
+    (legend,) = figure.legends
+    return [text.get_text() for text in legend.get_texts()]
+
+
+def both_angles():
+    run = step_steer(rear_rad=-0.01)
+    for name in ("superposition_rad", "superposition_demand_rad"):
+        run.channels[name] = -0.5 * run["rear_steer_rad"]
+    return run
+
+
+@pytest.mark.parametrize("draw", [figure_11, time_histories.general])
+def test_angles_added_at_both_axles_are_two_kinds_of_line(draw):
+    run = both_angles()
+    figure = draw({"lqr": run})
+    peaks = {}
+    for axis in figure.get_axes():
+        for line in axis.get_lines():
+            values = np.abs(np.asarray(line.get_ydata()))
+            for name in ("rear_steer_rad", "superposition_rad"):
+                if values.max() == pytest.approx(math.degrees(np.abs(run[name]).max())):
+                    peaks[name] = str(line._unscaled_dash_pattern)
+    assert len(set(peaks.values())) == 2
+    assert "added in front" in named(figure)
+    assert "added in front" not in named(draw({"ars": step_steer(rear_rad=-0.01)}))
+
+
+def test_phases_have_borders_and_names():
+    runs = {"none": step_steer(), "ars": step_steer(rear_rad=-0.01)}
+    for run, later_s in zip(runs.values(), (1.4, 1.6), strict=True):
+        phases = (("straight", 0.0), ("turn", 1.0), ("brake", later_s))
+        run.metadata["events"] = [{"time_s": at, "kind": "phase", "what": name} for name, at in phases]
+    figure = time_histories.general(runs)
+    for axis in figure.get_axes():
+        upright = [line for line in axis.get_lines() if np.ptp(np.asarray(line.get_xdata())) == 0.0]
+        # The border that both runs share is one line, the other border has the colour of each run.
+        assert sorted(float(np.asarray(line.get_xdata())[0]) for line in upright) == [1.0, 1.4, 1.6]
+        assert len({line.get_color() for line in upright}) == 3
+    texts = [text.get_text() for text in figure.get_axes()[0].texts]
+    assert texts == ["straight", "turn", "brake"]
+
+
+def test_another_friction_on_the_way_is_shaded_and_named():
+    run = step_steer()
+    for corner in ("fl", "fr", "rl", "rr"):
+        run.channels[f"{corner}_mu"] = np.where((run.time_s > 1.0) & (run.time_s < 1.5), 0.3, 0.9)
+    figure = time_histories.general({"none": run})
+    for axis in figure.get_axes():
+        (shade,) = axis.patches
+        box = shade.get_extents().transformed(axis.transData.inverted())
+        assert (box.x0, box.x1) == pytest.approx((1.0, 1.5), abs=0.02)
+    assert "friction 0.3" in named(figure)
+
+
+def test_a_track_shows_the_places_with_another_friction():
+    run = along_path()
+    run.metadata["maneuver"]["road"] = {"mu": 0.9, "patches": [{"start_m": 20.0, "end_m": 30.0, "mu": 0.3}]}
+    figure = tracks.track_figure({"none": run})
+    (patch,) = [patch for patch in figure.get_axes()[0].patches if patch.get_label() == "_friction 0.3"]
+    assert isinstance(patch, Polygon)
+    assert set(patch.get_xy()[:, 0].tolist()) == {20.0, 30.0}
+    assert "friction 0.3" in named(figure)

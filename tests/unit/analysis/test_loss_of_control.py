@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from activesteer.analysis.loss_of_control import has_spun, is_lost
+from activesteer.analysis.loss_of_control import has_spun, is_controlled, is_lost
 from activesteer.metric_table import CONES_MISSED, STAYS_IN_LANES
 
 PEAK = "sideslip_peak_abs_rad"
@@ -28,6 +28,7 @@ SMALL, LARGE = math.radians(5.0), math.radians(25.0)
 )
 def test_a_car_is_lost_that_spins_or_leaves_its_course(metrics: dict[str, float], lost: bool) -> None:
     assert is_lost(metrics) is lost
+    assert is_controlled(metrics) is not lost
 
 
 @pytest.mark.parametrize("missing", [None, math.nan])
@@ -37,3 +38,10 @@ def test_a_run_that_ended_before_it_could_be_said_is_lost(missing: float | None)
     assert is_lost({PEAK: SMALL, STAYS_IN_LANES: missing})
     assert is_lost({PEAK: SMALL, CONES_MISSED: missing})
     assert is_lost({})
+    assert not is_controlled({PEAK: missing})
+
+
+def test_a_run_without_a_metric_that_could_tell_counts_as_controlled() -> None:
+    assert is_controlled({"stopping_distance_m": 40.0})
+    assert not is_controlled({"heading_end_rad": LARGE})
+    assert not is_controlled({CONES_MISSED: 1.0})

@@ -20,6 +20,7 @@ from activesteer.analysis.report.results import Result, results
 from activesteer.analysis.report.significance import Change
 from activesteer.analysis.report.tables import difference_text, number
 from activesteer.errors import ParameterError, RecordingError
+from activesteer.metric_table import recorded_metric
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M
 from activesteer.signals import Channel
@@ -164,9 +165,27 @@ def test_key_figures_are_better_or_worse_only_where_one_could_tell(metric, first
     assert found["none"].figures[0].difference == ""
 
 
+def test_no_change_is_good_or_bad_next_to_a_run_that_is_lost():
+    lost, kept = {"sideslip_peak_rad": 0.9}, {"sideslip_peak_rad": 0.1}
+    for runs in ({"none": lost, "ars": kept}, {"none": kept, "ars": lost}):
+        (figure,) = told(through_cones(**runs))["ars"].figures
+        assert figure.difference
+        assert figure.change is Change.OTHER
+
+
+def test_no_change_is_good_or_bad_next_to_a_run_that_ended_early():
+    runs = {
+        "none.mcap": recording_of(step_steer(), "none", metrics={"yaw_rate_overshoot": 0.4}),
+        "ars.mcap": recording_of(step_steer(), "ars", metrics={"yaw_rate_overshoot": 0.1}, complete=False, error="x"),
+    }
+    (figure,) = told(groups_of(runs)[0])["ars"].figures
+    assert figure.change is Change.OTHER
+
+
 def test_numbers_are_whole_where_they_count_and_shares_are_of_something():
     assert number("cones_hit", 8.0) == "8"
     assert (number("stays_in_lanes", 1.0), number("stays_in_lanes", 0.0)) == ("yes", "no")
+    assert (number("ay_peak_mps2", -1e-5), recorded_metric("ay_peak_mps2").text(-1e-5)) == ("0.000", "0.000")
     assert number("ay_peak_mps2", -3.0) == "\N{MINUS SIGN}3.000"
     assert difference_text("cones_hit", 10.0, 8.0) == ("+2", "")
     assert difference_text("sideslip_gates_rms_rad", 0.0002, 0.0001).percent == ""  # 0.006 deg are nearly nothing
@@ -324,6 +343,15 @@ def test_instants_of_the_standard_are_marked(page):
     step, sine, cones = data_of(page)
     assert [mark["text"] for mark in sine["marks"]] == ["end of steer", "+1.00 s", "+1.75 s"]
     assert step["marks"] == cones["marks"] == []
+
+
+def test_phases_of_a_manoeuvre_are_marked():
+    run = recording_of(step_steer())
+    run.metadata["events"] = [
+        {"time_s": at, "kind": "phase", "what": name} for name, at in (("go", 0.0), ("turn", 1.0))
+    ]
+    (shown,) = data_of(report_page({"a.mcap": run}))
+    assert shown["marks"] == [{"time_s": 0.0, "text": "go"}, {"time_s": 1.0, "text": "turn"}]
 
 
 def test_what_is_not_finite_is_left_out():

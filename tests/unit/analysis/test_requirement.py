@@ -16,7 +16,9 @@ from activesteer.analysis.requirement import (
     distance,
 )
 from activesteer.config import Source
+from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import StudyError
+from activesteer.metric_table import METRICS
 from tests.raising import raises
 from tests.unit.analysis.good_runs import check, good
 
@@ -65,6 +67,20 @@ def test_the_margin_is_the_distance_to_the_limit_in_multiples_of_it():
     assert margin("lateral_displacement_m(controller) >= 2 * 0.8", lqr=moved) == pytest.approx(0.25)
     assert margin("1.6 <= lateral_displacement_m(lqr, lane)", lqr=moved) == pytest.approx(0.25)
     assert margin("lateral_displacement_m(lqr) <= 0", lqr=moved) == -2.0
+
+
+@pytest.mark.parametrize(
+    ("name", "limit", "value"),
+    [
+        ("sideslip_peak_abs_deg", 4.0, math.radians(2.0)),
+        ("yaw_rate_peak_abs_degps", 40.0, math.radians(20.0)),
+        ("speed_begin_kmh", 72.0, 10.0),
+        ("ay_peak_abs_g", 1.0, 0.5 * GRAVITY_MPS2),
+    ],
+)
+def test_a_metric_may_be_named_in_the_units_of_keys(name: str, limit: float, value: float):
+    (metric,) = (one for one in METRICS if one.startswith(f"{name.rpartition('_')[0]}_"))
+    assert margin(f"{name}(lqr) <= {limit}", lqr={metric: value}) == pytest.approx(0.5, rel=1e-5)
 
 
 def test_requirements_are_joined_by_their_smallest_or_largest_margin():

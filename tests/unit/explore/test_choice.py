@@ -36,7 +36,7 @@ class Mine:
         {"maneuver": "slalom", "controllers": ["../mine.py:Mine"]},
         {"maneuver": "slalom", "controllers": ["missing.py:Mine"]},
         {"maneuver": "slalom", "controllers": []},
-        {"maneuver": "slalom", "controllers": ["none", "ars", "afs", "lqr"]},
+        {"maneuver": "slalom", "controllers": ["none", "ars", "afs", "lqr", "esc"]},
         {"maneuver": "slalom", "speed_kmh": 80},
         {"maneuver": 3},
         {},

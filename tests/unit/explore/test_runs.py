@@ -24,7 +24,8 @@ def test_a_run_of_the_page_is_the_run_of_its_command(tmp_path: Path) -> None:
     assert replies[-1].header["command"] == "activesteer run step_steer -c none -c ars --set speed_kmh=90"
     again = activesteer.simulate("step_steer", "ars", overrides={"speed_kmh": 90.0})
     runs.save()
-    saved = activesteer.Recording.open(tmp_path / "step_steer_ars.mcap")
+    saved = activesteer.Recording.open(tmp_path / "step_steer-ars.mcap")
+    assert replies[0].header["title"] == saved.metadata["maneuver"]["title"] == "Step steer, 90 km/h, 0.4 g, dry"
     np.testing.assert_allclose(saved["yaw_rate_radps"], again["yaw_rate_radps"], atol=1e-6)  # stored with 32 bits
     yaw = next(panel for panel in replies[1].header["plots"]["panels"] if panel["title"] == "Yaw rate")
     assert yaw["series"][0]["values"][-1] == pytest.approx(math.degrees(again["yaw_rate_radps"][-1]), abs=0.05)
@@ -51,3 +52,14 @@ def test_the_shape_of_the_car_covers_its_length_and_stands_on_four_wheels(tmp_pa
     body = np.concatenate([at for panel, at in zip(panels, points, strict=True) if panel["body"] == "chassis"])
     assert 3.5 < np.ptp(body[:, 0]) < 5.2
     assert {panel["body"] for panel in panels} >= {"fl_wheel", "fr_wheel", "rl_wheel", "rr_wheel"}
+
+
+def test_a_count_has_no_decimals_and_groups_of_gains_are_named_in_words(tmp_path: Path) -> None:
+    choice: dict[str, Any] = {"maneuver": "slalom", "controllers": ("ars",)}
+    runs = Runs(Folder(tmp_path))
+    figures = next(iter(runs.run(Run(**choice), lambda: False))).header["figures"]
+    assert {figure["title"]: figure["digits"] for figure in figures}["Cones hit"] == 0
+    assert {figure["title"]: figure["digits"] for figure in figures}["Peak sideslip"] is None
+    groups = {slider["group"] for slider in runs.describe(Describe(**choice)).header["sliders"]}
+    assert {"ARS", "desired yaw rate"} <= groups
+    assert not any("_" in group for group in groups)

@@ -10,6 +10,7 @@ import pytest
 
 from activesteer.errors import RecordingError
 from activesteer.measured.comparison import FILTERS, TOLERANCES, compare, smooth
+from activesteer.measured.pages import comparison_page
 from activesteer.recording import Recording
 from activesteer.signals import Channel
 from tests.raising import raises
@@ -151,3 +152,10 @@ def test_the_filter_of_iso_15037_has_the_width_that_the_standard_requires():
         wave = np.sin(2.0 * np.pi * frequency_Hz * time_s)
         found = smooth(run(time_s, ay_mps2=wave), "ay_mps2", FILTERS["iso15037"]).values
         assert low <= np.abs(found[4000:6000]).max() <= high
+
+
+@pytest.mark.parametrize(("shift_s", "said"), [(-0.1, "100.0 ms earlier"), (0.05, "50.0 ms later")])
+def test_the_page_says_whether_the_measured_run_is_earlier_or_later(shift_s, said):
+    pytest.importorskip("matplotlib")
+    found = plain([run(yaw_rate_radps=0.3 * step(TIME_S - shift_s))], run(yaw_rate_radps=0.3 * step(TIME_S)))
+    assert f"Measured {said} than simulated" in comparison_page(found, ["car"], "model").lead[1]

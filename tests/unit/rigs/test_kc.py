@@ -3,6 +3,7 @@ from __future__ import annotations
 import functools
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -101,6 +102,19 @@ def test_curves_hold_both_wheels_and_go_through_static_ride() -> None:
 
 def test_a_car_without_targets_has_no_bands() -> None:
     assert load_targets("no_such_car") == {}
+
+
+def test_a_car_without_bands_gets_no_chart_and_no_count_of_bands(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    metrics = tuple(replace(entry, band=None, inside=None) for entry in compact().metrics)
+    result = replace(compact(), metrics=metrics)
+    paths = draw(result, tmp_path)
+    page = paths[-1].read_text("utf-8")
+    assert "targets" not in {path.stem for path in paths}
+    assert page.index("<h2>Metrics") < page.index("<h2>Camber angle")
+    for text in (result.table(), page):
+        assert "target band" not in text
+        assert "of 0" not in text
 
 
 @pytest.mark.parametrize(

@@ -26,5 +26,12 @@ def test_a_long_line_is_broken_not_cut():
     assert height[1] > height[0] + 30
 
 
+def test_a_long_title_is_broken_not_cut():
+    one, other = (end_card("A manoeuvre " * 9 + last, ["none: a"], ["#c9ccd1"], SIZE)(GREY) for last in ("end", "car"))
+    assert (one != other).any()
+    short = end_card("A manoeuvre", ["none: a"], ["#c9ccd1"], SIZE)(GREY)
+    assert ((one != 100).any(axis=(1, 2)).sum()) > (short != 100).any(axis=(1, 2)).sum() + 10
+
+
 def test_nothing_is_said_of_nothing():
     assert end_card("", [], [], (16, 16))(GREY[:16, :16]).shape == (16, 16, 3)

@@ -119,6 +119,12 @@ def test_long_title_leaves_room_for_the_time():
     assert (long[:20, 1275:] != 100).any()
 
 
+def test_a_title_that_does_not_fit_is_written_smaller_before_it_is_cut():
+    """The longest title of the package in a slow film, in the pane of one of four cars."""
+    titles = (f"Full braking on split friction, 80 km/h, driver keeps the {end}" for end in ("line", "lane"))
+    assert len(changed(*(drawn(recording(), title=title, size=(320, 480), note="speed x 0.25") for title in titles)))
+
+
 @pytest.mark.parametrize("size", [(16, 16), (64, 480), (480, 64), (1920, 1080)])
 def test_any_size_can_be_drawn_on(size):
     assert drawn(recording(), title="Title", size=size, note="x 0.25").shape == (size[1], size[0], 3)

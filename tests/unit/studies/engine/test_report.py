@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import re
+import shutil
+import subprocess
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -138,3 +143,62 @@ def test_factors_are_described_and_their_keys_can_be_read(page):
     factors = {factor["key"]: (factor["label"], factor["unit"]) for factor in found["factors"]}
     assert factors["speed_kmh"] == ("speed", "km/h")
     assert all(f"<code>{key}</code>" in text for key in factors)
+
+
+PARTS = ("distribution", "scatter", "heat", "paired", "parallel", "all")
+
+
+def drawn(data, folder, metric="yaw_rate_peak_radps"):
+    """Return what the script of the page draws into each part: pictures and texts."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed: apt-get install nodejs")
+    fake = Path(__file__).with_name("fake_page.js").read_text("utf-8").replace("DATA", json.dumps(data))
+    draws = (resources.files("activesteer.pages") / "templates" / "study.js").read_text("utf-8")
+    choice = f'at("metric").value = {json.dumps(metric)}; at("group").value = "0"; draw();'
+    parts = f"console.log(JSON.stringify(Object.fromEntries({json.dumps(PARTS)}.map((id) => [id, found(id)]))));"
+    (folder / "page.js").write_text("\n".join((fake, draws, choice, parts)))
+    done = subprocess.run([node, folder / "page.js"], capture_output=True, text=True, timeout=60, check=True)
+    return json.loads(done.stdout)
+
+
+def test_no_label_of_an_axis_is_cut_off(page, tmp_path):
+    data = copy.deepcopy(page[1])
+    metric = next(metric for metric in data["metrics"] if metric["name"] == "yaw_rate_peak_radps")
+    metric["label"] = "largest magnitude of the yaw rate from the beginning of the steering to the end of the run"
+    data["factors"][0] |= {"numeric": False, "levels": ["none", "a tyre with a very long name"]}
+    parts = drawn(data, tmp_path)
+    pictures = [picture for part in PARTS[:4] for picture in parts[part]["pictures"]]
+    assert len(pictures) >= 6
+    for picture in pictures:
+        width, height = (float(picture["attributes"][key]) for key in ("width", "height"))
+        upright, beside = [], []
+        for part in (part for part in picture["parts"] if part["name"] == "text"):
+            about, size = part["attributes"], 6.2 * len(part["text"])
+            if "rotate" in about.get("transform", ""):
+                at, _, middle = about["transform"].removeprefix("translate(").partition(")")[0].partition(" ")
+                assert float(middle) - 0.5 * size >= 0.0, part["text"]
+                assert float(middle) + 0.5 * size <= height
+                upright.append(float(at))
+            elif about.get("text-anchor") == "end":
+                beside.append(float(about["x"]) - size)
+            elif "x" in about and about.get("class") != "on-shade" and float(about["y"]) > height - 28.0:
+                assert float(about["x"]) - 0.5 * size >= -1.0, part["text"]
+                assert float(about["x"]) + 0.5 * size <= width + 1.0
+        assert min(beside, default=99.0) >= max(upright, default=0.0)
+
+
+def test_a_heat_map_has_a_bar_of_its_colours_unless_all_fields_are_the_same(page, tmp_path):
+    data = copy.deepcopy(page[1])
+    heat = drawn(data, tmp_path)["heat"]
+    assert len(heat["pictures"]) == len(data["controllers"]) + 1
+    bar = heat["pictures"][-1]
+    assert bar["attributes"]["aria-label"].startswith("colours of ")
+    assert len({part["attributes"]["fill"] for part in bar["parts"] if part["name"] == "rect"}) > 20
+    maps = data["by_group"][0]["yaw_rate_peak_radps"]["heat"]["maps"]
+    for chart in maps:
+        for line in chart:
+            line[:] = [None if value is None else 2.0 for value in line]
+    heat = drawn(data, tmp_path)["heat"]
+    assert heat["pictures"] == []
+    assert "is 2 in every field" in heat["texts"][0]

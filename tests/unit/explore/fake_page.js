@@ -1,0 +1,57 @@
+// Just enough of a page to run explore.js without a browser; `sent` has the messages to the program.
+class FakeElement {
+  constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, textContent: "" }); this.classList = { toggle() {} }; }
+  setAttribute(key, value) { this.attributes[key] = value; if (["value", "type"].includes(key)) this[key] = String(value); }
+  append(...children) { this.children.push(...children.filter((child) => child instanceof FakeElement)); }
+  replaceChildren(...children) { this.children = children; }
+  addEventListener(kind, act) { (this.listeners[kind] ??= []).push(act); }
+  fire(kind, about = {}) { for (const act of this.listeners[kind] ?? []) act({ preventDefault() {}, ...about }); }
+  all() { return this.children.flatMap((child) => [child, ...child.all()]); }
+  querySelectorAll(what) { return this.all().filter((one) => (what === "details[open]" ? false : one.name === what)); }
+  remove() {}
+}
+const named = new Map();
+export const $ = (id) => { if (!named.has(id)) named.set(id, new FakeElement(id)); return named.get(id); };
+Object.assign(globalThis, {
+  window: globalThis, location: { hash: "" }, requestAnimationFrame() {},
+  document: { getElementById: $, createElement: (name) => new FakeElement(name) },
+});
+export const sent = [];
+export let hear;
+export class Socket { constructor(heard) { hear = heard; } send(message) { sent.push(structuredClone(message)); } }
+export class Curves { show() {} }
+export class Track { show() {} at() {} }
+export class Scene { cars = new Map(); setShape() {} draw() {} }
+export class Drive { offer() {} failed() {} draw() {} show() {} }
+export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4;
+export const element = (name, attributes = {}, ...children) => {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+};
+export { number } from "./number.mjs";
+
+export const names = ["none", "ars", "afs", "lqr", "esc"];
+export function start() {
+  hear({ kind: "ready", maneuvers: ["step_steer"], vehicles: ["compact"], drivers: ["typical"], controllers: names }, []);
+  describe();
+  finish();
+}
+export function describe() {
+  const { id } = sent.at(-1);
+  const slider = { key: "speed_kmh", label: "speed", unit: "km/h", group: "manoeuvre", low: 20, high: 160, step: 1, value: 80 };
+  hear({ kind: "description", id, title: "Step steer, 80 km/h", sliders: [slider], shape: {} }, [[]]);
+}
+export function finish(title = "Step steer, 80 km/h") {
+  const { id } = sent.at(-1);
+  hear({ kind: "run", id, name: "none", title, error: "no curve in this test" }, [undefined]);
+  hear({ kind: "finished", id, command: "", python: "" }, []);
+}
+export const slider = () => $("sliders").querySelectorAll("input")[0];
+export function drag(value) { slider().value = value; slider().fire("input"); }
+export function tick(name, checked) {
+  const box = $("controllers").querySelectorAll("input").find((one) => one.value === name);
+  box.checked = checked;
+  box.fire("change");
+}

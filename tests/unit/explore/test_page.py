@@ -1,0 +1,147 @@
+"""What the page asks for, and when: its scripts without a browser."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PAGE = Path(str(resources.files("activesteer.explore"))) / "page"
+
+
+def script(tmp_path: Path, text: str) -> Any:
+    """Return what a script that imports modules of the page prints as JSON."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed: apt-get install nodejs")
+    for name in ("asking", "number"):
+        (tmp_path / f"{name}.mjs").write_text((PAGE / f"{name}.js").read_text("utf-8"))
+    imports = 'import { Asking, untickBeyond } from "./asking.mjs";\nimport { number } from "./number.mjs";\n'
+    (tmp_path / "test.mjs").write_text(f"{imports}{text}")
+    done = subprocess.run([node, tmp_path / "test.mjs"], capture_output=True, text=True, timeout=60, check=True)
+    return json.loads(done.stdout)
+
+
+def used(tmp_path: Path, events: str) -> Any:
+    """Return what the page has after events, with a fake document and a fake program."""
+    explore = (PAGE / "explore.js").read_text("utf-8")
+    for name in ("curves", "drive", "look", "scene", "socket"):
+        explore = explore.replace(f"./{name}.js", "./fake.mjs")
+    (tmp_path / "explore.mjs").write_text(explore.replace("./asking.js", "./asking.mjs"))
+    (tmp_path / "fake.mjs").write_text(Path(__file__).with_name("fake_page.js").read_text("utf-8"))
+    return script(
+        tmp_path,
+        f"""import {{ $, describe, drag, finish, hear, sent, slider, start, tick }} from "./fake.mjs";
+        await import("./explore.mjs");
+        start();
+        sent.length = 0;
+        {events}
+        const runs = sent.filter((one) => one.kind === "run").map((one) => [one.values.speed_kmh, one.dragging]);
+        const {{ title, message, state, saved }} = Object.fromEntries(
+          ["title", "message", "state", "saved"].map((id) => [id, $(id).textContent]));
+        console.log(JSON.stringify({{ sent, runs, title, message, state, saved }}));""",
+    )
+
+
+def asked(tmp_path: Path, events: str) -> list[Any]:
+    """Return the values of the slider that are sent, each with whether it was dragged."""
+    return script(
+        tmp_path,
+        f"""let value = 0;
+        const sent = [], asking = new Asking((dragging) => sent.push([value, dragging]));
+        const drag = (to) => {{ value = to; asking.ask(true); }}, rest = () => asking.ask(false);
+        {events}
+        console.log(JSON.stringify(sent));""",
+    )
+
+
+def test_a_moving_slider_lets_the_runs_in_progress_end_and_then_takes_the_newest_value(tmp_path: Path) -> None:
+    assert asked(tmp_path, "drag(1); drag(2); drag(3);") == [[1, True]]
+    assert asked(tmp_path, "drag(1); drag(2); drag(3); asking.finished();") == [[1, True], [3, True]]
+    assert asked(tmp_path, "drag(1); asking.finished(); asking.finished(); drag(2);") == [[1, True], [2, True]]
+
+
+def test_a_slider_that_is_let_go_does_not_wait(tmp_path: Path) -> None:
+    assert asked(tmp_path, "drag(1); drag(2); rest(); asking.finished();") == [[1, True], [2, False]]
+
+
+def test_another_manoeuvre_does_not_wait_for_runs_that_are_dropped(tmp_path: Path) -> None:
+    assert asked(tmp_path, "drag(1); drag(2); asking.stop(); drag(3);") == [[1, True], [3, True]]
+
+
+@pytest.mark.parametrize(
+    ("own", "ticked", "unticked"),
+    [("", "e", ["e"]), ("", "a", ["a"]), ("", None, ["e"]), ("my.py:C", None, ["d", "e"])],
+)
+def test_a_controller_beyond_the_limit_is_unticked_and_named(
+    tmp_path: Path, own: str, ticked: str | None, unticked: list[str]
+) -> None:
+    result = script(
+        tmp_path,
+        f"""const boxes = [..."abcde"].map((value) => ({{ value, checked: true }}));
+        const ticked = boxes.find((box) => box.value === {json.dumps(ticked)});
+        const names = untickBeyond(4, boxes, {json.dumps(own)}, ticked);
+        console.log(JSON.stringify([names, boxes.filter((box) => !box.checked).map((box) => box.value)]));""",
+    )
+    assert result == [unticked, unticked]
+
+
+def test_four_controllers_stay_ticked(tmp_path: Path) -> None:
+    text = (
+        'console.log(JSON.stringify(untickBeyond(4, [..."abc"].map((value) => ({ value, checked: true })), "x.py:C")));'
+    )
+    assert script(tmp_path, text) == []
+
+
+def test_enter_in_a_field_cannot_submit_the_page() -> None:
+    assert "<form" not in (PAGE / "index.html").read_text("utf-8")
+
+
+def test_numbers_are_whole_where_they_count_and_zero_has_no_sign(tmp_path: Path) -> None:
+    values = "[[0, 0], [-0.04, 1], [-0.06, 1], [2.5], [-123.45], [null]]"
+    texts = script(tmp_path, f"console.log(JSON.stringify({values}.map(([value, digits]) => number(value, digits))));")
+    assert texts == ["0", "0.0", "\N{MINUS SIGN}0.1", "2.50", "\N{MINUS SIGN}123.5", "\N{EN DASH}"]
+
+
+def test_the_page_drives_the_newest_value_once_the_runs_in_progress_are_shown(tmp_path: Path) -> None:
+    page = used(tmp_path, "drag(90); drag(100); drag(110); finish(); slider().fire('change');")
+    assert page["runs"] == [[90, True], [110, True], [110, False]]
+
+
+def test_a_failed_run_does_not_stop_the_next_value(tmp_path: Path) -> None:
+    page = used(tmp_path, "drag(90); drag(100); hear({ kind: 'error', text: 'no', about: 'run' }, []);")
+    assert page["runs"] == [[90, True], [100, True]]
+
+
+def test_a_held_key_drives_on_the_way_and_once_more_at_the_end(tmp_path: Path) -> None:
+    press = 'slider().fire("keydown", { key: "PageUp" });'
+    page = used(tmp_path, f'{press} {press} finish(); slider().fire("keyup", {{ key: "PageUp" }});')
+    assert page["runs"] == [[90, True], [100, True], [100, False]]
+
+
+def test_the_heading_names_the_driven_speed(tmp_path: Path) -> None:
+    assert used(tmp_path, "drag(120); finish('Step steer, 120 km/h');")["title"] == "Step steer, 120 km/h"
+
+
+def test_four_controllers_are_asked_for_and_a_fifth_is_unticked_with_a_message(tmp_path: Path) -> None:
+    page = used(tmp_path, 'tick("lqr", true); tick("esc", true);')
+    assert [message["controllers"] for message in page["sent"]] == 2 * [["none", "ars", "afs", "lqr"]]
+    assert page["message"].startswith("esc is not driven")
+
+
+def test_an_own_controller_takes_the_place_of_the_fifth_visibly(tmp_path: Path) -> None:
+    page = used(tmp_path, 'tick("lqr", true); $("own").value = "my.py:C"; $("own").fire("change");')
+    assert page["sent"][-1]["controllers"] == ["none", "ars", "afs", "my.py:C"]
+    assert page["message"].startswith("lqr is not driven")
+
+
+def test_saved_files_are_named_next_to_the_button(tmp_path: Path) -> None:
+    reply = "{ kind: 'saved', files: ['a.mcap'], folder: '/f' }"
+    assert used(tmp_path, f"$('save').fire('click'); hear({reply}, []);")["saved"] == "saved a.mcap in /f"
+    refused = "{ kind: 'error', text: 'there is no run', about: 'save' }"
+    assert used(tmp_path, f"$('save').fire('click'); hear({refused}, []);")["saved"] == "there is no run"
