@@ -14,8 +14,7 @@ from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import axis_label, cell
-from activesteer.standards.proving_ground import steering_wheel_at
-from activesteer.standards.standard import Findings, Ground, NoResult, Run, Standard
+from activesteer.standards.standard import Findings, Ground, NoResult, Run, Standard, steering_wheel_at
 from activesteer.units import quantity_of
 
 SPEED_KMH: Final = 100.0

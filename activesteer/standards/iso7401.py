@@ -22,8 +22,7 @@ from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.proving_ground import steering_wheel_at
-from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
+from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard, steering_wheel_at
 from activesteer.units import DisplayUnit, display_unit
 
 SPEED_KMH: Final = 80.0

@@ -8,8 +8,7 @@ from typing import Final
 from activesteer.metric_table import metric
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.proving_ground import steering_wheel_at
-from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
+from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard, steering_wheel_at
 
 SPEED_KMH: Final = 80.0
 AY_MPS2: Final = 5.0

@@ -1,20 +1,17 @@
-"""Proving ground of a standard: series of runs on the study engine, and the angle that they start from."""
+"""Proving ground of a standard: series of runs on the study engine, in one set of workers."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from activesteer.config import Range
-from activesteer.errors import RecordingError
 from activesteer.scenario import FileOrTable, Scenario, resolve
-from activesteer.standards.r79_circle import fault_circles
-from activesteer.standards.standard import Ground, NoResult, Run
+from activesteer.standards.fault_circle import fault_circles
+from activesteer.standards.standard import Run
 from activesteer.studies.engine import run_task
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.workers import Workers
@@ -95,36 +92,3 @@ def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> Run:
         },
         "" if row["status"] == run_task.Status.OK else row["error"] or row["status"],
     )
-
-
-_RATE_DEGPS: Final = 5.0
-"""Rate of the ramp [deg/s]; the car lags by some 0.1 s, which is half a degree."""
-_LONGEST_S: Final = 30.0
-
-
-def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float:
-    """Return the angle from a slow ramp to the left at constant speed.
-
-    Returns:
-        Steering wheel angle, to 0.1 deg [deg].
-    """
-    [run] = ground.drive(
-        f"ramp_{speed_kmh:g}kmh",
-        "slowly_increasing_steer",
-        [{"speed_kmh": speed_kmh}],
-        {"steer.rate_degps": _RATE_DEGPS, "duration_s": _LONGEST_S},
-        ("steering_wheel_rad", "ay_mps2"),
-    )
-    try:
-        ay = run["ay_mps2"]
-    except RecordingError as reason:
-        raise NoResult(f"the slow ramp at {speed_kmh:g} km/h cannot be driven: {reason}") from reason
-    if ay.max() < ay_mps2:
-        raise NoResult(
-            f"the car reaches {ay.max():.3g} m/s2 at {speed_kmh:g} km/h; the test needs {ay_mps2:g} m/s2",
-            value=ay.max(), allowed=Range(ay_mps2),
-        )  # fmt: skip
-    # Apart from noise, the acceleration rises until then.
-    end = int(np.argmax(ay >= ay_mps2))
-    rising = np.maximum.accumulate(ay[: end + 1])
-    return round(math.degrees(float(np.interp(ay_mps2, rising, run["steering_wheel_rad"][: end + 1]))), 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import re
 
 import control
 import numpy as np
@@ -128,8 +129,9 @@ def test_car_is_stable():
 
 
 def test_eigenvalue_table_has_a_line_for_every_mode_up_to_its_limit():
-    lines = eigenvalue_table(car().modes(), 5.0).splitlines()
-    assert len(lines) == 1 + sum(mode.natural_frequency_Hz <= 5.0 for mode in car().modes())
+    # Long names and words go on in lines without a frequency.
+    lines = [line for line in eigenvalue_table(car().modes(), 5.0).splitlines() if re.search(r" \d+\.\d\d  ", line)]
+    assert len(lines) == sum(mode.natural_frequency_Hz <= 5.0 for mode in car().modes())
     assert any(line.startswith("roll ") and "+-" in line for line in lines)
 
 

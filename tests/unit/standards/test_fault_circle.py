@@ -10,7 +10,7 @@ import pytest
 
 import activesteer
 from activesteer.scenario import resolve
-from activesteer.standards.r79_circle import AY_MPS2, CIRCLES, YAW_RATE_RADPS, circle, fault_circle
+from activesteer.standards.fault_circle import AY_MPS2, CIRCLES, YAW_RATE_RADPS, circle, fault_circle
 
 FAULTS = ("rear:runaway=left", "rear:runaway=right", "rear:stuck")
 BEGIN_S = 4.5

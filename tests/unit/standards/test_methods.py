@@ -20,8 +20,8 @@ from activesteer.standards.examination import Examination, examine
 from activesteer.standards.iso14512 import after_one_second
 from activesteer.standards.iso21994 import corrected_distance
 from activesteer.standards.page_parts import metrics_table
-from activesteer.standards.proving_ground import ProvingGround, steering_wheel_at
-from activesteer.standards.standard import Findings, Run
+from activesteer.standards.proving_ground import ProvingGround
+from activesteer.standards.standard import Findings, Run, steering_wheel_at
 from tests.raising import raises
 from tests.unit.standards.signals import run_of, times
 

@@ -11,7 +11,8 @@ import pytest
 
 from activesteer.files import json_text
 from activesteer.standards.examination import examine
-from activesteer.standards.r79_circle import CIRCLES, EFFORTS, FIGURES, RIM_RADIUS_M, STANDARD, reached
+from activesteer.standards.fault_circle import CIRCLES
+from activesteer.standards.r79_circle import EFFORTS, FIGURES, RIM_RADIUS_M, STANDARD, reached
 from activesteer.standards.standard import Run
 from tests.unit.standards.grounds import WrittenGround
 from tests.unit.standards.signals import run_of, times
@@ -86,7 +87,7 @@ def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
 
 
 def test_the_compact_is_steered_alike_to_both_sides_and_corrected_in_both_circles(monkeypatch):
-    monkeypatch.setattr("activesteer.standards.r79_circle.usual_faults", lambda _: ["rear:offset=1deg"])
+    monkeypatch.setattr("activesteer.standards.fault_circle.usual_faults", lambda _: ["rear:offset=1deg"])
     found = examine("r79-circle", ["ars"], jobs=1).findings["ars"]
     efforts = {(row["steering"], row["direction"]): row["effort_N"] for row in found.values["efforts"]}
     for name in EFFORTS:
