@@ -160,7 +160,7 @@ def _kc(options: argparse.Namespace) -> int:
     if options.tables is not None:
         from activesteer.errors import ParameterError
         from activesteer.files import write_text
-        from activesteer.rigs.kc.tables import write_tables
+        from activesteer.rigs.kc.result import write_tables
         from activesteer.scenario import load_car
         from activesteer.vehicle_builder.car_table import car_table
 

@@ -29,7 +29,7 @@ from activesteer.config import Source, read_toml
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.files import csv_number, is_file, is_folder, read_csv
-from activesteer.rigs.kc.tables import CHANNELS, OF_THE_AXLE, TESTS
+from activesteer.rigs.kc.result import CHANNELS, OF_THE_AXLE, TESTS
 from activesteer.units import UNIT_NAMES, alike, find_unit
 
 _HEAD: Final = re.compile(r"(?P<name>[\w ]+?)\s*\[\s*(?P<unit>[\w/]+)\s*\]")

@@ -24,8 +24,8 @@ from scipy.interpolate import CubicSpline
 from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar
-from activesteer.rigs.kc.sweep import INWARDS
-from activesteer.rigs.kc.tyre_stiffness import tyre_stiffness
+from activesteer.rigs.kc.modes import tyre_stiffness
+from activesteer.rigs.kc.programme import INWARDS
 from activesteer.scenario import load_car
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle

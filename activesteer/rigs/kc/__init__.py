@@ -1,8 +1,8 @@
 """Kinematics and compliance of a car with a held chassis and its wheels on pads, measured as on a test bench."""
 
 from activesteer.rigs.kc.figures import draw, rear_camber_figure
+from activesteer.rigs.kc.programme import Sweep
 from activesteer.rigs.kc.result import KcMetric, KcResult
 from activesteer.rigs.kc.rig import kinematics_compliance
-from activesteer.rigs.kc.sweep import Sweep
 
 __all__ = ["KcMetric", "KcResult", "Sweep", "draw", "kinematics_compliance", "rear_camber_figure"]

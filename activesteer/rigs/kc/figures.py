@@ -16,12 +16,9 @@ from activesteer.conventions import Array
 from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, save_all
 from activesteer.plotting import draw as drawn
-from activesteer.rigs.kc.definitions import Axle
-from activesteer.rigs.kc.metrics_steering import mean_steer_rad, ratio_curve
-from activesteer.rigs.kc.metrics_travel import roll_angle_rad
-from activesteer.rigs.kc.programme import rear_screw_travel_m
+from activesteer.rigs.kc.metrics import Axle, mean_steer_rad, ratio_curve, roll_angle_rad
+from activesteer.rigs.kc.programme import Sweep, rear_screw_travel_m
 from activesteer.rigs.kc.result import KcMetric, KcResult
-from activesteer.rigs.kc.sweep import Sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
@@ -12,13 +12,193 @@ import numpy as np
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
-from activesteer.rigs.kc.modes import Modes, modes
-from activesteer.rigs.kc.steering_axis import SteeringAxis, steering_axis
-from activesteer.rigs.kc.sweep import INWARDS, Sweep, run
-from activesteer.rigs.kc.tyre_stiffness import TyreStiffness, parking_moment_Nm, tyre_stiffness
+from activesteer.rigs.kc.modes import Modes, TyreStiffness, modes, parking_moment_Nm, tyre_stiffness
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import Vehicle, VehicleParameters
 from activesteer.vehicle import force_block as fb
+
+INWARDS: Final = np.array([-1.0, 1.0, -1.0, 1.0])
+"""Sign of y towards the middle of the car, by corner."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One sweep of the rig, n points in increasing order of its variable.
+
+    Vehicle axes of the standing car: x forward, y left, z up, origin on the road below the middle of the front axle.
+    Arrays have the shape (n, 4) or (n, 4, 3), by corner.
+    """
+
+    title: str
+    """Title of the sweep."""
+    variable: str
+    """Variable of the sweep, with its sign."""
+    unit: str
+    """SI unit of the variable."""
+    x: Array
+    """Values of the variable, shape (n,)."""
+    centre_m: Array
+    """Wheel centres."""
+    axle: Array
+    """Unit vectors along the wheels' axles, to the left."""
+    contact_m: Array
+    """Contact points: the lowest points of the wheels."""
+    patch_m: Array
+    """Points of the wheels, locked to their knuckles, that are the contact points at x = 0."""
+    load_N: Array
+    """Vertical forces of the pads."""
+    wind_up_rad: Array
+    """Rotation of the knuckles about y, positive in the sense of forward rolling."""
+    damper_m: Array
+    """Lengths of the dampers; for a strut its extension from the design position."""
+    rack_m: Array
+    """Travel of the rack, positive steers left, shape (n,)."""
+    steering_wheel_rad: Array
+    """Steering wheel angle, shape (n,)."""
+    steering_wheel_torque_Nm: Array
+    """Torque that holds the steering wheel, positive to the left, shape (n,)."""
+
+    @property
+    def steer_rad(self) -> Array:
+        """Steer angles: heading of the wheel planes, positive to the left, shape (n, 4)."""
+        return np.arctan2(-self.axle[..., 0], self.axle[..., 1])
+
+    @property
+    def toe_rad(self) -> Array:
+        """Toe angles, positive toe-in (front edge towards the middle of the car), shape (n, 4)."""
+        return self.steer_rad * INWARDS
+
+    @property
+    def camber_rad(self) -> Array:
+        """Camber angles, negative with the top towards the middle of the car, shape (n, 4)."""
+        return np.arcsin(self.axle[..., 2]) * INWARDS
+
+    @property
+    def travel_m(self) -> Array:
+        """Heights of the wheel centres above those at x = 0, positive in bump, shape (n, 4)."""
+        return self.centre_m[..., 2] - self.centre_m[self.zero, :, 2]
+
+    @property
+    def zero(self) -> int:
+        """Index of the point of the standing car, x = 0."""
+        return int(np.abs(self.x).argmin())
+
+    def as_table(self) -> dict[str, object]:
+        """Return all arrays as lists for JSON, with the angles of the wheels."""
+        table: dict[str, object] = {"title": self.title, "variable": self.variable, "unit": self.unit}
+        arrays = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in table}
+        arrays |= {"toe_rad": self.toe_rad, "camber_rad": self.camber_rad, "steer_rad": self.steer_rad}
+        return table | {name: value.tolist() for name, value in arrays.items()}
+
+
+def _read(car: HeldCar) -> dict[str, Array]:
+    """Return one point of a sweep by the names of the fields of `Sweep`, with the rotations of the wheels."""
+    model, data = car.model, car.data
+    poses = [car.wheel(corner) for corner in range(4)]
+    wheel = model.joint("steering_wheel")
+    return {
+        "centre_m": np.array([pose.centre_m for pose in poses]) - car.origin_m,
+        "rotation": np.array([pose.rotation for pose in poses]),
+        "contact_m": np.array([pose.contact_m for pose in poses]) - car.origin_m,
+        "load_N": car.load_N.copy(),
+        "damper_m": np.array([data.ten_length[model.tendon(f"{corner}_damper").id] for corner in CORNERS]),
+        "rack_m": data.qpos[model.joint("rack").qposadr[0]],
+        "steering_wheel_rad": data.qpos[wheel.qposadr[0]],
+        "steering_wheel_torque_Nm": data.qfrc_actuator[wheel.dofadr[0]],
+    }
+
+
+def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float, Case]) -> Sweep:
+    """Measure the points of a sweep, from zero outwards to either side.
+
+    Args:
+        car: The car on the rig; returned to its first equilibrium.
+        title: Title of the sweep.
+        variable: Variable of the sweep.
+        unit: SI unit of the variable.
+        cases: Loads and positions that the rig imposes, by value of the variable; 0 must be among them.
+
+    Raises:
+        ModelError: a point has no equilibrium.
+    """
+    points: dict[float, dict[str, Array]] = {}
+    for side in (sorted(x for x in cases if x >= 0.0), sorted((x for x in cases if x < 0.0), reverse=True)):
+        car.reset()
+        for x in side:
+            car.equilibrium(cases[x])
+            points[x] = _read(car)
+    car.reset()
+    order = sorted(points)
+    zero = points[min(points, key=abs)]
+    columns = {name: np.stack([points[x][name] for x in order]) for name in zero}
+    rotation = columns.pop("rotation")
+    at_zero = np.einsum("cji,cj->ci", zero["rotation"], zero["contact_m"] - zero["centre_m"])
+    return Sweep(
+        title, variable, unit,
+        x=np.array(order),
+        axle=rotation[..., 1],
+        patch_m=columns["centre_m"] + np.einsum("ncij,cj->nci", rotation, at_zero),
+        wind_up_rad=np.arctan2(-rotation[..., 2, 0], rotation[..., 0, 0]),
+        **columns,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SteeringAxis:
+    """A steering axis, and its distances from the wheel of the standing car."""
+
+    point_m: Array
+    """Point of the axis at the height of the contact point, vehicle axes, shape (3,)."""
+    direction: Array
+    """Unit vector along it, upwards, shape (3,)."""
+    caster_rad: float
+    """Angle to the vertical in side view, positive with the top to the rear (ISO 8855)."""
+    inclination_rad: float
+    """Angle to the vertical in front view, positive with the top towards the middle of the car (ISO 8855)."""
+    trail_m: float
+    """Distance from the contact point forwards to the axis on the ground: positive if the axis is ahead."""
+    scrub_radius_m: float
+    """Distance from the axis on the ground outwards to the contact point: positive if the axis is inside."""
+    centre_trail_m: float
+    """Distance from the wheel centre forwards to the axis, at the height of the wheel centre."""
+    centre_offset_m: float
+    """Distance from the axis outwards to the wheel centre, at the height of the wheel centre (disturbing force
+    lever)."""
+
+
+def steering_axis(right: WheelPose, left: WheelPose, standing: WheelPose, inwards: float) -> SteeringAxis:
+    """Return the axis of the screw motion that takes a wheel from one position to another.
+
+    Args:
+        right: The wheel steered slightly to the right, vehicle axes.
+        left: The wheel steered by the same angle to the left.
+        standing: The wheel straight ahead.
+        inwards: Sign of y towards the middle of the car.
+
+    Source: Chasles' theorem; the point is the solution of least norm of (I - R) p = t.
+    """
+    turn = left.rotation @ right.rotation.T
+    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    axis /= np.linalg.norm(axis)
+    axis *= math.copysign(1.0, axis[2])
+    shift = left.centre_m - turn @ right.centre_m
+    point = np.linalg.lstsq(np.eye(3) - turn, shift - axis * (axis @ shift), rcond=1e-9)[0]
+
+    def at_height(height_m: float) -> Array:
+        return point + axis * ((height_m - point[2]) / axis[2])
+
+    ground, beside = at_height(standing.contact_m[2]), at_height(standing.centre_m[2])
+    return SteeringAxis(
+        ground,
+        axis,
+        math.atan2(-axis[0], axis[2]),
+        math.atan2(inwards * axis[1], axis[2]),
+        float(ground[0] - standing.contact_m[0]),
+        float(inwards * (ground[1] - standing.contact_m[1])),
+        float(beside[0] - standing.centre_m[0]),
+        float(inwards * (beside[1] - standing.centre_m[1])),
+    )
+
 
 _TRAVEL_M: Final = np.linspace(-0.08, 0.08, 33)
 _SIDE_FORCE_N: Final = np.linspace(-4000.0, 4000.0, 17)

@@ -1,18 +1,27 @@
-"""Result of the kinematics and compliance rig: metrics in customary units, curves in SI, tables."""
+"""Result of the kinematics and compliance rig: metrics in customary units, curves in SI, tables.
+
+A column is a channel and its unit: `left_toe [deg]`. Signs are those of ISO 8855 and of `Sweep`: toe positive toe-in,
+camber negative with the top inwards, caster positive with the top to the rear, motion of a wheel outwards or
+forwards positive; for forces and moments see `TESTS`.
+"""
 
 from __future__ import annotations
 
 import math
+import os
 import textwrap
 from dataclasses import dataclass
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, Literal
 
+import numpy as np
+
+from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.rigs.kc.definitions import Axle
-from activesteer.rigs.kc.metrics_steering import DEFINITIONS
-from activesteer.rigs.kc.programme import Measured
-from activesteer.rigs.kc.sweep import Sweep
-from activesteer.rigs.kc.targets import Target, Targets
+from activesteer.files import make_folder, write_text
+from activesteer.rigs.kc.metrics import DEFINITIONS, Axle, Target, Targets
+from activesteer.rigs.kc.programme import INWARDS, Measured, Sweep
+from activesteer.units import known_unit
 
 
 @dataclass(frozen=True)
@@ -132,3 +141,119 @@ def evaluated(vehicle: str, measured: Measured, targets: Targets) -> KcResult:
                 )
             )  # fmt: skip
     return KcResult(vehicle, tuple(metrics), measured.sweeps, measured)
+
+
+Mirror = Literal["alike", "opposed"]
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test of an axle.
+
+    Attributes:
+        sweep: Name of our own sweep.
+        variable: Channel of the variable.
+        meaning: Meaning of the variable, with its sign.
+        sign: Sign from the variable to the load of the left wheel: its travel; forwards, to the left; a turn to the
+            left.
+        mirror: Whether the load of the right wheel is the mirror image of the left wheel's load, or its opposite.
+        front_only: Whether only the front axle has the test.
+    """
+
+    sweep: str
+    variable: str
+    meaning: str
+    sign: float = 1.0
+    mirror: Mirror = "alike"
+    front_only: bool = False
+
+
+TESTS: Final = {
+    "parallel_travel": Test("parallel_travel", "travel", "wheel travel, both wheels, positive in bump"),
+    "opposite_travel": Test("opposite_travel", "travel", "wheel travel, positive in bump, one wheel up, one down"),
+    "steering": Test(
+        "steering_rolling", "rack", "travel of the rack, positive steers left", 1.0, "opposed", front_only=True
+    ),
+    "side_force": Test(
+        "lateral_in_phase", "force", "side force at each contact point, positive to the left", 1.0, "opposed"
+    ),
+    "side_force_opposed": Test(
+        "lateral_opposed", "force", "side force at each contact point, positive towards the middle of the car", -1.0
+    ),
+    "braking_force": Test(
+        "longitudinal_patch", "force", "force at each contact point, wheels locked, positive forwards"
+    ),
+    "drive_force": Test("longitudinal_centre", "force", "force at each wheel centre, positive forwards"),
+    "aligning_moment": Test(
+        "aligning_in_phase", "moment", "moment about the vertical on each wheel, positive to the left", 1.0, "opposed"
+    ),
+    "aligning_moment_opposed": Test(
+        "aligning_opposed", "moment", "moment about the vertical on each wheel, positive towards toe-in", -1.0
+    ),
+}  # fmt: skip
+"""Tests by name; AXLE_NAME.csv is the file of a test."""
+
+CHANNELS: Final = {
+    "travel": ("m", "mm"), "rack": ("m", "mm"), "force": ("N", "N"), "moment": ("Nm", "Nm"),
+    "steering_wheel": ("rad", "deg"), "toe": ("rad", "deg"), "camber": ("rad", "deg"), "caster": ("rad", "deg"),
+    "centre_forward": ("m", "mm"), "centre_outwards": ("m", "mm"), "contact_forward": ("m", "mm"),
+    "contact_outwards": ("m", "mm"), "load": ("N", "N"), "damper": ("m", "mm"),
+}  # fmt: skip
+"""Channel -> its SI unit and its unit in a file; channels of a wheel begin with left_ or right_."""
+OF_THE_AXLE: Final = ("rack", "force", "moment", "steering_wheel")
+"""Channels of the axle, not of a wheel."""
+
+
+def write_tables(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
+    """Write all tests of both axles, and return the paths.
+
+    Args:
+        result: Result of the rig.
+        folder: Folder of the files; created if it does not exist.
+
+    Raises:
+        ParameterError: a file cannot be written.
+    """
+    target = make_folder(folder, ParameterError)
+    written = []
+    for first, axle in ((0, "front"), (2, "rear")):
+        for name, test in TESTS.items():
+            if test.front_only and axle == "rear":
+                continue
+            columns = _columns(result.curves[test.sweep], test, first)
+            text = _csv(f"{axle} axle of {result.vehicle}; {test.variable}: {test.meaning}", columns)
+            written.append(write_text(target / f"{axle}_{name}.csv", text, ParameterError))
+    return written
+
+
+def _columns(sweep: Sweep, test: Test, first: int) -> dict[str, Array]:
+    columns: dict[str, Array] = {}
+    if test.variable == "rack":
+        columns |= {"rack": sweep.rack_m, "steering_wheel": sweep.steering_wheel_rad}
+    elif test.variable != "travel":
+        columns[test.variable] = sweep.x
+    for side, wheel in (("left", first), ("right", first + 1)):
+        outwards = -INWARDS[wheel]
+        moved = {"centre": sweep.centre_m[:, wheel], "contact": sweep.contact_m[:, wheel]}
+        values = {
+            "travel": sweep.travel_m[:, wheel],
+            "toe": sweep.toe_rad[:, wheel],
+            "camber": sweep.camber_rad[:, wheel],
+            "caster": -(sweep.wind_up_rad[:, wheel] - sweep.wind_up_rad[sweep.zero, wheel]),
+            **{f"{point}_forward": path[:, 0] - path[sweep.zero, 0] for point, path in moved.items()},
+            **{f"{point}_outwards": outwards * (path[:, 1] - path[sweep.zero, 1]) for point, path in moved.items()},
+            "load": sweep.load_N[:, wheel],
+            "damper": sweep.damper_m[:, wheel],
+        }
+        columns |= {f"{side}_{name}": value for name, value in values.items()}
+    return columns
+
+
+def _csv(remark: str, columns: dict[str, Array]) -> str:
+    heads, values = [], []
+    for name, column in columns.items():
+        _, unit = CHANNELS[name.removeprefix("left_").removeprefix("right_")]
+        heads.append(f"{name} [{unit}]")
+        values.append(column / known_unit(unit).factor)
+    rows = [",".join(f"{value:.8g}" for value in row) for row in np.array(values).T]
+    return "\n".join([f"# {remark}", ",".join(heads), *rows, ""])

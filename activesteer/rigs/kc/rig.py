@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from activesteer.errors import ModelError
+from activesteer.rigs.kc.metrics import load_targets
 from activesteer.rigs.kc.programme import measure
 from activesteer.rigs.kc.result import KcResult, evaluated
-from activesteer.rigs.kc.targets import load_targets
 from activesteer.scenario import FileOrTable, check_gains, load_car
 from activesteer.vehicle.parameters import Friction
 

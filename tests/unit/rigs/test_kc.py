@@ -15,9 +15,8 @@ from activesteer.files import json_text
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, draw, kinematics_compliance
 from activesteer.rigs.kc.held_car import WheelPose
-from activesteer.rigs.kc.metrics_steering import DEFINITIONS
-from activesteer.rigs.kc.steering_axis import steering_axis
-from activesteer.rigs.kc.targets import load_targets
+from activesteer.rigs.kc.metrics import DEFINITIONS, load_targets
+from activesteer.rigs.kc.programme import steering_axis
 from tests.raising import raises
 
 

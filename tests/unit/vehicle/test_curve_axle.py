@@ -13,7 +13,7 @@ from activesteer import simulate
 from activesteer.conventions import Array
 from activesteer.errors import ModelError, ParameterError
 from activesteer.rigs.kc import kinematics_compliance
-from activesteer.rigs.kc.tables import write_tables
+from activesteer.rigs.kc.result import write_tables
 from activesteer.scenario import Car, load_car
 from activesteer.studies.linear.linearisation import linear_car
 from activesteer.vehicle import Vehicle
