@@ -14,7 +14,14 @@ _NotNegative = Annotated[float, Range(0.0)]
 
 @dataclass(frozen=True)
 class EstimatorParameters:
-    """Uncertainties of the estimator's model; the data sheets give those of the sensors."""
+    """Roll steer and uncertainties of the estimator's model; the data sheets give the uncertainties of the sensors."""
+
+    front_roll_steer: Annotated[float, Range(-2.0, 2.0)] = 0.0
+    """Slip angle that the front axle loses per roll angle [rad/rad]. From a K&C test: `roll_understeer`, plus
+    (1 + `roll_camber`) times the camber stiffness of the tyre over its cornering stiffness."""
+    rear_roll_steer: Annotated[float, Range(-2.0, 2.0)] = 0.0
+    """The same of the rear axle [rad/rad], with `roll_understeer` subtracted: the rear wheels then steer into the turn
+    and gain slip angle."""
 
     friction: Annotated[float, Range(0.05, 1.5)] = 0.9
     """Assumed friction of the road, relative to the road of the tyre files, until it is observed [-]: dry asphalt."""

@@ -110,26 +110,29 @@ def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s:
         parameters: Uncertainties of the model.
         timestep_s: Time between two calls [s].
     """
-    values = _car(setup) | _uncertainties(setup, parameters) | _times(setup, timestep_s) | _wheels(setup)
+    values = _car(setup, parameters) | _uncertainties(setup, parameters) | _times(setup, timestep_s) | _wheels(setup)
     known = np.zeros(1, KNOWN)
     for name, value in values.items():
         known[name] = value
     return known
 
 
-def _car(setup: EstimatorSetup) -> dict[str, float]:
+def _car(setup: EstimatorSetup, parameters: EstimatorParameters) -> dict[str, float]:
     body, more, (front, rear) = setup.single_track, setup.two_track, setup.tyres
     wheelbase_m = body.cg_to_front_m + body.cg_to_rear_m
     per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / wheelbase_m
     front_N, rear_N = per_metre * body.cg_to_rear_m, per_metre * body.cg_to_front_m
+    # In a steady turn an axle carries its share of the mass, and its roll steer acts like a compliance.
+    gradient = 0.5 * more.roll_gradient_radpmps2 * GRAVITY_MPS2
+    rolled = parameters.front_roll_steer * gradient / front_N, parameters.rear_roll_steer * gradient / rear_N
     transfer_kgm, fraction = body.mass_kg * more.load_height_m, more.front_load_transfer_fraction
     return {
         "mass_kg": body.mass_kg,
         "yaw_inertia_kgm2": body.yaw_inertia_kgm2,
         "cg_to_front_m": body.cg_to_front_m,
         "cg_to_rear_m": body.cg_to_rear_m,
-        "front_compliance_radpN": 1.0 / body.front_stiffness_Nprad - 0.5 / front.stiffness_at(front_N),
-        "rear_compliance_radpN": 1.0 / body.rear_stiffness_Nprad - 0.5 / rear.stiffness_at(rear_N),
+        "front_compliance_radpN": 1.0 / body.front_stiffness_Nprad - 0.5 / front.stiffness_at(front_N) - rolled[0],
+        "rear_compliance_radpN": 1.0 / body.rear_stiffness_Nprad - 0.5 / rear.stiffness_at(rear_N) - rolled[1],
         "front_load_N": front_N,
         "rear_load_N": rear_N,
         "front_load_kg": transfer_kgm * fraction / more.front_track_m,

@@ -4,7 +4,7 @@ For the axles i = f, r:
 
     m (v_y' + r v_x) = F_f cos d_f + F_r cos d_r + X_f sin d_f
     J_z r'           = l_f (F_f cos d_f + X_f sin d_f) - l_r F_r cos d_r + M_x
-    s_i / v_x a_i'   = d_i - (v_y + h p' +- l_i r) / v_x - c_i F_i + e_i - a_i
+    s_i / v_x a_i'   = d_i - (v_y + h p' +- l_i r) / v_x - c_i F_i - q_i p + e_i - a_i
     F_i              = sum over the axle's wheels of u F_y(a_i / u, F_z)
     p'' + 2 D w p' + w^2 p = w^2 k a_y
 
@@ -18,9 +18,11 @@ by p as a mass on a spring, about an axis that lies h below the centre of gravit
 by h p'. Springs and dampers of the body load the wheels. The compliance c_i is the difference between the identified
 cornering stiffness of the axle and the stiffness of its tyres:
 
-    c_i = 1 / C_i - 1 / (2 C_tyre)
+    c_i = 1 / C_i - 1 / (2 C_tyre) - q_i k / m_i
 
-It includes roll steer, elastokinematics and steering column. The slip angle error e_i covers the unknowns of tyre and
+It includes elastokinematics and steering column. The roll steer q_i (with the thrust of the wheels' camber) follows the
+body's roll and thus later than the force. In a steady turn with the axle's mass m_i = F_i / a_y it acts like a
+compliance, so its part is subtracted from the identified one. The slip angle error e_i covers the unknowns of tyre and
 axle; like the offsets of sensors and the friction it is a state.
 
 Sources:
@@ -172,7 +174,9 @@ def follow(known, tyres, memory, state, duration_s, out):
         front_N, rear_N = forces_of(known, tyres, memory, out)
         front_rad, rear_rad = slip_angles(known, memory, out, vx)
         front_rad += out[FRONT_ERROR] - known.front_compliance_radpN * front_N
+        front_rad -= known.front_roll_steer * memory.roll_rad
         rear_rad += out[REAR_ERROR] - known.rear_compliance_radpN * rear_N
+        rear_rad -= known.rear_roll_steer * memory.roll_rad
         out[FRONT_SLIP] += follow_front * (front_rad - out[FRONT_SLIP])
         out[REAR_SLIP] += follow_rear * (rear_rad - out[REAR_SLIP])
         across_N, behind_N = front_N * cos_f + memory.front_along_N * sin_f, rear_N * cos_r

@@ -26,8 +26,8 @@ class Drive(NamedTuple):
     said: list[Measurement]
 
 
-def drive(maneuver: str, **overrides: Any) -> Drive:
-    """Drive the compact with production sensors and an observer."""
+def drive(maneuver: str, vehicle: str = "compact", **overrides: Any) -> Drive:
+    """Drive the compact or another car with production sensors and an observer."""
     said: list[Measurement] = []
 
     class Listening:
@@ -38,9 +38,8 @@ def drive(maneuver: str, **overrides: Any) -> Drive:
             said.append(measurement)
             return self.inner.step(command, measurement)
 
-    return Drive(
-        activesteer.simulate(maneuver, Listening, overrides={"sensors.preset": "production", **overrides}), said
-    )
+    changes = {"sensors.preset": "production", **overrides}
+    return Drive(activesteer.simulate(maneuver, Listening, vehicle, changes), said)
 
 
 def estimates(estimator: Estimator, said: Iterable[Measurement]) -> dict[str, np.ndarray]:

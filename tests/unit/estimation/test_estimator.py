@@ -8,8 +8,13 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.conventions import GRAVITY_MPS2
 from activesteer.errors import ControllerError
+from activesteer.estimation import EstimatorParameters
+from activesteer.rigs.kc import kinematics_compliance
+from activesteer.scenario import resolve
 from activesteer.signals import Measurement
+from activesteer.tyre.evaluation import MagicFormula
 from tests.raising import raises
 from tests.unit.controllers.cars import setup
 from tests.unit.estimation.drives import drive, estimates, rolling
@@ -145,6 +150,34 @@ def test_soft_tyres_are_told_from_a_slippery_road_and_front_from_rear(mu, front,
         # The axle's compliance does not soften with its tyre, and the curve of a loaded tyre is not exactly similar.
         assert np.abs(run[f"estimated_{name}_stiffness"][late] - factor).max() < 0.2
         assert run[f"estimated_{name}_stiffness_std"][late].max() < 0.1
+
+
+def test_roll_steer_is_not_taken_for_stiff_tyres():
+    """The sedan's front wheels steer out of the turn as it rolls, 0.3 s after the force; its joints are rigid."""
+    run = drive("step_steer", "sedan", **{"steer.steering_wheel_deg": 50.0, "duration_s": 3.0}).recording
+    turns = run.time_s > 1.0
+    error, std = run["estimated_friction"] - 0.9, run["estimated_friction_std"]
+    assert np.abs(run["estimated_front_stiffness"] - 1.0)[turns].max() < EstimatorParameters.stiffness_std
+    assert (np.abs(error) < 2.0 * std)[turns].mean() > 0.9
+
+
+@pytest.mark.parametrize("vehicle", ["sedan", "compact", "compact_electric", "tesla_model_s", "bmw_m8"])
+def test_roll_steer_in_vehicle_files_is_that_of_the_test_bench(vehicle):
+    car = resolve("straight_line", vehicle).car
+    body, bench = car.config.single_track, kinematics_compliance(vehicle)
+    per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / body.wheelbase_m
+    loads_N = per_metre * body.cg_to_rear_m, per_metre * body.cg_to_front_m
+    parameters = resolve("straight_line", vehicle).controller_setup(0.001).gains.estimator
+    found = parameters.front_roll_steer, parameters.rear_roll_steer
+    small_rad = math.radians(0.5)
+    for axle, sign, tyre, load_N, known in zip(("front", "rear"), (1, -1), car.new_tyres, loads_N, found, strict=True):
+        sides = small_rad * np.array([1.0, -1.0])
+        camber, slip = (
+            np.diff(MagicFormula(tyre).evaluate(load_N, 0.0, *angles, vx_mps=20.0).fy_N)
+            for angles in ((0.0, sides), (sides, 0.0))
+        )
+        thrust = (1.0 + bench[axle, "roll_camber"]) * float(camber[0] / slip[0])
+        assert known == pytest.approx(sign * bench[axle, "roll_understeer"] + thrust, abs=0.005)
 
 
 def test_car_without_the_table_has_no_estimator():

@@ -14,16 +14,19 @@ from activesteer.estimation.kalman_filter import begin, correct, predict
 from activesteer.estimation.records import (
     AY_OFFSET,
     FRICTION,
+    FRONT_SLIP,
     FRONT_STIFFNESS,
     LATERAL_SPEED,
     MEMORY,
     N_STATES,
     RATE_OFFSET,
+    REAR_SLIP,
     REAR_STIFFNESS,
     SAID,
     YAW_RATE,
     known_of,
 )
+from activesteer.estimation.setup import GRID
 from activesteer.estimation.speed_filter import brush_slip
 from activesteer.estimation.two_track_model import follow, follow_roll
 from activesteer.estimation.wheels import read_wheels
@@ -79,6 +82,33 @@ def test_the_body_rolls_as_a_damped_oscillator_whose_springs_and_dampers_load_th
         assert memory.rolling_mps == pytest.approx(
             known.roll_arm_m * rate, abs=0.03 * known.roll_arm_m * speed * end_rad
         )
+
+
+def test_a_steady_turn_has_the_identified_stiffness_with_any_roll_steer(setup):
+    ay_mps2 = 0.5
+    taken_rad = []
+    for roll_steer in (0.0, 0.3):
+        parameters = replace(setup.gains.estimator, front_roll_steer=roll_steer, rear_roll_steer=-roll_steer)
+        known = known_of(setup.estimation, parameters, setup.timestep_s)[0]
+        rolled_rad = known.roll_gradient_radpmps2 * ay_mps2
+        front_N, rear_N = (2.0 * load_N / GRAVITY_MPS2 * ay_mps2 for load_N in (known.front_load_N, known.rear_load_N))
+        front_rad = known.front_compliance_radpN * front_N + known.front_roll_steer * rolled_rad
+        rear_rad = known.rear_compliance_radpN * rear_N + known.rear_roll_steer * rolled_rad
+        taken_rad.append((front_rad, rear_rad))
+    assert taken_rad[1] == pytest.approx(taken_rad[0])
+
+
+def test_the_front_axle_of_a_rolled_car_has_less_slip_angle(setup):
+    parameters = replace(setup.gains.estimator, front_roll_steer=0.3, rear_roll_steer=-0.1)
+    known = known_of(setup.estimation, parameters, setup.timestep_s)[0]
+    tyres = np.zeros((2, *GRID))  # without force no compliance
+    found = np.zeros(1, MEMORY)[0]
+    begin(known, found)
+    found.speed_mps, found.roll_rad = 20.0, 0.02
+    # Long enough for the relaxation.
+    follow(known, tyres, found, found.state, 1.0, found.now)
+    assert found.now[FRONT_SLIP] == pytest.approx(-0.3 * 0.02, rel=1e-6)
+    assert found.now[REAR_SLIP] == pytest.approx(0.1 * 0.02, rel=1e-6)
 
 
 def test_wheels_stand_at_their_corners(setup, known):
