@@ -21,7 +21,7 @@ from activesteer import simulate
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.recording import Recording
-from activesteer.studies.engine.task_queue import in_parallel
+from activesteer.studies.engine.workers import in_parallel
 
 VEHICLES: Final = ("compact", "compact_electric", "sedan", "tesla_model_s")
 COURSES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
