@@ -108,7 +108,16 @@ def read(text: str | bytes) -> Message:
 
 
 def add(waiting: deque[Message], message: Message) -> bool:
-    """Append a message to a queue, where it replaces an older one of the same meaning; return False if it is full."""
+    """Append a message to a queue, where it replaces an older one of the same meaning; return False if it is full.
+
+    Beginning and end of a drive are always taken: they make older hands useless.
+    """
+    if isinstance(message, (Start, End)):
+        useless = (Act, End) if isinstance(message, End) else (Act, End, Start)
+        for older in [other for other in waiting if isinstance(other, useless)]:
+            waiting.remove(older)
+        waiting.append(message)
+        return True
     if _is_replaced(message):
         for older in [other for other in waiting if type(other) is type(message) and _is_replaced(other)]:
             waiting.remove(older)
@@ -122,4 +131,4 @@ def _is_replaced(message: Message) -> bool:
     """Return whether a newer message of its type makes this one useless."""
     if isinstance(message, Act):
         return message.controller is UNSET and message.hold is UNSET
-    return not isinstance(message, (Start, End))
+    return True

@@ -11,7 +11,7 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder, check_numbers
-from activesteer.explore.messages import MAX_WAITING, Act, End, Message, Run, add, read
+from activesteer.explore.messages import MAX_WAITING, Act, End, Message, Run, Start, add, read
 from activesteer.explore.sliders import sliders
 from activesteer.scenario import resolve
 
@@ -73,8 +73,12 @@ def test_a_full_queue_holds_the_newest_choice_and_the_newest_hands() -> None:
     assert isinstance(waiting[-1], Act)
     assert waiting[-1].number == 1499
     assert len(waiting) <= MAX_WAITING
-    assert [add(waiting, End()) for _ in range(200)].count(False) > 0
+    assert [add(waiting, Act(hold=True)) for _ in range(200)].count(False) > 0
     assert len(waiting) == MAX_WAITING
+    assert add(waiting, End())
+    assert not any(isinstance(message, Act) for message in waiting)
+    assert [add(waiting, message) for message in (End(), Start(maneuver="plane"), End())] == [True] * 3
+    assert [type(message) for message in waiting if isinstance(message, (Start, End))] == [Start, End]
 
 
 def test_an_own_controller_in_the_folder_is_found_and_its_parameter_has_a_slider(tmp_path: Path) -> None:
