@@ -26,6 +26,11 @@ def native_type(message: type[Any]) -> types.Tuple:
     return types.Tuple([_TYPES.get(width) or types.UniTuple(types.float64, width) for width in widths])
 
 
+def zeros_of(message: type[Any]) -> tuple[Any, ...]:
+    """Return a message of zeros of the type by which compiled code takes it, None for fields that hold no number."""
+    return tuple(None if width == 0 else 0.0 if width == 1 else (0.0,) * width for width in widths_of(message))
+
+
 def _places(kind: Any) -> list[tuple[int, ...]]:
     """Indices of the numbers of a tuple and of the tuples within it, one after the other."""
     places: list[tuple[int, ...]] = []

@@ -111,14 +111,14 @@ def widths_of(message: type[tuple[Any, ...]]) -> tuple[int, ...]:
 
 
 @functools.cache
-def record_of(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+def record_fields(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
     """Return the fields of a record of float64 with the numbers of a message, by the names of its fields."""
     widths = zip(get_type_hints(message), widths_of(message), strict=True)
     return [(name, "f8") if width == 1 else (name, "f8", (width,)) for name, width in widths if width]
 
 
 @functools.cache
-def nested_of(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+def nested_fields(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
     """Return the same fields, with a record of four numbers for the wheels, which numpy turns into a tuple."""
     widths = zip(get_type_hints(message), widths_of(message), strict=True)
     wheels = [(corner, "f8") for corner in CORNERS]

@@ -88,7 +88,7 @@ class Antilock:
 
 @dataclass(frozen=True)
 class TractionControl:
-    """Limits of the driven wheels' slip, by the engine and by the brakes; see `traction`."""
+    """Limits of the driven wheels' slip, by the engine and by the brakes; see `control_unit`."""
 
     slip: Annotated[float, Range(0.005, 0.5)] = 0.05
     """Allowed slip, relative to the speed of the wheels that are not driven."""

@@ -14,7 +14,7 @@ from numba import carray, from_dtype, types
 from activesteer.compilation import address_of, call_at, compiled_call
 from activesteer.native_blocks import NativeBlock, record_type
 from activesteer.native_memory import f64_pointer, pointer_to
-from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, numbers_of, record_of
+from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, numbers_of, record_fields
 
 N_STEERING: Final = 6
 """Numbers of an `ActuatorCommand` that a controller with a native law decides; the others are 0."""
@@ -33,8 +33,8 @@ assert [number.name for number in numbers_of(ActuatorCommand)[:N_STEERING]] == [
 
 call_law: Final = call_at(types.void, *CALL)
 """`call_law(address, (block, command, measurement, held))` in compiled code."""
-_command_pointer: Final = pointer_to(from_dtype(np.dtype((np.record, record_of(DriverCommand)))))
-_measured_pointer: Final = pointer_to(from_dtype(np.dtype((np.record, record_of(Measurement)))))
+_command_pointer: Final = pointer_to(from_dtype(np.dtype((np.record, record_fields(DriverCommand)))))
+_measured_pointer: Final = pointer_to(from_dtype(np.dtype((np.record, record_fields(Measurement)))))
 
 
 def law_address(controller: Any) -> int:

@@ -35,7 +35,7 @@ _memory_pointer: Final = pointer_to(from_dtype(MEMORY))
 
 @compiled_call(types.void, *CALL)
 def lqr(block_address, command, measurement, held_address):
-    """Write what `Lqr.step` returns; see `law_interface.CALL`."""
+    """Write what `Lqr.step` returns; see `native_laws.CALL`."""
     block = carray(_block_pointer(block_address), (1,))[0]
     parts = block._estimator
     memory = carray(_memory_pointer(parts._memory.address), (1,))

@@ -33,7 +33,7 @@ from activesteer.signals import (
 )
 from activesteer.simulation.closed_loop import ClosedLoop, LoopState, OneAtATime
 from activesteer.simulation.native_cars import NativeCars
-from activesteer.simulation.native_loop import STEP_ADDRESS, drive_cars
+from activesteer.simulation.native_loop import PYTHON, STEP_ADDRESS, drive_cars
 from activesteer.simulation.preparation import prepared
 from activesteer.vehicle import engine_warnings_held
 
@@ -272,15 +272,14 @@ class Batch:
             native.cars["torques_set"][moving] = False
         if controllers is not None:
             native.rows[ActuatorCommand][moving] = controllers[moving]
-        for car in np.flatnonzero(moving & native.stale).tolist():
-            self.loops[car].vehicle.follow_model()
         self.failures |= native.drive(
             left, drivers_given=drivers is not None, controllers_given=controllers is not None, call=self._call
         )
 
     def _call(self, records: NDArray[Any]) -> None:
-        """Drive all cars natively, divided among the threads by their steps."""
-        done = np.cumsum(records["left"])
+        """Drive all cars natively, divided among the threads by the steps up to their next stop."""
+        in_python = (records["driver_kind"] == PYTHON) | (records["controller_kind"] == PYTHON)
+        done = np.cumsum(np.where(in_python, np.minimum(records["left"], 1), records["left"]))
         parts = self.threads if done[-1] >= _LEAST_STEPS else 1
         ends = [*np.searchsorted(done, done[-1] * np.arange(1, parts) / parts).tolist(), len(records)]
         futures: list[Future[None]] = []

@@ -24,7 +24,7 @@ from activesteer.signals import (
     Motion,
     WheelTorques,
     message_of,
-    nested_of,
+    nested_fields,
     new_message,
     numbers_of,
 )
@@ -56,6 +56,10 @@ _MAX_TABLES: Final = 64
 """Tables that are kept for cars that share a manoeuvre."""
 _NEVER: Final = 2**62
 _SPEED: Final = Motion._fields.index("speed_mps")
+_ROWS: Final[dict[str, type[Any]]] = {
+    "driver_command": DriverCommand, "actuator_command": ActuatorCommand, "measurement": Measurement, "motion": Motion,
+}  # fmt: skip
+"""Field of `CAR` with the address of the numbers of a message -> the message."""
 
 
 class NativeCars:
@@ -78,13 +82,12 @@ class NativeCars:
         """
         self._loops, count = loops, len(loops)
         self.cars = np.zeros(count, CAR)
-        kinds = ("driver_command", DriverCommand), ("actuator_command", ActuatorCommand), ("measurement", Measurement)
         self.rows: dict[type[Any], Array] = {}
-        for name, kind in (*kinds, ("motion", Motion)):
+        for name, kind in _ROWS.items():
             self.rows[kind] = row = np.zeros((count, len(numbers_of(kind))))
             self.cars[name] = row.ctypes.data + row.strides[0] * np.arange(count)
         self.buses: list[Array] = [np.zeros((0, N_HELD))] * count
-        self._blocks: list[NDArray[Any] | None] = [None] * count
+        self._blocks: list[Any] = [None] * count
         self._tables: list[SetpointTable | None] = [None] * count
         self._shared: dict[tuple[int, int, float | None], tuple[Any, SetpointTable]] = {}
         self._loaded = np.zeros(count, dtype=bool)
@@ -99,7 +102,7 @@ class NativeCars:
             self.cars[name].tolist() for name in ("driver_command", "actuator_command")
         )
         self._driver_rows, self._measured, self._motions = (
-            self.rows[kind].view(np.dtype(nested_of(kind)))[:, 0] for kind in (DriverCommand, Measurement, Motion)
+            self.rows[kind].view(np.dtype(nested_fields(kind)))[:, 0] for kind in (DriverCommand, Measurement, Motion)
         )
         self._acts: dict[int, Callable[[int], None]] = {
             AT_CHANGE: self._change_faults,
@@ -116,11 +119,6 @@ class NativeCars:
             self.cars["bindings"][index] = loop.vehicle.address
             self.connect(index)
 
-    @property
-    def stale(self) -> NDArray[np.bool_]:
-        """True for each car whose record is behind its objects."""
-        return ~self._loaded
-
     def connect(self, index: int) -> None:
         """Connect a new controller of a car with its bus, on which nothing is yet."""
         unit = self._loops[index].unit
@@ -132,8 +130,7 @@ class NativeCars:
 
     def adopt(self, index: int, other: NativeCars, place: int) -> None:
         """Take over a car from other records, with all its state."""
-        rows = ("driver_command", "actuator_command", "measurement", "motion")
-        own = {name: int(self.cars[name][index]) for name in rows}
+        own = {name: int(self.cars[name][index]) for name in _ROWS}
         self.cars[index] = other.cars[place]
         for name, address in own.items():
             self.cars[name][index] = address
@@ -145,6 +142,7 @@ class NativeCars:
     def load(self, index: int) -> None:
         """Copy driver and controller of a car into its record."""
         loop, cars = self._loops[index], self.cars
+        loop.vehicle.follow_model()
         driver, controller = loop.blocks
         self._driver_kinds[index] = self._controller_kinds[index] = PYTHON
         if type(driver) is HumanDriver and not driver.is_watched:
@@ -168,8 +166,8 @@ class NativeCars:
             loop = self._loops[index]
             if self._driver_kinds[index] == NATIVE:
                 take(loop.blocks[0], self.cars["driver"][index].item())
-            if (block := self._blocks[index]) is not None and self._controller_kinds[index] == NATIVE:
-                take(loop.blocks[1], block[0].item())
+            if self._controller_kinds[index] == NATIVE:
+                take(loop.blocks[1], self._blocks[index][0].item())
 
     def drive(
         self,
@@ -196,29 +194,21 @@ class NativeCars:
         cars["driver_kind"][moving] = GIVEN if drivers_given else self._driver_kinds[moving]
         cars["controller_kind"][moving] = GIVEN if controllers_given else self._controller_kinds[moving]
         cars["left"] = left
-        while True:
-            try:
-                (call or self._in_this_thread)(cars)
-            except SimulationDiverged as error:
-                failed[0], cars["left"] = error, 0
-                return failed
-            if not (stopped := np.flatnonzero(self._status).tolist()):
-                return failed
+        stopped = [0]
+        while stopped:
+            if call is None:
+                drive_cars(cars, 0, len(cars), STEP_ADDRESS)
+            else:
+                call(cars)
+            # One car stops in every step of a block in Python, and numpy's search takes as long as the block.
+            stopped = np.flatnonzero(self._status).tolist() if len(cars) > 1 else [0] if self._status.item(0) else []
             for index in stopped:
                 try:
                     self._acts[self._status.item(index)](index)
                 except SimulationDiverged as error:
                     failed[index] = error
                     cars["left"][index] = 0
-
-    def _in_this_thread(self, cars: NDArray[Any]) -> None:
-        """Drive the cars, and let Python act without a detour if there is only one."""
-        drive_cars(cars, 0, len(cars), STEP_ADDRESS)
-        if len(cars) == 1:
-            reason_of, acts = self._status.item, self._acts
-            while reason := reason_of(0):
-                acts[reason](0)
-                drive_cars(cars, 0, 1, STEP_ADDRESS)
+        return failed
 
     def measurement(self, index: int) -> Measurement:
         """Return the present measurement of a car."""

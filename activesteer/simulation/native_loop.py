@@ -17,8 +17,8 @@ from activesteer.driver.human import HumanDriver
 from activesteer.driver.native_driver import LINE, SETPOINT, follow
 from activesteer.native_blocks import ARRAY, record_type
 from activesteer.native_memory import array_of, f64_pointer, pointer_to
-from activesteer.native_messages import load_numbers, native_type, store_numbers
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_of, widths_of
+from activesteer.native_messages import load_numbers, native_type, store_numbers, zeros_of
+from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_of
 from activesteer.vehicle import native_step
 from activesteer.vehicle.powertrain import drive_limits, engine_speed
 
@@ -67,11 +67,7 @@ _step: Final = call_at(types.Tuple([types.boolean, native_type(Measurement), nat
 _setpoint_pointer: Final = pointer_to(from_dtype(SETPOINT))
 
 
-def _blank(message: type[Any]) -> tuple[Any, ...]:
-    return tuple(None if width == 0 else 0.0 if width == 1 else (0.0,) * width for width in widths_of(message))
-
-
-_DRIVER_COMMAND, _ACTUATOR_COMMAND = _blank(DriverCommand), _blank(ActuatorCommand)
+_DRIVER_COMMAND, _ACTUATOR_COMMAND = zeros_of(DriverCommand), zeros_of(ActuatorCommand)
 _DRIVER_NUMBERS: Final = [number.name for number in numbers_of(DriverCommand)]
 _WHEEL, _FRONT = map(_DRIVER_NUMBERS.index, ("steering_wheel_demand_rad", "front_steer_demand_rad"))
 _MEASURED: Final = [number.name for number in numbers_of(Measurement)]
@@ -111,8 +107,9 @@ def _drive(car):
     if not follow(car.driver, setpoint, car.path, measured, motion, engine_radps, low_Nm, high_Nm, command):
         return NEEDS_GAINS
     car.torques_set = setpoint.torques_set
-    for place in range(8):
-        car.torques_Nm[place] = setpoint.torques_Nm[place]
+    if setpoint.torques_set != 0:
+        for place in range(8):
+            car.torques_Nm[place] = setpoint.torques_Nm[place]
     return DONE
 
 

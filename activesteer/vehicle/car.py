@@ -505,9 +505,9 @@ def _changeable(part: mujoco.MjModel | mujoco.MjOption) -> list[str]:
 
 
 def check_gear(gear: Any) -> None:
-    """Raise a `ValueError` for a gear that the car does not have."""
+    """Raise a `ParameterError` for a gear that the car does not have."""
     if gear not in _GEARS:
-        raise ValueError(f"gear {gear!r} is not one of {_GEARS}")
+        raise ParameterError(f"is {shown(gear)}; -1, 0 or 1 is needed", key="gear", value=gear, allowed=_GEARS)
 
 
 def _refused(driver_command: object, actuator_command: object, reason: Exception | None = None) -> ActiveSteerError:

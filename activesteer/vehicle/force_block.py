@@ -72,7 +72,7 @@ LINK: Final = numbers_type(
     "tendon", "rest_m", "stiffness_Npm", "backlash_m", "act", "screw_act", "sign", "userdata",
     ("angle", POWERS),
 )  # fmt: skip
-"""A toe link with a screw in it (`toe_link_screws`), with the coefficients of angle over travel. `act` is its change of
+"""A toe link with a screw in it (`toe_links`), with the coefficients of angle over travel. `act` is its change of
 length, `screw_act` the position of its screw; the callback writes its angle to `userdata` for its sensor."""
 
 SCREW: Final = numbers_type(

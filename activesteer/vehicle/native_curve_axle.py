@@ -1,4 +1,4 @@
-"""The forces of curve axles; see `axle_curves`.
+"""The forces of curve axles; see `curve_axles`.
 
 With e = q - f(z) - g(s), the deflection of the five coordinates q from their curves over the travel z and the rack s,
 and t = a . e along each hardening spring, the energy is U = e'Ke/2 + sum(s t^3/3 + t^4/4) + the integral of the load
@@ -6,7 +6,7 @@ over z. Its slopes are the forces: Q_q = -dU/de, and by the chain rule Q_z = dU/
 lost or gained, whatever the curves.
 
 The engine is implicit in tendons only, so each corner has some tendons for the stiff part of K, with the slopes of the
-curves in the design position (`curve_axle_model`). The forces here are the difference: the forces above less those of
+curves in the design position (`curve_axles`). The forces here are the difference: the forces above less those of
 these tendons.
 """
 

@@ -11,6 +11,7 @@ from numba import carray, from_dtype, types
 from activesteer.compilation import compiled_call, inlined
 from activesteer.native_memory import f64_pointer, pointer_to
 from activesteer.native_records import numbers_type
+from activesteer.shared_laws import shared
 from activesteer.vehicle import force_block as fb
 
 IDLE, LISTENS, ACTS = range(3)
@@ -29,19 +30,18 @@ def memory_of(capacity: int) -> np.ndarray:
     return np.zeros(2 + capacity)
 
 
+@shared
 def oldest(memory, capacity):
     """Return the oldest kept number."""
     return memory[2 + (int(memory[1]) if memory[0] == capacity else 0)]
 
 
+@shared
 def keep(memory, capacity, value):
     """Keep a number, instead of the oldest one if the memory is full."""
     place = int(memory[1])
     memory[2 + place], memory[1] = value, (place + 1) % capacity
     memory[0] = min(memory[0] + 1.0, float(capacity))
-
-
-_oldest, _keep = inlined(oldest), inlined(keep)
 
 
 @inlined
@@ -51,7 +51,7 @@ def give_late(address, count):
         fault = carray(_pointer(address), (count,))[index]
         if fault.kind == DEMAND and fault.state == ACTS:
             memory = f64_pointer(fault.memory)
-            late = _oldest(memory, fault.capacity) if memory[0] > 0.0 else f64_pointer(fault.place)[0]
+            late = oldest(memory, fault.capacity) if memory[0] > 0.0 else f64_pointer(fault.place)[0]
             f64_pointer(fault.offset)[0] = late
 
 
@@ -61,7 +61,7 @@ def keep_demands(address, count):
     for index in range(count):
         fault = carray(_pointer(address), (count,))[index]
         if fault.kind == DEMAND and fault.state != IDLE:
-            _keep(f64_pointer(fault.memory), fault.capacity, f64_pointer(fault.place)[0])
+            keep(f64_pointer(fault.memory), fault.capacity, f64_pointer(fault.place)[0])
 
 
 @inlined
@@ -74,11 +74,11 @@ def misread(address, count, outputs):
         memory, good = f64_pointer(fault.memory), outputs[fault.place]
         acts = fault.state == ACTS
         if not (acts and fault.kind == STUCK and memory[0] > 0.0):
-            _keep(memory, fault.capacity, good)
+            keep(memory, fault.capacity, good)
         if acts:
             reading = 0.0
             if fault.kind in (STUCK, DELAYED):
-                reading = _oldest(memory, fault.capacity)
+                reading = oldest(memory, fault.capacity)
             elif fault.kind == OFFSET:
                 reading = good + fault.amount
             elif fault.kind == RUNAWAY:

@@ -93,7 +93,7 @@ VIBRATION_AT_MPS: Final = 80.0 / 3.6
 
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction, independent of speed: elastic until it slips; see `dry_friction`."""
+    """Dry friction, independent of speed: elastic until it slips; see `native_actuators`."""
 
     front_damper_N: NotNegative = 0.0
     """Seal, piston and rod guide of a front damper or strut, along it [N]."""

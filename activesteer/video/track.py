@@ -73,7 +73,7 @@ class Track:
         return float(np.interp(time_s, self._time_s, self._heading_rad))
 
     def direction(self, time_s: float) -> float:
-        """Return the averaged direction of motion at an instant [rad]; see `direction_of_motion`."""
+        """Return the averaged direction of motion at an instant [rad]; see `drawing.cars`."""
         return float(np.interp(time_s, self._time_s, self._direction_rad))
 
     def middle(self, time_s: float) -> Array:

@@ -6,15 +6,15 @@ They contain the kernels of a simulation; the C code around them holds no law of
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import compiled_callback
 from activesteer.coupling.car.variables import PLACE_GROUPS, PLACES
 from activesteer.native_memory import f64_pointer, pointer_to, word_pointer
-from activesteer.native_messages import load_numbers, store_numbers
-from activesteer.signals import ActuatorCommand, DriverCommand, numbers_of, widths_of
+from activesteer.native_messages import load_numbers, store_numbers, zeros_of
+from activesteer.signals import ActuatorCommand, DriverCommand, numbers_of
 from activesteer.vehicle.channels.car_motion import angle_sides, in_the_road_plane, sideslip_share
 from activesteer.vehicle.channels.native_channels import axial_force, is_limited, record_of
 from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, RawRows
@@ -24,13 +24,7 @@ from activesteer.vehicle.native_step import carry_out
 _BYTES: Final = 8
 
 
-def _zeros(message: type[Any]) -> tuple[Any, ...]:
-    """Return a message of zeros, with None for fields that are no numbers, as native code types it."""
-    zeros = {0: None, 1: 0.0}
-    return tuple(zeros.get(width, (0.0,) * width) for width in widths_of(message))
-
-
-_DRIVER, _ACTUATOR = _zeros(DriverCommand), _zeros(ActuatorCommand)
+_DRIVER, _ACTUATOR = zeros_of(DriverCommand), zeros_of(ActuatorCommand)
 _DRIVER_BYTES: Final = _BYTES * len(numbers_of(DriverCommand))
 
 

@@ -21,7 +21,7 @@ _SAME: Final = ("distributed", "dask", "cloudpickle", "msgpack")
 class DaskCluster:
     """A cluster, accessed through its client.
 
-    Workers may join and leave. One thread of a worker does one task at a time (see `task_queue`), so start a worker
+    Workers may join and leave. One thread of a worker does one task at a time (see `workers`), so start a worker
     with one thread.
 
     Attributes:

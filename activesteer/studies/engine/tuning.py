@@ -50,7 +50,7 @@ class Trial:
         objectives: Name of an objective -> its value.
         margins: Name of a statement -> its margin, negative if it is violated; at most 1e6 in magnitude.
         constraints: Name of a constraint -> its margin.
-        implausibility: Distance from the nominal values, see `prior`; nan if statements are not the goal.
+        implausibility: Distance from the nominal values, see `factor_values`; nan if statements are not the goal.
     """
 
     number: int

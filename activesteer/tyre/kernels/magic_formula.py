@@ -8,11 +8,11 @@ Inputs and outputs are in ISO-W axes at the contact point, SI and radians: alpha
 gamma > 0 inclines the wheel about +x, M_y < 0 rolls forward. Slip refers to the absolute value of the speed.
 
 `p` is the record of the tyre (`record.TYRE_RECORD`). Inputs outside the ranges of the file are evaluated at the limit
-(see `limits.limit_flags`). Below the smallest valid load, the forces of that load are scaled down to zero.
+(see `limit_flags`). Below the smallest valid load, the forces of that load are scaled down to zero.
 
 Below the speed VXLOW everything that depends on the rolling direction (shifts, trail, rolling resistance) fades with
 a sine through zero at rest, so that the forces are continuous through standstill. The forces due to slip do not fade,
-because there slip is the deflection of the contact patch (see `relaxation`).
+because there slip is the deflection of the contact patch (see `slip`).
 
 A division by zero gives inf or nan, as in numpy, and no exception. The kernels run inside the engine's callbacks, where
 nothing could catch an exception; the check of the state finds values that are not finite.
