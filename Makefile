@@ -14,7 +14,7 @@ help:  ## what there is
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## */  make \1\t/' | expand -t 24
 
 demo: $(READY)  ## the paper's scenarios with three steering systems: scorecard, MCAP files and figures in demo/
-	$(BIN)/activesteer reproduce --setting paper --setting human --figures -o demo
+	$(BIN)/activesteer reproduce --setting paper --setting literature --figures -o demo
 
 test: MARK := -m "not slow"
 test:  ## lint, types, module borders, every test that is not slow, and the key metrics against their baseline

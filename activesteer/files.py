@@ -40,7 +40,7 @@ def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Abst
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[Path]:
+def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[Path]:
     """Yield a new file beside `path` that replaces `path` at the end.
 
     No one can read half a file: if the body fails, the new file is deleted and the old one stays. A device is written
@@ -60,7 +60,7 @@ def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> It
             yield target
             return
         part = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}.part{target.suffix}")
-        with passing(part):
+        with temporary_file(part):
             yield part
             if target.exists():
                 part.chmod(target.stat().st_mode & 0o777)
@@ -68,11 +68,11 @@ def replacing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> It
 
 
 @contextmanager
-def passing(part: Path) -> Iterator[None]:
+def temporary_file(part: Path) -> Iterator[None]:
     """Context around the writing of a temporary file; deletes the file if it still exists at the end.
 
     Args:
-        part: The file; `delete_passing` deletes it too.
+        part: The file; `delete_temporary_files` deletes it too.
     """
     _passing.add(part)
     try:
@@ -82,8 +82,8 @@ def passing(part: Path) -> Iterator[None]:
         _passing.discard(part)
 
 
-def delete_passing() -> None:
-    """Delete all temporary files of `passing`, before the process ends without unwinding."""
+def delete_temporary_files() -> None:
+    """Delete all temporary files of `temporary_file`, before the process ends without unwinding."""
     for part in tuple(_passing):
         with suppress(OSError):
             part.unlink(missing_ok=True)
@@ -95,7 +95,7 @@ def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerE
     Raises:
         ActiveSteerError: the file cannot be written; of class `error`.
     """
-    with replacing(path, error) as part:
+    with atomic_write(path, error) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)
 

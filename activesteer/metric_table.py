@@ -40,7 +40,9 @@ _TOLERANCES: Final = {
 }  # fmt: skip
 """Declared unit of a metric -> smallest difference between two versions of the program that a reader would notice."""
 
-TYRE_USE: Final = ("tyre_use_max", "tyre_use_mean")
+FRICTION_UTILISATION: Final = ("friction_utilisation_max", "friction_utilisation_mean")
+RENAMED: Final = {f"tyre_use_{end}": f"friction_utilisation_{end}" for end in ("max", "mean")}
+"""Former name of a metric -> its name."""
 CONES_HIT: Final = "cones_hit"
 CONES_MISSED: Final = "cones_missed"
 LANE_OVERSTEP: Final = "lane_overstep_m"
@@ -236,7 +238,7 @@ METRICS: Final = {
             "added_angles_opposite_share", unit=_PERCENT,
         ),
         *_pure(
-            "tyre_use_max", "tyre_use_mean", "yaw_rate_peak_gain_ratio", "coherence_min",
+            "friction_utilisation_max", "friction_utilisation_mean", "yaw_rate_peak_gain_ratio", "coherence_min",
             "added_angles_correlation",
         ),
         *_declare("", CONES_HIT, CONES_MISSED, better=_SMALLER, unit=_PURE, form=Form.COUNT),
@@ -252,6 +254,8 @@ def metric(name: str) -> Metric:
     Raises:
         ParameterError: no metric has this name.
     """
+    if name in RENAMED:
+        raise ParameterError(f"this metric is now {RENAMED[name]}", value=name)
     if name not in METRICS:
         raise ParameterError(f"no such metric; {nearest_names(name, METRICS)}", value=name, allowed=tuple(METRICS))
     return METRICS[name]

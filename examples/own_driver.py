@@ -37,7 +37,7 @@ class PurePursuit:
         distance_m = math.hypot(x_m - motion.x_m, y_m - motion.y_m)
         curvature_1pm = 2.0 * math.sin(bearing_rad) / distance_m
         angle_rad = self.steering_ratio * math.atan(self.wheelbase_m * curvature_1pm)
-        return self.robot.turn(angle_rad, setpoint, measurement)
+        return self.robot.steer_to(angle_rad, setpoint, measurement)
 
 
 def compare(speed_kmh=60.0):

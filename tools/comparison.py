@@ -23,9 +23,9 @@ from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.analysis.energy import METRICS as ENERGIES
 from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.report.significance import Change, significance
-from activesteer.analysis.requirement import Names, Requirement, Run, Runs
+from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, Runs
 from activesteer.config import Source
-from activesteer.controllers import find_controller
+from activesteer.controllers import controller_spec
 from activesteer.errors import ParameterError, SimulationDiverged
 from activesteer.files import make_folder
 from activesteer.metric_table import SIDESLIP_PEAKS
@@ -74,10 +74,10 @@ def targets(controllers: Sequence[str], rows: Iterable[Any]) -> list[Target]:
 
     A target fails if its value was sought and not found. It is left out if no controller has the metric.
     """
-    runs: defaultdict[Run, dict[str, float | None]] = defaultdict(dict)
+    runs: defaultdict[EvaluatedRun, dict[str, float | None]] = defaultdict(dict)
     sought = set()
     for row in rows:
-        runs[Run(row.controller, row.scenario)][row.metric] = row.value
+        runs[EvaluatedRun(row.controller, row.scenario)][row.metric] = row.value
         sought.add((row.metric, row.scenario))
     found = []
     for name in asked(controllers):
@@ -232,7 +232,7 @@ def compare(
     extremes. The recordings are SCENARIO-CONTROLLER.mcap in the folder. A failed run stops no other run; `failures`
     names it.
     """
-    labels = {find_controller(given).label: given for given in controllers}
+    labels = {controller_spec(given).label: given for given in controllers}
     if len(labels) < len(controllers):
         raise ParameterError(f"of {', '.join(controllers)} two are called the same", value=tuple(controllers))
     scenarios = {name: resolve(maneuver, vehicle, {**SENSORS, **other}) for name, (maneuver, other) in CASES.items()}

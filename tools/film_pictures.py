@@ -16,7 +16,7 @@ from PIL import Image
 from activesteer.conventions import SYSTEM_LABELS
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.video import Film, Settings
 
@@ -70,13 +70,13 @@ def draw_films(names: Sequence[str] = ()) -> None:
     for page, scene in SCENES.items():
         name = f"film_{page}.webp"
         if not wanted or name in wanted:
-            scenario = prepared(resolve(scene.maneuver))
+            scenario = with_amplitude_found(resolve(scene.maneuver))
             runs = {system: run_scenario(scenario, system) for system in scene.systems}
             size, layout = (SCENE_SIZE, "side-by-side") if len(runs) > 1 else (SINGLE_SIZE, "overlay")
             settings = Settings(scene.camera, "fr", size, layout=layout, gauges=scene.gauges)
             animate(runs, settings, PICTURES / name, scene.from_s, scene.to_s)
     if not wanted or wanted & {STILL.name, ANIMATION.name}:
-        scenario = prepared(resolve("sine_with_dwell"))
+        scenario = with_amplitude_found(resolve("sine_with_dwell"))
         runs = {name: run_scenario(scenario, name) for name in SYSTEM_LABELS}
         begin_s = runs["none"].metrics["steer_begin_time_s"]
         with Film({"ars": runs["ars"]}, Settings()) as film:

@@ -38,7 +38,7 @@ AROUND: Final = {"around_paper_setting": False, "around_paper_setting_wide": Tru
 _CAR: Final = ("factors.", "load.", "road.", "speed_", "sensors.")
 _BAND: Final = "controllers.ars.corrector.deadband_start_degps"
 _WIDE: Final = {_BAND: {"log_uniform": [0.5, 2.0]}, "single_track.characteristic_speed_kmh": {"uniform": [0.95, 1.05]}}
-"""Ranges of the second study that the population with the human driver does not have, relative to the setting."""
+"""Ranges of the second study that the population does not have, relative to the setting."""
 FILE: Final = Path(setting_file.__file__).parent / "paper_setting.toml"
 _HEAD: Final = """# The paper's setting: numbers for all that the paper leaves open, with which most statements hold.
 # Selected by the verdicts of the claims, among the settings of `activesteer tune match_paper`: the most plausible of

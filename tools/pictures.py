@@ -29,7 +29,7 @@ from activesteer.analysis.linear_plots import driver_loops_figure
 from activesteer.plotting import Heat, Picture, draw, new_figure
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.run_task import CLAIM
 from activesteer.studies.engine.study_file import read_study
@@ -112,7 +112,7 @@ def draw_pictures(names: Sequence[str]) -> None:
 
 
 def _manoeuvre(name: str) -> Figure:
-    scenario = prepared(resolve(name))
+    scenario = with_amplitude_found(resolve(name))
     kind = scenario.maneuver.kind
     # In those of PANELS no system has anything to do.
     runs = {system: run_scenario(scenario, system) for system in (("none",) if name in PANELS else SYSTEMS)}
@@ -163,7 +163,7 @@ def _controller() -> dict[str, Figure]:
     found = re.search(r"```python\n(# yaw_damper\.py\n.*?)```", page, re.DOTALL)
     if found is None:
         sys.exit("docs/controller.md has no block that begins with `# yaw_damper.py`")
-    scenario = prepared(resolve("sine_with_dwell"))
+    scenario = with_amplitude_found(resolve("sine_with_dwell"))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "yaw_damper.py")
         file.write_text(found[1], encoding="utf-8")
@@ -173,7 +173,9 @@ def _controller() -> dict[str, Figure]:
 
 def _sensors() -> dict[str, Figure]:
     """True and measured yaw rate and lateral acceleration at the beginning of a sine with dwell."""
-    run = run_scenario(prepared(resolve("sine_with_dwell", overrides={"sensors.preset": "production"})), "ars")
+    run = run_scenario(
+        with_amplitude_found(resolve("sine_with_dwell", overrides={"sensors.preset": "production"})), "ars"
+    )
     begin = run.metrics["steer_begin_time_s"] - 0.1
     shown = (run.time_s >= begin) & (run.time_s < begin + 0.8)
     figure = new_figure(7.5, 4.5)

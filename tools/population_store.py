@@ -26,7 +26,7 @@ from activesteer.analysis.claims.stored import PAPER, SUMMARY, read_setting
 from activesteer.commands.terminal import RunCounter
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
-from activesteer.files import make_folder, replacing, write_text
+from activesteer.files import atomic_write, make_folder, write_text
 from activesteer.metric_table import metric
 from activesteer.resources import find_study, studies_dir
 from activesteer.studies.engine.plan import Plan
@@ -236,7 +236,7 @@ def store_population(found: Population, study_folder: Path) -> list[Path]:
     paths = [store_summary(found, STUDY)]
     folder = paths[0].parent
     for name, kept in ((RUNS, _in_short(table)), (BANDS, table_of(_bands(table)))):
-        with replacing(folder / name, StudyError) as path:
+        with atomic_write(folder / name, StudyError) as path:
             pq.write_table(kept.replace_schema_metadata(about), path, compression="zstd", compression_level=19)
         paths.append(folder / name)
     return paths
@@ -404,7 +404,7 @@ def judge_again(changed: dict[str, str], jobs: int | None) -> Population:
         table = table.set_column(table.column_names.index(name), name, pa.array(column, pa.int8()))
     failed = [float(sum(own[place] == 0 for own in verdicts.values())) for place in range(len(rows))]
     table = table.set_column(table.column_names.index("claims_failed"), "claims_failed", pa.array(failed, pa.float32()))
-    with replacing(path, StudyError) as target:
+    with atomic_write(path, StudyError) as target:
         pq.write_table(table, target, compression="zstd", compression_level=19)
     nominal = [Claim(STATEMENTS[claim.id], claim.passed, {}) for claim in stored.claims]
     again = summarise(stored_runs(), population_study(stored.samples, stored.seed), nominal)

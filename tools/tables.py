@@ -50,7 +50,7 @@ def claims_table() -> str:
     for kind in Kind:
         lines += [f"**{kind.value.capitalize()}**", ""]
         lines += [
-            "| | statement | paper's setting | human driver | population, % | ideal, production sensors, % | "
+            "| | statement | paper's setting | driver from literature | population, % | ideal, production sensors, % | "
             "depends most on |",
             "|---|---|---|---|---|---|---|",
         ]
@@ -92,7 +92,7 @@ def summary() -> list[str]:
     """Return the statements that hold, by scenario, as lines of Markdown."""
     known, population, fails = not_reproduced(VEHICLE), stored_population(VEHICLE), read_setting(PAPER).fails
     lines = [
-        "| scenario | the paper's statements | paper's setting | human driver | population, ideal sensors | "
+        "| scenario | the paper's statements | paper's setting | driver from literature | population, ideal sensors | "
         "population, production sensors |",
         "|---|---|---|---|---|---|",
     ]

@@ -34,7 +34,7 @@ KEY_METRICS: Final = (
 """Key metrics, the most telling first."""
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def brake_in_turn_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of braking in a turn.
 
     Returns:

@@ -15,7 +15,7 @@ METRICS: Final = ("battery_energy_J", "steering_energy_J", "brake_energy_J")
 """Metrics of an electric car."""
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def energy_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the energies of a run; nothing for a car without motors.
 
     Returns:

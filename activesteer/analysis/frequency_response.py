@@ -133,7 +133,7 @@ def response_of(
     return FrequencyResponse(frequency_Hz, cross / power_u, np.where(power_y > 0.0, coherence, 1.0))
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def frequency_response_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of a sine sweep, from 0.2 to 4 Hz.
 
     Returns:

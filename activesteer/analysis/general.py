@@ -22,13 +22,13 @@ KEY_METRICS: Final = (
 """Key metrics, the most telling first."""
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def general_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return peaks and root mean squares of a run.
 
     Returns:
         `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip (above 10 km/h)
-        and roll; the largest steering wheel angle; `tyre_use_max`, the largest fraction of its available friction that
-        any tyre uses; and `speed_end_mps`.
+        and roll; the largest steering wheel angle; `friction_utilisation_max`, the largest fraction of its available
+        friction that any tyre uses; and `speed_end_mps`.
 
     Raises:
         RecordingError: a channel is missing.
@@ -37,7 +37,9 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     for name, unit in SIGNALS:
         values |= _size(recording, name, unit)
     values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
-    values["tyre_use_max"] = max(float(recording[f"{corner}_friction_utilisation"].max()) for corner in CORNERS)
+    values["friction_utilisation_max"] = max(
+        float(recording[f"{corner}_friction_utilisation"].max()) for corner in CORNERS
+    )
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     return values
 

@@ -183,7 +183,7 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> Handli
     )
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def handling_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the values of `evaluate`, and the speed at the end."""
     return {**evaluate(recording)._asdict(), "speed_end_mps": float(recording["speed_mps"][-1])}
 

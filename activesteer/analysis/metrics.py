@@ -40,21 +40,21 @@ def _evaluation(metrics: Callable[[RecordingLike], dict[str, float]], key_metric
     return Evaluation(metrics, tuple(map(metric, key_metrics)))
 
 
-_GENERAL: Final = _evaluation(general.metrics, general.KEY_METRICS)
+_GENERAL: Final = _evaluation(general.general_metrics, general.KEY_METRICS)
 EVALUATIONS: Final[dict[str, Evaluation]] = {
-    "step_steer": _evaluation(step_response.metrics, step_response.KEY_METRICS),
+    "step_steer": _evaluation(step_response.step_response_metrics, step_response.KEY_METRICS),
     "open_loop": _GENERAL,
     "random_steer": _GENERAL,
-    "slowly_increasing_steer": _evaluation(slow_ramp.metrics, slow_ramp.KEY_METRICS),
-    "constant_radius": _evaluation(handling.metrics, handling.KEY_METRICS),
-    "sine_sweep": _evaluation(frequency_response.metrics, frequency_response.KEY_METRICS),
-    "sine_with_dwell": _evaluation(sine_with_dwell.metrics, sine_with_dwell.KEY_METRICS),
-    "lane_change": _evaluation(path_following.metrics, path_following.LANE_CHANGE_KEY_METRICS),
-    "slalom": _evaluation(path_following.metrics, path_following.SLALOM_KEY_METRICS),
-    "follow_path": _evaluation(path_following.metrics, path_following.PATH_KEY_METRICS),
-    "brake_in_turn": _evaluation(brake_in_turn.metrics, brake_in_turn.KEY_METRICS),
-    "phases": _evaluation(rollover.metrics, rollover.KEY_METRICS),
-    "straight_braking": _evaluation(straight_braking.metrics, straight_braking.KEY_METRICS),
+    "slowly_increasing_steer": _evaluation(slow_ramp.slow_ramp_metrics, slow_ramp.KEY_METRICS),
+    "constant_radius": _evaluation(handling.handling_metrics, handling.KEY_METRICS),
+    "sine_sweep": _evaluation(frequency_response.frequency_response_metrics, frequency_response.KEY_METRICS),
+    "sine_with_dwell": _evaluation(sine_with_dwell.sine_with_dwell_metrics, sine_with_dwell.KEY_METRICS),
+    "lane_change": _evaluation(path_following.path_following_metrics, path_following.LANE_CHANGE_KEY_METRICS),
+    "slalom": _evaluation(path_following.path_following_metrics, path_following.SLALOM_KEY_METRICS),
+    "follow_path": _evaluation(path_following.path_following_metrics, path_following.PATH_KEY_METRICS),
+    "brake_in_turn": _evaluation(brake_in_turn.brake_in_turn_metrics, brake_in_turn.KEY_METRICS),
+    "phases": _evaluation(rollover.rollover_metrics, rollover.KEY_METRICS),
+    "straight_braking": _evaluation(straight_braking.straight_braking_metrics, straight_braking.KEY_METRICS),
     "measured": _evaluation(general.measured_metrics, general.KEY_METRICS),
 }
 """Kind of manoeuvre -> its evaluation."""
@@ -91,9 +91,9 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
             than two rows, or the run is not what its kind promises.
         ParameterError: the evaluation returns a metric that `metric_table` does not declare.
     """
-    values = evaluation_of(recording).metrics(Evaluable(recording)) | energy.metrics(recording)
+    values = evaluation_of(recording).metrics(Evaluable(recording)) | energy.energy_metrics(recording)
     if ride.is_uneven(recording):
-        values |= ride.metrics(Evaluable(recording))
+        values |= ride.ride_metrics(Evaluable(recording))
     for name in values:
         metric(name)
     return values

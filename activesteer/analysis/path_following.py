@@ -32,7 +32,8 @@ OSCILLATING: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2")
 
 PATH_KEY_METRICS: Final = (
     "lap_time_s", "track_deviation_max_m", "track_deviation_rms_m", "sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps",
-    "ay_peak_abs_mps2", "roll_peak_abs_rad", "steering_wheel_peak_abs_rad", "tyre_use_max", "speed_loss_mps",
+    "ay_peak_abs_mps2", "roll_peak_abs_rad", "steering_wheel_peak_abs_rad", "friction_utilisation_max",
+    "speed_loss_mps",
 )  # fmt: skip
 """Key metrics of a path without gates, the most telling first."""
 
@@ -91,7 +92,8 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
       end of the run against the path, `heading_end_rad`.
     - Lanes: `lane_overstep_m`, the largest distance of the body beyond a lane (below 0: smallest distance from a side),
       `stays_in_lanes` (1 or 0), `cones_hit`, `cone_distance_min_m`.
-    - Tyres: `tyre_use_max`, `tyre_use_mean`, the fraction of the available friction that all wheels use.
+    - Tyres: `friction_utilisation_max`, `friction_utilisation_mean`, the fraction of the available friction
+      that all wheels use.
     - Speed: `speed_loss_mps`, initial less lowest speed; `speed_end_mps`.
     - A path without gates: `lap_time_s`, the time in which the car covers its length; and `road_overstep_m`, the
       largest distance of a side of the car beyond the edge of the road, if the width of the road is known (below 0: the
@@ -134,14 +136,14 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
     if maneuver_kind(recording) == "slalom":
         values |= _slalom(recording, course)
     use = np.array([recording[f"{corner}_friction_utilisation"] for corner in CORNERS], dtype=np.float64)
-    values["tyre_use_max"], values["tyre_use_mean"] = float(use.max()), float(use.mean())
+    values["friction_utilisation_max"], values["friction_utilisation_mean"] = float(use.max()), float(use.mean())
     speed = recording["speed_mps"]
     values["speed_loss_mps"] = float(speed[0] - speed.min())
     values["speed_end_mps"] = float(speed[-1])
     return PathFollowing(values, windows.notes)
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the values of `evaluate` alone."""
     return evaluate(recording).values
 

@@ -26,7 +26,7 @@ from typing import Final, NamedTuple
 from activesteer.analysis.harm import changes, severity
 from activesteer.config import Source, field_in_unit
 from activesteer.errors import nearest_names, shown
-from activesteer.metric_table import METRICS
+from activesteer.metric_table import METRICS, RENAMED
 
 HARM: Final = "harm"
 CLAIM: Final = "claim"
@@ -53,14 +53,14 @@ def _margin(room: float, limit: float) -> float:
     return room / max(abs(limit), 1e-9) if limit and math.isfinite(room) else room
 
 
-class Run(NamedTuple):
+class EvaluatedRun(NamedTuple):
     """Place of a run in a set: its controller and its manoeuvre."""
 
     controller: str
     maneuver: str
 
 
-Runs = Mapping[Run, Mapping[str, float | None]]
+Runs = Mapping[EvaluatedRun, Mapping[str, float | None]]
 """Place of a run -> its metrics; a metric that the run does not define is None or nan."""
 
 
@@ -97,7 +97,7 @@ class Expression:
     def __init__(self, text: str, names: Names, source: Source, where: tuple[str, ...]) -> None:
         """Read an expression; errors name its place in the source."""
         self.text, self._names = text, names
-        self.metrics: dict[tuple[str, Run], None] = {}
+        self.metrics: dict[tuple[str, EvaluatedRun], None] = {}
         self.comparisons: list[tuple[_Number, str, _Number]] = []
         self._fail = lambda problem: source.fail(where, f"{problem} in {shown(self.text)}", text)
         if len(text) > _LONGEST:
@@ -147,6 +147,8 @@ class Expression:
     def _metric(self, name: str, controller: str, maneuver: str = "") -> _Number:
         names = self._names
         known = [HARM, CLAIMS_FAILED, *METRICS]
+        if name in RENAMED:
+            raise self._fail(f"{name} is now {RENAMED[name]};")
         metric, factor = field_in_unit(name, known)
         if metric is None:
             raise self._fail(f"{name}: {nearest_names(name, known)};")
@@ -163,7 +165,7 @@ class Expression:
                 f"{maneuver} is no manoeuvre of the runs" if maneuver else f"{name}({controller}, MANEUVER) is needed"
             )
             raise self._fail(f"{problem}; {nearest_names(maneuver, names.maneuvers)};")
-        run, base = Run(controller, maneuver), Run(NONE, maneuver)
+        run, base = EvaluatedRun(controller, maneuver), EvaluatedRun(NONE, maneuver)
         self.metrics[metric, run] = None
         if metric == HARM:
             self.metrics[metric, base] = None
@@ -209,14 +211,14 @@ class Requirement(Expression):
                 f"{ast.unparse(node)} needs claims = true and a statement of the runs; {nearest_names(word, claims)};"
             )
         metric, maneuver = claims[word]
-        run = Run(NONE, maneuver)
+        run = EvaluatedRun(NONE, maneuver)
         self.metrics[metric, run] = None
 
         distance = _value_of(metric, run)
         return lambda runs: -distance(runs)
 
 
-def _value_of(name: str, run: Run) -> _Number:
+def _value_of(name: str, run: EvaluatedRun) -> _Number:
     return lambda runs: math.nan if (value := runs[run].get(name)) is None else value
 
 

@@ -32,7 +32,7 @@ def is_uneven(recording: RecordingLike) -> bool:
     return any(getattr(channel, "name", channel) == _MARKER for channel in getattr(recording, "channels", ()))
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def ride_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of the ride.
 
     Returns:

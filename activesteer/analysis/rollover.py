@@ -20,12 +20,13 @@ LIFTED_N: Final = 1.0
 """Vertical load below which a wheel is lifted [N]."""
 KEY_METRICS: Final = (
     "two_wheel_lift_time_s", "wheel_load_min_N", "roll_peak_abs_rad", "ay_peak_abs_mps2", "sideslip_peak_abs_rad",
-    "yaw_rate_peak_abs_radps", "yaw_rate_rms_radps", "tyre_use_max", "steering_wheel_peak_abs_rad", "speed_end_mps",
+    "yaw_rate_peak_abs_radps", "yaw_rate_rms_radps", "friction_utilisation_max", "steering_wheel_peak_abs_rad",
+    "speed_end_mps",
 )  # fmt: skip
 """Key metrics, the most telling first."""
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def rollover_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the general metrics, and those of the wheel loads.
 
     Returns:
@@ -37,4 +38,4 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
     both = (lifted[0] & lifted[2]) | (lifted[1] & lifted[3])
     step_s = float(recording.time_s[1] - recording.time_s[0])
     values = {"two_wheel_lift_time_s": float(both.sum()) * step_s, "wheel_load_min_N": float(loads_N.min())}
-    return values | general.metrics(recording)
+    return values | general.general_metrics(recording)

@@ -113,7 +113,7 @@ def steering(recording: RecordingLike) -> Steering:
     return Steering(side, begin_s, reversal_s, completion_s, straight)
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of a sine with dwell.
 
     Returns:

@@ -116,7 +116,7 @@ def evaluate(recording: RecordingLike) -> StepSteer:
     return StepSteer(values, notes)
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the values of `evaluate` alone."""
     return evaluate(recording).values
 

@@ -26,7 +26,7 @@ KEY_METRICS: Final = (
 """Key metrics, the most telling first."""
 
 
-def metrics(recording: RecordingLike) -> dict[str, float]:
+def straight_braking_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of braking straight ahead.
 
     Returns:

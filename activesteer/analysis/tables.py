@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from activesteer.analysis.loss_of_control import LOST, shown
-from activesteer.metric_table import TYRE_USE, recorded_metric
+from activesteer.metric_table import FRICTION_UTILISATION, recorded_metric
 from activesteer.text_table import text_table, wrapped_line
 
 Paint = Callable[[str, str, float, float, str], str]
@@ -46,5 +46,5 @@ def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = No
 
 def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
     """Return explanations of values that a reader may take for an error."""
-    above = any(metrics.get(name, 0.0) > 1.0 for metrics in runs.values() for name in TYRE_USE)
+    above = any(metrics.get(name, 0.0) > 1.0 for metrics in runs.values() for name in FRICTION_UTILISATION)
     return wrapped_line(TYRE_USE_NOTE) if above else []

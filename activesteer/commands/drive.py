@@ -112,11 +112,11 @@ class _Failures(dict[str, str]):
     cutaway("with --watch: "), JSON,
 )  # fmt: skip
 def _run(options: argparse.Namespace) -> int:
-    from activesteer.controllers import find_controller
+    from activesteer.controllers import controller_spec
     from activesteer.conventions import DEFAULT_TIMESTEP_S
     from activesteer.coupling.fmu import isolated
     from activesteer.scenario import check_gains
-    from activesteer.simulation.preparation import prepared
+    from activesteer.simulation.preparation import with_amplitude_found
 
     if options.watch:
         return _watch(options)
@@ -124,7 +124,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ParameterError("has an effect with --watch only", key="--cutaway")
     options.output = options.output or Path("runs")
     options.driver = isolated(options.driver, options.isolate)
-    controllers = [find_controller(isolated(name, options.isolate)) for name in options.controller or ["none"]]
+    controllers = [controller_spec(isolated(name, options.isolate)) for name in options.controller or ["none"]]
     scenario, failures, alone = scenario_of(options), _Failures(), len(controllers) == 1
     check_gains(scenario.overrides, controllers)
     # Check all controllers before the first run.
@@ -133,7 +133,7 @@ def _run(options: argparse.Namespace) -> int:
             controller.make(scenario.controller_setup(DEFAULT_TIMESTEP_S))
     paths = _output_paths(options.output, scenario.maneuver.name, controllers)
     driving = list(zip(controllers, paths, strict=True))
-    scenario = prepared(scenario)
+    scenario = with_amplitude_found(scenario)
     if not options.replace:
         for controller, path in driving:
             _check_settings(path, scenario, controller)
@@ -161,7 +161,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _watch(options: argparse.Namespace) -> int:
     from activesteer.scenario import check_gains
-    from activesteer.simulation.preparation import prepared
+    from activesteer.simulation.preparation import with_amplitude_found
 
     for key in ("output", "replace", "all", "isolate", "udp", "plot", "json"):
         if getattr(options, key) not in (None, False):
@@ -178,7 +178,7 @@ def _watch(options: argparse.Namespace) -> int:
     from activesteer.simulation.live_view import check_display, watch
 
     check_display()
-    watch(prepared(scenario), controller, pace, cutaway=options.cutaway)
+    watch(with_amplitude_found(scenario), controller, pace, cutaway=options.cutaway)
     return 0
 
 
@@ -286,7 +286,7 @@ def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
         before = _flat(Recording.open(path, recover=True).metadata)
     except RecordingError:  # there is no recording
         return
-    own = {"controller": controller.name, "controller_parameters": controller.parameters_with(scenario.own)}
+    own = {"controller": controller.name, "controller_parameters": controller.parameters_with(scenario.user_parameters)}
     now = _flat({key: value for key, value in (describe(scenario) | own).items() if key != "overrides"})
     other = sorted(key for key, value in now.items() if before.get(key, value) != value)
     if other:

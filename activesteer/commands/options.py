@@ -28,6 +28,7 @@ SUCCESSORS: Final = {
     "fault-map": "study fault_map -o DIR` or `activesteer test r79-circle",
     "match": "tune STUDY",
     "falsify": "tune STUDY -c CONTROLLER",
+    "linearise --speeds-kmh": "linearise --speed-kmh",
     "reproduce --population": "study population -o DIR` or `activesteer study comparison -o DIR",
     **dict.fromkeys(
         ("reproduce -c", "reproduce --controller", "reproduce --controllers"), "study side_by_side -o DIR -c CONTROLLER"

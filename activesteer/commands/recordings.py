@@ -37,7 +37,7 @@ from activesteer.commands.terminal import (
     tell_files,
 )
 from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
-from activesteer.files import replacing, shown_path
+from activesteer.files import atomic_write, shown_path
 from activesteer.text_table import text_table
 
 if TYPE_CHECKING:
@@ -362,7 +362,7 @@ def _import(options: argparse.Namespace) -> int:
     output = options.output or options.files[0].with_suffix(".mcap")
     recording = found.recording
     check_target(output)
-    with replacing(output, RecordingError) as part:
+    with atomic_write(output, RecordingError) as part:
         try:
             recording.save(part)
         except RecordingError as error:

@@ -116,7 +116,7 @@ class StopSignals:
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
             line = f"activesteer: stopped by {name}; {saved}{getattr(self.options, 'how_to_resume', '')}"
             if "activesteer.files" in sys.modules:
-                sys.modules["activesteer.files"].delete_passing()
+                sys.modules["activesteer.files"].delete_temporary_files()
             if not self._watching:
                 print(line, file=sys.stderr)
                 return 128 + number

@@ -366,9 +366,9 @@ def _identify(options: argparse.Namespace) -> int:
     option("--loop", ("driver", "controller"), "instead of the modes, stability of a loop"),
     controllers("with --loop ars and afs, with --loop driver also none"),
     driver(f"{DEFAULT_DRIVER}; with --loop driver"),
-    option("--speeds-kmh --speed-kmh", "V,V",
+    option("--speed-kmh", "V,V",
         "speeds, separated by commas (default: 80; with --loop driver 60, 80 ... 140; with --loop controller 60, 80 "
-        "... 160)", type=numbers, action="extend"),
+        "... 160)", type=numbers, action="extend", dest="speeds_kmh"),
     option("--study", "STUDY",
         "with --loop controller: smallest margins over the samples of a study (file or name); controllers are "
         "designed for the car without the factors of the study"),

@@ -32,16 +32,24 @@ if TYPE_CHECKING:
     from activesteer.studies.reproduction import Reproduction
 
 command: Final = Group("verify")
-SETTINGS: Final = {"paper": "paper's setting", "human": "human driver"}
+SETTINGS: Final = {"paper": "paper's setting", "literature": "driver from literature"}
 """As in `activesteer.analysis.claims.stored`, which takes too long to import for `--help`."""
+
+
+def _setting(name: str) -> str:
+    """Return the name of a setting; its former name is rejected."""
+    if name == "human":
+        raise argparse.ArgumentTypeError("the setting 'human' is now 'literature'")
+    return name
 
 
 @command("reproduce", "drive the scenarios of the paper and check its claims",
     output("DIR", "folder for recordings, report and figures", "runs"),
     VEHICLE,
     option("--setting", tuple(SETTINGS),
-        "paper: the most plausible numbers found for what the paper leaves open, selected by the verdicts; human: the "
-        "nominal car with a driver from published ranges (default). Both may be given", many=True, dest="settings"),
+        "paper: the most plausible numbers found for what the paper leaves open, selected by the verdicts; "
+        "literature: the nominal car with a driver from published ranges (default). Both may be given",
+        many=True, dest="settings", type=_setting),
     JOBS,
     flag("--all", "also print every claim with its numbers"),
     flag("--figures", "also draw the figures"),
@@ -51,7 +59,7 @@ def _settings(options: argparse.Namespace) -> int:
     """Drive the 15 runs in every setting asked for, and tell the verdicts."""
     from activesteer.studies.reproduction import draw_figures, write_page
 
-    settings = list(dict.fromkeys(options.settings or ["human"]))
+    settings = list(dict.fromkeys(options.settings or ["literature"]))
     folders = {name: options.output / name if len(settings) > 1 else options.output for name in settings}
     results = _driven(options, folders)
     for result in results.values():
@@ -173,7 +181,7 @@ def _print_settings(results: Mapping[str, Reproduction]) -> None:
         print_entry(f"not in the {SETTINGS[name]}: ", " ".join(failed) or "-", hanging=4)
     words = (
         "The paper's setting was selected by its verdicts, within ranges of everything that the paper leaves open; the "
-        "population varies the setting with the human driver (mean share of the claims)."
+        "population varies the setting with the driver from literature (mean share of the claims)."
     )
     print("\n".join(wrapped(words)))
 

@@ -111,7 +111,7 @@ CONTROLLER: Final = _ControllerKind(
 """Rules that all controllers follow."""
 
 
-def find_controller(given: Any) -> Plugin:
+def controller_spec(given: Any) -> Plugin:
     """Find a controller; see `activesteer.plugins.find`.
 
     Args:
@@ -123,7 +123,7 @@ def find_controller(given: Any) -> Plugin:
     """
     if is_variant(given):
         variant = read_variant(given)
-        return Plugin(CONTROLLER, variant.name, variant.name, variant, variant.gains, variant.files, ours=True)
+        return Plugin(CONTROLLER, variant.name, variant.name, variant, variant.gains, variant.files, is_builtin=True)
     if isinstance(given, str) and given in IN_EXAMPLES:
         raise ControllerError(f"{given!r} is an example now; use -c {IN_EXAMPLES[given]}", value=given)
     return find(given, CONTROLLER)
@@ -145,10 +145,10 @@ def keys_read(given: Any) -> frozenset[str]:
     A user's own code may read all of them.
 
     Args:
-        given: See `find_controller`.
+        given: See `controller_spec`.
     """
-    plugin = find_controller(given)
-    if not plugin.ours:
+    plugin = controller_spec(given)
+    if not plugin.is_builtin:
         return frozenset(field.name for field in fields(ControllerParameters))
     return frozenset(plugin.origin.reads) | (frozenset() if plugin.origin is NoControl else _UNIT_READS)
 
@@ -157,15 +157,15 @@ def declared_parameters(given: Any, gains: ControllerParameters | None = None) -
     """Return the parameters of any controller that overrides can set: key -> default, unit, range and type.
 
     Args:
-        given: See `find_controller`.
+        given: See `controller_spec`.
         gains: The table [controllers] of a vehicle file, for the values of a built-in controller.
 
     Returns:
         Dotted keys in SI, such as `controllers.ars.limit_rad` or `controllers.YawBeta.k_beta`; no gains that a variant,
         or text behind a `?`, has fixed.
     """
-    plugin, table = find_controller(given), f"{CONTROLLER.table}."
-    if not plugin.ours:
+    plugin, table = controller_spec(given), f"{CONTROLLER.table}."
+    if not plugin.is_builtin:
         own = plugin.declared.items()
         return {f"{table}{plugin.key}.{name}": each for name, each in own if name not in plugin.parameters}
     fixed = {table + ".".join(field_path(ControllerParameters, path)) for path in leaf_keys(plugin.parameters)}
@@ -177,7 +177,7 @@ def load_controller(given: Any, setup: ControllerSetup) -> Controller:
     """Find and make a controller.
 
     Args:
-        given: See `find_controller`.
+        given: See `controller_spec`.
         setup: What the controller may know of the car.
 
     Returns:
@@ -186,4 +186,4 @@ def load_controller(given: Any, setup: ControllerSetup) -> Controller:
     Raises:
         ControllerError: there is no such controller, or it cannot be made.
     """
-    return find_controller(given).make(setup)
+    return controller_spec(given).make(setup)

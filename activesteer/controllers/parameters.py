@@ -320,7 +320,7 @@ class ControllerSetup:
         timestep_s: Time between two calls [s].
         overridden: Dotted keys of the gains that were overridden for this run.
         estimation: The car as an estimator knows it; None if its file has no table [two_track].
-        own: Overrides of the parameters of users' controllers: class -> name -> value.
+        user_parameters: Overrides of the parameters of users' controllers: class -> name -> value.
         split_axles: Electric axles whose left and right torques can differ.
         battery_power_W: Largest power that the battery takes and gives [W].
     """
@@ -331,7 +331,7 @@ class ControllerSetup:
     timestep_s: float
     overridden: frozenset[str] = frozenset()
     estimation: EstimatorSetup | None = None
-    own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
+    user_parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     split_axles: tuple[SplitAxle, ...] = ()
     battery_power_W: tuple[float, float] = (math.inf, math.inf)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from activesteer.compilation import compiled_call
-from activesteer.controllers.find import find_controller
+from activesteer.controllers.find import controller_spec
 from activesteer.controllers.native_laws import N_COMMAND, N_HELD, call_law, law_address
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import Array
@@ -41,13 +41,13 @@ class Vectorised:
         """Make the controllers.
 
         Args:
-            controller: Name of a controller, or your own; see `find_controller`.
+            controller: Name of a controller, or your own; see `controller_spec`.
             setups: Inputs of the controllers, with the time between two calls.
 
         Raises:
             ControllerError: there is no such controller, or it cannot be made.
         """
-        self.n, plugin = len(setups), find_controller(controller)
+        self.n, plugin = len(setups), controller_spec(controller)
         self._blocks = [plugin.make(setup) for setup in setups]
         self._law, self._held = law_address(self._blocks[0]), np.zeros((self.n, N_HELD))
         if self._law:

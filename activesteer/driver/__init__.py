@@ -2,7 +2,7 @@
 
 from activesteer.driver.base import Driver, DriverParameters, DriverSetup
 from activesteer.driver.constant_radius import ConstantRadiusDriver
-from activesteer.driver.find import DRIVER, find_driver, is_driver_file
+from activesteer.driver.find import DRIVER, driver_spec, is_driver_file
 from activesteer.driver.human import HumanDriver
 from activesteer.driver.open_loop import OpenLoopDriver, SpeedHold
 from activesteer.driver.path_preview import PathPreviewDriver
@@ -17,6 +17,6 @@ __all__ = [
     "OpenLoopDriver",
     "PathPreviewDriver",
     "SpeedHold",
-    "find_driver",
+    "driver_spec",
     "is_driver_file",
 ]

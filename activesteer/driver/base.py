@@ -83,7 +83,7 @@ class Driver(Protocol):
         ...
 
 
-class Drive(Protocol):
+class Drivetrain(Protocol):
     """Engine and gearbox as a driver knows them."""
 
     def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float], /) -> float:
@@ -108,7 +108,7 @@ class DriverSetup:
         drive: Engine and gearbox.
         wheel_radius_m: Radius that relates the speed of the driven wheels to the speed of the car [m].
         timestep_s: Time between two steps [s].
-        own: Overrides of the parameters of a user's driver: class -> name -> value.
+        user_parameters: Overrides of the parameters of a user's driver: class -> name -> value.
     """
 
     single_track: SingleTrackParameters
@@ -116,7 +116,7 @@ class DriverSetup:
     steering_ratio: float
     steering_wheel_limit_rad: float
     rack_per_steering_wheel_m: float | None
-    drive: Drive
+    drive: Drivetrain
     wheel_radius_m: float
     timestep_s: float
-    own: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    user_parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

@@ -47,7 +47,7 @@ class ConstantRadiusDriver(NativeBlock):
             return self.robot.step(setpoint, measurement, motion)
         robot = self.robot
         angle = circle_angle(self, robot, curvature)
-        command = robot.turn(angle, setpoint, measurement)
+        command = robot.steer_to(angle, setpoint, measurement)
         if command.steering_wheel_demand_rad == angle:
             correct_circle(self, curvature, measurement.yaw_rate_radps, measurement.speed_mps)
         return command

@@ -68,7 +68,7 @@ DRIVER: Final = _DriverKind(
 """Rules that all drivers follow."""
 
 
-def find_driver(given: Any) -> Plugin:
+def driver_spec(given: Any) -> Plugin:
     """Find a driver; see `activesteer.plugins.find`.
 
     Args:
@@ -81,7 +81,7 @@ def find_driver(given: Any) -> Plugin:
     if not is_driver_file(given):
         return find(given, DRIVER)
     name = str(given.get("name", "driver")) if isinstance(given, Mapping) else Path(given).stem
-    return Plugin(DRIVER, name, name, HumanDriver, {}, {}, ours=True)
+    return Plugin(DRIVER, name, name, HumanDriver, {}, {}, is_builtin=True)
 
 
 def is_driver_file(given: Any) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from activesteer.driver.base import Drive, DriverParameters, DriverSetup
+from activesteer.driver.base import DriverParameters, DriverSetup, Drivetrain
 from activesteer.errors import ManeuverError
 from activesteer.native_blocks import NativeBlock
 from activesteer.shared_laws import shared
@@ -40,7 +40,7 @@ class SpeedHold(NativeBlock):
     saturated: bool
 
     def __init__(
-        self, parameters: DriverParameters, drive: Drive, mass_kg: float, wheel_radius_m: float, timestep_s: float
+        self, parameters: DriverParameters, drive: Drivetrain, mass_kg: float, wheel_radius_m: float, timestep_s: float
     ) -> None:
         """Make the speed control of one run.
 
@@ -181,12 +181,12 @@ class OpenLoopDriver(NativeBlock):
             ManeuverError: the setpoint is a rack position and the car has no rack.
         """
         if setpoint.rack_demand_m is None:
-            return self.turn(setpoint.steering_wheel_demand_rad, setpoint, measurement)
+            return self.steer_to(setpoint.steering_wheel_demand_rad, setpoint, measurement)
         if self._rack_per_steering_wheel_m is None:
             raise ManeuverError(NO_RACK, key="steering.rack_m")
-        return self.turn(setpoint.rack_demand_m / self._rack_per_steering_wheel_m, setpoint, measurement)
+        return self.steer_to(setpoint.rack_demand_m / self._rack_per_steering_wheel_m, setpoint, measurement)
 
-    def turn(self, angle: float, setpoint: Setpoint, measurement: Measurement) -> DriverCommand:
+    def steer_to(self, angle: float, setpoint: Setpoint, measurement: Measurement) -> DriverCommand:
         """Return the command for a steering wheel angle [rad] in place of the angle of the setpoint."""
         speed_mps, drive = setpoint.speed_demand_mps, self.speed_hold.drive
         engine_radps, limits_Nm = 0.0, (0.0, 0.0)
@@ -213,7 +213,7 @@ def turned(
     low_Nm: float,
     high_Nm: float,
 ) -> tuple[float, float, bool, int]:
-    """Law of `OpenLoopDriver.turn`: steering wheel angle, drive torque, whether a limit is active, gear."""
+    """Law of `OpenLoopDriver.steer_to`: steering wheel angle, drive torque, whether a limit is active, gear."""
     saturated = False
     if angle > robot.steering_wheel_limit_rad:
         angle, saturated = robot.steering_wheel_limit_rad, True

@@ -147,7 +147,7 @@ class PathPreviewDriver(NativeBlock):
             look(self, self.robot.steering_wheel_limit_rad, decided, *motion, *PathSearch(path).line, gains)
         self._steps += 1
         wheel, saturated = moved(self)
-        command = self.robot.turn(wheel, setpoint, measurement)
+        command = self.robot.steer_to(wheel, setpoint, measurement)
         self._wheel_rad = command.steering_wheel_demand_rad
         return command._replace(saturated=True) if saturated else command
 

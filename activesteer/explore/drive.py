@@ -21,7 +21,7 @@ from activesteer.explore.runs import Reply, free_path
 from activesteer.road.course import CONE_RADIUS_M, Footprint
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
-from activesteer.simulation.live_view import Pacer
+from activesteer.simulation.live_view import FramePacer
 from activesteer.simulation.simulation import Simulation
 
 _LONGEST_S: Final = 900.0
@@ -115,10 +115,10 @@ def _towards(value: float, target: float, most: float) -> float:
     return value + min(max(target - value, -most), most)
 
 
-class Drive:
+class DriveSession:
     """A drive in real time, recorded to a file."""
 
-    def __init__(self, choice: Start, folder: Folder, pacer: Pacer | None = None) -> None:
+    def __init__(self, choice: Start, folder: Folder, pacer: FramePacer | None = None) -> None:
         """Put the car at the start of a course.
 
         Args:
@@ -142,7 +142,7 @@ class Drive:
         self._size = Footprint.from_table(vehicle.dimensions())
         self._bodies = [vehicle.body_names.index(name) for name in BODIES]
         self._standing = np.ones(len(self._cones()), bool)
-        self._pacer, self._lap_s, self._turned_rad, self._last_lap_s = pacer or Pacer(), 0.0, 0.0, None
+        self._pacer, self._lap_s, self._turned_rad, self._last_lap_s = pacer or FramePacer(), 0.0, 0.0, None
         self._bearing_rad, self._gate_s, self._seen = self._bearing(), None, 0
         self._longest_s = self._busy_s = 0.0
 

@@ -43,7 +43,7 @@ class Describe(Choice, frozen=True, tag="describe"):
     """Number that the reply repeats."""
 
 
-class Run(Choice, frozen=True, tag="run"):
+class RunRequest(Choice, frozen=True, tag="run"):
     """The page asks for runs."""
 
     id: _Number = 0
@@ -89,7 +89,7 @@ class End(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag
     """The drive ends."""
 
 
-Message = Describe | Run | Start | Act | Save | Report | End
+Message = Describe | RunRequest | Start | Act | Save | Report | End
 _DECODER: Final = msgspec.json.Decoder(Message)
 
 

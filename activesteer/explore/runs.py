@@ -17,19 +17,19 @@ from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.results import KEY_FIGURES
 from activesteer.analysis.report.run_page import write_report
-from activesteer.controllers import find_controller
+from activesteer.controllers import controller_spec
 from activesteer.conventions import run_looks
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.car_shape import poses_of, shape_of
 from activesteer.explore.choice import Folder, check_numbers
-from activesteer.explore.messages import Choice, Describe, Run
+from activesteer.explore.messages import Choice, Describe, RunRequest
 from activesteer.explore.sliders import Slider, sliders
 from activesteer.metric_table import Better, recorded_metric
 from activesteer.plugins import Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import Scenario, resolve
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.simulation import Simulation
 
 _CHUNK: Final = 500
@@ -73,7 +73,7 @@ class Runs:
             tuple(arrays),
         )
 
-    def run(self, choice: Run, stale: Callable[[], bool]) -> Iterator[Reply]:
+    def run(self, choice: RunRequest, stale: Callable[[], bool]) -> Iterator[Reply]:
         """Drive the chosen controllers, and yield a reply for each as soon as it is driven.
 
         Args:
@@ -92,7 +92,7 @@ class Runs:
             run = {"kind": "run", "name": name, "label": look.label, "place": look.place, "dashes": look.dashes}
             run["title"] = scenario.maneuver.title or choice.maneuver
             try:
-                controller = find_controller(self.folder.located(name))
+                controller = controller_spec(self.folder.located(name))
                 recording = self._driven(scenario, controller, stale)
             except ActiveSteerError as error:
                 yield Reply({**run, "error": str(error)})
@@ -134,15 +134,15 @@ class Runs:
     def _sliders(self, choice: Choice, scenario: Scenario | None = None) -> list[Slider]:
         return sliders(scenario or self._resolved(choice, {}), self._located(choice))
 
-    def _held(self, choice: Run, scenario: Scenario) -> Scenario:
+    def _held(self, choice: RunRequest, scenario: Scenario) -> Scenario:
         """Return a scenario with its amplitude: that of the last search while a slider moves, else a new one."""
         maneuver: Any = scenario.maneuver
         if maneuver.search is None:
-            return prepared(scenario)
+            return with_amplitude_found(scenario)
         key = choice.maneuver, choice.vehicle
         if choice.dragging and key in self._held_rad:
             return replace(scenario, maneuver=maneuver.with_amplitude(self._held_rad[key]))
-        ready = prepared(scenario)
+        ready = with_amplitude_found(scenario)
         steer: Any = ready.maneuver
         self._held_rad[key] = steer.steer.steering_wheel_rad
         return ready

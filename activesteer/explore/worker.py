@@ -16,8 +16,8 @@ from pathlib import Path
 
 from activesteer.errors import ActiveSteerError
 from activesteer.explore.choice import Folder
-from activesteer.explore.drive import Drive
-from activesteer.explore.messages import Act, Describe, End, Message, Report, Run, Save, Start, add
+from activesteer.explore.drive import DriveSession
+from activesteer.explore.messages import Act, Describe, End, Message, Report, RunRequest, Save, Start, add
 from activesteer.explore.runs import Reply, Runs
 
 
@@ -34,7 +34,7 @@ class _Worker:
         self._connection, self._folder = connection, folder
         self._waiting: deque[Message] = deque()
         self._runs = Runs(folder)
-        self._drive: Drive | None = None
+        self._drive: DriveSession | None = None
         self._reports = Path(tempfile.mkdtemp(prefix="activesteer-"))
 
     def run(self) -> None:
@@ -67,7 +67,7 @@ class _Worker:
         match message:
             case Describe():
                 yield _numbered(self._runs.describe(message), message.id)
-            case Run():
+            case RunRequest():
                 if self._drive is None:  # a drive comes before curves; the page asks again after it
                     for reply in self._runs.run(message, self._stale):
                         yield _numbered(reply, message.id)
@@ -81,7 +81,7 @@ class _Worker:
                 if self._drive is not None:
                     drive, self._drive = self._drive, None
                     yield drive.end()
-                self._drive = Drive(message, self._folder)
+                self._drive = DriveSession(message, self._folder)
                 yield self._drive.start()
             case End():
                 if self._drive is not None:
@@ -91,7 +91,7 @@ class _Worker:
                 if self._drive is not None:
                     self._drive.act(message)
 
-    def _drive_on(self, drive: Drive) -> None:
+    def _drive_on(self, drive: DriveSession) -> None:
         try:
             self._send(drive.frame())
             if drive.done:
@@ -107,7 +107,7 @@ class _Worker:
     def _stale(self) -> bool:
         """Return whether a newer choice waits."""
         self._receive(wait=False)
-        return any(isinstance(message, (Run, Start)) for message in self._waiting)
+        return any(isinstance(message, (RunRequest, Start)) for message in self._waiting)
 
     def _receive(self, *, wait: bool) -> None:
         """Take all messages that have come."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.errors import PlaybackError
-from activesteer.files import replacing, shown_path
+from activesteer.files import atomic_write, shown_path
 from activesteer.playback.layout import blueprint
 from activesteer.playback.runs import Run
 from activesteer.playback.showing import Showing
@@ -42,7 +42,7 @@ def save(runs: Sequence[Run], path: Path, how: Showing = _PLAIN) -> None:
     """
     if path.suffix.lower() != ".rrd":
         raise PlaybackError(f"{shown_path(path)}: the name of a file for the viewer must end in .rrd", value=path)
-    with replacing(path, PlaybackError) as part:
+    with atomic_write(path, PlaybackError) as part:
         part.touch()
         stream = new_stream(runs, compare=how.compare)
         # The stream writes in a thread of its own, which only logs errors.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 from markupsafe import Markup
 
 from activesteer.errors import ActiveSteerError, ParameterError, not_installed
-from activesteer.files import replacing, shown_path
+from activesteer.files import atomic_write, shown_path
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +56,7 @@ def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterEr
     Raises:
         ActiveSteerError: the file cannot be written; of class `error`.
     """
-    with replacing(path, error) as part:
+    with atomic_write(path, error) as part:
         try:
             figure.savefig(part, dpi=DOTS_PER_INCH)
         except ValueError as reason:  # an ending that is no format of matplotlib's

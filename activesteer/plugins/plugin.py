@@ -32,7 +32,7 @@ class Plugin:
         origin: A class, a function, or an object that is copied.
         parameters: Arguments by name.
         files: File of the code and the modules beside it that it imports, to be kept with the recording.
-        ours: Whether the code belongs to the package and needs no watching.
+        is_builtin: Whether the code belongs to the package and needs no watching.
     """
 
     kind: Kind
@@ -41,7 +41,7 @@ class Plugin:
     origin: Any
     parameters: Mapping[str, Any]
     files: Mapping[str, bytes]
-    ours: bool = False
+    is_builtin: bool = False
 
     def __post_init__(self) -> None:
         """Mark a block that uses the truth in its label."""
@@ -66,7 +66,7 @@ class Plugin:
         Raises:
             ActiveSteerError: of the kind's type: the declaration is wrong.
         """
-        if self.ours or is_instance(self.origin):
+        if self.is_builtin or is_instance(self.origin):
             return {}
         try:
             return declared_by(self.origin)
@@ -113,7 +113,7 @@ class Plugin:
         Args:
             own: Overrides: class -> name -> value.
         """
-        if self.ours:
+        if self.is_builtin:
             return dict(self.parameters)
         defaults = {name: each.default for name, each in self.declared.items()}
         return _plain({**defaults, **self.parameters, **own.get(self.key, {})})
@@ -131,7 +131,7 @@ class Plugin:
             ActiveSteerError: of the kind's type: the block cannot be created.
         """
         kind, origin = self.kind, self.origin
-        if self.ours:
+        if self.is_builtin:
             return origin.from_vehicle(setup)
         if getattr(origin, "checks_itself", False):
             return self._created(setup)
@@ -156,7 +156,7 @@ class Plugin:
     def _created(self, setup: Any) -> Any:
         if is_instance(self.origin):
             return copy.deepcopy(self.origin)
-        parameters = {**self.parameters, **getattr(setup, "own", {}).get(self.key, {})}
+        parameters = {**self.parameters, **getattr(setup, "user_parameters", {}).get(self.key, {})}
         if hasattr(self.origin, "from_vehicle"):
             return self.origin.from_vehicle(setup, **parameters)
         given = {SETUP: setup} if has_argument(self.origin, SETUP) else {}
@@ -219,7 +219,7 @@ def find(given: Any, kind: Kind) -> Plugin:
         return found_format.load()(given, kind)
     if isinstance(given, str):
         if given in kind.built_in:
-            return Plugin(kind, given, given, kind.built_in[given], {}, {}, ours=True)
+            return Plugin(kind, given, given, kind.built_in[given], {}, {}, is_builtin=True)
         origin, written, files = from_file(given, kind)
         label = "-".join([given.partition("?")[0].rpartition(":")[2], *(f"{k}={v}" for k, v in written.items())])
         found = Plugin(kind, given, re.sub(r"[^\w=.+-]+", "_", label), origin, {}, files)

@@ -15,7 +15,7 @@ import numpy as np
 
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, not_installed
-from activesteer.files import finite, replacing
+from activesteer.files import atomic_write, finite
 from activesteer.recording.channels import TIME, ChannelTable
 from activesteer.recording.contents import metadata_texts
 
@@ -166,6 +166,6 @@ def _metadata(recording: Exportable) -> str:
 
 def _written(path: str | os.PathLike[str], write: Callable[[Path], object]) -> Path:
     target = Path(path)
-    with replacing(target, RecordingError) as part:
+    with atomic_write(target, RecordingError) as part:
         write(part)
     return target

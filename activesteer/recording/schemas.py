@@ -41,7 +41,7 @@ _CONTINUES = np.array([0x80, 0x80, 0x80, 0x80, 0], np.uint64)
 
 
 @dataclass(frozen=True)
-class Run:
+class ColumnRun:
     """Numbers at a constant distance in a message.
 
     Attributes:
@@ -100,7 +100,7 @@ class FixedMessage:
     def __init__(self) -> None:
         """Start with an empty message."""
         self.template = bytearray()
-        self.runs: list[Run] = []
+        self.runs: list[ColumnRun] = []
 
     def __len__(self) -> int:
         """Return the length of the message [byte]."""
@@ -131,7 +131,7 @@ class FixedMessage:
     def block(self, dtype: str, count: int) -> FixedMessage:
         """Append a new run of adjacent untagged numbers."""
         width = np.dtype(dtype).itemsize
-        self.runs.append(Run(dtype, len(self.template), width, count))
+        self.runs.append(ColumnRun(dtype, len(self.template), width, count))
         self.template += bytes(width * count)
         return self
 

@@ -1,10 +1,10 @@
 """Scenarios: manoeuvre, car and driver with their overrides."""
 
-from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, load_car
+from activesteer.scenario.car import CarSpec, FileOrTable, VehicleConfig, load_car
 from activesteer.scenario.overrides import check_gains, read_by, unread_gains
 from activesteer.scenario.scenario import Scenario, check_parts, describe, resolve, value_of
 
 __all__ = [
-    "Car", "FileOrTable", "Scenario", "VehicleConfig", "check_gains", "check_parts", "describe", "load_car", "read_by",
-    "resolve", "unread_gains", "value_of",
+    "CarSpec", "FileOrTable", "Scenario", "VehicleConfig", "check_gains", "check_parts", "describe", "load_car",
+    "read_by", "resolve", "unread_gains", "value_of",
 ]  # fmt: skip

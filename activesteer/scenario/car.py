@@ -212,7 +212,7 @@ class VehicleConfig(VehicleParameters):
 
 
 @dataclass(frozen=True)
-class Car:
+class CarSpec:
     """A car, ready to be put on a road.
 
     Attributes:
@@ -236,7 +236,7 @@ class Car:
         """Name of the vehicle."""
         return self.config.name
 
-    def with_ideal_sensors(self) -> Car:
+    def with_ideal_sensors(self) -> CarSpec:
         """Return the car with ideal sensors, like measuring equipment."""
         return replace(self, config=replace(self.config, sensors=Sensors()))
 
@@ -256,7 +256,7 @@ class Car:
         return Vehicle(self.mjcf, self.config, self.tyres, Road() if road is None else road, timestep_s, content)
 
 
-def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | None = None) -> Car:
+def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | None = None) -> CarSpec:
     """Read and check a car.
 
     Args:
@@ -275,7 +275,7 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
     return replace(car_with(vehicle, listed), overrides=changes)
 
 
-def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
+def car_with(vehicle: FileOrTable, overrides: list[Override]) -> CarSpec:
     """Read a car with overrides of the vehicle file only; see `load_car`."""
     table, source, folder, files = read_table(vehicle, "vehicle", find_vehicle, ParameterError)
     known = table.get("single_track")
@@ -294,7 +294,7 @@ def car_with(vehicle: FileOrTable, overrides: list[Override]) -> Car:
     files |= {f"mjcf/{model}/{name}": text for name, text in model_files(mjcf).items()}
     front_tyre = _tyre(front, config)
     new = front_tyre, front_tyre if rear == front else _tyre(rear, config)
-    return Car(config, mjcf, config.factors.on_tyres(*new), new, files=files)
+    return CarSpec(config, mjcf, config.factors.on_tyres(*new), new, files=files)
 
 
 def _tyre(path: Path, config: VehicleConfig) -> TyreParameters:

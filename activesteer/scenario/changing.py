@@ -41,8 +41,13 @@ def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s
     part, path = part_of(key, type(scenario.maneuver), own_controllers([controller]))
     overrides = {**scenario.overrides, key: value}
     if part == "controllers":
-        known = scenario.own.get(path[0], {}) | own_values({key: value}, own_controllers([controller]))[path[0]]
-        return Change("controller", replace(scenario, own={**scenario.own, path[0]: known}, overrides=overrides))
+        known = (
+            scenario.user_parameters.get(path[0], {}) | own_values({key: value}, own_controllers([controller]))[path[0]]
+        )
+        return Change(
+            "controller",
+            replace(scenario, user_parameters={**scenario.user_parameters, path[0]: known}, overrides=overrides),
+        )
     if part == "driver":
         return Change("driver", replace(scenario, driver=_driver(scenario, path, value), overrides=overrides))
     if part == "vehicle":
@@ -81,10 +86,10 @@ def _with(cls: type[Any], table: Mapping[str, Any], path: list[str], value: Any,
 
 def _driver(scenario: Scenario, path: list[str], value: Any) -> Any:
     who = scenario.driver
-    if not who.plugin.ours and path[0] == who.plugin.key and path[1:]:
-        values = {**who.own.get(path[0], {}), **who.plugin.own_values({".".join(path[1:]): value})}
-        return replace(who, own={**who.own, path[0]: values})
-    if not who.plugin.ours:
+    if not who.plugin.is_builtin and path[0] == who.plugin.key and path[1:]:
+        values = {**who.user_parameters.get(path[0], {}), **who.plugin.own_values({".".join(path[1:]): value})}
+        return replace(who, user_parameters={**who.user_parameters, path[0]: values})
+    if not who.plugin.is_builtin:
         raise ParameterError(f"has no effect: {who.plugin.name} drives", key=".".join(("driver", *path)), value=value)
     return replace(who, parameters=_with(DriverParameters, to_table(who.parameters), path, value, ["driver"]))
 

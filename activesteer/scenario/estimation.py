@@ -9,7 +9,7 @@ import numpy as np
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation import EstimatorSetup, KnownTyre
 from activesteer.estimation.setup import GRID
-from activesteer.scenario.car import Car
+from activesteer.scenario.car import CarSpec
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 
@@ -21,7 +21,7 @@ _SPEED_MPS: Final = 20.0
 """Speed at which the tyres are evaluated [m/s]."""
 
 
-def estimator_setup(car: Car) -> EstimatorSetup | None:
+def estimator_setup(car: CarSpec) -> EstimatorSetup | None:
     """Return the properties that estimators may know; None if the vehicle file has no table [two_track]."""
     config, body = car.config, car.config.single_track
     if config.two_track is None:

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.config import Source, check_overruled, field_path, merged
-from activesteer.controllers import CONTROLLER, ControllerParameters, find_controller, keys_read
+from activesteer.controllers import CONTROLLER, ControllerParameters, controller_spec, keys_read
 from activesteer.errors import ParameterError, shown
 from activesteer.plugins import Plugin
 
@@ -80,8 +80,8 @@ def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
         ParameterError: classes of two files have the same name.
     """
     found: dict[str, list[Plugin]] = {}
-    for plugin in map(find_controller, controllers):
-        if not plugin.ours:
+    for plugin in map(controller_spec, controllers):
+        if not plugin.is_builtin:
             found.setdefault(plugin.key, []).append(plugin)
     for name, plugins in found.items():
         if any(plugin.files != plugins[0].files for plugin in plugins):
@@ -139,7 +139,7 @@ def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> Non
         if own_path(key):
             problem = f"has no effect: no controller {', '.join(names)} drives here"
             raise ParameterError(problem, key=key, value=overrides[key], overridden=True)
-        driving = " and ".join(find_controller(given).label for given in controllers)
+        driving = " and ".join(controller_spec(given).label for given in controllers)
         allowed = [f"controllers.{name}" for name in sorted(frozenset[str]().union(*map(keys_read, controllers)))]
         words = "controller {} reads" if len(controllers) == 1 else "controllers {} read"
         here = f"{words.format(driving)} {', '.join(allowed)}" if controllers else "no controller drives here"

@@ -20,13 +20,13 @@ from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
 from activesteer.maneuver.tables import with_road_files
 from activesteer.plugins import Plugin
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
-from activesteer.scenario.car import Car, FileOrTable, VehicleConfig, car_with, read_table
+from activesteer.scenario.car import CarSpec, FileOrTable, VehicleConfig, car_with, read_table
 from activesteer.scenario.driver import ChosenDriver, driver_with
 from activesteer.scenario.electric import battery_power_W, split_axles
 from activesteer.scenario.estimation import estimator_setup
 from activesteer.scenario.overrides import Override, applied, gain_paths, own_controllers, own_path, own_values, plain
 from activesteer.scenario.recorded_inputs import is_recording, led, recorded_inputs
-from activesteer.vehicle.powertrain import Drive
+from activesteer.vehicle.powertrain import PowertrainLimits
 
 
 @dataclass(frozen=True)
@@ -39,15 +39,15 @@ class Scenario:
         driver: The driver.
         overrides: Changes of their files.
         files: Name -> content of all files, to be kept with the recording.
-        own: Overrides of the parameters of users' controllers: class -> name -> value.
+        user_parameters: Overrides of the parameters of users' controllers: class -> name -> value.
     """
 
     maneuver: Maneuver
-    car: Car
+    car: CarSpec
     driver: ChosenDriver
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
-    own: dict[str, dict[str, Any]] = field(default_factory=dict)
+    user_parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     @functools.cached_property
     def digest(self) -> str:
@@ -59,7 +59,7 @@ class Scenario:
         car, replaced = self.car.config, frozenset(map(".".join, gain_paths(self.overrides).values()))
         return ControllerSetup(
             car.single_track, car.controllers, car.steering.ratio, timestep_s, replaced, estimator_setup(self.car),
-            self.own, split_axles(car.motors), battery_power_W(car.battery),
+            self.user_parameters, split_axles(car.motors), battery_power_W(car.battery),
         )  # fmt: skip
 
     def driver_setup(
@@ -69,7 +69,8 @@ class Scenario:
         car = self.car.config
         return DriverSetup(
             car.single_track, self.driver.parameters, car.steering.ratio, car.steering.steering_wheel_limit_rad,
-            rack_per_steering_wheel_m, Drive(car.drive), wheel_radius_m, timestep_s, self.driver.own,
+            rack_per_steering_wheel_m, PowertrainLimits(car.drive), wheel_radius_m, timestep_s,
+            self.driver.user_parameters,
         )  # fmt: skip
 
 
@@ -93,7 +94,7 @@ def resolve(
             your own code have keys such as `controllers.YawBeta.k_beta` and `driver.Cautious.preview_s`. The key
             `driver` replaces the driver, the key `fault` the faults: tables, or texts such as `rear:stuck@2.0`,
             separated by spaces.
-        driver: Name, path or table of a driver, or your own code; see `find_driver`.
+        driver: Name, path or table of a driver, or your own code; see `driver_spec`.
         controllers: Controllers whose parameters `overrides` may set, as for `simulate`; needed for your own code only.
 
     Raises:
@@ -225,10 +226,10 @@ def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> A
     if part == "controllers":
         if path[0] not in (owned := own_controllers(controllers)):
             raise ParameterError("no controller here has such a parameter", key=key)
-        return owned[path[0]][0].value_of(path[1], scenario.own)
+        return owned[path[0]][0].value_of(path[1], scenario.user_parameters)
     who = scenario.driver
-    if part == "driver" and not who.plugin.ours and path[0] == who.plugin.key and path[1:]:
-        return who.plugin.value_of(".".join(path[1:]), who.own)
+    if part == "driver" and not who.plugin.is_builtin and path[0] == who.plugin.key and path[1:]:
+        return who.plugin.value_of(".".join(path[1:]), who.user_parameters)
     value: Any = {"maneuver": scenario.maneuver, "vehicle": scenario.car.config, "driver": who.parameters}[part]
     factor = 1.0
     for name in path:
@@ -250,5 +251,5 @@ def describe(scenario: Scenario) -> dict[str, Any]:
         "vehicle": to_table(scenario.car.config),
         "driver": scenario.driver.to_table(),
         "overrides": dict(scenario.overrides),
-        **({"controllers": scenario.own} if scenario.own else {}),
+        **({"controllers": scenario.user_parameters} if scenario.user_parameters else {}),
     }

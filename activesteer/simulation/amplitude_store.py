@@ -58,7 +58,7 @@ def keep(key: str, value: float) -> None:
         part = place / f"{key}-{secrets.token_hex(4)}{_SUFFIX}"
         try:
             part.write_text(_line(key, value), encoding="ascii")
-            # Not `files.replacing`, which follows links: a link here may point to any file of the user.
+            # Not `files.atomic_write`, which follows links: a link here may point to any file of the user.
             part.replace(place / f"{key}{_SUFFIX}")
         finally:
             part.unlink(missing_ok=True)

@@ -13,7 +13,7 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer.controllers import CONTROLLER, find_controller
+from activesteer.controllers import CONTROLLER, controller_spec
 from activesteer.controllers.vectorised import Vectorised
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import DRIVER
@@ -31,10 +31,10 @@ from activesteer.signals import (
     numbers_of,
     widths_of,
 )
-from activesteer.simulation.closed_loop import ClosedLoop, LoopState, OneAtATime
+from activesteer.simulation.closed_loop import ClosedLoop, LoopState, NonReentrantLock
 from activesteer.simulation.native_cars import NativeCars
 from activesteer.simulation.native_loop import PYTHON, STEP_ADDRESS, drive_cars
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.vehicle import engine_warnings_held
 
 MAX_CARS: Final = 100_000
@@ -115,7 +115,7 @@ class Batch:
         if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
             raise ParameterError(f"is {shown(threads)}; at least 1 is needed", key="threads", value=threads)
         self.threads = threads or os.cpu_count() or 1
-        self._controller, self._timestep_s = find_controller(controller), timestep_s
+        self._controller, self._timestep_s = controller_spec(controller), timestep_s
         inputs = [maneuver] * n if isinstance(maneuver, Scenario) else []
         if inputs and (overrides or vehicle != "compact" or driver != DEFAULT_DRIVER):
             raise ParameterError(
@@ -131,7 +131,7 @@ class Batch:
 
         def of(car: int) -> Scenario:
             scenario = resolve(maneuver, vehicle, overrides[car], driver, [self._controller])
-            return prepared(scenario, self._timestep_s)
+            return with_amplitude_found(scenario, self._timestep_s)
 
         keys = [repr(sorted(changes.items())) for changes in overrides]
         known = self._of_different_cars(of, keys)
@@ -162,7 +162,7 @@ class Batch:
             start = self._starts[id(scenario)]
             self.loops.append(loop or ClosedLoop(scenario, self._controller, self._timestep_s, settled=start))
         self.failures = {}
-        self._in_use = OneAtATime()
+        self._in_use = NonReentrantLock()
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
         self._native = NativeCars(self.loops)
         for car, loop in enumerate(self.loops):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Source, build
-from activesteer.controllers import find_controller
+from activesteer.controllers import controller_spec
 from activesteer.controllers.native_laws import N_HELD
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import Driver
@@ -23,11 +23,11 @@ from activesteer.maneuver.phases import seen_of
 from activesteer.scenario import Scenario
 from activesteer.scenario.changing import changed
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint, numbers_in
-from activesteer.simulation.control_unit import control_unit
 from activesteer.simulation.copies import retuned
 from activesteer.simulation.native_cars import NativeCars
 from activesteer.simulation.native_loop import GIVEN, PYTHON
 from activesteer.simulation.recorder import Recorder
+from activesteer.simulation.sampled_controller import control_unit
 from activesteer.vehicle import Uncopyable, engine_warnings_held
 from activesteer.vehicle.faults import Faults
 
@@ -56,7 +56,7 @@ class LoopState(NamedTuple):
     inputs: str
 
 
-class OneAtATime:
+class NonReentrantLock:
     """A context that a second caller cannot enter while the first is inside."""
 
     def __init__(self) -> None:
@@ -120,7 +120,7 @@ class ClosedLoop(Uncopyable):
             DriverError: the driver cannot be created, or fails while the car settles.
             SimulationDiverged: the car does not settle.
         """
-        self.scenario, self._plugin, self.sequence = scenario, find_controller(controller), None
+        self.scenario, self._plugin, self.sequence = scenario, controller_spec(controller), None
         self._start, self.changes = scenario, ()
         self._maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.ground, timestep_s)
@@ -130,7 +130,7 @@ class ClosedLoop(Uncopyable):
         self.controller_setup, self.unit, block = control_unit(self._plugin, scenario, vehicle)
         self.blocks = driver, block
         self.recorder: Recorder | None = None
-        self.in_use = OneAtATime()
+        self.in_use = NonReentrantLock()
         self._cars, self._car = NativeCars([self]), 0
         steps = round(maneuver.settle_s / timestep_s)
         measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
@@ -197,7 +197,7 @@ class ClosedLoop(Uncopyable):
         Raises:
             ControllerError: there is no such controller, or it cannot be created.
         """
-        self._plugin = find_controller(controller)
+        self._plugin = controller_spec(controller)
         self.controller_setup, self.unit, self.controller = control_unit(self._plugin, self.scenario, self.vehicle)
         self._cars.connect(self._car)
 
@@ -302,9 +302,10 @@ class ClosedLoop(Uncopyable):
             self.controller = retuned(self.controller, old, new)
         elif part == "driver":
             make, who = after.driver.plugin.make, after.driver
-            old, self.driver_setup = (
-                make(self.driver_setup), replace(self.driver_setup, parameters=who.parameters, own=who.own)
-            )  # fmt: skip
+            old = make(self.driver_setup)
+            self.driver_setup = replace(
+                self.driver_setup, parameters=who.parameters, user_parameters=who.user_parameters
+            )
             self.driver = retuned(self.driver, old, make(self.driver_setup))
         self._adopt(after)
         self.changes = (*self.changes, (key, value, time_s))
@@ -409,7 +410,9 @@ class ClosedLoop(Uncopyable):
         if state.changes != self.changes:
             self._adopt(self._changed_by(state.changes))
             self.changes, who = state.changes, self.scenario.driver
-            self.driver_setup = replace(self.driver_setup, parameters=who.parameters, own=who.own)
+            self.driver_setup = replace(
+                self.driver_setup, parameters=who.parameters, user_parameters=who.user_parameters
+            )
             self.controller_setup, _, _ = control_unit(self._plugin, self.scenario, self.vehicle)
         if state.faults != self._fault_list:
             self.fail(state.faults)

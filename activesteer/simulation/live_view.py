@@ -60,7 +60,7 @@ class Viewer(Protocol):
         ...
 
 
-class Pacer:
+class FramePacer:
     """Keeper of simulated time to the time of a clock.
 
     Attributes:
@@ -181,7 +181,7 @@ def scene_for(
 
 
 def drive(
-    simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: Pacer, keys: Keys | None = None
+    simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: FramePacer, keys: Keys | None = None
 ) -> DriveResult:
     """Drive and show a manoeuvre from start to end, or until the window is closed or the drive is restarted.
 
@@ -299,7 +299,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
             scene.model, scene.data, show_left_ui=False, show_right_ui=False, key_callback=keys
         ) as viewer,
     ):
-        pacer = Pacer(speed)
+        pacer = FramePacer(speed)
         while viewer.is_running():
             driven = drive(simulation, scene, viewer, pacer, keys)
             slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
@@ -312,7 +312,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
             while driven.finished and viewer.is_running() and not keys.restart:
                 time.sleep(0.05)
                 viewer.sync()
-            pacer = Pacer(pacer.speed)
+            pacer = FramePacer(pacer.speed)
             simulation = ClosedLoop(scenario, controller)
 
 

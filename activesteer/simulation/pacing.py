@@ -16,7 +16,7 @@ _SPIN_S: Final = 0.15e-3
 """Time before an instant from which the clock is watched, since a sleep ends some 0.1 ms late [s]."""
 
 
-class Pacer:
+class RealtimePacer:
     """Clock of a run.
 
     Attributes:

@@ -25,13 +25,13 @@ from activesteer.analysis.slow_ramp import FIT, angle_at
 from activesteer.analysis.source import RecordingLike
 from activesteer.compilation import content_key, processor
 from activesteer.config import to_table
-from activesteer.controllers import find_controller
+from activesteer.controllers import controller_spec
 from activesteer.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
 from activesteer.errors import ManeuverError, ModelError
 from activesteer.maneuver.base import Search
 from activesteer.maneuver.steering_tests import RampAngle, SteadyTurn, StepSteer
 from activesteer.recording import Recording
-from activesteer.scenario import Car, FileOrTable, Scenario, resolve
+from activesteer.scenario import CarSpec, FileOrTable, Scenario, resolve
 from activesteer.simulation import amplitude_store
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
@@ -224,7 +224,7 @@ def with_identified_single_track(scenario: Scenario, run: Run) -> Scenario:
     return replace(scenario, car=replace(car, config=replace(car.config, single_track=single_track)))
 
 
-def body_of(car: Car) -> Body:
+def body_of(car: CarSpec) -> Body:
     """Return the mass properties of the whole car, from the model at static ride."""
     vehicle = car.on()
     body = mass_properties(vehicle.model, vehicle.data)
@@ -266,7 +266,7 @@ def fitted(body: Body, tests: list[Handling]) -> SingleTrackParameters:
     )
 
 
-def prepared(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
+def with_amplitude_found(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
     """Return the scenario with the results of all searches: single-track model, steering wheel amplitude.
 
     Args:
@@ -293,4 +293,4 @@ def _test_drive(scenario: Scenario) -> Recording:
     loop = ClosedLoop(replace(scenario, car=scenario.car.with_ideal_sensors()))
     recorder = Recorder(loop.vehicle, loop.steps)
     loop.run(recorder)
-    return RunContext.of(scenario, loop.vehicle, find_controller("none")).recording(recorder)
+    return RunContext.of(scenario, loop.vehicle, controller_spec("none")).recording(recorder)

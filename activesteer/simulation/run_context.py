@@ -17,8 +17,8 @@ from activesteer.road.drawn import DrawnSurface, places_to_draw
 from activesteer.road.surface import surface_of
 from activesteer.scenario import Scenario, describe
 from activesteer.signals import Channel
-from activesteer.simulation.control_unit import about
 from activesteer.simulation.recorder import Recorder
+from activesteer.simulation.sampled_controller import about
 from activesteer.vehicle import Vehicle
 from activesteer.version import __version__
 
@@ -127,7 +127,11 @@ class RunContext(NamedTuple):
         """Return the context of a run of a scenario, before the run."""
         metadata = {
             "controller": controller.name,
-            **({"controller_parameters": values} if (values := controller.parameters_with(scenario.own)) else {}),
+            **(
+                {"controller_parameters": values}
+                if (values := controller.parameters_with(scenario.user_parameters))
+                else {}
+            ),
             **describe(scenario),
             **about(controller, scenario.car.config.controllers, vehicle.timestep_s),
             "car": vehicle.dimensions(),

@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple, Protocol, Self
 import mujoco
 
 from activesteer.analysis.metrics import metrics
-from activesteer.controllers import CONTROLLER, find_controller
+from activesteer.controllers import CONTROLLER, controller_spec
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
@@ -28,12 +28,12 @@ from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
-from activesteer.simulation.control_unit import slow_actuators
 from activesteer.simulation.copies import pickled, unpickled
-from activesteer.simulation.pacing import Pacer
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.pacing import RealtimePacer
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder
 from activesteer.simulation.run_context import RunContext
+from activesteer.simulation.sampled_controller import slow_actuators
 
 MAX_KEPT_VALUES: Final = 2**25
 """Most values of a run with a file that stay in memory: 256 MiB, about three minutes. The values of a longer run are
@@ -140,7 +140,7 @@ class Simulation:
         Raises:
             ActiveSteerError: an input is wrong, or the car does not settle.
         """
-        self._controller = controller = find_controller(controller)
+        self._controller = controller = controller_spec(controller)
         if not isinstance(maneuver, Scenario):
             maneuver = resolve(maneuver, vehicle, overrides, driver, [controller])
         elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:
@@ -148,12 +148,12 @@ class Simulation:
                 "a Scenario already includes vehicle, driver and overrides", key="vehicle, overrides, driver"
             )
         # Does nothing if nothing has to be searched for.
-        self.scenario = prepared(maneuver, timestep_s)
+        self.scenario = with_amplitude_found(maneuver, timestep_s)
         self.loop = ClosedLoop(self.scenario, controller, timestep_s)
         self.context = RunContext.of(self.scenario, self.loop.vehicle, controller)
         self._given: dict[str, int] = {}
         self.events: tuple[Event, ...] = ()
-        self._pacer = None if realtime is False else Pacer(1.0 if realtime is True else realtime, timestep_s)
+        self._pacer = None if realtime is False else RealtimePacer(1.0 if realtime is True else realtime, timestep_s)
         self._link = link
         if link is not None:
             self._connect(link)

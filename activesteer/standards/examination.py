@@ -18,8 +18,8 @@ from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Panel, Picture, as_svg, draw
 from activesteer.scenario import FileOrTable, check_gains, check_parts, read_by, resolve
 from activesteer.standards.catalogue import standard_of
-from activesteer.standards.proving_ground import ProvingGround
 from activesteer.standards.standard import Findings, NoResult, Standard
+from activesteer.standards.study_test_runner import StudyTestRunner
 from activesteer.studies.engine.factor_values import label_of
 from activesteer.studies.engine.runs import versions
 from activesteer.studies.engine.workers import workers_for
@@ -100,9 +100,9 @@ def examine(
                     progress(label, series, done, total)
 
             read = read_by(given, controller)
-            ground = ProvingGround(standard.name, vehicle, driver, controller, read, folder, workers, tell)
+            runner = StudyTestRunner(standard.name, vehicle, driver, controller, read, folder, workers, tell)
             try:
-                found[label] = standard.examine(ground)
+                found[label] = standard.examine(runner)
             except NoResult as reason:
                 found[label] = Findings.without_result(reason)
     today = datetime.datetime.now(tz=datetime.UTC).date()

@@ -11,7 +11,7 @@ from activesteer.analysis.slow_ramp import FIT, REFERENCE_MPS2
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import cell
-from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
+from activesteer.standards.standard import SIDES, Findings, NoResult, Standard, StandardRun, TestRunner
 
 RAMP_DEGPS: Final = 13.5
 """Rate of the slowly increasing steer [deg/s]; S7.6."""
@@ -64,12 +64,12 @@ def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
     return broken
 
 
-def _examine(ground: Ground) -> Findings:
-    a_deg, ramps_deg = _reference_angle(ground)
-    mass_kg = ground.scenario("sine_with_dwell").car.config.single_track.mass_kg
+def _examine(runner: TestRunner) -> Findings:
+    a_deg, ramps_deg = _reference_angle(runner)
+    mass_kg = runner.scenario("sine_with_dwell").car.config.single_track.mass_kg
     least_m = LEAST_DISPLACEMENT_M if mass_kg <= HEAVY_KG else LEAST_HEAVY_DISPLACEMENT_M
     steps = [(side, *step) for side in SIDES for step in amplitudes(a_deg)]
-    runs = ground.drive(
+    runs = runner.drive(
         "sine_with_dwell",
         "sine_with_dwell",
         [{"steer.direction": side, "steer.steering_wheel_deg": amplitude} for side, _, amplitude in steps],
@@ -99,14 +99,14 @@ def _examine(ground: Ground) -> Findings:
     return Findings(values, _summary(series, broken), tables, _pictures(series, runs, least_m))
 
 
-def _reference_angle(ground: Ground) -> tuple[float, dict[str, list[float]]]:
+def _reference_angle(runner: TestRunner) -> tuple[float, dict[str, list[float]]]:
     """Return A [deg], the mean of six slow ramps, and the angles of the ramps by side, rounded to 0.1 deg."""
-    sensors = ground.scenario("slowly_increasing_steer").car.config.sensors
+    sensors = runner.scenario("slowly_increasing_steer").car.config.sensors
     signs = {"left": 1.0, "right": -1.0}
     # Repetitions differ only by the noise of the sensors.
     noise = [{} if sensors.seed is None else {"sensors.seed": sensors.seed + number} for number in range(RAMPS)]
     cases = [{"steer.rate_degps": sign * RAMP_DEGPS, **other} for sign in signs.values() for other in noise]
-    runs = ground.drive("slowly_increasing_steer", "slowly_increasing_steer", cases, _RAMP)
+    runs = runner.drive("slowly_increasing_steer", "slowly_increasing_steer", cases, _RAMP)
     found = [math.degrees(abs(run.metric("steering_wheel_at_0_3g_rad"))) for run in runs]
     for run, angle in zip(runs, found, strict=True):
         if math.isnan(angle):
@@ -129,7 +129,7 @@ def _summary(series: list[dict[str, Any]], broken: list[list[str]]) -> str:
     )
 
 
-def _table(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> Table:
+def _table(series: list[dict[str, Any]], runs: list[StandardRun], least_m: float) -> Table:
     limits = zip(INSTANTS_S, RATIO_LIMITS, strict=True)
     columns = (
         "first direction", "amplitude [A]", "amplitude [deg]",
@@ -149,7 +149,7 @@ def _table(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> Tab
     return Table("Sine with dwell", columns, rows, frozenset(i for i, row in enumerate(series) if not row["pass"]))
 
 
-def _pictures(series: list[dict[str, Any]], runs: list[Run], least_m: float) -> list[Picture]:
+def _pictures(series: list[dict[str, Any]], runs: list[StandardRun], least_m: float) -> list[Picture]:
     last = max(row["factor"] for row in series)
 
     def panel(channel: str, title: str, side: str) -> Panel:

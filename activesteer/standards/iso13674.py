@@ -14,7 +14,7 @@ from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import axis_label, cell
-from activesteer.standards.standard import Findings, Ground, NoResult, Run, Standard, steering_wheel_at
+from activesteer.standards.standard import Findings, NoResult, Standard, StandardRun, TestRunner, steering_wheel_at
 from activesteer.units import quantity_of
 
 SPEED_KMH: Final = 100.0
@@ -65,10 +65,10 @@ def weave_loops(signals: Signals) -> list[dict[str, Any]]:
     return found
 
 
-def _examine(ground: Ground) -> Findings:
-    angle_deg = steering_wheel_at(ground, SPEED_KMH, AY_MPS2)
-    [weave] = ground.drive("weave", _weave(angle_deg), [{"speed_kmh": SPEED_KMH}], curves=_CHANNELS)
-    transition = ground.drive(
+def _examine(runner: TestRunner) -> Findings:
+    angle_deg = steering_wheel_at(runner, SPEED_KMH, AY_MPS2)
+    [weave] = runner.drive("weave", _weave(angle_deg), [{"speed_kmh": SPEED_KMH}], curves=_CHANNELS)
+    transition = runner.drive(
         "transition",
         "slowly_increasing_steer",
         [{"steer.rate_degps": sign * TRANSITION_DEGPS} for sign in (1.0, -1.0)],
@@ -122,7 +122,7 @@ def _weave(angle_deg: float) -> dict[str, Any]:
     }
 
 
-def _through_centre(runs: list[Run]) -> dict[str, Array]:
+def _through_centre(runs: list[StandardRun]) -> dict[str, Array]:
     """Join both transitions from the right to the left, up to the wanted lateral acceleration."""
     left, right = ({name: run[name] for name in _CHANNELS} for run in runs)
     ends = [int(np.argmax(np.abs(side["ay_mps2"]) >= AY_MPS2)) or len(side["ay_mps2"]) for side in (left, right)]

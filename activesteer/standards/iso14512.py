@@ -7,7 +7,7 @@ from typing import Final
 
 from activesteer.plotting import Picture
 from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.standard import Findings, Ground, Run, Standard
+from activesteer.standards.standard import Findings, Standard, StandardRun, TestRunner
 
 AFTER_S: Final = 1.0
 """Time after the beginning of braking at which the car is evaluated [s]."""
@@ -21,7 +21,7 @@ _CHANNELS: Final = ("yaw_rate_radps", "yaw_rad", "y_m", "speed_mps")
 _BEGIN_S: Final = 0.5
 
 
-def after_one_second(run: Run, begin_s: float) -> dict[str, float]:
+def after_one_second(run: StandardRun, begin_s: float) -> dict[str, float]:
     """Return the motion of the car 1 s after the beginning of braking, left positive; nan if the run ends before."""
     then_s = begin_s + AFTER_S
     return {
@@ -31,9 +31,9 @@ def after_one_second(run: Run, begin_s: float) -> dict[str, float]:
     }
 
 
-def _examine(ground: Ground) -> Findings:
+def _examine(runner: TestRunner) -> Findings:
     changes = {"hold_line": False, "brake.start_s": _BEGIN_S}
-    driven = ground.drive("split_mu", "split_mu_braking", list(_CASES.values()), changes, _CHANNELS)
+    driven = runner.drive("split_mu", "split_mu_braking", list(_CASES.values()), changes, _CHANNELS)
     runs = dict(zip(_CASES, driven, strict=True))
     own = {label: after_one_second(run, _BEGIN_S) for label, run in runs.items()}
     worst = max(own.values(), key=lambda metrics: abs(metrics["yaw_rate_after_1000ms_radps"]))

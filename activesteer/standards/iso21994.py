@@ -7,7 +7,7 @@ from typing import Final
 
 from activesteer.plotting import Picture
 from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.standard import Findings, Ground, Standard
+from activesteer.standards.standard import Findings, Standard, TestRunner
 
 SPEED_KMH: Final = 100.0
 """Speed at which the brake is pressed [km/h]."""
@@ -19,8 +19,8 @@ def corrected_distance(distance_m: float, speed_mps: float, nominal_mps: float) 
     return distance_m * (nominal_mps / speed_mps) ** 2
 
 
-def _examine(ground: Ground) -> Findings:
-    [run] = ground.drive(
+def _examine(runner: TestRunner) -> Findings:
+    [run] = runner.drive(
         "stop",
         "straight_braking",
         [{"speed_kmh": SPEED_KMH}],

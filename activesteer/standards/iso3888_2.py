@@ -10,7 +10,7 @@ from typing import Final
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import cell, time_panels
-from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
+from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner
 
 DRIVER: Final = "expert"
 """The standard requires a skilled driver."""
@@ -46,24 +46,24 @@ def highest_clean(attempt: Try) -> float | None:
     return max([clean[-1], *good])
 
 
-def is_clean(run: Run) -> bool:
+def is_clean(run: StandardRun) -> bool:
     """Return True if the whole body stays in the lanes and hits no cone."""
     return run.metric("stays_in_lanes") == 1.0 and run.metric("cones_hit") == 0.0
 
 
-def best_run(runs: Sequence[Run], highest_kmh: float | None) -> Run | None:
+def best_run(runs: Sequence[StandardRun], highest_kmh: float | None) -> StandardRun | None:
     """Return the run with the largest clearance at the highest clean speed, or at any speed if none is clean."""
     good = [run for run in runs if highest_kmh in (None, run.case["speed_kmh"]) and not run.error]
     return min(good, key=lambda run: run.metric("lane_overstep_m"), default=None)
 
 
-def _examine(ground: Ground) -> Findings:
+def _examine(runner: TestRunner) -> Findings:
     speeds: dict[str, float | None] = {}
-    driven: dict[str, list[Run]] = {side: [] for side in SIDES}
+    driven: dict[str, list[StandardRun]] = {side: [] for side in SIDES}
     for side in SIDES:
 
         def attempt(series: str, speeds_kmh: Sequence[float], side: str = side) -> list[bool]:
-            runs = ground.drive(
+            runs = runner.drive(
                 f"{side}_{series}",
                 "severe_lane_change",
                 [{"speed_kmh": speed, "lane.margin_m": margin} for speed in speeds_kmh for margin in MARGINS_M],
@@ -81,7 +81,7 @@ def _examine(ground: Ground) -> Findings:
         "runs": [{"direction": side, "clean": is_clean(run), **run.values} for side in SIDES for run in driven[side]],
     }
     summary = "highest clean entry speed: " + ", ".join(f"{side} {_words(speed)}" for side, speed in speeds.items())
-    return Findings(values, summary, [_table(driven)], _pictures(ground, speeds, driven))
+    return Findings(values, summary, [_table(driven)], _pictures(runner, speeds, driven))
 
 
 def _words(speed_kmh: float | None) -> str:
@@ -90,7 +90,7 @@ def _words(speed_kmh: float | None) -> str:
     return f"{speed_kmh:.0f} km/h" + (" or more" if speed_kmh == COARSE_KMH[-1] else "")
 
 
-def _table(driven: dict[str, list[Run]]) -> Table:
+def _table(driven: dict[str, list[StandardRun]]) -> Table:
     """Return a row for each entry speed, with a column for each line."""
     rows = []
     for side, runs in driven.items():
@@ -112,20 +112,22 @@ def _table(driven: dict[str, list[Run]]) -> Table:
     return Table("Entry speeds; a negative overstep is clearance to the edge of the lane", columns, rows, outside)
 
 
-def _room(run: Run) -> str:
+def _room(run: StandardRun) -> str:
     cones = run.metric("cones_hit")
     hit = f", {cones:.0f} cone{'s' if cones > 1.0 else ''}" if cones > 0.0 else ""
     return run.error or cell(run.metric("lane_overstep_m"), 3) + hit
 
 
-def _pictures(ground: Ground, speeds: dict[str, float | None], driven: dict[str, list[Run]]) -> list[Picture]:
+def _pictures(
+    runner: TestRunner, speeds: dict[str, float | None], driven: dict[str, list[StandardRun]]
+) -> list[Picture]:
     """Return pictures of the best run to each side: its track between the cones, and its channels over time."""
     best = {side: run for side, runs in driven.items() if (run := best_run(runs, speeds[side])) is not None}
     if not best:
         return []
     tracks = []
     for side, run in best.items():
-        course = ground.scenario("severe_lane_change", {"lane.side": side}).maneuver.course
+        course = runner.scenario("severe_lane_change", {"lane.side": side}).maneuver.course
         assert course is not None
         x, y = run["x_m"], run["y_m"]
         inside = x < course.lanes[-1].end_x_m + _BEYOND_M

@@ -13,7 +13,7 @@ from activesteer.errors import RecordingError
 from activesteer.metric_table import metric
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import axis_label, metrics_table
-from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard
+from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner
 from activesteer.units import quantity_of
 
 RADIUS_M: Final = 100.0
@@ -33,19 +33,19 @@ _DURATION_S: Final = 90.0
 _RESULT: Final = "understeer_gradient_radpmps2"
 
 
-def _examine(ground: Ground) -> Findings:
-    config = ground.scenario("constant_radius").car.config
+def _examine(runner: TestRunner) -> Findings:
+    config = runner.scenario("constant_radius").car.config
     single_track = config.single_track
     car = CarGeometry(single_track.cg_to_front_m, single_track.cg_to_rear_m, config.steering.ratio)
     methods = {
-        f"constant radius {RADIUS_M:g} m": ground.drive(
+        f"constant radius {RADIUS_M:g} m": runner.drive(
             "constant_radius",
             "constant_radius",
             [{"circle.radius_m": sign * RADIUS_M} for sign in SIDES.values()],
             curves=_CHANNELS,
         ),
-        f"constant steering wheel angle, from {FIXED_RADIUS_M:g} m on": _fixed_angle(ground, car),
-        f"constant speed {SPEED_KMH:g} km/h": ground.drive(
+        f"constant steering wheel angle, from {FIXED_RADIUS_M:g} m on": _fixed_angle(runner, car),
+        f"constant speed {SPEED_KMH:g} km/h": runner.drive(
             "constant_speed",
             "slowly_increasing_steer",
             [{"steer.rate_degps": sign * 5.0} for sign in SIDES.values()],
@@ -70,7 +70,7 @@ def _examine(ground: Ground) -> Findings:
     return Findings({"methods": values}, "; ".join(words), tables, pictures)
 
 
-def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
+def _fixed_angle(runner: TestRunner, car: CarGeometry) -> list[StandardRun]:
     """Drive with the steering wheel at the Ackermann angle of the radius while the speed rises."""
     angle_deg = math.degrees(car.steering_ratio * car.wheelbase_m / FIXED_RADIUS_M)
     speed_mps = _START_KMH / 3.6
@@ -91,7 +91,7 @@ def _fixed_angle(ground: Ground, car: CarGeometry) -> list[Run]:
     ]
     # The values of a factor cannot be tables, so each side is a series.
     return [
-        ground.drive(f"constant_angle_{side}", {**maneuver, **case}, [{"speed_kmh": _START_KMH}], curves=_CHANNELS)[0]
+        runner.drive(f"constant_angle_{side}", {**maneuver, **case}, [{"speed_kmh": _START_KMH}], curves=_CHANNELS)[0]
         for side, case in zip(SIDES, cases, strict=True)
     ]
 
@@ -109,7 +109,7 @@ def _words(found: dict[str, dict[str, float]]) -> str:
     )
 
 
-def _picture(method: str, runs: dict[str, Run]) -> Picture:
+def _picture(method: str, runs: dict[str, StandardRun]) -> Picture:
     def panel(channel: str) -> Panel:
         factor = quantity_of(channel).factor
         curves = []

@@ -22,7 +22,7 @@ from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard, steering_wheel_at
+from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, steering_wheel_at
 from activesteer.units import DisplayUnit, display_unit
 
 SPEED_KMH: Final = 80.0
@@ -49,9 +49,9 @@ COHERENCE: Final = 0.95
 Responses = dict[str, FrequencyResponse]
 
 
-def _examine(ground: Ground) -> Findings:
-    angle_deg = steering_wheel_at(ground, SPEED_KMH, STEP_MPS2)
-    driven = ground.drive(
+def _examine(runner: TestRunner) -> Findings:
+    angle_deg = steering_wheel_at(runner, SPEED_KMH, STEP_MPS2)
+    driven = runner.drive(
         "step_steer",
         "step_steer",
         [{"steer.steering_wheel_deg": sign * angle_deg} for sign in SIDES.values()],
@@ -59,9 +59,9 @@ def _examine(ground: Ground) -> Findings:
         _STEP_CHANNELS,
     )
     steps = dict(zip(SIDES, driven, strict=True))
-    [sweep] = ground.drive("sine_sweep", "sine_sweep", [{"speed_kmh": SPEED_KMH}], curves=(INPUT, *_RESPONSES))
+    [sweep] = runner.drive("sine_sweep", "sine_sweep", [{"speed_kmh": SPEED_KMH}], curves=(INPUT, *_RESPONSES))
     rms_deg = round(RANDOM_SHARE * angle_deg, 1)
-    random = ground.drive(
+    random = runner.drive(
         "random_steer",
         "random_steer",
         [{"random.seed": seed} for seed in range(SEQUENCES)],
@@ -113,7 +113,7 @@ def _examine(ground: Ground) -> Findings:
     return Findings(values, summary, tables, pictures)
 
 
-def _sweep_responses(sweep: Run) -> Responses:
+def _sweep_responses(sweep: StandardRun) -> Responses:
     """Return the frequency responses to the steering wheel angle; empty if the sweep failed."""
     frequencies = np.geomspace(LOWEST_Hz, HIGHEST_Hz, _POINTS)
     try:
@@ -122,7 +122,7 @@ def _sweep_responses(sweep: Run) -> Responses:
         return {}
 
 
-def _random_responses(runs: list[Run]) -> dict[str, RandomResponse]:
+def _random_responses(runs: list[StandardRun]) -> dict[str, RandomResponse]:
     """Return the responses from the finished runs with random steering; empty without one."""
     driven = [run for run in runs if run.channels]
     if not driven:

@@ -8,7 +8,7 @@ from typing import Final
 from activesteer.metric_table import metric
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.standard import SIDES, Findings, Ground, Run, Standard, steering_wheel_at
+from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, steering_wheel_at
 
 SPEED_KMH: Final = 80.0
 AY_MPS2: Final = 5.0
@@ -24,15 +24,15 @@ _AFTER_S: Final = 2.2
 """Duration after the beginning of braking [s]; it ends before the car stops, where sideslip is undefined."""
 
 
-def _examine(ground: Ground) -> Findings:
-    angle_deg = steering_wheel_at(ground, SPEED_KMH, AY_MPS2)
+def _examine(runner: TestRunner) -> Findings:
+    angle_deg = steering_wheel_at(runner, SPEED_KMH, AY_MPS2)
     cases = [
         {"turn.steering_wheel_deg": sign * angle_deg, "brake.pedal": pedal}
         for sign in SIDES.values()
         for pedal in PEDALS
     ]
     changes = {"speed_kmh": SPEED_KMH, "brake.start_s": _BEGIN_S, "duration_s": _BEGIN_S + _AFTER_S}
-    runs = ground.drive("brake_in_turn", "brake_in_turn", cases, changes, _CHANNELS)
+    runs = runner.drive("brake_in_turn", "brake_in_turn", cases, changes, _CHANNELS)
     by_side = {side: runs[len(PEDALS) * number :][: len(PEDALS)] for number, side in enumerate(SIDES)}
     done = [run for run in runs if not run.error]
     summary = f"no result: {runs[0].error}"
@@ -57,7 +57,7 @@ def _examine(ground: Ground) -> Findings:
     return Findings(values, summary, tables, pictures)
 
 
-def _over_deceleration(name: str, by_side: dict[str, list[Run]]) -> Panel:
+def _over_deceleration(name: str, by_side: dict[str, list[StandardRun]]) -> Panel:
     shown = metric(name)
     curves = [
         Curve(

@@ -12,7 +12,7 @@ from activesteer.errors import SimulationDiverged
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.page_parts import cell, time_panels
-from activesteer.standards.standard import SIDES, Findings, Ground, NoResult, Run, Standard
+from activesteer.standards.standard import SIDES, Findings, NoResult, Standard, StandardRun, TestRunner
 from activesteer.units import display_unit
 
 
@@ -60,7 +60,7 @@ class Reached(NamedTuple):
     effort_N: float
 
 
-def reached(run: Run, radius_m: float) -> Reached:
+def reached(run: StandardRun, radius_m: float) -> Reached:
     """Return time and force to reach a radius of the centre of gravity's path [m] in a spiral from `_BEGIN_S` on."""
     if not run.channels:
         return Reached(math.nan, math.nan)
@@ -72,8 +72,8 @@ def reached(run: Run, radius_m: float) -> Reached:
     return Reached(float(run.time_s[first]) - _BEGIN_S, effort_N)
 
 
-def _examine(ground: Ground) -> Findings:
-    spirals = {name: _spirals(ground, name, effort) for name, effort in EFFORTS.items()}
+def _examine(runner: TestRunner) -> Findings:
+    spirals = {name: _spirals(runner, name, effort) for name, effort in EFFORTS.items()}
     efforts = []
     for name, runs in spirals.items():
         requirement = EFFORTS[name]
@@ -84,7 +84,7 @@ def _examine(ground: Ground) -> Findings:
                 "steering": name, "direction": side, "radius_m": requirement.radius_m, "time_s": found.time_s,
                 "effort_N": found.effort_N, "limit_N": requirement.limit_N, "pass": good,
             })  # fmt: skip
-    faults = _faults(ground)
+    faults = _faults(runner)
     values = {
         "rim_radius_m": RIM_RADIUS_M, "efforts": efforts, "faults": faults,
         "pass": all(row["pass"] for row in efforts),
@@ -98,19 +98,19 @@ def _examine(ground: Ground) -> Findings:
     return Findings(values, summary, [_effort_table(efforts), _fault_table(faults)], pictures)
 
 
-def _faults(ground: Ground) -> list[dict[str, Any]]:
+def _faults(runner: TestRunner) -> list[dict[str, Any]]:
     try:
-        return ground.fault_circles()
+        return runner.fault_circles()
     except SimulationDiverged as reason:
         raise NoResult(f"the car without fault does not complete the circle: {reason}") from reason
 
 
-def _spirals(ground: Ground, name: str, effort: Effort) -> dict[str, Run]:
+def _spirals(runner: TestRunner, name: str, effort: Effort) -> dict[str, StandardRun]:
     """Drive a spiral to each side with a steadily rising steering wheel angle."""
-    config = ground.scenario("slowly_increasing_steer").car.config
+    config = runner.scenario("slowly_increasing_steer").car.config
     single_track = config.single_track
     angle_deg = math.degrees(config.steering.ratio * single_track.wheelbase_m / effort.radius_m)
-    runs = ground.drive(
+    runs = runner.drive(
         f"effort_{name}",
         "slowly_increasing_steer",
         [{"steer.rate_degps": sign * angle_deg / _TURNED_S, **effort.case} for sign in SIDES.values()],

@@ -32,7 +32,7 @@ class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test
 
 
 @dataclass(frozen=True)
-class Run:
+class StandardRun:
     """A finished run; the analysis reads it like a recording.
 
     Attributes:
@@ -54,7 +54,7 @@ class Run:
 
     @property
     def metadata(self) -> Mapping[str, Any]:
-        """Empty: the proving ground knows the car."""
+        """Empty: the test runner knows the car."""
         return {}
 
     def __getitem__(self, channel: str) -> Array:
@@ -95,8 +95,8 @@ class Run:
         return Curve(time_s[shown], quantity_of(channel).factor * values[shown], **words)
 
 
-class Ground(Protocol):
-    """Interface of a proving ground; `proving_ground.ProvingGround` implements it."""
+class TestRunner(Protocol):
+    """Interface of a test runner; `study_test_runner.StudyTestRunner` implements it."""
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
         """Resolve the car and a manoeuvre."""
@@ -109,7 +109,7 @@ class Ground(Protocol):
         cases: Sequence[Mapping[str, Any]],
         overrides: Mapping[str, Any] | None = None,
         curves: Sequence[str] = (),
-    ) -> list[Run]:
+    ) -> list[StandardRun]:
         """Drive a series of runs.
 
         Args:
@@ -182,7 +182,7 @@ class Standard:
     edition: str
     implemented: Sequence[str]
     left_out: Sequence[str]
-    examine: Callable[[Ground], Findings]
+    examine: Callable[[TestRunner], Findings]
     driver: str = DEFAULT_DRIVER
     overlaid: bool = False
 
@@ -192,13 +192,13 @@ _RATE_DEGPS: Final = 5.0
 _LONGEST_S: Final = 30.0
 
 
-def steering_wheel_at(ground: Ground, speed_kmh: float, ay_mps2: float) -> float:
+def steering_wheel_at(runner: TestRunner, speed_kmh: float, ay_mps2: float) -> float:
     """Return the angle from a slow ramp to the left at constant speed.
 
     Returns:
         Steering wheel angle, to 0.1 deg [deg].
     """
-    [run] = ground.drive(
+    [run] = runner.drive(
         f"ramp_{speed_kmh:g}kmh",
         "slowly_increasing_steer",
         [{"speed_kmh": speed_kmh}],

@@ -26,7 +26,7 @@ import numpy as np
 from activesteer.analysis.claims.judge import SYSTEMS
 from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
-from activesteer.brakes.control_unit import step_brakes
+from activesteer.brakes.brake_control_unit import step_brakes
 from activesteer.compilation import compiled
 from activesteer.conventions import CORNERS
 from activesteer.errors import ActiveSteerError, RecordingError
@@ -38,7 +38,7 @@ from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.simulation.amplitude_store import searched_anew
 from activesteer.simulation.batch import Batch
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
@@ -57,9 +57,9 @@ _PRODUCTION: Final = {"sensors.preset": "production"}
 
 def bench(rounds: int = ROUNDS) -> dict[str, float]:
     """Measure one step at several stages, and the blocks of the loop; `docs/performance.md` explains the results."""
-    scenario, along_path = prepared(resolve("step_steer")), resolve("slalom")
-    sedan = prepared(resolve("step_steer", "sedan"))
-    sensed = prepared(resolve("step_steer", overrides=_PRODUCTION))
+    scenario, along_path = with_amplitude_found(resolve("step_steer")), resolve("slalom")
+    sedan = with_amplitude_found(resolve("step_steer", "sedan"))
+    sensed = with_amplitude_found(resolve("step_steer", overrides=_PRODUCTION))
     driven, along_path_driven = _KeptInputs(scenario), _KeptInputs(along_path)
     with tempfile.TemporaryDirectory() as folder:
         stages: dict[str, Callable[[], float]] = {
@@ -220,7 +220,7 @@ def _runs_per_min() -> float:
 
 
 def _step_steers(count: int) -> None:
-    scenario = prepared(resolve("step_steer"))
+    scenario = with_amplitude_found(resolve("step_steer"))
     for _ in range(count):
         run_scenario(scenario, _CONTROLLER)
 
@@ -498,7 +498,7 @@ def bench_maneuvers() -> Benchmark:
         scenario = resolve(name)
         with searched_anew():
             start = time.perf_counter()
-            found = prepared(scenario)
+            found = with_amplitude_found(scenario)
             if scenario.maneuver.search is not None:
                 search_s[name] = time.perf_counter() - start
         simulated_s = scenario.maneuver.settle_s + scenario.maneuver.duration_s

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from activesteer.analysis.claims.judge import SYSTEMS, Claim
 from activesteer.analysis.claims.scorecard import Scorecard, scorecard
 from activesteer.analysis.claims.statements import SCENARIOS
-from activesteer.analysis.claims.stored import HUMAN, PAPER, VEHICLE, read_setting
+from activesteer.analysis.claims.stored import LITERATURE, PAPER, VEHICLE, read_setting
 from activesteer.analysis.figures import FORMATS, figure_2
 from activesteer.analysis.figures import draw_all as draw_runs
 from activesteer.analysis.report import write_report
@@ -29,7 +29,7 @@ from activesteer.recording import Recording, check_target
 from activesteer.rigs import kinematics_compliance
 from activesteer.rigs.kc import rear_camber_figure
 from activesteer.scenario import FileOrTable, Scenario, resolve
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.workers import TaskQueue, in_parallel, workers_for
 from activesteer.studies.linear.identification import single_track_response
@@ -53,7 +53,7 @@ class Reproduction:
     paths: dict[str, dict[str, Path]] = field(default_factory=dict)
     failures: dict[tuple[str, str], str] = field(default_factory=dict)
     scorecard: Scorecard = field(default_factory=lambda: scorecard([]))
-    setting: str = HUMAN
+    setting: str = LITERATURE
 
     @property
     def exit_status(self) -> int:
@@ -74,15 +74,15 @@ def reproduce(
     vehicle: FileOrTable = "compact",
     overrides: Mapping[str, Any] | None = None,
     *,
-    setting: str = HUMAN,
+    setting: str = LITERATURE,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Reproduction:
     """Drive all five scenarios with all three systems and check the paper's claims.
 
     With more than one job, the runs are made in newly started processes: a script that calls this function needs `if
-    __name__ == "__main__":`. The recordings are SCENARIO-SYSTEM.mcap in the folder. The setting is `human` or `paper`,
-    see `activesteer.analysis.claims.stored`. A failed run stops no other run; `failures` names it.
+    __name__ == "__main__":`. The recordings are SCENARIO-SYSTEM.mcap in the folder. The setting is `literature` or
+    `paper`, see `activesteer.analysis.claims.stored`. A failed run stops no other run; `failures` names it.
     """
     if setting == PAPER and vehicle != VEHICLE:
         raise ParameterError(
@@ -126,7 +126,7 @@ def drive(
     with workers_for(jobs) as workers:
         queue = TaskQueue(workers)
         for name, scenario in scenarios.items():
-            queue.add((name, None), prepared, scenario)
+            queue.add((name, None), with_amplitude_found, scenario)
         for (name, system), value, error in queue.outcomes():
             if error is not None and not isinstance(error, ActiveSteerError):
                 raise error
@@ -159,7 +159,7 @@ def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None)
 
 
 def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
-    scenario = prepared(resolve(name, vehicle))
+    scenario = with_amplitude_found(resolve(name, vehicle))
     return SCENARIOS[name]({system: run_scenario(scenario, system) for system in SYSTEMS})
 
 

@@ -11,7 +11,7 @@ from typing import Final
 
 from numba import carray, from_dtype, types
 
-from activesteer.brakes.control_unit import step_brakes
+from activesteer.brakes.brake_control_unit import step_brakes
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS

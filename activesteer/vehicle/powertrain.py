@@ -80,7 +80,7 @@ def engine_speed(fractions: Sequence[float], wheel_speeds_radps: Sequence[float]
     return f[0] * w[0] + f[1] * w[1] + f[2] * w[2] + f[3] * w[3]
 
 
-class Drive:
+class PowertrainLimits:
     """The drive as its driver knows it: its torque limits at the present speed of the wheels.
 
     Attributes:

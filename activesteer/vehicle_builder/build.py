@@ -22,7 +22,7 @@ from activesteer.tyre.file.tir import load_tir
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle_builder.axle_kinds import AxleKind
 from activesteer.vehicle_builder.completion import DEFAULT_TYRE, check_origin, complete
-from activesteer.vehicle_builder.design import Assumption, Car, Log
+from activesteer.vehicle_builder.design import Assumption, CarDesign, Log
 from activesteer.vehicle_builder.kc_tables import KcTables, read_kc
 from activesteer.vehicle_builder.keyframe import keyframe_xml
 from activesteer.vehicle_builder.mjcf import mjcf_files
@@ -156,7 +156,7 @@ def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None)
     return None if kc is None else read_kc(Path(kc), guided)
 
 
-def _drive(folder: Path, car: Car, trimmed: Trimmed) -> list[str]:
+def _drive(folder: Path, car: CarDesign, trimmed: Trimmed) -> list[str]:
     """Drive the standing car, and write its two-track properties; return why that is impossible."""
     file = folder / f"{car.name}.toml"
     try:
@@ -167,11 +167,11 @@ def _drive(folder: Path, car: Car, trimmed: Trimmed) -> list[str]:
     return []
 
 
-def _compiled(folder: Path, car: Car) -> mujoco.MjModel:
+def _compiled(folder: Path, car: CarDesign) -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(folder / f"{car.name}.xml"))
 
 
-def _write(folder: Path, car: Car, trimmed: Trimmed, *, final: bool = False) -> Path:
+def _write(folder: Path, car: CarDesign, trimmed: Trimmed, *, final: bool = False) -> Path:
     """Write MJCF and vehicle file; only the final file holds the single-track model of the car itself."""
     for name, text in mjcf_files(car, trimmed).items():
         (folder / name).write_text(text, encoding="utf-8")

@@ -14,7 +14,7 @@ import numpy as np
 from activesteer.config import to_table, toml_text
 from activesteer.conventions import CORNERS, Array
 from activesteer.rigs.kc.result import KcResult
-from activesteer.scenario import Car
+from activesteer.scenario import CarSpec
 from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.design import hardware_tables
 
@@ -28,7 +28,7 @@ _LEAST = 1e-4
 """Mass and inertia of a part that the original car does not have [kg, kg m2]."""
 
 
-def car_table(car: Car, result: KcResult) -> str:
+def car_table(car: CarSpec, result: KcResult) -> str:
     """Return the text of the table."""
     model, config = result.measured.vehicle.model, car.config
     data = mujoco.MjData(model)
@@ -92,7 +92,7 @@ def _point(point: Array) -> list[float]:
     return [round(float(value), 5) for value in point]
 
 
-def _axle(car: Car, model: mujoco.MjModel, data: mujoco.MjData, centres: Array, axle: str) -> dict[str, Any]:
+def _axle(car: CarSpec, model: mujoco.MjModel, data: mujoco.MjData, centres: Array, axle: str) -> dict[str, Any]:
     corner, front = f"{axle[0]}l", axle == "front"
     curve = getattr(car.config.dampers, axle)
     friction = car.config.friction

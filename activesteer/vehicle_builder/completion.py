@@ -14,7 +14,7 @@ from activesteer.units import known_unit
 from activesteer.vehicle.electric_drive import Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind
-from activesteer.vehicle_builder.design import Axle, Car, Link, Log, Solid
+from activesteer.vehicle_builder.design import Axle, CarDesign, Link, Log, Solid
 from activesteer.vehicle_builder.kc_fit import MeasuredAxle, measured_axle
 from activesteer.vehicle_builder.kc_tables import KcTables
 from activesteer.vehicle_builder.levers import mount
@@ -46,7 +46,7 @@ def complete(
     tyres: dict[str, tuple[str, TyreParameters]],
     log: Log,
     tables: KcTables | None = None,
-) -> Car:
+) -> CarDesign:
     """Make a car from a table in vehicle coordinates.
 
     Args:
@@ -92,7 +92,7 @@ def complete(
         aero = Aerodynamics(drag_area_m2=0.65, pressure_point_m=(round(middle, 3), 0.0, 0.6))
         log.note("aerodynamics", "0.65 m2", "a car of the compact's class; acts between the axles, 0.6 m high")
     track = 2.0 * max(front.wheel_centre_m[1], rear.wheel_centre_m[1])
-    return Car(
+    return CarDesign(
         name,
         table,
         front,
@@ -314,7 +314,7 @@ def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:
     return first, second
 
 
-def check_origin(car: Car, given: CarTable) -> None:
+def check_origin(car: CarDesign, given: CarTable) -> None:
     """Check that the vehicle coordinates begin on the road below the front axle.
 
     Raises:

@@ -121,7 +121,7 @@ class Axle:
 
 
 @dataclass
-class Car:
+class CarDesign:
     """A car, complete but for the trim."""
 
     name: str
@@ -183,7 +183,7 @@ class Log:
         self.assumptions.append(Assumption(key, value, rule))
 
 
-def chassis_of(car: Car, model: mujoco.MjModel, log: Log) -> Solid:
+def chassis_of(car: CarDesign, model: mujoco.MjModel, log: Log) -> Solid:
     """Return the chassis of the table, or the rest of the whole car without its other bodies.
 
     Raises:
@@ -230,14 +230,14 @@ _INERTIA_RULE = (
 )
 
 
-def _usual_inertia(mass: float, base: float, car: Car, front_fraction: float) -> tuple[float, float, float]:
+def _usual_inertia(mass: float, base: float, car: CarDesign, front_fraction: float) -> tuple[float, float, float]:
     to_front = (1.0 - front_fraction) * base
     yaw = 0.915 * mass * to_front * (base - to_front)
     track = car.front.wheel_centre_m[1] + car.rear.wheel_centre_m[1]
     return round(mass * (0.4 * track) ** 2, 1), round(0.95 * yaw, 1), round(yaw, 1)
 
 
-def _cg_x(car: Car, front_fraction: float) -> float:
+def _cg_x(car: CarDesign, front_fraction: float) -> float:
     """Return x of the centre of gravity from the weights on the contact points, below the wheel centres."""
     rear, front = car.rear.wheel_centre_m[0], car.front.wheel_centre_m[0]
     return float(rear + front_fraction * (front - rear))

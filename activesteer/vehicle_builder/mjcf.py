@@ -9,7 +9,7 @@ from string import Template
 import numpy as np
 
 from activesteer.vehicle_builder import mjcf_tendons as tendons
-from activesteer.vehicle_builder.design import Car
+from activesteer.vehicle_builder.design import CarDesign
 from activesteer.vehicle_builder.mjcf_axles import axle_file
 from activesteer.vehicle_builder.texts import num, sig, vec
 from activesteer.vehicle_builder.trim import Trimmed
@@ -28,7 +28,7 @@ _SHELL = (
 )
 
 
-def mjcf_files(car: Car, trimmed: Trimmed) -> dict[str, str]:
+def mjcf_files(car: CarDesign, trimmed: Trimmed) -> dict[str, str]:
     """Return the files of the model as name to text; the keyframe is empty."""
     return {
         f"{car.name}.xml": _main(car, trimmed),
@@ -45,7 +45,7 @@ def _fill(file: str, **values: str) -> str:
     return Template((_TEMPLATES / file).read_text(encoding="utf-8")).substitute(values)
 
 
-def _main(car: Car, trimmed: Trimmed) -> str:
+def _main(car: CarDesign, trimmed: Trimmed) -> str:
     front = car.front
     half_width = 0.5 * float(front.tyre_parameters["WIDTH"])
     rim = 0.65 * front.radius_m
@@ -106,7 +106,7 @@ def _main(car: Car, trimmed: Trimmed) -> str:
     )
 
 
-def _shell(car: Car) -> str:
+def _shell(car: CarDesign) -> str:
     scale = np.array([car.wheelbase_m / 2.637, car.width_m / 1.8, 1.0])
     lines = [
         f'      <geom class="{kind}" pos="{vec(scale * np.array(at), 3)}" size="{vec(scale * np.array(size), 3)}"/>'
@@ -115,7 +115,7 @@ def _shell(car: Car) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _steering(car: Car) -> str:
+def _steering(car: CarDesign) -> str:
     left = car.front.points["tie_rod_inner"]
     right = left * np.array([1.0, -1.0, 1.0])
     bar = car.rack_mass_kg * left[1] ** 2 / 5.0

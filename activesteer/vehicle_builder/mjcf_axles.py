@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.vehicle_builder.design import Axle, Car, Solid
+from activesteer.vehicle_builder.design import Axle, CarDesign, Solid
 from activesteer.vehicle_builder.levers import Mount
 from activesteer.vehicle_builder.texts import num, vec
 from activesteer.vehicle_builder.trim import Trimmed, TrimmedAxle
@@ -20,7 +20,7 @@ _GUIDED = """  <!-- {words} guide the {axle} axle, a fragment of the chassis bod
        serve only for display. -->"""
 
 
-def axle_file(car: Car, axle: Axle, trimmed: Trimmed) -> str:
+def axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
     """Return the text of front_axle.xml or rear_axle.xml."""
     words = axle.kind.name.replace("_", " ")
     lines = [
@@ -80,7 +80,7 @@ def _inertial(solid: Solid, side: float, indent: str) -> str:
     )
 
 
-def _corner(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str]:
+def _corner(car: CarDesign, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str]:
     corner = corner_name(axle, side)
     if axle.kind.strut:
         inner = _knuckle(axle, trimmed, side, "    ", _jounce(axle, corner, side))
@@ -159,7 +159,7 @@ def _knuckle(
     return [*lines, f"{indent}</body>"]
 
 
-def _carrier(car: Car, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str]:
+def _carrier(car: CarDesign, axle: Axle, trimmed: TrimmedAxle, side: float) -> list[str]:
     corner, indent, inside = corner_name(axle, side), "    ", "      "
     lower, upper = (_in_design(axle, point) for point in car.kingpin_m)
     axis = (upper - lower) / np.linalg.norm(upper - lower)

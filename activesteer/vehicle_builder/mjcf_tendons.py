@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from activesteer.vehicle_builder.design import Axle, Car
+from activesteer.vehicle_builder.design import Axle, CarDesign
 from activesteer.vehicle_builder.mjcf_axles import corner_name
 from activesteer.vehicle_builder.steering_geometry import rack_per_steer_m
 from activesteer.vehicle_builder.texts import num, sig
@@ -18,7 +18,7 @@ _VIEWER_GUIDES = (
 """Joint, stiffness and damping of a guide in the scene."""
 
 
-def link_classes(car: Car) -> str:
+def link_classes(car: CarDesign) -> str:
     """Return the default classes of the links, one per link and axle."""
     lines = []
     for axle in car.axles:
@@ -40,7 +40,7 @@ def _class_of(axle: Axle, link: str) -> str:
     return f"{axle.name}_{link}"
 
 
-def link_tendons(car: Car) -> str:
+def link_tendons(car: CarDesign) -> str:
     """Return the links of all corners."""
     lines = []
     for axle in car.axles:
@@ -55,7 +55,7 @@ def link_tendons(car: Car) -> str:
     return "\n".join(lines)
 
 
-def part_tendons(car: Car, part: str) -> str:
+def part_tendons(car: CarDesign, part: str) -> str:
     """Return the springs or dampers of all corners."""
     lines = []
     reported = set()
@@ -99,7 +99,7 @@ def rack_joint(axle: Axle, lever: float) -> str:
     return f'<joint joint="rack" coef="{num(lever * lift)}"/>' if lift else ""
 
 
-def viewer_springs(car: Car) -> str:
+def viewer_springs(car: CarDesign) -> str:
     """Return springs for the scene, for springs without a shape of their own or on an arm."""
     lines = []
     for axle in car.axles:
@@ -115,7 +115,7 @@ def viewer_springs(car: Car) -> str:
     return "\n".join([*lines, *_viewer_guides(car)]) + ("\n" if lines else "")
 
 
-def _viewer_guides(car: Car) -> list[str]:
+def _viewer_guides(car: CarDesign) -> list[str]:
     """Return straight, steered guides that hold the wheels of axles of curves without their native forces."""
     lines = []
     for axle in car.axles:
@@ -135,7 +135,7 @@ def _viewer_guides(car: Car) -> list[str]:
     return lines
 
 
-def spring_classes(car: Car, trimmed: Trimmed) -> str:
+def spring_classes(car: CarDesign, trimmed: Trimmed) -> str:
     """Return the default classes of the springs."""
     lines = []
     for axle in car.axles:
@@ -150,7 +150,7 @@ def spring_classes(car: Car, trimmed: Trimmed) -> str:
     return "\n".join(lines) + "\n"
 
 
-def mount_classes(car: Car, trimmed: Trimmed) -> str:
+def mount_classes(car: CarDesign, trimmed: Trimmed) -> str:
     """Return the default classes of the top mounts."""
     lines = []
     for axle in car.axles:
@@ -165,7 +165,7 @@ def mount_classes(car: Car, trimmed: Trimmed) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def mount_tendons(car: Car) -> str:
+def mount_tendons(car: CarDesign) -> str:
     """Return the top mounts of all corners."""
     lines = []
     for axle in car.axles:
@@ -177,7 +177,7 @@ def mount_tendons(car: Car) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def damper_classes(car: Car, trimmed: Trimmed) -> str:
+def damper_classes(car: CarDesign, trimmed: Trimmed) -> str:
     """Return the default classes of the dampers."""
     lines = []
     for axle in car.axles:

@@ -17,7 +17,7 @@ from activesteer.simulation.two_track_search import two_track_lines
 from activesteer.theory.two_track import TwoTrackParameters
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle.statics import mass_properties
-from activesteer.vehicle_builder.design import Car, hardware_tables, in_degrees
+from activesteer.vehicle_builder.design import CarDesign, hardware_tables, in_degrees
 from activesteer.vehicle_builder.trim import Trimmed
 
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
@@ -51,7 +51,7 @@ _REMARKS: Final = {
 
 
 def vehicle_text(
-    car: Car, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None = None
+    car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None = None
 ) -> str:
     """Return the text of the vehicle file.
 
@@ -75,7 +75,7 @@ def vehicle_text(
 
 
 def _table(
-    car: Car, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None
+    car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None
 ) -> dict[str, Any]:
     """Return the vehicle file as a table; tables in the form of a vehicle file are copied with all keys."""
     compact, _ = read_toml(find_vehicle("compact"))
@@ -113,14 +113,14 @@ def _table(
     }
 
 
-def _curves(car: Car, trimmed: Trimmed) -> dict[str, Any]:
+def _curves(car: CarDesign, trimmed: Trimmed) -> dict[str, Any]:
     """Return the tables [curves.front] and [curves.rear], angles in degrees; none if links guide both axles."""
     guided = {axle.name: curves for axle in car.axles if (curves := trimmed.axle(axle.name).curves) is not None}
     tables = {name: in_degrees(to_table(curves, defaults=False)) for name, curves in guided.items()}
     return {"curves": tables} if tables else {}
 
 
-def _single_track(car: Car, model: mujoco.MjModel | None) -> dict[str, float]:
+def _single_track(car: CarDesign, model: mujoco.MjModel | None) -> dict[str, float]:
     """Return the single-track model estimated from the tyres, with a characteristic speed of 50 to 300 km/h."""
     base = car.wheelbase_m
     mass, inertia, to_front, stiffness = 1500.0, 2300.0, 0.45 * base, {"front": 1e5, "rear": 1.5e5}
@@ -169,7 +169,7 @@ def vec(values: Iterable[float], digits: int = 6) -> str:
 _TEMPLATE: Final = Path(__file__).resolve().parent / "templates" / "README.md"
 
 
-def readme_text(car: Car, trimmed: Trimmed, table_name: str) -> str:
+def readme_text(car: CarDesign, trimmed: Trimmed, table_name: str) -> str:
     """Return the text of README.md."""
     kinds = " and ".join(f"{axle.kind.name.replace('_', ' ')} {axle.name}" for axle in car.axles)
     rows = [f"| `{item.key}` | {item.value} | {item.rule} |" for item in car.assumptions]
@@ -190,7 +190,7 @@ def readme_text(car: Car, trimmed: Trimmed, table_name: str) -> str:
     )
 
 
-def _measured(car: Car) -> str:
+def _measured(car: CarDesign) -> str:
     """Return the section on the measurements of the K&C rig, their roughness, and unusual ones."""
     lines = []
     for axle in car.axles:

@@ -33,7 +33,7 @@ from activesteer.vehicle.curve_axles import OVER_RACK, OVER_TRAVEL, AxleCurves
 from activesteer.vehicle.parameters import Friction
 from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.corner_motion import corner_motion
-from activesteer.vehicle_builder.design import Axle, Car, Log, Solid, chassis_of
+from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, chassis_of
 from activesteer.vehicle_builder.steering_geometry import rack_per_steer_m
 
 
@@ -263,7 +263,7 @@ class _Stand:
         return {joint.name.removeprefix(start): float(qpos[int(joint.qposadr[0])]) for joint in joints}
 
 
-def trim(car: Car, write: Write, log: Log) -> Trimmed:
+def trim(car: CarDesign, write: Write, log: Log) -> Trimmed:
     """Find all values of `Trimmed`, and write the files with them.
 
     Raises:
@@ -418,7 +418,11 @@ def wheel_rates_Npm(held: HeldCar) -> dict[str, float]:
 
 
 def _let_stand(
-    car: Car, trimmed: Trimmed, write: Write, ratios: dict[str, tuple[float, float]], targets: dict[str, float | None]
+    car: CarDesign,
+    trimmed: Trimmed,
+    write: Write,
+    ratios: dict[str, tuple[float, float]],
+    targets: dict[str, float | None],
 ) -> dict[str, float]:
     """Let the car stand by Newton's method for each axle, and return the wheel rates."""
     left_m = np.zeros(4)
@@ -460,7 +464,7 @@ def _let_stand(
     )
 
 
-def _match_curves(car: Car, guided: tuple[Axle, ...], trimmed: Trimmed, write: Write) -> None:
+def _match_curves(car: CarDesign, guided: tuple[Axle, ...], trimmed: Trimmed, write: Write) -> None:
     """Find curves that give the measured curves under load."""
     left = 0.0
     for _ in range(_MATCHES):
@@ -476,7 +480,7 @@ def _match_curves(car: Car, guided: tuple[Axle, ...], trimmed: Trimmed, write: W
     )
 
 
-def _fit_steering(car: Car, trimmed: Trimmed, write: Write, log: Log) -> None:
+def _fit_steering(car: CarDesign, trimmed: Trimmed, write: Write, log: Log) -> None:
     """Find the pinion for the ratio, or the ratio of the pinion."""
     target = car.table.steering.ratio
     if target is None and car.table.steering.pinion_radius_m is None:

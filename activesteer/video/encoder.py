@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from activesteer.errors import ParameterError, PlaybackError, not_installed
-from activesteer.files import passing, writing
+from activesteer.files import temporary_file, writing
 
 Pixels = NDArray[np.uint8]
 
@@ -125,7 +125,7 @@ class _Mp4:
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             self._log = stack.enter_context(tempfile.TemporaryFile())
-            stack.enter_context(passing(self._part))
+            stack.enter_context(temporary_file(self._part))
             try:
                 self._process: Any = subprocess.Popen(self._command, stdin=subprocess.PIPE, stderr=self._log)
             except OSError as reason:
@@ -170,7 +170,7 @@ class _Gif:
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
-            stack.enter_context(passing(self._part))
+            stack.enter_context(temporary_file(self._part))
             with writing(self._path, PlaybackError):
                 self._part.open("wb").close()
             self._leaving = stack.pop_all()

@@ -61,8 +61,8 @@ def test_command_that_does_not_listen_is_ended_and_leaves_no_half_file(tmp_path,
     body = f"""
         import contextlib, time
         from activesteer.errors import ParameterError
-        from activesteer.files import replacing
-        with replacing("half.png", ParameterError) as part:
+        from activesteer.files import atomic_write
+        with atomic_write("half.png", ParameterError) as part:
             part.write_text("half")
             open("busy", "w").close()
             while True:

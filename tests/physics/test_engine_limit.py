@@ -10,7 +10,7 @@ from activesteer.conventions import CORNERS
 from activesteer.recording import Recording
 from activesteer.resources import list_maneuvers
 from activesteer.scenario import resolve
-from activesteer.vehicle.powertrain import Drive
+from activesteer.vehicle.powertrain import PowertrainLimits
 
 AT_THE_LIMIT = ("double_lane_change", "drive_off_and_stop", "slalom")
 """Those that reach the limit or start from rest; the others are driven in the long run of the tests."""
@@ -25,7 +25,7 @@ FULL_THROTTLE = {
 def assert_within_the_engine(recording: Recording, vehicle: str) -> None:
     """Recorded torque and power at the wheels stay within the engine's limits at each speed."""
     engine = resolve("standstill", vehicle).car.config.powertrain
-    drive = Drive(engine)
+    drive = PowertrainLimits(engine)
     torques = np.stack([recording[f"{corner}_drive_torque_Nm"] for corner in CORNERS])
     speeds = np.stack([recording[f"{corner}_wheel_speed_radps"] for corner in CORNERS])
     # Recorded in 32 bits.

@@ -6,21 +6,21 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.scenario import describe, resolve
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from tests.raising import raises
 
 LOAD = {"load.payload_kg": 300.0}
 
 
 def test_belief_is_kept_unless_asked_otherwise() -> None:
-    known = prepared(resolve("straight_line", overrides=LOAD)).car.config.single_track
+    known = with_amplitude_found(resolve("straight_line", overrides=LOAD)).car.config.single_track
     assert known == resolve("straight_line").car.config.single_track
     assert known.source == "file"
 
 
 @pytest.mark.parametrize("key", ["single_track", "single_track.source"])
 def test_belief_is_identified_where_asked_for_and_said_so(key: str) -> None:
-    scenario = prepared(resolve("straight_line", overrides={**LOAD, key: "identify"}))
+    scenario = with_amplitude_found(resolve("straight_line", overrides={**LOAD, key: "identify"}))
     known, before = scenario.car.config.single_track, resolve("straight_line").car.config.single_track
     assert known.mass_kg == pytest.approx(1730.0, abs=1.0)
     # 300 kg above the rear axle take the centre of gravity back by 300 (l - l_V) / 1730.

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.controllers import find_controller
+from activesteer.controllers import controller_spec
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from tests.raising import raises
@@ -89,4 +89,4 @@ def test_the_table_of_seven_controllers_fits_a_terminal():
 
 @pytest.mark.parametrize("name", ["ars_sideslip", "lqr", "esc", "integrated", "tv"])
 def test_controllers_of_the_package_are_found_by_name(name):
-    assert find_controller(name).label == name
+    assert controller_spec(name).label == name

@@ -7,11 +7,11 @@ import pytest
 
 from activesteer.errors import ParameterError, PlaybackError
 from activesteer.files import (
+    atomic_write,
     csv_number,
-    delete_passing,
+    delete_temporary_files,
     make_folder,
     reading,
-    replacing,
     shown_path,
     write_text,
     writing,
@@ -37,7 +37,7 @@ def test_what_fails_halfway_leaves_what_was_there(tmp_path: Path) -> None:
     path.write_text("before")
 
     def fail(reason: BaseException) -> None:
-        with replacing(path, PlaybackError) as part:
+        with atomic_write(path, PlaybackError) as part:
             part.write_text("half")
             raise reason
 
@@ -52,11 +52,11 @@ def test_what_fails_halfway_leaves_what_was_there(tmp_path: Path) -> None:
 def test_half_files_can_be_deleted_from_elsewhere(tmp_path: Path) -> None:
     path = tmp_path / "page.html"
     path.write_text("before")
-    with raises(ParameterError, cause=FileNotFoundError, value=path), replacing(path, ParameterError) as part:
+    with raises(ParameterError, cause=FileNotFoundError, value=path), atomic_write(path, ParameterError) as part:
         part.write_text("half")
-        delete_passing()
+        delete_temporary_files()
         assert os.listdir(tmp_path) == ["page.html"]
-    delete_passing()
+    delete_temporary_files()
     assert path.read_text() == "before"
 
 

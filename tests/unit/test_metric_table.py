@@ -22,7 +22,7 @@ from tests.raising import raises
         ("speed_end_mps", "speed end", "km/h", 3.6),
         ("yaw_rate_response_time_s", "yaw rate response time", "s", 1.0),
         ("ay_overshoot", "lateral acceleration overshoot", "%", 100.0),
-        ("tyre_use_max", "tyre use max", "-", 1.0),
+        ("friction_utilisation_max", "friction utilisation max", "-", 1.0),
         ("yaw_rate_after_1000ms_share", "yaw rate after 1000ms share", "%", 100.0),
         ("lane_overstep_m", "lane overstep", "m", 1.0),
         ("steering_wheel_rate_rms_radps", "steering wheel rate rms", "deg/s", 180.0 / math.pi),
@@ -78,3 +78,9 @@ def test_a_recorded_metric_of_another_version_is_shown_unconverted():
 
 def test_every_key_metric_is_declared():
     assert METRICS.keys() >= {key.name for evaluation in EVALUATIONS.values() for key in evaluation.key_metrics}
+
+
+def test_a_former_name_is_rejected_with_the_new_one():
+    with raises(ParameterError, value="tyre_use_max") as caught:
+        metric("tyre_use_max")
+    assert "friction_utilisation_max" in str(caught.value)

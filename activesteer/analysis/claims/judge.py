@@ -19,7 +19,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.analysis.requirement import Names, Requirement, Run, distance
+from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, distance
 from activesteer.analysis.series import Array, timestep
 from activesteer.analysis.source import Evaluable, RecordingLike
 from activesteer.config import Source
@@ -171,7 +171,7 @@ class Scenario:
 def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance: float) -> Claim:
     """Return the claim, which passes if all its conditions hold and there is no obstacle."""
     needed = {place for one in statement.requirements for place in one.metrics}
-    runs: dict[Run, dict[str, float | None]] = {run: {} for _, run in needed}
+    runs: dict[EvaluatedRun, dict[str, float | None]] = {run: {} for _, run in needed}
     for name, run in needed:
         runs[run][name] = metrics[run.controller][name]
     margins = [requirement(runs) for requirement in statement.requirements]

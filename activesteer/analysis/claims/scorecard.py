@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from activesteer.analysis.claims.judge import SYSTEMS, Claim
 from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS
 from activesteer.analysis.claims.stored import (
-    HUMAN,
+    LITERATURE,
     NOT_REPRODUCED,
     PAPER,
     ClaimProportion,
@@ -64,7 +64,7 @@ class Scorecard:
 
     judged: tuple[Judged, ...]
     population: Population | None = None
-    setting: str = HUMAN
+    setting: str = LITERATURE
 
     @property
     def exit_status(self) -> int:
@@ -143,7 +143,7 @@ def scorecard(
     *,
     known: Mapping[str, str] | None = None,
     population: Population | None = None,
-    setting: str = HUMAN,
+    setting: str = LITERATURE,
 ) -> Scorecard:
     """Judge claims with the vehicle's list of claims that are not reproduced, and its stored population.
 

@@ -432,7 +432,7 @@ SLIPPERY: Final = (
 
 
 def _step_metrics(recording: RecordingLike) -> dict[str, float]:
-    values = step_response.metrics(recording)
+    values = step_response.step_response_metrics(recording)
     for name, unit in TURNED:
         values[f"{name}_steady_state_{unit}"] -= mean_straight_ahead(recording, f"{name}_{unit}")
     return values | {PEAK: float(np.abs(recording["yaw_rate_radps"]).max())}
@@ -482,7 +482,7 @@ def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole:
 
 
 def _lane_metrics(recording: RecordingLike) -> dict[str, float]:
-    return {CONES_HIT: math.nan} | path_following.metrics(recording)
+    return {CONES_HIT: math.nan} | path_following.path_following_metrics(recording)
 
 
 def _tracks(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool) -> RunMetrics:
@@ -503,16 +503,16 @@ def _slippery_metrics(recording: RecordingLike) -> dict[str, float]:
     without = dict.fromkeys((LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT), math.nan)
     last = recording.time_s >= recording.time_s[-1] - END_S
     end = {END_YAW_RATE: rms(recording["yaw_rate_radps"][last]), END_SIDESLIP: rms(recording["sideslip_rad"][last])}
-    return without | path_following.metrics(recording) | end
+    return without | path_following.path_following_metrics(recording) | end
 
 
 SCENARIOS: Final[dict[str, Scenario]] = {
     "step_steer": Scenario("step steer", Kind.SYSTEMS, STEP_STEER, _step_metrics, _step_compared),
     "sine_with_dwell": Scenario(
-        "sine with dwell", Kind.SYSTEMS, SINE_WITH_DWELL, sine_with_dwell.metrics, _added_angles
+        "sine with dwell", Kind.SYSTEMS, SINE_WITH_DWELL, sine_with_dwell.sine_with_dwell_metrics, _added_angles
     ),
     "double_lane_change": Scenario("double lane change", Kind.DRIVER, DOUBLE_LANE_CHANGE, _lane_metrics, _tracks),
-    "slalom": Scenario("slalom", Kind.DRIVER, SLALOM, path_following.metrics),
+    "slalom": Scenario("slalom", Kind.DRIVER, SLALOM, path_following.path_following_metrics),
     "double_lane_change_low_mu": Scenario("slippery double lane change", Kind.DRIVER, SLIPPERY, _slippery_metrics),
 }
 """Name of the manoeuvre -> its claims, in the order of the paper's sections."""

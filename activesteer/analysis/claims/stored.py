@@ -1,7 +1,7 @@
 """Data that the package stores about the claims: settings, claims that are not reproduced, and populations.
 
-A setting holds what the paper leaves open, as numbers with ranges and reasons. `human` is the nominal car with a driver
-from published ranges; it changes nothing. `paper` was selected by the verdicts of the claims (`activesteer tune
+A setting holds what the paper leaves open, as numbers with ranges and reasons. `literature` is the nominal car with a
+driver from published ranges; it changes nothing. `paper` was selected by the verdicts of the claims (`activesteer tune
 match_paper`), within ranges that were written down before: it shows under which conditions the paper's statements hold
 together, and is no evidence for them.
 
@@ -27,9 +27,9 @@ from activesteer.files import reading
 from activesteer.resources import studies_dir
 from activesteer.theory.proportions import ProportionVerdict, proportion_verdict
 
-HUMAN: Final = "human"
+LITERATURE: Final = "literature"
 PAPER: Final = "paper"
-SETTINGS: Final = {PAPER: "paper's setting", HUMAN: "human driver"}
+SETTINGS: Final = {PAPER: "paper's setting", LITERATURE: "driver from literature"}
 """Name of a setting -> its title."""
 VEHICLE: Final = "compact"
 """Car of the paper's setting."""
@@ -50,7 +50,7 @@ class Number:
     value: float | str
     """Its value in this setting."""
     nominal: float | str
-    """Its value in the setting `human`."""
+    """Its value in the setting `literature`."""
     reason: str
     """Source of the range."""
     low: float | None = None
@@ -81,10 +81,10 @@ class Setting:
 
 @functools.cache
 def read_setting(name: str) -> Setting:
-    """Return a setting of the package, `paper` or `human`."""
+    """Return a setting of the package, `paper` or `literature`."""
     if name not in SETTINGS:
         raise ParameterError(nearest_names(name, SETTINGS), key="--setting", value=name, allowed=tuple(SETTINGS))
-    if name == HUMAN:
+    if name == LITERATURE:
         return Setting()
     table, source = read_toml(Path(__file__).parent / f"{name}_setting.toml", ParameterError)
     found = build(Setting, table, source)
@@ -99,7 +99,7 @@ def setting_of(recording: RecordingLike) -> str:
     if name not in SCENARIOS or not isinstance(overrides, Mapping):
         return ""
     if not overrides:
-        return HUMAN
+        return LITERATURE
     return PAPER if dict(overrides) == read_setting(PAPER).overrides(str(name)) else ""
 
 

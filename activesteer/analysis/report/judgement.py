@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from activesteer.analysis.claims.judge import SYSTEMS
 from activesteer.analysis.claims.scorecard import Scorecard, scorecard
-from activesteer.analysis.claims.stored import HUMAN, claims_for, setting_of
+from activesteer.analysis.claims.stored import LITERATURE, claims_for, setting_of
 from activesteer.analysis.report.groups import Group, entry
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording
@@ -45,7 +45,7 @@ def judge(group: Group) -> Judgement:
         return Judgement(nothing, "the three runs differ in manoeuvre or vehicle; see the parameters")
     try:
         claims, setting = check(recordings), setting_of(systems[0])
-        return Judgement(scorecard(claims, entry(systems[0], "vehicle", "name"), setting=setting or HUMAN))
+        return Judgement(scorecard(claims, entry(systems[0], "vehicle", "name"), setting=setting or LITERATURE))
     except ActiveSteerError as error:
         return Judgement(nothing, str(error))
 

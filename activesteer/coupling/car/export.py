@@ -37,12 +37,12 @@ from activesteer.coupling.car.variables import (
 )  # fmt: skip
 from activesteer.errors import ModelError, ParameterError
 from activesteer.faults import ACTUATORS
-from activesteer.files import replacing
+from activesteer.files import atomic_write
 from activesteer.scenario import Scenario
 from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.corners import design_heights_m
@@ -102,7 +102,7 @@ def export_fmu(scenario: Scenario, path: Path, version: int = 2) -> Export:
     export = _export(scenario)
     folder = "binaries/linux64" if version == 2 else "binaries/x86_64-linux"
     name = _identifier(export.name)
-    with replacing(path, ParameterError) as target, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+    with atomic_write(path, ParameterError) as target, zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         description = model_description(export.variables, name, export.token, version, export.timestep_s)
         archive.writestr("modelDescription.xml", description)
         archive.writestr(f"{folder}/{name}.so", export.library)
@@ -136,7 +136,7 @@ def export_library(scenario: Scenario, folder: Path) -> Export:
         "license.txt": _licenses().encode(),
     }
     for name, content in files.items():
-        with replacing(folder / name, ParameterError) as target:
+        with atomic_write(folder / name, ParameterError) as target:
             target.write_bytes(content)
     return export
 
@@ -149,7 +149,7 @@ def _export(scenario: Scenario) -> Export:
     """Build the car, let it settle, and compile it into a library."""
     if scenario.maneuver.fault:
         raise ParameterError("an exported car has no faults of a manoeuvre; leave them out", key="fault")
-    scenario = prepared(scenario)
+    scenario = with_amplitude_found(scenario)
     loop = ClosedLoop(scenario)
     sensors = scenario.car.config.sensors
     inputs = inputs_of(loop, scenario.maneuver.road.mu)

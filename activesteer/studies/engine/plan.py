@@ -234,7 +234,7 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
     if part == "vehicle" and first == "single_track" and rest[0] != "mass_kg":  # the speed controller uses it too
         return bool(others) or follows_path or scenario.maneuver.settling_setpoint().curvature_demand_1pm is not None
     if part == "driver":
-        return not scenario.driver.plugin.ours or follows_path or first.startswith("speed_")
+        return not scenario.driver.plugin.is_builtin or follows_path or first.startswith("speed_")
     return True
 
 

@@ -12,9 +12,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from activesteer.controllers import find_controller
+from activesteer.controllers import controller_spec
 from activesteer.conventions import Array, run_looks
-from activesteer.driver import find_driver
+from activesteer.driver import driver_spec
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import write_text
 from activesteer.metric_table import recorded_metric
@@ -119,9 +119,9 @@ def _label(study: StudyFile, key: str) -> tuple[str, str]:
     """Return label and unit of a factor; those of a user's controller or driver as its code declares them."""
     words, unit = parameter_label(key)
     with contextlib.suppress(ActiveSteerError):  # the code may be elsewhere by now
-        for plugin in (*map(find_controller, study.controllers), find_driver(study.driver)):
+        for plugin in (*map(controller_spec, study.controllers), driver_spec(study.driver)):
             table, _, name = key.partition(f"{plugin.kind.table}.{plugin.key}.")
-            if not plugin.ours and not table and name in plugin.declared:
+            if not plugin.is_builtin and not table and name in plugin.declared:
                 return f"{plugin.key}: {name}", plugin.declared[name].unit
     return words, unit
 

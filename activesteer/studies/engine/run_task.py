@@ -22,7 +22,7 @@ from activesteer.files import file_word
 from activesteer.recording import Recording
 from activesteer.scenario import Scenario
 from activesteer.simulation import amplitude_store
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.runs import (
     Request,
@@ -113,7 +113,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
         if files_digest(scenario) != settings.expected[key]:
             raise StudyError(f"{key}: changed while the study ran")
         with amplitude_store.not_on_disk():
-            ready = prepared(scenario, settings.study.timestep_s)
+            ready = with_amplitude_found(scenario, settings.study.timestep_s)
     except ActiveSteerError as error:
         return [failed_row(settings, request, Status.FAILED, _words_of(error)) for request in requests]
     rows = []

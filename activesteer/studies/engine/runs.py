@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 
 import activesteer
 from activesteer.config import toml_value
-from activesteer.controllers import find_controller, is_variant, read_variant
+from activesteer.controllers import controller_spec, is_variant, read_variant
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.files import make_folder, writing
 from activesteer.plugins.file import format_of, source_of
@@ -85,7 +85,7 @@ def controller_digest(controller: str) -> str:
     """Return the hash of a controller: its name, its parameters, and the source of a user's own controller."""
     path, _, name = controller.partition(":")
     if format_of(controller) is not None:
-        source: Any = {"fmu": find_controller(controller).files}
+        source: Any = {"fmu": controller_spec(controller).files}
     else:
         source = read_variant(controller).files if is_variant(controller) else source_of(controller)
     return digest({"name": f"{Path(path).name}:{name}", "source": source})

@@ -23,7 +23,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from activesteer.errors import StudyError
-from activesteer.files import make_folder, reading, replacing, write_text, writing
+from activesteer.files import atomic_write, make_folder, reading, write_text, writing
 from activesteer.studies.engine.run_task import CURVE, Row
 from activesteer.studies.engine.runs import versions
 from activesteer.units import unit_of
@@ -189,7 +189,7 @@ class Store:
     def write(self, rows: Sequence[Row]) -> None:
         """Store the rows of a finished task, which belong to consecutive runs."""
         name = f"{rows[0]['run']:09d}-{rows[-1]['run']:09d}.parquet"
-        with replacing(self._parts / name, StudyError) as path:
+        with atomic_write(self._parts / name, StudyError) as path:
             pq.write_table(table_of(rows, self._factors), path)
 
     def join(self) -> Path:
@@ -198,7 +198,7 @@ class Store:
         if not target.exists():
             paths = self._paths()
             schema = self._joined_schema(paths)
-            with replacing(target, StudyError) as path, pq.ParquetWriter(path, schema) as writer:
+            with atomic_write(target, StudyError) as path, pq.ParquetWriter(path, schema) as writer:
                 for batch in batched((fitted(table, schema) for table in _tables(paths)), _ROW_GROUP):
                     writer.write_table(batch, row_group_size=_ROW_GROUP)
         shutil.rmtree(self._parts, ignore_errors=True)

@@ -13,7 +13,7 @@ from enum import StrEnum
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
 from activesteer.analysis.claims.statements import SCENARIO_OF
-from activesteer.analysis.requirement import ANY, Expression, Names, Requirement, Run, Runs, distance
+from activesteer.analysis.requirement import ANY, EvaluatedRun, Expression, Names, Requirement, Runs, distance
 from activesteer.config import Range, build
 from activesteer.errors import nearest_names, shown
 from activesteer.metric_table import METRICS
@@ -188,10 +188,10 @@ class Judge:
                 if name in METRICS and (known := names[run.maneuver]) and name not in known:
                     problem = f"the runs of {run.maneuver} have no such metric; {nearest_names(name, known)}"
                     raise self._source.fail(where, problem, name)
-        found: dict[str, dict[Run, dict[str, float | None]]] = {}
+        found: dict[str, dict[EvaluatedRun, dict[str, float | None]]] = {}
         for row in rows:
             metrics = {name: row.get(name) for name in names[row["maneuver"]]}
-            found.setdefault(row["vehicle"], {})[Run(row["controller"], row["maneuver"])] = metrics
+            found.setdefault(row["vehicle"], {})[EvaluatedRun(row["controller"], row["maneuver"])] = metrics
         return list(found.values())
 
 

@@ -241,7 +241,7 @@ def driver_loops(
     """
     scenario = resolve("straight_line", vehicle, overrides, driver, controllers)
     check_gains(overrides or {}, controllers)
-    if not scenario.driver.plugin.ours:
+    if not scenario.driver.plugin.is_builtin:
         raise DriverError(f"{scenario.driver.plugin.name} is code; only a driver file has a linear form", value=driver)
     setup, who = scenario.controller_setup(DEFAULT_TIMESTEP_S), scenario.driver.parameters
     known = SingleTrack(setup.single_track)

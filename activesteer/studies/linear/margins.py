@@ -31,7 +31,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.controllers import Controller, ControllerSetup, find_controller
+from activesteer.controllers import Controller, ControllerSetup, controller_spec
 from activesteer.controllers.linear_form import (
     SIGNALS,
     has_linear_form,
@@ -44,7 +44,7 @@ from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
 from activesteer.signals import Measurement
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.control_unit import interval_s
+from activesteer.simulation.sampled_controller import interval_s
 from activesteer.studies.linear.discrete_time_map import OUTPUTS
 from activesteer.studies.linear.linearisation import LinearCar, linear_cars
 
@@ -266,7 +266,7 @@ def margins_of_cars(
 
     A controller that knows the same about two cars is evaluated once. With `keep_curves` the loop gains are kept too.
     """
-    plugins = [find_controller(given) for given in controllers]
+    plugins = [controller_spec(given) for given in controllers]
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
     for overrides in cars:
         found: list[LoopMargins] = []

@@ -11,7 +11,7 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import SimulationDiverged
-from activesteer.scenario import Car
+from activesteer.scenario import CarSpec
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from activesteer.vehicle import force_block as fb
@@ -22,7 +22,7 @@ _STEPS: Final = 500
 _STILL_MPS: Final = 0.01
 
 
-def standing(vehicle: Vehicle, car: Car) -> Iterator[Finding]:
+def standing(vehicle: Vehicle, car: CarSpec) -> Iterator[Finding]:
     """Return all findings about the car at rest.
 
     Args:
@@ -89,13 +89,13 @@ def _inertia(model: mujoco.MjModel) -> Iterator[Finding]:
     yield judged("yaw_inertia", float(body.inertia_kgm2[2, 2] / (body.mass_kg * to_front * to_rear)))
 
 
-def _tyres(car: Car, load_N: np.ndarray) -> Iterator[Finding]:
+def _tyres(car: CarSpec, load_N: np.ndarray) -> Iterator[Finding]:
     for axle, tyre, load in zip(("front", "rear"), car.tyres, (load_N[:2].mean(), load_N[2:].mean()), strict=True):
         yield judged("tyre_load", float(load) / float(tyre["FNOMIN"]), axle=axle)
         yield judged("tyre_reserve", float(tyre["FZMAX"]) / float(load), axle=axle)
 
 
-def _dampers(car: Car) -> Iterator[Finding]:
+def _dampers(car: CarSpec) -> Iterator[Finding]:
     for axle, curve in (("front", car.config.dampers.front), ("rear", car.config.dampers.rear)):
         pushes = [force * speed < 0.0 for speed, force in zip(curve.velocity_mps, curve.force_N, strict=True)]
         bad = any(pushes) or float(np.interp(0.0, curve.velocity_mps, curve.force_N)) != 0.0
@@ -107,14 +107,14 @@ def _dampers(car: Car) -> Iterator[Finding]:
         yield judged("damper_slope", float(slope), axle=axle)
 
 
-def _brakes(vehicle: Vehicle, car: Car, mass_kg: float) -> Iterator[Finding]:
+def _brakes(vehicle: Vehicle, car: CarSpec, mass_kg: float) -> Iterator[Finding]:
     brakes = car.config.brakes
     radius = vehicle.data.xpos[vehicle.model.body("fl_wheel").id, 2]
     maximum = 2.0 * (brakes.front_torque_Nm + brakes.rear_torque_Nm) / radius / (mass_kg * GRAVITY_MPS2)
     yield judged("deceleration", float(maximum))
 
 
-def _controllers_view(car: Car, mass_kg: float, yaw_inertia: float) -> Iterator[Finding]:
+def _controllers_view(car: CarSpec, mass_kg: float, yaw_inertia: float) -> Iterator[Finding]:
     track = car.config.single_track
     for what, known, real in (("mass", track.mass_kg, mass_kg), ("yaw inertia", track.yaw_inertia_kgm2, yaw_inertia)):
         yield judged("known", 100.0 * (known / real - 1.0), what=what)

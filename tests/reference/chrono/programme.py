@@ -11,7 +11,7 @@ import numpy as np
 
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ParameterError
-from activesteer.files import make_folder, replacing, shown_path
+from activesteer.files import atomic_write, make_folder, shown_path
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import simulate
@@ -169,7 +169,7 @@ def write_runs(result: Validation, folder: Path) -> list[Path]:
         t = table["t"]
         every = max(1, round(_WRITTEN_EVERY_S / float(t[1] - t[0])))
         rows = np.column_stack(list(table.values()))[::every]
-        with replacing(path, ParameterError) as part:
+        with atomic_write(path, ParameterError) as part:
             np.savetxt(part, rows, fmt="%.8g", delimiter=",", header=",".join(table), comments="")
         paths.append(path)
     return paths

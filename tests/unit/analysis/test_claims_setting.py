@@ -10,7 +10,7 @@ import pytest
 from activesteer.analysis.claims.judge import Claim
 from activesteer.analysis.claims.scorecard import Verdict, scorecard
 from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
-from activesteer.analysis.claims.stored import HUMAN, PAPER, claims_for, read_setting, setting_of
+from activesteer.analysis.claims.stored import LITERATURE, PAPER, claims_for, read_setting, setting_of
 from activesteer.errors import ParameterError
 from activesteer.scenario import resolve, value_of
 from activesteer.studies.reproduction import reproduce
@@ -46,7 +46,7 @@ def test_the_numbers_act_and_their_nominal_values_are_those_of_the_files(scenari
 def test_a_run_is_of_the_setting_whose_numbers_it_has():
     overrides = read_setting(PAPER).overrides("slalom")
     assert setting_of(run_of("slalom", overrides)) == PAPER
-    assert setting_of(run_of("slalom", {})) == HUMAN
+    assert setting_of(run_of("slalom", {})) == LITERATURE
     assert setting_of(run_of("slalom", {**overrides, "cones.spacing_m": 30.0})) == ""
     assert setting_of(run_of("brake_in_turn", {})) == ""
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.frequency_response import OUTPUTS, frequency_response, metrics
+from activesteer.analysis.frequency_response import OUTPUTS, frequency_response, frequency_response_metrics
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun
@@ -48,7 +48,7 @@ def test_coherence_falls_with_noise(rng):
 
 
 def test_metrics_of_a_lag():
-    values = metrics(sweep())
+    values = frequency_response_metrics(sweep())
     assert values["yaw_rate_gain_1ps"] == pytest.approx(GAIN / abs(1 + 2j * math.pi * 0.2 * LAG_S), rel=0.01)
     assert values["yaw_rate_45deg_Hz"] == pytest.approx(1.0 / (2 * math.pi * LAG_S), rel=0.02)
     assert math.isnan(values["yaw_rate_peak_gain_Hz"])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.analysis.handling import CarGeometry, car_of, evaluate, metrics
+from activesteer.analysis.handling import CarGeometry, car_of, evaluate, handling_metrics
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun
@@ -90,6 +90,6 @@ def test_car_comes_from_the_metadata_or_the_caller():
 
 
 def test_metrics_are_all_numbers():
-    values: dict[str, Any] = metrics(run())
+    values: dict[str, Any] = handling_metrics(run())
     assert all(isinstance(value, float) for value in values.values())
     assert values["speed_end_mps"] == 22.0

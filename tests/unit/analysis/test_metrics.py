@@ -37,12 +37,12 @@ def wave(kind: str = "open_loop") -> SyntheticRun:
 
 def test_step_steer_gets_the_metrics_of_iso_7401():
     run = step_steer()
-    assert metrics(run) == pytest.approx(step_response.metrics(run), nan_ok=True)
+    assert metrics(run) == pytest.approx(step_response.step_response_metrics(run), nan_ok=True)
 
 
 @pytest.mark.parametrize("kind", ["open_loop", "random_steer"])
 def test_kinds_without_metrics_of_their_own_get_the_general_ones(kind):
-    assert metrics(wave(kind)) == general.metrics(wave(kind))
+    assert metrics(wave(kind)) == general.general_metrics(wave(kind))
 
 
 def test_a_kind_without_an_evaluation_is_an_error():
@@ -77,10 +77,10 @@ def test_peaks_and_root_mean_squares_of_a_sine():
     assert values["speed_end_mps"] == pytest.approx(19.0)
 
 
-def test_tyre_use_is_the_largest_fraction_of_its_friction_that_a_tyre_uses():
+def test_friction_utilisation_is_the_largest_fraction_of_its_friction_that_a_tyre_uses():
     run = wave()
     run.channels["rl_friction_utilisation"] = np.where(TIME_S > 1.0, 0.7, 0.0)
-    assert metrics(run)["tyre_use_max"] == 0.7
+    assert metrics(run)["friction_utilisation_max"] == 0.7
 
 
 def test_wheels_of_a_side_that_are_lifted_together_count_as_two_wheel_lift():

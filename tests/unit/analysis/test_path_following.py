@@ -94,10 +94,10 @@ def test_deviation_is_that_of_the_front_axle_from_the_path():
     assert values["track_deviation_rms_m"] == pytest.approx(0.4)
 
 
-def test_tyre_use_and_speed_loss():
+def test_friction_utilisation_and_speed_loss():
     values = metrics(along_path(friction_utilisation=0.8))
-    assert values["tyre_use_max"] == pytest.approx(0.8)
-    assert values["tyre_use_mean"] == pytest.approx(0.25 * (0.8 + 3.0 * 0.4))
+    assert values["friction_utilisation_max"] == pytest.approx(0.8)
+    assert values["friction_utilisation_mean"] == pytest.approx(0.25 * (0.8 + 3.0 * 0.4))
     assert values["speed_loss_mps"] == pytest.approx(1.0)
 
 

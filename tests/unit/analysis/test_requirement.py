@@ -9,10 +9,10 @@ import pytest
 
 from activesteer.analysis.requirement import (
     ANY,
+    EvaluatedRun,
     Expression,
     Names,
     Requirement,
-    Run,
     distance,
 )
 from activesteer.config import Source
@@ -56,7 +56,7 @@ WHERE = Source("test.toml", error=StudyError), ("tune", "violate")
 
 def margin(text: str, **runs: Mapping[str, float | None]) -> float:
     """Return the margin of a requirement for the metrics of the runs by controller."""
-    return Requirement(text, NAMES, *WHERE)({Run(name, "lane"): metrics for name, metrics in runs.items()})
+    return Requirement(text, NAMES, *WHERE)({EvaluatedRun(name, "lane"): metrics for name, metrics in runs.items()})
 
 
 def test_the_margin_is_the_distance_to_the_limit_in_multiples_of_it():
@@ -94,9 +94,11 @@ def test_requirements_are_joined_by_their_smallest_or_largest_margin():
 def test_a_metric_that_a_run_does_not_define_decides_nothing():
     text = "max(0, lane_overstep_m(lqr)) - min(0, lane_overstep_m(none)) <= 0"
     assert math.isnan(margin(text, lqr={"lane_overstep_m": None}, none={"lane_overstep_m": 0.1}))
-    assert Requirement(text, NAMES, *WHERE).undefined(
-        {Run("lqr", "lane"): {"lane_overstep_m": math.nan}, Run("none", "lane"): {"lane_overstep_m": 0.1}}
-    ) == {"lqr"}
+    runs = {
+        EvaluatedRun("lqr", "lane"): {"lane_overstep_m": math.nan},
+        EvaluatedRun("none", "lane"): {"lane_overstep_m": 0.1},
+    }
+    assert Requirement(text, NAMES, *WHERE).undefined(runs) == {"lqr"}
     two = "lane_overstep_m(lqr) <= 0.1 {} lane_overstep_m(none) <= 0.1"
     for word, other_m, whole in (("and", 0.2, -1.0), ("and", 0.0, math.nan), ("or", 0.0, 1.0), ("or", 0.2, math.nan)):
         found = margin(two.format(word), lqr={}, none={"lane_overstep_m": other_m})
@@ -122,8 +124,8 @@ def test_a_claim_of_the_paper_has_its_own_distance():
 
 def test_an_expression_is_a_number_and_divides_by_zero():
     ratio = Expression("min(2, abs(ay_overshoot('my.py:Mine') / ay_overshoot(none)))", NAMES, *WHERE)
-    assert list(ratio.metrics) == [("ay_overshoot", Run("my.py:Mine", "lane")), ("ay_overshoot", Run("none", "lane"))]
-    mine, none = Run("my.py:Mine", "lane"), Run("none", "lane")
+    mine, none = EvaluatedRun("my.py:Mine", "lane"), EvaluatedRun("none", "lane")
+    assert list(ratio.metrics) == [("ay_overshoot", mine), ("ay_overshoot", none)]
     assert ratio({mine: {"ay_overshoot": -0.3}, none: {"ay_overshoot": 0.2}}) == pytest.approx(1.5)
     assert ratio({mine: {"ay_overshoot": -0.3}, none: {"ay_overshoot": 0.0}}) == 2.0
     assert math.isnan(ratio({mine: {"ay_overshoot": 0.0}, none: {"ay_overshoot": 0.0}}))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis import step_response
+from activesteer.analysis.step_response import step_response_metrics
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import RAMP_S, STEP_S, SyntheticRun, first_order, second_order, step_steer
@@ -16,23 +17,23 @@ SIGNED = ("_steady_state_", "_peak_rad", "_peak_mps2")
 
 
 def test_time_counts_from_half_of_the_steering_angle():
-    assert step_response.metrics(step_steer())["step_time_s"] == pytest.approx(STEP_S, abs=1e-6)
+    assert step_response_metrics(step_steer())["step_time_s"] == pytest.approx(STEP_S, abs=1e-6)
 
 
 def test_step_time_is_interpolated_in_a_coarse_recording():
     coarse = step_steer(timestep_s=0.03)
-    assert step_response.metrics(coarse)["step_time_s"] == pytest.approx(STEP_S, abs=1e-6)
+    assert step_response_metrics(coarse)["step_time_s"] == pytest.approx(STEP_S, abs=1e-6)
 
 
 def test_every_signal_has_its_metrics():
-    values = step_response.metrics(step_steer())
+    values = step_response_metrics(step_steer())
     for name, unit in (("yaw_rate", "radps"), ("ay", "mps2"), ("roll", "rad"), ("sideslip", "rad")):
         for metric in (f"steady_state_{unit}", "response_time_s", f"peak_{unit}", "peak_time_s", "overshoot"):
             assert f"{name}_{metric}" in values
 
 
 def test_values_are_those_of_the_formulas():
-    values = step_response.metrics(step_steer(sideslip_rad=-0.02, rear_rad=-0.015, superposition_rad=0.01))
+    values = step_response_metrics(step_steer(sideslip_rad=-0.02, rear_rad=-0.015, superposition_rad=0.01))
     root = math.sqrt(0.75)
     peak_time_s = math.pi / (9.0 * root)
     assert values["yaw_rate_steady_state_radps"] == pytest.approx(0.2, rel=1e-6)
@@ -49,7 +50,7 @@ def test_values_are_those_of_the_formulas():
 
 
 def test_a_turn_to_the_right_is_the_mirror_image():
-    left, right = (step_response.metrics(step_steer(side=side, rear_rad=-0.01)) for side in (1.0, -1.0))
+    left, right = (step_response_metrics(step_steer(side=side, rear_rad=-0.01)) for side in (1.0, -1.0))
     for name, value in left.items():
         sign = -1.0 if any(part in name for part in SIGNED) else 1.0
         assert right[name] == pytest.approx(sign * value, rel=1e-12, nan_ok=True), name
@@ -65,7 +66,7 @@ def test_reasons_are_given_for_what_does_not_exist():
 
 def test_overshoot_grows_when_damping_falls():
     loose, tight = (
-        step_response.metrics(step_steer(yaw=lambda t, d=damping: second_order(t, damping=d)))["yaw_rate_overshoot"]
+        step_response_metrics(step_steer(yaw=lambda t, d=damping: second_order(t, damping=d)))["yaw_rate_overshoot"]
         for damping in (0.4, 0.8)
     )
     assert loose > tight > 0.0
@@ -78,21 +79,21 @@ def with_steering(values: np.ndarray, run: SyntheticRun) -> SyntheticRun:
 def test_straight_driving_is_no_step():
     run = step_steer()
     with raises(RecordingError, value=0.0, allowed=step_response.MIN_STEP_RAD):
-        step_response.metrics(with_steering(np.zeros_like(run.time_s), run))
+        step_response_metrics(with_steering(np.zeros_like(run.time_s), run))
 
 
 def test_a_wheel_that_is_turned_from_the_start_is_no_step():
     run = step_steer()
     with raises(RecordingError, value=0.5):
-        step_response.metrics(with_steering(np.full_like(run.time_s, 0.5), run))
+        step_response_metrics(with_steering(np.full_like(run.time_s, 0.5), run))
 
 
 def test_a_run_that_ends_early_is_refused():
     with raises(RecordingError, value=pytest.approx(1.5), allowed=2.0):
-        step_response.metrics(step_steer(duration_s=2.5))
+        step_response_metrics(step_steer(duration_s=2.5))
 
 
 def test_a_steering_angle_that_is_not_a_number_is_no_step():
     run = step_steer()
     with raises(RecordingError, allowed=step_response.MIN_STEP_RAD):
-        step_response.metrics(with_steering(np.full_like(run.time_s, np.nan), run))
+        step_response_metrics(with_steering(np.full_like(run.time_s, np.nan), run))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.straight_braking import metrics
+from activesteer.analysis.straight_braking import straight_braking_metrics
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
 from tests.unit.analysis.synthetic import SyntheticRun
@@ -40,7 +40,7 @@ def stopping(*, slip: float = 0.1, until_s: float = 6.0, pedal: float = 1.0) -> 
 
 
 def test_a_constant_deceleration_is_found_with_its_distance_and_efficiency() -> None:
-    found = metrics(stopping())
+    found = straight_braking_metrics(stopping())
     assert found["stopping_distance_m"] == pytest.approx(SPEED_MPS**2 / (2.0 * DECELERATION_MPS2), rel=1e-3)
     assert found["mean_deceleration_mps2"] == pytest.approx(DECELERATION_MPS2, rel=1e-4)
     assert found["braking_efficiency"] == pytest.approx(DECELERATION_MPS2 / (PEAK * 9.80665), rel=1e-3)
@@ -51,11 +51,11 @@ def test_a_constant_deceleration_is_found_with_its_distance_and_efficiency() -> 
 
 @pytest.mark.parametrize("slip", [0.1, 0.4, 1.0])
 def test_the_largest_slip_is_that_of_the_wheel_that_has_it(slip: float) -> None:
-    assert metrics(stopping(slip=slip))["wheel_slip_max"] == pytest.approx(slip, abs=1e-9)
+    assert straight_braking_metrics(stopping(slip=slip))["wheel_slip_max"] == pytest.approx(slip, abs=1e-9)
 
 
 def test_what_a_run_that_ends_on_the_way_does_not_have_is_not_defined() -> None:
-    found = metrics(stopping(until_s=3.0))
+    found = straight_braking_metrics(stopping(until_s=3.0))
     assert math.isnan(found["stopping_distance_m"])
     assert math.isnan(found["braking_efficiency"])
     assert found["wheel_slip_max"] == pytest.approx(0.1)
@@ -63,4 +63,4 @@ def test_what_a_run_that_ends_on_the_way_does_not_have_is_not_defined() -> None:
 
 def test_a_run_without_a_brake_is_none() -> None:
     with pytest.raises(RecordingError):
-        metrics(stopping(pedal=0.0))
+        straight_braking_metrics(stopping(pedal=0.0))

@@ -26,7 +26,7 @@ def test_what_does_not_exist_is_a_dash_and_what_is_missing_a_blank():
 
 
 def test_table_of_real_metrics_has_a_line_for_each():
-    values = step_response.metrics(step_steer())
+    values = step_response.step_response_metrics(step_steer())
     assert len(comparison({"none": values}).splitlines()) == len(values) + 1
 
 
@@ -40,6 +40,6 @@ def test_a_car_that_has_turned_round_has_lost_metrics_but_its_verdicts_remain():
     assert rows["steering"] == ["57.296", "57.296"]
 
 
-def test_a_tyre_use_above_1_is_explained():
-    assert "combined slip" in comparison({"none": {"tyre_use_max": 1.06}}).splitlines()[-1]
-    assert len(comparison({"none": {"tyre_use_max": 0.9}}).splitlines()) == 2
+def test_a_friction_utilisation_above_1_is_explained():
+    assert "combined slip" in comparison({"none": {"friction_utilisation_max": 1.06}}).splitlines()[-1]
+    assert len(comparison({"none": {"friction_utilisation_max": 0.9}}).splitlines()) == 2

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.brakes import Brakes
 from activesteer.brakes.antilock import BUILD, HOLD, OFF, antilock
-from activesteer.brakes.control_unit import follow_car, follow_wheels, step_brakes
+from activesteer.brakes.brake_control_unit import follow_car, follow_wheels, step_brakes
 from activesteer.brakes.records import NO_LIMIT_NM
 from tests.unit.brakes.test_hydraulics import of
 

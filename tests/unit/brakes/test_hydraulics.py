@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.brakes import Brakes, Hydraulics
-from activesteer.brakes.control_unit import ask, flow
+from activesteer.brakes.brake_control_unit import ask, flow
 from activesteer.brakes.records import BRAKE_STATE, brake_setup, reset
 
 BAR = 1e5

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from activesteer.brakes import Brakes
-from activesteer.brakes.control_unit import traction
+from activesteer.brakes.brake_control_unit import traction
 from activesteer.brakes.records import NO_LIMIT_NM
 from tests.unit.brakes.test_hydraulics import of
 

@@ -16,8 +16,8 @@ from activesteer.controllers import (
     FrontSuperposition,
     NoControl,
     RearSteer,
+    controller_spec,
     declared_parameters,
-    find_controller,
     load_controller,
 )
 from activesteer.errors import ControllerError
@@ -107,8 +107,8 @@ def test_users_controller_can_be_copied_with_its_state(write):
 
 def test_users_file_is_kept_with_the_recording(write):
     path = write("class Mine:\n    def step(self, command, measurement): ...\n")
-    assert find_controller(f"{path}:Mine").files == {"mine.py": path.read_bytes()}
-    assert find_controller("ars").files == {}
+    assert controller_spec(f"{path}:Mine").files == {"mine.py": path.read_bytes()}
+    assert controller_spec("ars").files == {}
 
 
 @pytest.mark.parametrize(

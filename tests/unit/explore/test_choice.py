@@ -11,7 +11,7 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder, check_numbers
-from activesteer.explore.messages import MAX_WAITING, Act, End, Message, Run, Start, add, read
+from activesteer.explore.messages import MAX_WAITING, Act, End, Message, RunRequest, Start, add, read
 from activesteer.explore.sliders import sliders
 from activesteer.scenario import resolve
 
@@ -44,7 +44,7 @@ class Mine:
 )
 def test_a_message_can_name_nothing_outside_the_lists_and_the_folder(message: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(ParameterError):
-        Folder(tmp_path).check(cast(Run, read(json.dumps({"kind": "run", **message}))))
+        Folder(tmp_path).check(cast(RunRequest, read(json.dumps({"kind": "run", **message}))))
 
 
 @pytest.mark.parametrize(
@@ -67,9 +67,9 @@ def test_a_message_of_another_form_or_size_is_refused(text: str) -> None:
 def test_a_full_queue_holds_the_newest_choice_and_the_newest_hands() -> None:
     waiting: deque[Message] = deque()
     for number in range(1500):
-        assert add(waiting, Run(maneuver="slalom", id=number))
+        assert add(waiting, RunRequest(maneuver="slalom", id=number))
         assert add(waiting, Act(steer=0.5, number=number))
-    assert [getattr(message, "id", None) for message in waiting if isinstance(message, Run)] == [1499]
+    assert [getattr(message, "id", None) for message in waiting if isinstance(message, RunRequest)] == [1499]
     assert isinstance(waiting[-1], Act)
     assert waiting[-1].number == 1499
     assert len(waiting) <= MAX_WAITING

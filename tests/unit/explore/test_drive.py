@@ -12,9 +12,9 @@ import pytest
 import activesteer
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder
-from activesteer.explore.drive import Drive
+from activesteer.explore.drive import DriveSession
 from activesteer.explore.messages import Act, Start
-from activesteer.simulation.live_view import Pacer
+from activesteer.simulation.live_view import FramePacer
 
 
 class Clock:
@@ -28,12 +28,12 @@ class Clock:
         return self.now_s
 
 
-def drive(course: str, folder: Path, controller: str = "none") -> Drive:
-    pacer = Pacer(clock=Clock(), sleep=lambda _: None)
-    return Drive(Start(maneuver=course, controllers=(controller,)), Folder(folder), pacer)
+def drive(course: str, folder: Path, controller: str = "none") -> DriveSession:
+    pacer = FramePacer(clock=Clock(), sleep=lambda _: None)
+    return DriveSession(Start(maneuver=course, controllers=(controller,)), Folder(folder), pacer)
 
 
-def go(car: Drive, until_s: float) -> dict[str, Any]:
+def go(car: DriveSession, until_s: float) -> dict[str, Any]:
     while True:
         header = car.frame().header
         if header["time_s"] >= until_s:

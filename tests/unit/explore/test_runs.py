@@ -11,7 +11,7 @@ import pytest
 
 import activesteer
 from activesteer.explore.choice import Folder
-from activesteer.explore.messages import Describe, Run
+from activesteer.explore.messages import Describe, RunRequest
 from activesteer.explore.runs import Runs
 
 CHOICE: dict[str, Any] = {"maneuver": "step_steer", "controllers": ("none", "ars")}
@@ -19,7 +19,7 @@ CHOICE: dict[str, Any] = {"maneuver": "step_steer", "controllers": ("none", "ars
 
 def test_a_run_of_the_page_is_the_run_of_its_command(tmp_path: Path) -> None:
     runs = Runs(Folder(tmp_path))
-    replies = list(runs.run(Run(**CHOICE, values={"speed_kmh": 90.0}), lambda: False))
+    replies = list(runs.run(RunRequest(**CHOICE, values={"speed_kmh": 90.0}), lambda: False))
     assert [reply.header["kind"] for reply in replies] == ["run", "run", "finished"]
     assert replies[-1].header["command"] == "activesteer run step_steer -c none -c ars --set speed_kmh=90"
     again = activesteer.simulate("step_steer", "ars", overrides={"speed_kmh": 90.0})
@@ -34,7 +34,9 @@ def test_a_run_of_the_page_is_the_run_of_its_command(tmp_path: Path) -> None:
 def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_path: Path) -> None:
     runs, amplitudes = Runs(Folder(tmp_path)), []
     for speed, dragging in ((80.0, False), (100.0, True), (100.0, False)):
-        (run, _) = runs.run(Run(maneuver="step_steer", dragging=dragging, values={"speed_kmh": speed}), lambda: False)
+        (run, _) = runs.run(
+            RunRequest(maneuver="step_steer", dragging=dragging, values={"speed_kmh": speed}), lambda: False
+        )
         wheel = next(panel for panel in run.header["plots"]["panels"] if panel["title"].startswith("Steering wheel"))
         amplitudes.append(wheel["series"][0]["values"][-1])
     assert amplitudes[1] == pytest.approx(amplitudes[0], rel=1e-3)  # the column twists a little
@@ -43,7 +45,7 @@ def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_p
 
 def test_a_newer_choice_drops_the_rest_of_the_runs(tmp_path: Path) -> None:
     looks = iter([False] * 3 + [True] * 10)
-    assert list(Runs(Folder(tmp_path)).run(Run(**CHOICE), lambda: next(looks))) == []
+    assert list(Runs(Folder(tmp_path)).run(RunRequest(**CHOICE), lambda: next(looks))) == []
 
 
 def test_the_shape_of_the_car_covers_its_length_and_stands_on_four_wheels(tmp_path: Path) -> None:
@@ -57,7 +59,7 @@ def test_the_shape_of_the_car_covers_its_length_and_stands_on_four_wheels(tmp_pa
 def test_a_count_has_no_decimals_and_groups_of_gains_are_named_in_words(tmp_path: Path) -> None:
     choice: dict[str, Any] = {"maneuver": "slalom", "controllers": ("ars",)}
     runs = Runs(Folder(tmp_path))
-    figures = next(iter(runs.run(Run(**choice), lambda: False))).header["figures"]
+    figures = next(iter(runs.run(RunRequest(**choice), lambda: False))).header["figures"]
     assert {figure["title"]: figure["digits"] for figure in figures}["Cones hit"] == 0
     assert {figure["title"]: figure["digits"] for figure in figures}["Peak sideslip"] is None
     groups = {slider["group"] for slider in runs.describe(Describe(**choice)).header["sliders"]}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from activesteer.analysis.path_following import metrics
+from activesteer.analysis.path_following import path_following_metrics
 from activesteer.conventions import CORNERS
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.follow_path import FollowPath
@@ -89,7 +89,7 @@ def test_lap_time_and_overstep_of_a_car_beside_the_path(tmp_path: Path) -> None:
     run = SyntheticRun(time_s, channels, "follow_path")
     car = {"width_m": 1.8, "wheelbase_m": 2.6, "front_track_m": 1.5, "rear_track_m": 1.5, "tyre_width_m": [0.2, 0.2]}
     run.metadata |= {"course": course.to_table(), "car": car}
-    values = metrics(run)
+    values = path_following_metrics(run)
     assert values["lap_time_s"] == pytest.approx(path.length_m / 10.0, abs=0.02)
     assert values["road_overstep_m"] == pytest.approx(1.0 + 0.9 - 3.0, abs=0.02)
 

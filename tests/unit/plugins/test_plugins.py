@@ -15,8 +15,8 @@ import pytest
 
 from activesteer import ActuatorCommand, DriverCommand, simulate
 from activesteer.config import Range
-from activesteer.controllers import find_controller
-from activesteer.driver import find_driver
+from activesteer.controllers import controller_spec
+from activesteer.driver import driver_spec
 from activesteer.errors import ControllerError, DriverError, ParameterError
 from activesteer.scenario import resolve, value_of
 from activesteer.signals import WheelTorques, new_message
@@ -48,7 +48,7 @@ def factory(setup: Any, gain: float = 3.0) -> Counting:
 
 
 def first_angle(given: Any) -> float:
-    return find_controller(given).make(setup()).step(steering(0.0), measured(0.0)).rear_steer_demand_rad
+    return controller_spec(given).make(setup()).step(steering(0.0), measured(0.0)).rear_steer_demand_rad
 
 
 @pytest.fixture
@@ -118,7 +118,7 @@ def test_object_used_twice_carries_nothing_over():
     ],
 )
 def test_parameters_of_a_file_are_typed_as_in_toml(gains, query, parameters):
-    found = find_controller(f"{gains}:Mine{query}")
+    found = controller_spec(f"{gains}:Mine{query}")
     assert found.parameters == parameters
     inner = found.make(setup()).inner
     assert {key: getattr(inner, key) for key in parameters} == parameters
@@ -135,11 +135,11 @@ def test_parameters_of_a_file_are_typed_as_in_toml(gains, query, parameters):
 )
 def test_wrong_parameter_is_answered(gains, query, value, allowed):
     with raises(ControllerError, value=value, allowed=allowed):
-        find_controller(f"{gains}:Mine{query}")
+        controller_spec(f"{gains}:Mine{query}")
 
 
 def test_parameters_of_two_runs_tell_their_labels_apart(gains):
-    labels = [find_controller(f"{gains}:Mine{query}").label for query in ("", "?gain=1", "?gain=2", "?side=a/b")]
+    labels = [controller_spec(f"{gains}:Mine{query}").label for query in ("", "?gain=1", "?gain=2", "?side=a/b")]
     assert labels == ["Mine", "Mine-gain=1", "Mine-gain=2", "Mine-side=a_b"]
 
 
@@ -154,12 +154,12 @@ def test_wrong_object_is_answered(given):
 @pytest.mark.parametrize("given", [int, dict, Path])
 def test_class_that_is_no_controller_is_answered(given):
     with raises(ControllerError, value=given):
-        find_controller(given)
+        controller_spec(given)
 
 
 def test_factory_that_makes_something_else_is_answered():
     with raises(ControllerError, key="controller test_plugins.py:_lambda", value=5):
-        find_controller(lambda: 5).make(setup())
+        controller_spec(lambda: 5).make(setup())
 
 
 def test_object_that_cannot_be_copied_is_answered(tmp_path):
@@ -170,14 +170,14 @@ def test_object_that_cannot_be_copied_is_answered(tmp_path):
 
     mine = Logging(tmp_path / "log")
     with mine.file, raises(ControllerError, key="controller test_plugins.py:Logging"):
-        find_controller(mine).make(setup())
+        controller_spec(mine).make(setup())
 
 
 @pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, lambda path: path.symlink_to("/dev/zero"), lambda path: None])
 def test_what_is_no_file_is_answered(tmp_path, make):
     make(tmp_path / "mine.py")
     with raises(ControllerError, value=f"{tmp_path}/mine.py:Mine"):
-        find_controller(f"{tmp_path}/mine.py:Mine")
+        controller_spec(f"{tmp_path}/mine.py:Mine")
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_what_is_no_file_is_answered(tmp_path, make):
 )
 def test_name_that_no_file_can_have_is_answered(name):
     with pytest.raises(ControllerError) as told:
-        find_controller(name)
+        controller_spec(name)
     assert len(told.value.problem) < 700
 
 
@@ -194,7 +194,7 @@ def test_file_that_does_not_run_is_answered(tmp_path, text):
     path = tmp_path / "mine.py"
     path.write_text(text)
     with pytest.raises(ControllerError) as refused:
-        find_controller(f"{path}:Mine")
+        controller_spec(f"{path}:Mine")
     assert refused.value.value in (path, f"{path}:Mine")
 
 
@@ -425,7 +425,7 @@ def test_torques_of_the_wheels_are_checked():
 
 def test_unknown_driver_is_answered():
     with raises(DriverError, value="typicle", allowed=("expert", "novice", "typical")):
-        find_driver("typicle")
+        driver_spec("typicle")
 
 
 YAW_BETA = """
@@ -445,7 +445,7 @@ YAW_BETA = """
 
 
 def test_declared_parameters_have_name_default_unit_and_range(write):
-    declared = find_controller(f"{write(YAW_BETA)}:YawBeta").declared
+    declared = controller_spec(f"{write(YAW_BETA)}:YawBeta").declared
     assert [(name, each.default, each.unit) for name, each in declared.items()] == [
         ("k_beta", 0.4, "rad/rad"), ("k_yaw", 0.1, ""), ("limit_rad", 0.05, "rad"),
     ]  # fmt: skip
@@ -455,8 +455,8 @@ def test_declared_parameters_have_name_default_unit_and_range(write):
 def test_key_of_a_parameter_means_the_same_as_the_question_mark(write):
     given, changed = f"{write(YAW_BETA)}:YawBeta", {"controllers.YawBeta.k_beta": 2, "controllers.YawBeta.limit_deg": 3}
     scenario = resolve("straight_line", overrides=changed, controllers=["none", given])
-    made = find_controller(given).make(scenario.controller_setup(0.001)).inner
-    asked = find_controller(f"{given}?k_beta=2&limit_deg=3").make(setup()).inner
+    made = controller_spec(given).make(scenario.controller_setup(0.001)).inner
+    asked = controller_spec(f"{given}?k_beta=2&limit_deg=3").make(setup()).inner
     assert made.values == asked.values == (2.0, 0.1, pytest.approx(math.radians(3.0)))
     assert value_of(scenario, "controllers.YawBeta.limit_deg", [given]) == pytest.approx(3.0)
     assert value_of(scenario, "controllers.YawBeta.k_yaw", [given]) == 0.1
@@ -492,13 +492,13 @@ def test_own_parameter_needs_its_controller(write):
 @pytest.mark.parametrize("name", ["lqr", "estimator", "ars_tuned"])
 def test_class_with_the_name_of_a_built_in_controller_is_refused(write, name):
     with raises(ControllerError, value=name):
-        find_controller(f"{write(YAW_BETA.replace('YawBeta', name))}:{name}")
+        controller_spec(f"{write(YAW_BETA.replace('YawBeta', name))}:{name}")
 
 
 def test_wrong_declaration_is_answered(write):
     path = write(YAW_BETA.replace('"k_beta": {', '"k_bta": {'))
     with raises(ControllerError):
-        find_controller(f"{path}:YawBeta")
+        controller_spec(f"{path}:YawBeta")
 
 
 def test_parameter_of_an_own_driver_is_a_key_too(write):
@@ -534,4 +534,4 @@ def test_misspelt_attribute_is_answered_with_the_nearest(write, body, attribute)
     step = "" if "step" in body else "\n            def step(self, command, measurement): return ActuatorCommand()"
     path = write(f"class Mine:\n    {body}{step}".replace("            def", "    def"))
     with pytest.raises(ControllerError, match=f"did you mean .*{attribute}"):
-        find_controller(f"{path}:Mine").make(setup()).step(steering(0.0), measured(0.0))
+        controller_spec(f"{path}:Mine").make(setup()).step(steering(0.0), measured(0.0))

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from activesteer.controllers import CONTROLLERS, ControllerParameters, find_controller, keys_read
+from activesteer.controllers import CONTROLLERS, ControllerParameters, controller_spec, keys_read
 from activesteer.controllers.variant import Variant
 from activesteer.errors import ParameterError
 from activesteer.resources import list_controller_variants
@@ -33,7 +33,7 @@ def test_controller_says_what_it_reads(name, monkeypatch):
     setup = resolve("straight_line", "compact_electric").controller_setup(0.01)
     asked = Asked(setup.gains)
     monkeypatch.setattr(Variant, "gains_in", lambda _, setup: setup.gains)
-    find_controller(name).make(replace(setup, gains=asked))  # pyright: ignore[reportArgumentType]
+    controller_spec(name).make(replace(setup, gains=asked))  # pyright: ignore[reportArgumentType]
     assert asked.names == keys_read(name) - {"interval_s", "bus_delay_s"}
 
 

@@ -24,7 +24,7 @@ from activesteer.maneuver import KINDS
 from activesteer.maneuver.steering_tests import StepSteer
 from activesteer.resources import find_vehicle, list_maneuvers, list_vehicles, models_dir
 from activesteer.scenario import VehicleConfig, describe, load_car, resolve
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 from tests.raising import raises
 
 SHORT = {"duration_s": 0.2, "settle_s": 0.0, "steer.start_s": 0.05, "steer.steering_wheel_deg": 20}
@@ -296,7 +296,7 @@ def test_mass_in_a_vehicle_file_leads_to_the_keys_that_change_it(vehicle):
 
 def search(**overrides: Any) -> float:
     keys = {"settle_s": 0.5} | {key.replace("__", "."): value for key, value in overrides.items()}
-    maneuver = prepared(resolve("step_steer", overrides=keys)).maneuver
+    maneuver = with_amplitude_found(resolve("step_steer", overrides=keys)).maneuver
     assert isinstance(maneuver, StepSteer)
     assert maneuver.steer.steering_wheel_rad is not None
     return maneuver.steer.steering_wheel_rad

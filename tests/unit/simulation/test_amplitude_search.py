@@ -14,7 +14,7 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver.braking import BrakeInTurn
 from activesteer.maneuver.steering_tests import SineWithDwell, StepSteer
 from activesteer.scenario import describe, resolve
-from activesteer.simulation.preparation import linear_tests, prepared, single_track_of
+from activesteer.simulation.preparation import linear_tests, single_track_of, with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from tests.raising import raises
 
@@ -22,7 +22,7 @@ from tests.raising import raises
 def dwell_deg(factor: float = 1.0, **overrides: Any) -> float:
     keys = {"steer.amplitude_factor": factor, "settle_s": 1.0}
     keys |= {key.replace("__", "."): value for key, value in overrides.items()}
-    maneuver = prepared(resolve("sine_with_dwell", overrides=keys)).maneuver
+    maneuver = with_amplitude_found(resolve("sine_with_dwell", overrides=keys)).maneuver
     assert isinstance(maneuver, SineWithDwell)
     assert maneuver.steer.steering_wheel_rad is not None
     return math.degrees(maneuver.steer.steering_wheel_rad)
@@ -54,7 +54,9 @@ def test_angle_is_rounded_to_a_tenth_of_a_degree_and_then_multiplied():
 def test_search_judges_whole_step_steers():
     # The search shares the time before the step between its runs, and records the end only.
     wanted, keys = 0.5 * GRAVITY_MPS2, {"steer.start_s": 0.3, "settle_s": 1.0}
-    maneuver = prepared(resolve("step_steer", overrides=keys | {"steer.lateral_acceleration_g": 0.5})).maneuver
+    maneuver = with_amplitude_found(
+        resolve("step_steer", overrides=keys | {"steer.lateral_acceleration_g": 0.5})
+    ).maneuver
     assert isinstance(maneuver, StepSteer)
     assert maneuver.steer.steering_wheel_rad is not None
     found_deg = math.degrees(maneuver.steer.steering_wheel_rad)
@@ -91,11 +93,11 @@ def test_heavier_car_has_an_angle_of_its_own():
 
 
 def test_found_angle_is_described_beside_its_aim():
-    scenario = prepared(resolve("sine_with_dwell", overrides={"settle_s": 1.0}))
+    scenario = with_amplitude_found(resolve("sine_with_dwell", overrides={"settle_s": 1.0}))
     steer = describe(scenario)["maneuver"]["steer"]
     assert steer["amplitude_factor"] == 5.0
     assert steer["steering_wheel_rad"] == pytest.approx(math.radians(dwell_deg(5.0)))
-    assert prepared(scenario) is scenario
+    assert with_amplitude_found(scenario) is scenario
 
 
 def test_road_too_slippery_for_03_g_is_answered():
@@ -105,7 +107,7 @@ def test_road_too_slippery_for_03_g_is_answered():
 
 def test_turn_before_the_brake_has_the_angle_of_a_step_steer():
     overrides = {"settle_s": 1.0, "turn.lateral_acceleration_mps2": 4.0}
-    maneuver = prepared(resolve("brake_in_turn", overrides=overrides)).maneuver
+    maneuver = with_amplitude_found(resolve("brake_in_turn", overrides=overrides)).maneuver
     assert isinstance(maneuver, BrakeInTurn)
     angle = maneuver.turn.steering_wheel_rad
     assert angle is not None

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.scenario import resolve
 from activesteer.simulation import amplitude_store, preparation
-from activesteer.simulation.preparation import prepared
+from activesteer.simulation.preparation import with_amplitude_found
 
 KEY, ANGLE_RAD = "0123456789abcdef" * 4, 0.1 + 0.2
 
@@ -31,7 +31,7 @@ def searches(monkeypatch):
 
 
 def angle(overrides: dict[str, Any] | None = None, vehicle: Any = "compact") -> float:
-    maneuver: Any = prepared(resolve("step_steer", vehicle, overrides or {})).maneuver
+    maneuver: Any = with_amplitude_found(resolve("step_steer", vehicle, overrides or {})).maneuver
     return maneuver.steer.steering_wheel_rad
 
 

@@ -153,6 +153,6 @@ class Omniscient:
 def test_use_of_the_truth_is_said_wherever_results_are_shown() -> None:
     recording = activesteer.simulate("step_steer", Omniscient, overrides=STEP | {"sensors.preset": "production"})
     assert recording.metadata["controller_uses_truth"] is True
-    assert activesteer.controllers.find_controller(Omniscient).label == "Omniscient+truth"
+    assert activesteer.controllers.controller_spec(Omniscient).label == "Omniscient+truth"
     assert np.abs(recording["rear_steer_demand_rad"]).max() > 1e-4
     assert "controller_uses_truth" not in activesteer.simulate("step_steer", "ars", overrides=STEP).metadata

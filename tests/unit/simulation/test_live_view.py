@@ -15,7 +15,7 @@ from activesteer.conventions import run_looks
 from activesteer.drawing.cars import shares_of
 from activesteer.scenario import resolve
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.live_view import FRAME_S, Keys, Pacer, drive, scene_for
+from activesteer.simulation.live_view import FRAME_S, FramePacer, Keys, drive, scene_for
 
 
 class Clock:
@@ -79,7 +79,7 @@ def watched(duration_s: float = 0.5, speed: float = 1.0, **look: Any):
     )  # instead of searching for it
     simulation, clock = ClosedLoop(scenario), Clock()
     stage = scene_for(simulation, scenario.maneuver)
-    viewer, pacer = Viewer(stage, clock, **look), Pacer(speed, clock, clock.sleep)
+    viewer, pacer = Viewer(stage, clock, **look), FramePacer(speed, clock, clock.sleep)
     return drive(simulation, stage, viewer, pacer, viewer.keys), viewer, clock, pacer, simulation
 
 
@@ -122,7 +122,7 @@ def test_viewer_that_is_far_too_slow_makes_the_drive_slower():
 
 def test_pause_is_not_caught_up_with():
     clock = Clock()
-    pacer = Pacer(1.0, clock, clock.sleep)
+    pacer = FramePacer(1.0, clock, clock.sleep)
     shown = pacer.next(0.0)
     clock.now_s += 30.0
     shown = pacer.next(shown)

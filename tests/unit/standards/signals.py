@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from activesteer.conventions import CURVE_STEP_S
-from activesteer.standards.standard import Run
+from activesteer.standards.standard import StandardRun
 
 
-def run_of(channels: dict[str, np.ndarray], **metrics: float) -> Run:
-    return Run({}, metrics, {name: np.asarray(values, dtype=float) for name, values in channels.items()}, "")
+def run_of(channels: dict[str, np.ndarray], **metrics: float) -> StandardRun:
+    return StandardRun({}, metrics, {name: np.asarray(values, dtype=float) for name, values in channels.items()}, "")
 
 
 def times(duration_s: float) -> np.ndarray:

@@ -17,10 +17,10 @@ from activesteer.pages import render_page
 from activesteer.standards import fmvss126
 from activesteer.standards.examination import examination_page, examine
 from activesteer.standards.fmvss126 import STANDARD, amplitudes, verdict
-from activesteer.standards.proving_ground import ProvingGround
-from activesteer.standards.standard import Findings, Ground
+from activesteer.standards.standard import Findings
+from activesteer.standards.study_test_runner import StudyTestRunner
 from tests.raising import raises
-from tests.unit.standards.grounds import WrittenGround
+from tests.unit.standards.runners import PrescribedRunner
 
 GOOD = {"factor": 5.0, "yaw_ratio_1s": 0.35, "yaw_ratio_175s": -0.2, "displacement_m": 1.83}
 
@@ -81,19 +81,19 @@ def test_displacement_counts_from_5_a_on():
 
 
 def test_a_car_that_keeps_the_limits_passes():
-    ground = WrittenGround(driven)
-    found = STANDARD.examine(ground)
+    runner = PrescribedRunner(driven)
+    found = STANDARD.examine(runner)
     assert found.passed is True
     assert found.values["A_deg"] == 30.0
     assert len(found.values["series"]) == 32
-    assert [case["steer.rate_degps"] for case in ground.asked["slowly_increasing_steer"]] == [13.5] * 3 + [-13.5] * 3
+    assert [case["steer.rate_degps"] for case in runner.asked["slowly_increasing_steer"]] == [13.5] * 3 + [-13.5] * 3
     assert set(found.values["series"][0]) >= {
         "direction", "amplitude_deg", "factor", "yaw_ratio_1s", "yaw_ratio_175s", "displacement_m", "pass",
     }  # fmt: skip
 
 
 def test_a_car_that_spins_to_one_side_fails_and_the_first_amplitude_is_named():
-    found = STANDARD.examine(WrittenGround(lambda series, case: driven(series, case, spins_from_deg=164.0)))
+    found = STANDARD.examine(PrescribedRunner(lambda series, case: driven(series, case, spins_from_deg=164.0)))
     assert found.passed is False
     assert "first at 5.5 A (165 deg), right first: yaw rate 80 %" in found.summary
     assert [row["pass"] for row in found.values["series"]].count(False) == 8
@@ -104,7 +104,7 @@ def test_a_run_in_which_the_car_tips_over_is_a_row_that_fails():
         over = case.get("steer.steering_wheel_deg", 0.0) > 260.0
         return "the car tips over" if over else driven(series, case)
 
-    found = STANDARD.examine(WrittenGround(tips))
+    found = STANDARD.examine(PrescribedRunner(tips))
     assert found.passed is False
     assert [row["amplitude_deg"] for row in found.values["series"] if not row["pass"]] == [270.0, 270.0]
     assert "no result: the car tips over" in found.summary
@@ -113,9 +113,9 @@ def test_a_run_in_which_the_car_tips_over_is_a_row_that_fails():
 
 
 def test_a_controller_with_which_the_car_cannot_be_tested_does_not_stop_the_others(monkeypatch):
-    def examined(ground: Ground) -> Findings:
-        good = isinstance(ground, ProvingGround) and ground.controller == "afs"
-        return STANDARD.examine(WrittenGround(driven if good else lambda *_: "it spins"))
+    def examined(runner: object) -> Findings:
+        good = isinstance(runner, StudyTestRunner) and runner.controller == "afs"
+        return STANDARD.examine(PrescribedRunner(driven if good else lambda *_: "it spins"))
 
     standard = dataclasses.replace(STANDARD, examine=examined)
     monkeypatch.setattr("activesteer.standards.examination.standard_of", lambda _: standard)
@@ -128,14 +128,14 @@ def test_a_controller_with_which_the_car_cannot_be_tested_does_not_stop_the_othe
 
 
 def test_noisy_sensors_are_drawn_anew_for_each_repetition():
-    ground = WrittenGround(driven, changed={"sensors.preset": "production"})
-    STANDARD.examine(ground)
-    assert [case["sensors.seed"] for case in ground.asked["slowly_increasing_steer"]] == [0, 1, 2, 0, 1, 2]
+    runner = PrescribedRunner(driven, changed={"sensors.preset": "production"})
+    STANDARD.examine(runner)
+    assert [case["sensors.seed"] for case in runner.asked["slowly_increasing_steer"]] == [0, 1, 2, 0, 1, 2]
 
 
 def test_a_car_that_does_not_get_to_0_375_g_has_no_a():
     with raises(ManeuverError, key="A"):
-        STANDARD.examine(WrittenGround(lambda *_: {"steering_wheel_at_0_3g_rad": math.nan}))
+        STANDARD.examine(PrescribedRunner(lambda *_: {"steering_wheel_at_0_3g_rad": math.nan}))
 
 
 def test_the_compact_keeps_the_limits_at_3_a_and_not_without_control_at_6_5_a(monkeypatch, tmp_path):

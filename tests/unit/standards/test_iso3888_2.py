@@ -11,8 +11,8 @@ from activesteer.scenario import resolve
 from activesteer.standards import iso3888_2
 from activesteer.standards.examination import examine
 from activesteer.standards.iso3888_2 import COARSE_KMH, best_run, highest_clean
-from activesteer.standards.standard import Run
-from tests.unit.standards.grounds import WrittenGround
+from activesteer.standards.standard import StandardRun
+from tests.unit.standards.runners import PrescribedRunner
 
 
 @pytest.mark.parametrize(("limit", "found"), [(54.0, 54.0), (54.9, 54.0), (55.0, 55.0), (100.0, 80.0), (20.0, None)])
@@ -40,13 +40,13 @@ def test_one_clean_line_is_enough_and_a_car_that_tips_over_is_a_row():
         clean = case["speed_kmh"] <= 52.0 and case["lane.margin_m"] == 0.15
         return {"stays_in_lanes": float(clean), "cones_hit": 0.0 if clean else 1.0, "lane_overstep_m": -0.1 * clean}
 
-    ground = WrittenGround(driven)
+    runner = PrescribedRunner(driven)
     # Without channels there is nothing to draw.
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(iso3888_2, "_pictures", lambda *_: [])
-        found = iso3888_2.STANDARD.examine(ground)
+        found = iso3888_2.STANDARD.examine(runner)
     assert found.values["entry_speed_kmh"] == {"left": 52.0, "right": 52.0}
-    assert [case["speed_kmh"] for case in ground.asked["left_fine"][::3]] == [51.0, 52.0, 53.0, 54.0]
+    assert [case["speed_kmh"] for case in runner.asked["left_fine"][::3]] == [51.0, 52.0, 53.0, 54.0]
     tipped = [row for row in found.values["runs"] if row["speed_kmh"] == 80.0]
     assert len(tipped) == 6
     assert all(row["error"] == "the car tips over" and not row["clean"] for row in tipped)
@@ -60,8 +60,8 @@ def test_one_clean_line_is_enough_and_a_car_that_tips_over_is_a_row():
 
 
 def test_the_run_that_is_shown_is_clean_where_there_is_one():
-    def run(speed_kmh: float, overstep_m: float, error: str = "") -> Run:
-        return Run({"speed_kmh": speed_kmh}, {"lane_overstep_m": overstep_m}, {}, error)
+    def run(speed_kmh: float, overstep_m: float, error: str = "") -> StandardRun:
+        return StandardRun({"speed_kmh": speed_kmh}, {"lane_overstep_m": overstep_m}, {}, error)
 
     roomy, narrow, wide = run(50.0, -0.2), run(54.0, -0.01), run(54.0, 0.3)
     assert best_run([roomy, narrow, wide], 54.0) is narrow

@@ -20,8 +20,8 @@ from activesteer.standards.examination import Examination, examine
 from activesteer.standards.iso14512 import after_one_second
 from activesteer.standards.iso21994 import corrected_distance
 from activesteer.standards.page_parts import metrics_table
-from activesteer.standards.proving_ground import ProvingGround
-from activesteer.standards.standard import Findings, Run, steering_wheel_at
+from activesteer.standards.standard import Findings, StandardRun, steering_wheel_at
+from activesteer.standards.study_test_runner import StudyTestRunner
 from tests.raising import raises
 from tests.unit.standards.signals import run_of, times
 
@@ -47,9 +47,9 @@ def test_settings_of_a_controller_are_for_the_controllers_that_read_them(monkeyp
     changes = {"controllers.ars.limit_deg": 2.0, "factors.mass": 1.1}
     given = {}
 
-    def look(ground: ProvingGround) -> Findings:
-        given[ground.controller] = dict(ground.overrides)
-        [run] = ground.drive("short", "straight_line", [{"speed_kmh": 50.0}], {"duration_s": 0.2})
+    def look(runner: StudyTestRunner) -> Findings:
+        given[runner.controller] = dict(runner.overrides)
+        [run] = runner.drive("short", "straight_line", [{"speed_kmh": 50.0}], {"duration_s": 0.2})
         return Findings({}, run.error)
 
     quick = replace(standard_of("iso4138"), examine=look)
@@ -77,7 +77,7 @@ class RampGround:
     def __init__(self, gain_mps2prad: float) -> None:
         self._gain = gain_mps2prad
 
-    def drive(self, *_: object, **__: object) -> list[Run]:
+    def drive(self, *_: object, **__: object) -> list[StandardRun]:
         steering = np.radians(5.0) * times(30.0)
         return [run_of({"steering_wheel_rad": steering, "ay_mps2": self._gain * steering})]
 
@@ -106,7 +106,7 @@ def test_one_second_after_the_brake_of_a_constant_yaw_acceleration():
 def test_a_run_that_ends_early_or_failed_has_no_value():
     run = run_of({"y_m": times(1.0)})
     assert math.isnan(run.at("y_m", 1.5))
-    failed = Run({}, {}, {}, "it diverged")
+    failed = StandardRun({}, {}, {}, "it diverged")
     assert math.isnan(failed.at("y_m", 0.5))
     assert failed.values == {"error": "it diverged"}
     with raises(RecordingError, problem="it diverged", value="y_m"):

@@ -13,14 +13,14 @@ from activesteer.files import json_text
 from activesteer.standards.examination import examine
 from activesteer.standards.fault_circle import CIRCLES
 from activesteer.standards.r79_circle import EFFORTS, FIGURES, RIM_RADIUS_M, STANDARD, reached
-from activesteer.standards.standard import Run
-from tests.unit.standards.grounds import WrittenGround
+from activesteer.standards.standard import StandardRun
+from tests.unit.standards.runners import PrescribedRunner
 from tests.unit.standards.signals import run_of, times
 
 SPEED_MPS = 10.0 / 3.6
 
 
-def spiral(tightest_m: float, force_N: float, side: float = 1.0) -> Run:
+def spiral(tightest_m: float, force_N: float, side: float = 1.0) -> StandardRun:
     """Return a spiral: the curvature and the force at the rim rise steadily for 4 s to their final values."""
     rising = np.clip(times(5.0) - 0.5, 0.0, 4.0) / 4.0
     return run_of({
@@ -29,7 +29,7 @@ def spiral(tightest_m: float, force_N: float, side: float = 1.0) -> Run:
     })  # fmt: skip
 
 
-class SpiralGround(WrittenGround):
+class SpiralRunner(PrescribedRunner):
     """A car with prescribed steering effort and faults."""
 
     def __init__(self, tightest_m: float = 9.0, force_N: float = 100.0) -> None:
@@ -50,11 +50,11 @@ def test_force_until_the_radius_of_a_known_spiral():
 
 
 def test_intact_and_without_power_assist_to_both_sides():
-    ground = SpiralGround()
-    found = STANDARD.examine(ground)
+    runner = SpiralRunner()
+    found = STANDARD.examine(runner)
     assert found.passed is True
     assert [row["direction"] for row in found.values["efforts"]] == ["left", "right"] * 2
-    intact, failed = ground.asked.values()
+    intact, failed = runner.asked.values()
     assert [case.get("steering.assist_fraction") for case in (*intact, *failed)] == [None, None, 0.0, 0.0]
     # To 12 m the wheel is turned further than to 20 m, by as much as the circle is tighter.
     assert intact[0]["steer.rate_degps"] == pytest.approx(20.0 / 12.0 * failed[0]["steer.rate_degps"])
@@ -65,20 +65,20 @@ def test_intact_and_without_power_assist_to_both_sides():
 )
 def test_more_than_the_effort_that_is_allowed_fails(force_N, steering):
     """A radius of 12 m needs three quarters of the force at 9 m, 20 m needs 9 / 20 of it."""
-    found = STANDARD.examine(SpiralGround(force_N=force_N))
+    found = STANDARD.examine(SpiralRunner(force_N=force_N))
     assert found.passed is False
     assert [row["steering"] for row in found.values["efforts"] if not row["pass"]] == steering
-    assert STANDARD.examine(SpiralGround(force_N=195.0)).passed is True
+    assert STANDARD.examine(SpiralRunner(force_N=195.0)).passed is True
 
 
 def test_a_radius_that_is_not_reached_fails():
-    found = STANDARD.examine(SpiralGround(tightest_m=15.0))
+    found = STANDARD.examine(SpiralRunner(tightest_m=15.0))
     assert found.passed is False
     assert "a radius of 12 m is not reached within 4 s" in found.summary
 
 
 def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
-    found = STANDARD.examine(SpiralGround())
+    found = STANDARD.examine(SpiralRunner())
     rows = {(row["fault"], row["direction"]): row for row in found.values["faults"]}
     assert rows["rear:float", "right"]["error"] == "the car tips over"
     assert "2 of 4 faults did not finish" in found.summary

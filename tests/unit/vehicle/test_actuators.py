@@ -12,7 +12,7 @@ from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError
 from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Tape, Vehicle
-from activesteer.vehicle.powertrain import Drive
+from activesteer.vehicle.powertrain import PowertrainLimits
 from tests.raising import raises
 from tests.unit.vehicle.cars import activation, actuator, dof, floating, standing, step
 
@@ -260,7 +260,7 @@ def test_the_drive_gives_what_the_engine_gives_at_the_mean_speed_of_its_wheels(
                 vehicle.data.qvel[dof(vehicle, f"{corner}_spin")] = speed
             vehicle.step(DriverCommand(drive_torque_demand_Nm=demand_Nm, gear=gear), ActuatorCommand())
         given = [float(vehicle.data.actuator_force[actuator(vehicle, f"{corner}_drive")]) for corner in CORNERS]
-        low, high = Drive(engine).limits_Nm(speed_radps, gear)
+        low, high = PowertrainLimits(engine).limits_Nm(speed_radps, gear)
         expected = high if demand_Nm > 0.0 else low
         np.testing.assert_allclose(given, expected * np.asarray(engine.wheel_fractions), rtol=1e-9, atol=1e-9)
         assert float(np.dot(given, turning)) <= engine.max_power_W * (1.0 + 1e-12)

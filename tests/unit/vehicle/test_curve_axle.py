@@ -14,7 +14,7 @@ from activesteer.conventions import Array
 from activesteer.errors import ModelError, ParameterError
 from activesteer.rigs.kc import kinematics_compliance
 from activesteer.rigs.kc.result import write_tables
-from activesteer.scenario import Car, load_car
+from activesteer.scenario import CarSpec, load_car
 from activesteer.studies.linear.linearisation import linear_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle_builder import new_vehicle
@@ -26,7 +26,7 @@ JOINTS = ("x", "y", "z", "toe", "camber", "caster")
 
 
 @pytest.fixture(scope="module")
-def guided(tmp_path_factory: pytest.TempPathFactory) -> Car:
+def guided(tmp_path_factory: pytest.TempPathFactory) -> CarSpec:
     """Return the compact with curves instead of links."""
     folder = tmp_path_factory.mktemp("kc")
     result = kinematics_compliance("compact")
@@ -35,7 +35,7 @@ def guided(tmp_path_factory: pytest.TempPathFactory) -> Car:
     return load_car(new_vehicle("guided", folder=folder / "car", kc=folder).vehicle_file)
 
 
-def strange(guided: Car) -> Vehicle:
+def strange(guided: CarSpec) -> Vehicle:
     """Return the same car with curves that bend in every coordinate, far from any real car."""
     return dataclasses.replace(guided, config=dataclasses.replace(guided.config, curves=other_curves())).on()
 
@@ -50,7 +50,7 @@ def suspension_forces(vehicle: Vehicle, qpos: Array) -> Array:
     return data.qfrc_passive.copy()
 
 
-def test_forces_are_the_slopes_of_an_energy(guided: Car, rng: np.random.Generator) -> None:
+def test_forces_are_the_slopes_of_an_energy(guided: CarSpec, rng: np.random.Generator) -> None:
     """Virtual work: the stiffness is symmetric wherever the wheels are, to 1e-6 of its largest entry.
 
     What a curve's slope hands from a side force to the springs it takes from the side: no way round gains work.
@@ -76,7 +76,7 @@ def test_forces_are_the_slopes_of_an_energy(guided: Car, rng: np.random.Generato
     assert np.abs(stiffness - stiffness.T).max() < 1e-6 * np.abs(stiffness).max()
 
 
-def test_left_and_right_are_mirror_images(guided: Car, rng: np.random.Generator) -> None:
+def test_left_and_right_are_mirror_images(guided: CarSpec, rng: np.random.Generator) -> None:
     vehicle = strange(guided)
     model = vehicle.model
     signs = np.array([1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
@@ -92,7 +92,7 @@ def test_left_and_right_are_mirror_images(guided: Car, rng: np.random.Generator)
     np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9, atol=1e-6)
 
 
-def test_the_rig_finds_the_measured_curves(guided: Car) -> None:
+def test_the_rig_finds_the_measured_curves(guided: CarSpec) -> None:
     """Over the whole travel within 0.01 deg and 0.1 mm; over forces as well as five numbers can describe it.
 
     Curves of parallel travel know nothing of the load of roll on the top mounts: the roll centre is 2 mm lower.
@@ -115,7 +115,7 @@ def test_the_rig_finds_the_measured_curves(guided: Car) -> None:
     assert after["front", "side_force_toe"] == pytest.approx(before["front", "side_force_toe"], abs=0.003)
 
 
-def test_a_guided_car_drives_as_the_one_it_was_measured_on(guided: Car) -> None:
+def test_a_guided_car_drives_as_the_one_it_was_measured_on(guided: CarSpec) -> None:
     """A step of 30 deg: steady state within 1 %, peaks within 3 %."""
     file = Path(guided.mjcf).with_suffix(".toml")
     runs = [simulate("step_steer", "none", car, {"steer.steering_wheel_deg": 30.0}) for car in ("compact", file)]
@@ -125,7 +125,7 @@ def test_a_guided_car_drives_as_the_one_it_was_measured_on(guided: Car) -> None:
         assert np.abs(runs[1][channel]).max() == pytest.approx(np.abs(runs[0][channel]).max(), rel=0.03), channel
 
 
-def test_half_a_step_changes_nothing(guided: Car) -> None:
+def test_half_a_step_changes_nothing(guided: CarSpec) -> None:
     """The stiff part is implicit in the engine, the curvature is not; together they do not depend on the step."""
     file = Path(guided.mjcf).with_suffix(".toml")
     changes = {"steer.steering_wheel_deg": 90.0, "duration_s": 2.0}
@@ -133,7 +133,7 @@ def test_half_a_step_changes_nothing(guided: Car) -> None:
     assert np.abs(rolls[1]).max() == pytest.approx(np.abs(rolls[0]).max(), rel=2e-3)
 
 
-def test_the_state_is_complete(guided: Car) -> None:
+def test_the_state_is_complete(guided: CarSpec) -> None:
     vehicle = guided.on()
     vehicle.start(20.0)
     for _ in range(50):

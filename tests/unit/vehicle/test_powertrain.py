@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from activesteer.vehicle.parameters import Powertrain
-from activesteer.vehicle.powertrain import Drive
+from activesteer.vehicle.powertrain import PowertrainLimits
 
 ENGINE = Powertrain(
     front_fraction=0.3,
@@ -15,7 +15,7 @@ ENGINE = Powertrain(
     engine_brake_torque_Nm=300.0,
     max_wheel_speed_radps=240.0,
 )
-DRIVE = Drive(ENGINE)
+DRIVE = PowertrainLimits(ENGINE)
 
 
 def high(speed_radps: float) -> float:

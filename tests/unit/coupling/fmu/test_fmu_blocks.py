@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.controllers import find_controller
-from activesteer.driver import find_driver
+from activesteer.controllers import controller_spec
+from activesteer.driver import driver_spec
 from activesteer.errors import ControllerError, DriverError
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, Measurement
@@ -63,7 +63,7 @@ def changed(fmu, target, edits=(), left_out="", added=()):
 
 
 def made(given, **setup):
-    return find_controller(given).make(resolve("straight_line").controller_setup(setup.get("timestep_s", 1e-3)))
+    return controller_spec(given).make(resolve("straight_line").controller_setup(setup.get("timestep_s", 1e-3)))
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -99,7 +99,7 @@ def test_a_map_names_signal_and_unit(fmus, tmp_path):
     ):
         toml.write_text(text)
         with pytest.raises(ControllerError, match=said):
-            find_controller(fmu)
+            controller_spec(fmu)
 
 
 def test_a_path_is_no_signal_of_an_fmu(fmus, tmp_path):
@@ -108,7 +108,7 @@ def test_a_path_is_no_signal_of_an_fmu(fmus, tmp_path):
     )
     (tmp_path / "d.toml").write_text('yaw_rate_radps = { signal = "path" }')
     with pytest.raises(DriverError, match="path is no number"):
-        find_driver(fmu)
+        driver_spec(fmu)
 
 
 def test_an_fmu_drives(fmus, tmp_path):
@@ -127,7 +127,7 @@ def test_an_fmu_drives(fmus, tmp_path):
 def test_variables_without_a_signal_are_listed_in_one_message(fmus, tmp_path):
     fmu = changed(fmus / "paper_afs_fmi2.fmu", tmp_path / "x.fmu", [("speed_mps'", "v'"), ("correction_rad", "c")])
     with pytest.raises(ControllerError, match=r"inputs v and outputs c; .* write x.toml"):
-        find_controller(fmu)
+        controller_spec(fmu)
 
 
 def test_parameters_are_keys_and_set_before_the_initialisation(fmus, tmp_path):
@@ -139,10 +139,10 @@ def test_parameters_are_keys_and_set_before_the_initialisation(fmus, tmp_path):
     changes = {"controllers.yaw_damper_fmi2.limit_deg": 2.0, "controllers.yaw_damper_fmi2.gain_s": 0.1}
     fmu = fmus / "yaw_damper_fmi2.fmu"
     setup = resolve("straight_line", overrides=changes, controllers=[fmu]).controller_setup(1e-3)
-    assert find_controller(fmu).make(setup).step(DriverCommand(), MEASUREMENT).rear_steer_demand_rad == double
+    assert controller_spec(fmu).make(setup).step(DriverCommand(), MEASUREMENT).rear_steer_demand_rad == double
     shutil.copy(fmu, taken := tmp_path / "lqr.fmu")
     with pytest.raises(ControllerError, match="cannot have the name 'lqr'"):
-        find_controller(taken)
+        controller_spec(taken)
 
 
 @pytest.mark.parametrize("text", ["yaw_damper_fmi2.fmu", "yaw_damper_fmi3.fmu?isolate=20"])
@@ -219,14 +219,14 @@ def test_an_archive_cannot_write_outside_of_its_folder_or_fill_the_disk(fmus, tm
     for info in ("../evil", "/evil", "resources/../../evil", "a\\evil", link):
         fmu = changed(fmus / "yaw_damper_fmi2.fmu", tmp_path / "x.fmu", added=[(info, "/etc")])
         with pytest.raises(ControllerError, match="outside of the FMU"):
-            find_controller(fmu)
+            controller_spec(fmu)
     monkeypatch.setattr("activesteer.limits.MAX_FMU_UNPACKED_BYTES", 10_000)
     fmu = changed(fmus / "yaw_damper_fmi2.fmu", tmp_path / "x.fmu", added=[("resources/zeros", bytes(100_000))])
     with pytest.raises(ControllerError, match="unpacked bytes, at most 10000"):
-        find_controller(fmu)
+        controller_spec(fmu)
     (tmp_path / "x.fmu").write_bytes((fmus / "yaw_damper_fmi2.fmu").read_bytes()[:-100])
     with pytest.raises(ControllerError, match="is not an FMU"):
-        find_controller(tmp_path / "x.fmu")
+        controller_spec(tmp_path / "x.fmu")
 
 
 def test_an_fmu_steps_at_its_own_multiple_and_its_output_is_held(fmus, tmp_path):

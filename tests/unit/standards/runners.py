@@ -1,4 +1,4 @@
-"""A proving ground with prescribed runs."""
+"""A test runner with prescribed runs."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from activesteer.scenario import FileOrTable, Scenario, resolve
-from activesteer.standards.standard import Run
+from activesteer.standards.standard import StandardRun
 
-Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float] | str | Run]
+Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float] | str | StandardRun]
 """Series, case -> metrics, or why there are none; a whole run where channels are looked at."""
 
 
 @dataclass
-class WrittenGround:
-    """A proving ground that returns prescribed runs and records the requests."""
+class PrescribedRunner:
+    """A test runner that returns prescribed runs and records the requests."""
 
     driven: Driven
     vehicle: FileOrTable = "compact"
@@ -32,7 +32,7 @@ class WrittenGround:
         cases: Sequence[Mapping[str, Any]],
         overrides: Mapping[str, Any] | None = None,
         curves: Sequence[str] = (),
-    ) -> list[Run]:
+    ) -> list[StandardRun]:
         # Every case must be one that can be driven.
         resolve(maneuver, self.vehicle, {**(overrides or {}), **self.changed, **cases[0]})
         self.asked.setdefault(series, []).extend(dict(case) for case in cases)
@@ -42,7 +42,7 @@ class WrittenGround:
         raise NotImplementedError
 
 
-def _run(case: Mapping[str, Any], found: Mapping[str, float] | str | Run) -> Run:
-    if isinstance(found, Run):
+def _run(case: Mapping[str, Any], found: Mapping[str, float] | str | StandardRun) -> StandardRun:
+    if isinstance(found, StandardRun):
         return found
-    return Run(case, {}, {}, found) if isinstance(found, str) else Run(case, found, {}, "")
+    return StandardRun(case, {}, {}, found) if isinstance(found, str) else StandardRun(case, found, {}, "")

@@ -1,4 +1,4 @@
-"""Proving ground of a standard: series of runs on the study engine, in one set of workers."""
+"""test runner of a standard: series of runs on the study engine, in one set of workers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.standards.fault_circle import fault_circles
-from activesteer.standards.standard import Run
+from activesteer.standards.standard import StandardRun
 from activesteer.studies.engine import run_task
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.workers import Workers
 
 
 @dataclass(frozen=True)
-class ProvingGround:
+class StudyTestRunner:
     """A car with a controller and a driver.
 
     Attributes:
@@ -42,7 +42,7 @@ class ProvingGround:
     progress: Callable[[str, int, int], None]
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
-        """See `Ground`."""
+        """See `TestRunner`."""
         changes = {**(overrides or {}), **self.overrides}
         return resolve(maneuver, self.vehicle, changes, self.driver, [self.controller])
 
@@ -53,8 +53,8 @@ class ProvingGround:
         cases: Sequence[Mapping[str, Any]],
         overrides: Mapping[str, Any] | None = None,
         curves: Sequence[str] = (),
-    ) -> list[Run]:
-        """See `Ground`."""
+    ) -> list[StandardRun]:
+        """See `TestRunner`."""
         table = study(
             {
                 "title": f"{self.standard}: {series}",
@@ -73,16 +73,16 @@ class ProvingGround:
         return [_run(row, case) for row, case in zip(table.to_pylist(), cases, strict=True)]
 
     def fault_circles(self) -> list[dict[str, Any]]:
-        """See `Ground`; the runs are not kept."""
+        """See `TestRunner`; the runs are not kept."""
         return fault_circles(
             self.controller, self.vehicle, self.overrides, self.driver, self.workers,
             lambda done, total: self.progress("fault_circles", done, total),
         )  # fmt: skip
 
 
-def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> Run:
+def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> StandardRun:
     told = {*case, "run", "sample"}
-    return Run(
+    return StandardRun(
         case,
         {name: value for name, value in row.items() if isinstance(value, float) and name not in told},
         {
