@@ -36,13 +36,7 @@ class Child:
     """A child process with time limits for its answers, and its process group, which ends with it."""
 
     def __init__(self, file: str, max_memory_bytes: int | None = None, *, quiet: bool = False) -> None:
-        """Start the process.
-
-        Args:
-            file: Python file with a function `make_answerer`; it returns a function from request to answer.
-            max_memory_bytes: Limit of the child's data; None for none.
-            quiet: Whether to discard what the child prints.
-        """
+        """Start the process."""
         self._socket, theirs = socket.socketpair()
         limit = "" if max_memory_bytes is None else str(max_memory_bytes)
         words = [file, str(theirs.fileno()), str(os.getpid()), limit, json.dumps(sys.path)]
@@ -60,17 +54,7 @@ class Child:
         return self._finalizer.alive
 
     def ask(self, request: bytes, doing: str, limit_s: float, max_bytes: int) -> bytes:
-        """Return the answer to a request. The child is killed if there is none.
-
-        Args:
-            request: The request.
-            doing: What the child does meanwhile, in words.
-            limit_s: Time until the end of the answer [s].
-            max_bytes: Largest answer.
-
-        Raises:
-            ChildFault: the child ended, is too slow, or its answer is too long.
-        """
+        """Return the answer to a request. The child is killed if there is none."""
         if not self.alive:
             raise ChildFault(f"has ended, before {doing}")
         try:

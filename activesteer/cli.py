@@ -14,15 +14,7 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of the console script.
-
-    Args:
-        arguments: Words after the name of the program; those of the process by default. Only then does the process
-            belong to the program: Ctrl-C and SIGTERM end it, see `commands.stopping`.
-
-    Returns:
-        Exit status: 0, 1 after an explained error, 130 after Ctrl-C, 143 after SIGTERM.
-    """
+    """Entry point of the console script."""
     # Before anything else is imported: a signal may come at any moment.
     from io import TextIOWrapper
 

@@ -80,12 +80,7 @@ def _know_shared() -> None:
 
 
 def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], CFunc]:
-    """Decorator: compile a function now to a C function that the engine can call, and keep it on disk.
-
-    Args:
-        result: Type of the result.
-        arguments: Types of the arguments.
-    """
+    """Decorator: compile a function now to a C function that the engine can call, and keep it on disk."""
 
     def decorate(function: Callable[..., Any]) -> CFunc:
         _know_shared()
@@ -103,12 +98,6 @@ def compiled_call(
     """Decorator: compile a function now to native code with one signature.
 
     Call it from Python only, with positional arguments; it does not inspect their types first.
-
-    Args:
-        result: Type of the result.
-        arguments: Types of the arguments; what is passed is converted.
-        others_run: Let other threads run during the call; this costs more than a small function does.
-        about: Name and file of what a function made by another function is about, to tell the kept code apart.
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
@@ -211,17 +200,7 @@ def _say_uncached() -> None:
 
 
 def content_key(source: Path) -> str:
-    """Return a key of the code compiled from a file: all sources behind it, and the versions of the compilers.
-
-    Args:
-        source: A file of a package.
-
-    Returns:
-        A hexadecimal digest.
-
-    Raises:
-        OSError: the file cannot be read.
-    """
+    """Return a key of the code compiled from a file: all sources behind it, and the versions of the compilers."""
     return hashlib.sha256(f"{_versions()}\n{_sources_key(source)}".encode()).hexdigest()
 
 

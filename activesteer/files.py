@@ -45,12 +45,6 @@ def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) ->
 
     No one can read half a file: if the body fails, the new file is deleted and the old one stays. A device is written
     directly.
-
-    Yields:
-        Path to write to, with the ending of `path`.
-
-    Raises:
-        ActiveSteerError: the body raised an OSError, or `path` may not be replaced; of class `error`.
     """
     with _refused("write", path, error):
         target = Path(os.path.realpath(path))
@@ -69,11 +63,7 @@ def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) ->
 
 @contextmanager
 def temporary_file(part: Path) -> Iterator[None]:
-    """Context around the writing of a temporary file; deletes the file if it still exists at the end.
-
-    Args:
-        part: The file; `delete_temporary_files` deletes it too.
-    """
+    """Context around the writing of a temporary file; deletes the file if it still exists at the end."""
     _passing.add(part)
     try:
         yield
@@ -90,11 +80,7 @@ def delete_temporary_files() -> None:
 
 
 def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerError]) -> Path:
-    """Write a text file in UTF-8, and return its path; an existing file is replaced as a whole.
-
-    Raises:
-        ActiveSteerError: the file cannot be written; of class `error`.
-    """
+    """Write a text file in UTF-8, and return its path; an existing file is replaced as a whole."""
     with atomic_write(path, error) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)
@@ -126,11 +112,7 @@ def file_word(text: str) -> str:
 
 
 def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:
-    """Return a path with `~` replaced by the home folder.
-
-    Raises:
-        ActiveSteerError: there is no such home folder; of class `error`.
-    """
+    """Return a path with `~` replaced by the home folder."""
     try:
         return Path(os.fsdecode(path)).expanduser()
     except RuntimeError as reason:
@@ -165,11 +147,7 @@ def why_no_file(path: str | os.PathLike[str]) -> str:
 def read_bytes(
     path: str | os.PathLike[str], error: type[ActiveSteerError], max_bytes: int = limits.MAX_TEXT_BYTES
 ) -> bytes:
-    """Read a regular file of limited size.
-
-    Raises:
-        ActiveSteerError: the file cannot be read, is a folder, pipe or device, or is too long; of class `error`.
-    """
+    """Read a regular file of limited size."""
     with reading(path, error):
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
@@ -218,17 +196,6 @@ def read_csv(
     """Read the rows of a CSV with cells separated by commas, semicolons or tabs; the first line with any decides.
 
     Text after `#` is a comment. With semicolons or tabs, 1,5 is the number 1.5.
-
-    Args:
-        path: The file.
-        error: Class of the errors.
-        empty_cells_count: Whether to keep rows with empty cells only, as spreadsheets leave them at the end.
-
-    Returns:
-        Rows that are not empty.
-
-    Raises:
-        ActiveSteerError: the file cannot be read, or is no CSV; of class `error`.
     """
     lines = [line.partition("#")[0] for line in read_text(path, error, limits.MAX_CSV_BYTES).split("\n")]
     separator = next((sign for line in lines for sign in ";\t," if sign in line), ",")
@@ -247,11 +214,7 @@ def read_csv(
 
 
 def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, column: str) -> float:
-    """Return the number in a cell of a CSV.
-
-    Raises:
-        ActiveSteerError: the cell holds no finite number, or one above `limits.MAX_NUMBER`; of class `error`.
-    """
+    """Return the number in a cell of a CSV."""
     try:
         value = float(cell)
     except ValueError:
@@ -261,11 +224,7 @@ def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, c
 
 
 def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:
-    """Create a folder with its parents if needed, and return its path.
-
-    Raises:
-        ActiveSteerError: the folder cannot be created, or is a file; of class `error`.
-    """
+    """Create a folder with its parents if needed, and return its path."""
     folder = Path(path)
     with _refused("make the folder", folder, error):
         folder.mkdir(parents=True, exist_ok=True)

@@ -86,28 +86,13 @@ MAX_LIST_ELEMENTS: Final = 1_000_000
 
 
 def check_count(count: int, most: int, what: str, error: type[ActiveSteerError], **place: Any) -> None:
-    """Refuse more than `most`.
-
-    Args:
-        count: Number of things, or size.
-        most: What is allowed.
-        what: The things, in the plural.
-        error: Class of the error.
-        place: `file`, `line` and `key` of the error.
-    """
+    """Refuse more than `most`."""
     if count > most:
         raise error(f"has {count} {what}, at most {most} are allowed", value=count, allowed=most, **place)
 
 
 def check_number(value: float, error: type[ActiveSteerError], *, text: Any = None, **place: Any) -> None:
-    """Refuse a number that is not finite or above `MAX_NUMBER`.
-
-    Args:
-        value: The number.
-        error: Class of the error.
-        text: The number as the file has it.
-        place: `file`, `line` and `key` of the error.
-    """
+    """Refuse a number that is not finite or above `MAX_NUMBER`."""
     given = value if text is None else text
     if not math.isfinite(value):
         raise error(f"{shown(given)} is not a finite number", value=given, **place)

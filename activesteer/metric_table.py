@@ -249,11 +249,7 @@ METRICS: Final = {
 
 
 def metric(name: str) -> Metric:
-    """Return a declared metric.
-
-    Raises:
-        ParameterError: no metric has this name.
-    """
+    """Return a declared metric."""
     if name in RENAMED:
         raise ParameterError(f"this metric is now {RENAMED[name]}", value=name)
     if name not in METRICS:

@@ -28,14 +28,6 @@ def text_table(
 
     A table that is too wide gets narrower columns, then smaller gaps. If that is not enough, it is split into several
     tables below each other, or its words are wrapped.
-
-    Args:
-        rows: Cells of each row, all of the same number.
-        text: Number of the first columns that hold words, aligned to the left; the others are aligned to the right.
-        repeat: Number of the first columns that every part of a split table repeats; None to wrap words instead.
-        least: Least width of the other columns if the table fits.
-        gap: Blanks between columns if the table fits.
-        marks: Beginning of the first line of each row; all of one length.
     """
     marks = marks or [""] * len(rows)
     width = COLUMNS - len(marks[0])

@@ -185,11 +185,7 @@ class Quantity(NamedTuple):
         return f"{self.short}\n[{self.unit.name}]"
 
     def value_text(self, value: float) -> str:
-        """Return a value as text without its unit, and a zero without a minus sign.
-
-        Args:
-            value: The value, SI; `n/a` if it is not finite.
-        """
+        """Return a value as text without its unit, and a zero without a minus sign."""
         if not math.isfinite(value):
             return "n/a"
         text = f"{value * self.factor:.{self.digits}f}"
@@ -204,14 +200,7 @@ _PARAMETER_WORDS: Final = {
 
 
 def parameter_label(key: str) -> tuple[str, str]:
-    """Return the label and the unit of a parameter, from the words of its key and its tables.
-
-    Args:
-        key: Dotted key, such as `controllers.ars.corrector.proportional_gain_s`.
-
-    Returns:
-        The label, such as `ARS corrector: proportional gain`, and the unit; empty for a pure number.
-    """
+    """Return the label and the unit of a parameter, from the words of its key and its tables."""
     stem, unit = split_ending(key)
     *tables, name = stem.split(".")
     within = " ".join(parameter_words(table) for table in tables if table not in _FILES)
@@ -285,11 +274,7 @@ _QUANTITIES: Final = {
 
 
 def quantity_of(channel: str) -> Quantity:
-    """Return the display of a channel.
-
-    Args:
-        channel: Name of the channel, possibly with a corner, `measured` or `estimated` before it.
-    """
+    """Return the display of a channel."""
     corner, _, rest = channel.partition("_")
     if corner in (MEASURED, ESTIMATED):
         true = quantity_of(rest)

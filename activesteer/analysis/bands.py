@@ -36,12 +36,7 @@ class Band(NamedTuple):
 
 
 def bands_of(recording: RecordingLike) -> Mapping[str, Band]:
-    """Return the population's bands for a run.
-
-    Returns:
-        Channel -> band. Empty if the run differs from the paper's, if the population varies another driver, or if no
-        population of the car is stored.
-    """
+    """Return the population's bands for a run."""
     maneuver, vehicle, driver = (_name(recording, part) for part in ("maneuver", "vehicle", "driver"))
     if claims_for(recording) is None or recording.metadata.get("overrides") or driver != DEFAULT_DRIVER:
         return {}

@@ -16,13 +16,7 @@ METRICS: Final = ("battery_energy_J", "steering_energy_J", "brake_energy_J")
 
 
 def energy_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the energies of a run; nothing for a car without motors.
-
-    Returns:
-        `battery_energy_J`, given by the battery from start to end, less what it took back; `steering_energy_J`,
-        mechanical work of the actuators of rear wheels and superposition where they drive (they recover nothing);
-        `brake_energy_J`, heat of the friction brakes. All in J.
-    """
+    """Return the energies of a run; nothing for a car without motors."""
     vehicle = recording.metadata.get("vehicle")
     if not isinstance(vehicle, Mapping) or not vehicle.get("motors"):
         return {}

@@ -127,16 +127,7 @@ displacement that the law asks for."""
 
 
 def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
-    """Return the growth of each measure by a controller [SI], for the measures that the manoeuvre has.
-
-    Args:
-        without: Metrics of the run without control; empty for a run that failed.
-        controlled: Metrics of the same run with the controller; empty for a run that failed.
-
-    Returns:
-        Name of the measure -> growth: infinite if the run with the controller alone does not define the measure, 0 if
-        both do not, minus infinity if only the run without control does not.
-    """
+    """Return the growth of each measure by a controller [SI], for the measures that the manoeuvre has."""
     found = {}
     for name, measure in MEASURES.items():
         before, after = measure.value(without), measure.value(controlled)

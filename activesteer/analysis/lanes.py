@@ -25,9 +25,6 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> f
 
     A corner of the body counts while it is between the two ends of a lane. The end of a side always counts, since a
     body that turns there covers it while its corners are elsewhere.
-
-    Returns:
-        Distance [m]; below 0, the smallest distance from a side. nan if no corner is ever inside a lane.
     """
     oversteps = [math.nan]
     for x, y in corners(recording, car):
@@ -58,9 +55,6 @@ def cone_distances(recording: RecordingLike, course: Course, car: Footprint) -> 
 
     A cone is a disc of `CONE_RADIUS_M` around its point. A cone on the side of a lane is the point itself, since the
     width of a lane is measured between the sides of its cones.
-
-    Returns:
-        Distance [m], shape (number of cones,); 0 or less for a cone that is hit, by the depth that the body covers.
     """
     radius_m = np.where(course.on_lane_side(), 0.0, CONE_RADIUS_M)
     return _distances(recording, course.cones_m, car) - radius_m
@@ -132,15 +126,6 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
     """Return the distance of points from a path of straight pieces, which continues straight beyond both of its ends.
 
     The nearest point of the path lies on a piece beside the nearest corner point.
-
-    Args:
-        x_m: World x of the points [m], shape (n,).
-        y_m: World y of the points [m], shape (n,).
-        path_x_m: World x of the path [m], shape (m,), m >= 2.
-        path_y_m: World y of the path [m], shape (m,).
-
-    Returns:
-        Distance [m], shape (n,), positive for a point to the left of the path; nan for a point that is not finite.
     """
     from scipy.spatial import KDTree  # noqa: PLC0415 - takes a while to import
 

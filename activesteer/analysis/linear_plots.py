@@ -41,14 +41,7 @@ def draw_bode(
     input_name: str = "steering_wheel_rad",
     recording: RecordingLike | None = None,
 ) -> Path:
-    """Draw gain and phase of yaw rate, lateral acceleration, roll and sideslip over frequency, and save them.
-
-    Args:
-        systems: Linear cars by label, with the outputs of a linearised car, or fewer of them.
-        path: File to write; its ending gives the format (.png, .pdf, .svg).
-        input_name: Input that the responses belong to.
-        recording: A sine sweep of the full car, drawn as dots within its frequencies.
-    """
+    """Draw gain and phase of yaw rate, lateral acceleration, roll and sideslip over frequency, and save them."""
     if not systems:
         raise ParameterError("there is no linear car to draw, at least one is needed")
     responses = {label: _responses(label, system, input_name) for label, system in systems.items()}
@@ -98,14 +91,7 @@ def driver_loops_figure(
     frequency_radps: NDArray[np.float64],
     responses: Sequence[NDArray[np.complexfloating]],
 ) -> Figure:
-    """Return Bode diagrams of the open loop of driver and car at the middle speed, and its damping over speed.
-
-    Args:
-        rows: Properties of each loop: `speed_kmh`, `controller`, `damping`, `damping_in_run`, `phase_margin_deg`,
-            `crossover_rad_s`.
-        frequency_radps: Frequencies [rad/s].
-        responses: Return ratios, one row for each loop.
-    """
+    """Return Bode diagrams of the open loop of driver and car at the middle speed, and its damping over speed."""
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))
@@ -145,13 +131,7 @@ def driver_loops_figure(
 def draw_root_locus(
     systems: Sequence[control.StateSpace], speeds_mps: Sequence[float], path: str | os.PathLike[str]
 ) -> Path:
-    """Draw the poles of a car over its speed, with rays of equal damping, and save the picture.
-
-    Args:
-        systems: The car linearised at every speed.
-        speeds_mps: The speeds [m/s].
-        path: File to write; its ending gives the format (.png, .pdf, .svg).
-    """
+    """Draw the poles of a car over its speed, with rays of equal damping, and save the picture."""
     if not systems or len(systems) != len(speeds_mps):
         raise ParameterError(
             f"{len(systems)} linear cars and {len(speeds_mps)} speeds given; as many of each are needed",

@@ -61,11 +61,7 @@ EVALUATIONS: Final[dict[str, Evaluation]] = {
 
 
 def evaluation_of(recording: RecordingLike) -> Evaluation:
-    """Return the evaluation of a run's kind of manoeuvre.
-
-    Raises:
-        RecordingError: the metadata name no kind, or a kind without an evaluation.
-    """
+    """Return the evaluation of a run's kind of manoeuvre."""
     kind = maneuver_kind(recording)
     if kind not in EVALUATIONS:
         raise RecordingError(

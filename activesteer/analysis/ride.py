@@ -33,16 +33,7 @@ def is_uneven(recording: RecordingLike) -> bool:
 
 
 def ride_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the metrics of the ride.
-
-    Returns:
-        - `seat_acceleration_rms_mps2`: RMS of the vertical acceleration at the seat, weighted by W_k.
-        - `wheel_load_coefficient_max`: standard deviation over mean of the load, of the wheel with the largest.
-        - `suspension_travel_max_m`: largest difference of travel of a wheel.
-        - `wheel_lift_share`: largest fraction of the time in which a wheel carries no load.
-        - `extended_road_share`: largest fraction of the time in which a wheel is beyond the known surface, where
-          `road.outside = "extend"` continues its edge.
-    """
+    """Return the metrics of the ride."""
     road = road_of(recording.metadata)
     extended = [
         road.extended_share(*(np.asarray(recording[f"{corner}_contact_{axis}_m"])[::_EVERY] for axis in "xy"))

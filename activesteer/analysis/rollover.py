@@ -27,12 +27,7 @@ KEY_METRICS: Final = (
 
 
 def rollover_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the general metrics, and those of the wheel loads.
-
-    Returns:
-        `two_wheel_lift_time_s`, the time with both wheels of a side lifted; `wheel_load_min_N`, the smallest vertical
-        load of any wheel; and the metrics of `general`.
-    """
+    """Return the general metrics, and those of the wheel loads."""
     loads_N = np.array([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS], dtype=np.float64)
     lifted = loads_N < LIFTED_N
     both = (lifted[0] & lifted[2]) | (lifted[1] & lifted[3])

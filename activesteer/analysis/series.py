@@ -69,15 +69,7 @@ def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
 
 
 def smooth(values: Array, timestep_s: float) -> Array:
-    """Smooth a signal without delay, by a cubic fitted around every sample (Savitzky and Golay, 1964).
-
-    Args:
-        values: Samples at equal distances, shape (n,).
-        timestep_s: Interval between the samples [s].
-
-    Returns:
-        Smoothed samples, shape (n,); the samples themselves if the window holds fewer than five.
-    """
+    """Smooth a signal without delay, by a cubic fitted around every sample (Savitzky and Golay, 1964)."""
     half = round(SMOOTHING_S / timestep_s / 2.0)
     window = 2 * half + 1
     if window < 5 or window > len(values):
@@ -91,16 +83,7 @@ def smooth(values: Array, timestep_s: float) -> Array:
 
 
 def crossing_time(time_s: Array, values: Array, level: float) -> float:
-    """Return the first time at which a signal rises through a level, interpolated between samples.
-
-    Args:
-        time_s: Time of the samples [s], ascending, shape (n,).
-        values: Samples, shape (n,).
-        level: Level, in the unit of `values`.
-
-    Returns:
-        Time [s]; nan if the signal never rises through the level.
-    """
+    """Return the first time at which a signal rises through a level, interpolated between samples."""
     rising = np.flatnonzero((values[:-1] < level) & (values[1:] >= level))
     if rising.size == 0:
         return math.nan
@@ -113,13 +96,6 @@ def largest_rate(values: Array, timestep_s: float) -> float:
     """Return the largest rate of change over `RATE_SPAN_S`.
 
     Unlike the slope of a smoothed signal it does not overshoot.
-
-    Args:
-        values: Samples at equal distances, shape (n,).
-        timestep_s: Interval between the samples [s].
-
-    Returns:
-        Magnitude of the rate, in the unit of `values` per second; nan if the signal is shorter than the span.
     """
     span = max(1, round(RATE_SPAN_S / timestep_s))
     if len(values) <= span:
@@ -139,18 +115,7 @@ def rms(values: Array) -> float:
 
 
 def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> float:
-    """Return the lag of a signal behind another signal: the shift at which the two are most alike.
-
-    Args:
-        leader: Samples at equal distances, shape (n,).
-        follower: Samples of the other signal, shape (n,).
-        timestep_s: Interval between the samples [s].
-        longest_s: Longest possible lag [s].
-
-    Returns:
-        Lag [s], by the maximum of the normalised cross-correlation, with a parabola between samples; nan if the maximum
-        is at an end of the range (the follower leads, or lags longer), or if a signal is zero.
-    """
+    """Return the lag of a signal behind another signal: the shift at which the two are most alike."""
     lead, follow = (np.asarray(values, dtype=np.float64) for values in (leader, follower))
     count, maximum = len(lead), round(longest_s / timestep_s)
     if count < 2 * maximum:
@@ -168,11 +133,7 @@ def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> 
 
 
 def timestep(time_s: Array) -> float:
-    """Return the interval between equidistant samples [s].
-
-    Raises:
-        RecordingError: fewer than two samples, or they are not equidistant within 1 % of a step.
-    """
+    """Return the interval between equidistant samples [s]."""
     if len(time_s) < 2:
         raise RecordingError(f"{len(time_s)} samples are too few to analyse, at least 2 are needed", value=len(time_s))
     steps = np.diff(time_s)
@@ -288,15 +249,7 @@ _AVERAGED_S: Final = 0.1
 
 
 def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
-    """Return the second before the steering wheel turns fast.
-
-    Args:
-        time_s: Time of the samples [s], equidistant, shape (n,).
-        steering_rad: Filtered steering wheel angle [rad], shape (n,).
-
-    Returns:
-        Samples of the range, as far as the run has them; none if the wheel never turns faster than 75 deg/s for 200 ms.
-    """
+    """Return the second before the steering wheel turns fast."""
     step_s = timestep(time_s)
     width = max(1, round(_AVERAGED_S / step_s))
     rate = np.convolve(np.gradient(steering_rad, step_s), np.full(width, 1.0 / width), mode="same")
@@ -337,15 +290,7 @@ class Loop(NamedTuple):
 
 
 def loop(x: Array, y: Array) -> Loop:
-    """Evaluate a loop.
-
-    Args:
-        x: Abscissa, which oscillates about zero, shape (n,).
-        y: Ordinate, shape (n,).
-
-    Raises:
-        RecordingError: a signal does not pass through zero both upwards and downwards.
-    """
+    """Evaluate a loop."""
     up, down = (crossings(x, y, rising=rising) for rising in (True, False))
     right, left = (crossings(y, x, rising=rising) for rising in (True, False))
     rate = np.gradient(x)

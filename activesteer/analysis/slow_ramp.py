@@ -30,12 +30,7 @@ KEY_METRICS: Final = (
 
 
 def slow_ramp_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the metrics of a slow ramp.
-
-    Returns:
-        The metrics of `handling`, and `steering_wheel_at_0_3g_rad`: the steering wheel angle at 0.3 g with its sign, by
-        the line through the filtered signals [rad]; nan if the run does not reach 0.375 g.
-    """
+    """Return the metrics of a slow ramp."""
     values = handling.handling_metrics(recording)
     step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
     ay = low_pass(recording["ay_mps2"], step_s, MOTION_CUT_OFF_Hz)

@@ -41,11 +41,7 @@ class Evaluable:
         self.time_s, self.metadata = recording.time_s, recording.metadata
 
     def __getitem__(self, name: str, /) -> NDArray[Any]:
-        """Return a channel over time, shape (n,).
-
-        Raises:
-            RecordingError: no channel has this name, or the channel is not finite.
-        """
+        """Return a channel over time, shape (n,)."""
         values = self._recording[name]
         usable = np.abs(values) <= _MAX_VALUE
         if not usable.all():

@@ -20,16 +20,7 @@ TYRE_USE_NOTE: Final = (
 
 
 def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = None) -> str:
-    """Return a table with a row per metric and a column per run.
-
-    Args:
-        runs: Metrics by label of the run; a metric that a run lacks leaves a blank.
-        paint: Colours the values of all runs but the first; None for no colours.
-
-    Returns:
-        Lines without a newline at the end: name, unit, then the values. A value that the run does not define (nan) is
-        shown as `-`; a value of a car that has turned round as `lost`.
-    """
+    """Return a table with a row per metric and a column per run."""
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows, first = [["", "", *runs]], next(iter(runs.values()), {})
     for name in names:

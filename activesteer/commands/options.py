@@ -61,14 +61,7 @@ class Group:
         self.commands: list[tuple[str, str, str, Sequence[Part], Action | Group]] = []
 
     def __call__(self, name: str, help: str, *parts: Part, description: str = "") -> Callable[[Action], Action]:
-        """Declare a command.
-
-        Args:
-            name: Name of the command.
-            help: One line for the list of commands.
-            parts: Its arguments.
-            description: First lines of the command's own help; `help` by default.
-        """
+        """Declare a command."""
 
         def declare(action: Action) -> Action:
             self.commands.append((name, help, description or f"{help[0].upper()}{help[1:]}.", parts, action))
@@ -124,11 +117,7 @@ class CommandLine:
         self.names = [name for group in groups for name, *_ in group.commands]
 
     def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
-        """Parse a command line; end the program with a correction if the command line is wrong.
-
-        Args:
-            arguments: Words after the name of the program; those of the process by default.
-        """
+        """Parse a command line; end the program with a correction if the command line is wrong."""
         words = list(sys.argv[1:] if arguments is None else arguments)
         command = next((word for word in words if not word.startswith("-")), None)
         if command in SUCCESSORS:
@@ -160,15 +149,7 @@ def _hint(parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -
 
 
 def option(names: str, metavar: str | tuple[Any, ...], help: str, default: Any = None, **words: Any) -> Option:
-    """Declare an argument with a value; its help ends with the default if there is one.
-
-    Args:
-        names: Names such as `-o --output`, or the name of an argument without dashes.
-        metavar: Name of its value, or all allowed values.
-        help: Help text.
-        default: Default value, whose type is the type of the values. A default in words belongs into the help text.
-        words: Further keywords of `argparse`. `many` allows the option several times.
-    """
+    """Declare an argument with a value; its help ends with the default if there is one."""
     if words.pop("many", False):
         words["action"] = "append"
     words["metavar" if isinstance(metavar, str) else "choices"] = metavar

@@ -94,14 +94,7 @@ class StopSignals:
         self.end(in_order=False)
 
     def end(self, *, in_order: bool = True) -> int:
-        """Print which files are saved; end the process if it belongs to the program.
-
-        Args:
-            in_order: Whether the command unwound; otherwise it is cut off.
-
-        Returns:
-            Exit status: 128 plus the number of the signal.
-        """
+        """Print which files are saved; end the process if it belongs to the program."""
         number = self.number or signal.SIGINT
         with self._ending:  # never released by the first caller; a second one waits for the end
             if in_order and self._watching:

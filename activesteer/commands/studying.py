@@ -294,17 +294,7 @@ def _fit_lines(found: Fit) -> Iterator[str]:
 
 
 def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: bool = False) -> int:
-    """Predict a measurement, with `fitted` also fit the factors of the folder, and print the verdict.
-
-    Args:
-        name: Folder, or name of a folder of the package.
-        options: `samples`, `jobs`, `scheduler` and `json` of the command.
-        page: File of the page; None for no page.
-        fitted: Whether the factors are fitted in one window and judged in another.
-
-    Returns:
-        Exit status: 1 if a quantity is outside its tolerance.
-    """
+    """Predict a measurement, with `fitted` also fit the factors of the folder, and print the verdict."""
     from activesteer.measured.circle import SAMPLES, validate_circle
     from activesteer.measured.folder import validate_measured
     from activesteer.measured.folder_file import measured_folder, read_measured

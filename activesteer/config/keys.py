@@ -21,11 +21,7 @@ def spellings(name: str) -> list[str]:
 
 
 def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, float]:
-    """Return the field that a key of a file fills.
-
-    Returns:
-        Name of the field, or None, and the factor from the unit of the key to SI.
-    """
+    """Return the field that a key of a file fills."""
     if not isinstance(key, str):
         return None, 1.0
     for name in (key, f"{key}_"):
@@ -117,11 +113,7 @@ def no_such_key(cls: type, source: Source, path: Sequence[str]) -> ActiveSteerEr
 def merged(
     cls: type, table: Mapping[str, Any], path: Sequence[str], value: object, source: Source, above: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Return a table with one key replaced, in any of its units.
-
-    Raises:
-        ActiveSteerError: there is no such key, or a key above it is no table.
-    """
+    """Return a table with one key replaced, in any of its units."""
     where = (*above, path[0])
     if not isinstance(table, Mapping):
         raise source.fail(above, f"is {shown(table)}, which is no table and has no {path[0]}", table)
@@ -177,17 +169,7 @@ def _merged_list(
 
 
 def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: Iterable[Sequence[str]]) -> None:
-    """Refuse keys that other keys make ineffective; see `OVERRULED`.
-
-    Args:
-        cls: Dataclass of the table.
-        table: The table.
-        source: Source of the table, for error messages.
-        given: Given keys, each as a path of names.
-
-    Raises:
-        ActiveSteerError: a key has no effect; the message names both keys.
-    """
+    """Refuse keys that other keys make ineffective; see `OVERRULED`."""
     for path in given:
         owner, within = cls, table
         for key in path[:-1]:

@@ -53,12 +53,7 @@ class Source:
         )
 
     def placed(self, path: Sequence[str], reason: ActiveSteerError) -> ActiveSteerError:
-        """Return the error of a check with the place in the file, which the check does not know.
-
-        Args:
-            path: Path of names to the checked table.
-            reason: Error of the check; its key is relative to the table.
-        """
+        """Return the error of a check with the place in the file, which the check does not know."""
         inner = reason.key.split(".") if reason.key else ()
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 

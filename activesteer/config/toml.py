@@ -19,11 +19,7 @@ _DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{limits.
 
 
 def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tuple[dict[str, Any], Source]:
-    """Return the table of a TOML file, and its source.
-
-    Raises:
-        ActiveSteerError: the file cannot be read or is no TOML; of class `error`.
-    """
+    """Return the table of a TOML file, and its source."""
     text = read_text(path, error)
     try:
         return _parsed(text), Source(path.name, text, error)
@@ -32,11 +28,7 @@ def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tup
 
 
 def _parsed(text: str) -> dict[str, Any]:
-    """Parse a TOML text.
-
-    Raises:
-        ValueError: the text is no TOML, is nested too deeply, or has a number with too many digits.
-    """
+    """Parse a TOML text."""
     if _DEEP_KEY.search(text):
         raise ValueError(f"a key is nested more than {limits.MAX_TOML_DEPTH} deep")
     try:
@@ -46,11 +38,7 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value written as in TOML; any other text is returned as it is.
-
-    Raises:
-        ParameterError: the value is nested too deeply, or has a number with too many digits.
-    """
+    """Return a value written as in TOML; any other text is returned as it is."""
     try:
         table = _parsed(f"value = {text}")
     except tomllib.TOMLDecodeError:

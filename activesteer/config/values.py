@@ -19,18 +19,7 @@ T = TypeVar("T")
 
 
 def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = (), base: Any = None) -> T:
-    """Build a dataclass from a table, and convert display units.
-
-    Args:
-        cls: Dataclass to build.
-        table: Keys and values.
-        source: Source of the table, for error messages.
-        path: Path of names to this table.
-        base: Object whose values fill the keys that are missing and have no default in the class.
-
-    Raises:
-        ActiveSteerError: a key is unknown, missing or given twice, or a value is wrong.
-    """
+    """Build a dataclass from a table, and convert display units."""
     hints = hints_of(cls, include_extras=True)
     fields = fields_of(cls)
     values: dict[str, Any] = {}
@@ -66,19 +55,7 @@ def _default_of(field: dataclasses.Field[Any]) -> Any:
 
 
 def convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[str], base: Any = None) -> Any:
-    """Check a value against its type hint and convert it.
-
-    Args:
-        hint: Type, possibly `Annotated` with its range; `Any` allows every value.
-        raw: The value.
-        factor: Factor from the unit of the value to SI.
-        source: Source of the value, for error messages.
-        path: Path of names to the value.
-        base: Object whose values fill missing keys; see `build`.
-
-    Raises:
-        ActiveSteerError: the value is wrong.
-    """
+    """Check a value against its type hint and convert it."""
     limits = Range()
     if typing.get_origin(hint) is typing.Annotated:
         hint, *notes = typing.get_args(hint)
@@ -155,21 +132,12 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
 
 
 def checked_number(key: str, value: object, limits: Range) -> float:
-    """Check the argument `key` of a Python function like a number in a file, and return it.
-
-    Raises:
-        ParameterError: the value is no number, or out of range.
-    """
+    """Check the argument `key` of a Python function like a number in a file, and return it."""
     return _scalar(float, value, 1.0, limits, Source(""), (key,))
 
 
 def to_table(value: Any, *, defaults: bool = True) -> Any:
-    """Return a dataclass as plain tables for JSON; `build` restores it.
-
-    Args:
-        value: A dataclass, or a value in one.
-        defaults: Whether to keep fields with default values; fields that are None are always left out.
-    """
+    """Return a dataclass as plain tables for JSON; `build` restores it."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         values = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
         return {

@@ -27,13 +27,7 @@ class ConstantRadiusDriver(NativeBlock):
     _correction_1pm: float
 
     def __init__(self, robot: OpenLoopDriver, wheelbase_m: float, timestep_s: float) -> None:
-        """Make the driver of one run.
-
-        Args:
-            robot: Turns the steering wheel and holds the speed.
-            wheelbase_m: Wheelbase [m].
-            timestep_s: Time between two steps [s].
-        """
+        """Make the driver of one run."""
         self.robot = robot
         self.speed_hold = robot.speed_hold
         self._wheelbase_m = wheelbase_m

@@ -65,15 +65,7 @@ class SetpointTable(NamedTuple):
 
 
 def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | None) -> SetpointTable:
-    """Return setpoints as a table, up to where the path changes.
-
-    Args:
-        setpoints: Setpoints of successive steps.
-        rack_per_steering_wheel_m: Rack travel per steering wheel angle [m/rad]; None without a rack.
-
-    Raises:
-        ManeuverError: a setpoint is a rack position and the car has no rack.
-    """
+    """Return setpoints as a table, up to where the path changes."""
     path = setpoints[0].path
     steps = next((step for step, setpoint in enumerate(setpoints) if setpoint.path is not path), len(setpoints))
     count = steps
@@ -101,22 +93,7 @@ def setpoint_row(setpoint: Setpoint, rack_per_steering_wheel_m: float | None) ->
 
 @inlined
 def follow(human, setpoint, line, measured, motion, engine_radps, low_Nm, high_Nm, command):
-    """Write the command of a `HumanDriver`.
-
-    Args:
-        human: Record of the driver; changed.
-        setpoint: A `SETPOINT`.
-        line: A `LINE`, for a path.
-        measured: Numbers of the `Measurement`.
-        motion: Numbers of the `Motion`.
-        engine_radps: Speed of the engine [rad/s].
-        low_Nm: Lowest drive torque [N m].
-        high_Nm: Highest drive torque [N m].
-        command: Numbers of a `DriverCommand`, to write.
-
-    Returns:
-        False, and nothing is changed, if the driver lacks the gains for the present speed.
-    """
+    """Write the command of a `HumanDriver`."""
     robot = human._open_loop
     angle, slow_arms = setpoint.steering_wheel_rad, False
     if setpoint.kind == PATH:

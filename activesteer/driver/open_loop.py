@@ -42,15 +42,7 @@ class SpeedHold(NativeBlock):
     def __init__(
         self, parameters: DriverParameters, drive: Drivetrain, mass_kg: float, wheel_radius_m: float, timestep_s: float
     ) -> None:
-        """Make the speed control of one run.
-
-        Args:
-            parameters: Gains.
-            drive: Limits of the engine.
-            mass_kg: Mass of the car, as the driver knows it [kg].
-            wheel_radius_m: Radius that relates the speed of the driven wheels to the speed of the car [m].
-            timestep_s: Time between two steps [s].
-        """
+        """Make the speed control of one run."""
         self._gain_Nmspm = parameters.speed_gain_1ps * mass_kg * wheel_radius_m
         self._integral_gain_Nmpm = parameters.speed_integral_gain_1ps2 * mass_kg * wheel_radius_m
         self.drive = drive
@@ -65,12 +57,7 @@ class SpeedHold(NativeBlock):
         self.saturated = False
 
     def step(self, speed_demand_mps: float, measurement: Measurement) -> float:
-        """Return the total torque at the driven wheels for a speed [N m].
-
-        Args:
-            speed_demand_mps: Speed to hold [m/s].
-            measurement: Measurement of the car's sensors.
-        """
+        """Return the total torque at the driven wheels for a speed [N m]."""
         engine_radps, gear = self.drive.speed_radps(measurement.wheel_speed_radps), 1 if speed_demand_mps >= 0.0 else -1
         limits_Nm = self.drive.limits_Nm(engine_radps, gear)
         return drive_torque(self, speed_demand_mps, measurement.speed_mps, engine_radps, *limits_Nm)
@@ -84,16 +71,7 @@ class SpeedHold(NativeBlock):
 def drive_torque(
     hold: SpeedHold, speed_demand_mps: float, speed: float, engine_radps: float, low: float, high: float
 ) -> float:
-    """Law of `SpeedHold.step`.
-
-    Args:
-        hold: The cruise control.
-        speed_demand_mps: Speed to hold [m/s].
-        speed: Speed of the car [m/s].
-        engine_radps: Mean speed of the driven wheels [rad/s].
-        low: Least torque of the engine in the gear of the demand [N m].
-        high: Greatest torque of the engine in this gear [N m].
-    """
+    """Law of `SpeedHold.step`."""
     if speed_demand_mps == 0.0 and abs(speed) < _STANDSTILL_MPS:
         take_foot_off(hold)
         return 0.0

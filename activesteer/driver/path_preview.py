@@ -238,12 +238,6 @@ def steering_gains(
 
     Beyond the preview the path is straight. Its gains follow without its points: a path that is shifted or turned
     together with the car requires the same steering, which gives the sum and the moment of the gains.
-
-    Args:
-        speed_mps: Speed [m/s].
-        model: The car as the driver knows it.
-        parameters: The driver.
-        steering_ratio: Steering wheel angle over road-wheel angle [-].
     """
     car, steered = (tuple(matrix.ravel().tolist()) for matrix in model(speed_mps))
     return _steering_gains(speed_mps, car, steered, parameters, steering_ratio)

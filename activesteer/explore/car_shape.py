@@ -21,12 +21,7 @@ POSE_HZ: Final = 50.0
 
 
 def shape_of(vehicle: Vehicle) -> tuple[dict[str, Any], list[NDArray[np.float32]]]:
-    """Return the surfaces of a car.
-
-    Returns:
-        Size of the car, and for each panel its body and its colour, 0 to 1, or None for the paint; and for each panel
-        the points of its triangles [m], shape (3 x triangles, 3), and the directions of the surface there.
-    """
+    """Return the surfaces of a car."""
     size = Footprint.from_table(vehicle.dimensions())
     _, panels = dressed(scene_of(vehicle.model), size)
     shown = [panel for panel in panels if panel.body in BODIES]
@@ -44,11 +39,7 @@ def shape_of(vehicle: Vehicle) -> tuple[dict[str, Any], list[NDArray[np.float32]
 
 
 def poses_of(recording: Recording) -> tuple[float, NDArray[np.float32]]:
-    """Return the poses of `BODIES` of a recorded run.
-
-    Returns:
-        Time between two poses [s]; positions [m] and quaternions w x y z, shape (poses, bodies, 7).
-    """
+    """Return the poses of `BODIES` of a recorded run."""
     poses = recording.poses
     step_s = float(np.median(np.diff(poses.time_s))) if len(poses.time_s) > 1 else 1.0 / POSE_HZ
     every = max(1, round(1.0 / (POSE_HZ * step_s)))

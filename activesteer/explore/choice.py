@@ -38,15 +38,7 @@ class Folder:
         }
 
     def check(self, choice: Choice, courses: Mapping[str, Any] | None = None) -> None:
-        """Check the names of a choice.
-
-        Args:
-            choice: The choice.
-            courses: Names that stand for the manoeuvre; those of the package by default.
-
-        Raises:
-            ParameterError: a name is not in the lists, and no file directly in the folder.
-        """
+        """Check the names of a choice."""
         names = self.names()
         self._check("maneuver", choice.maneuver, list(courses) if courses else names["maneuvers"], r".+\.toml")
         self._check("vehicle", choice.vehicle, names["vehicles"], r".+\.toml")
@@ -77,15 +69,7 @@ class Folder:
 
 
 def check_numbers(values: Mapping[str, float], allowed: Mapping[str, tuple[float, float]]) -> None:
-    """Check the values of sliders.
-
-    Args:
-        values: Key -> number, from the page.
-        allowed: Key -> least and greatest number.
-
-    Raises:
-        ParameterError: a key has no slider, or its number is out of range.
-    """
+    """Check the values of sliders."""
     for key, value in values.items():
         if key not in allowed:
             raise ParameterError(f"has no slider; {nearest_names(key, allowed)}", key=key, value=value)

@@ -119,13 +119,7 @@ class DriveSession:
     """A drive in real time, recorded to a file."""
 
     def __init__(self, choice: Start, folder: Folder, pacer: FramePacer | None = None) -> None:
-        """Put the car at the start of a course.
-
-        Args:
-            choice: The choice of the page; `maneuver` is one of `COURSES`.
-            folder: The user's own files, and the place of the recording.
-            pacer: Keeper of the pace; that of the clock by default.
-        """
+        """Put the car at the start of a course."""
         folder.check(choice, COURSES)
         self._folder = folder
         self._course = course = COURSES[choice.maneuver]
@@ -185,11 +179,7 @@ class DriveSession:
         return self._simulation.done
 
     def frame(self) -> Reply:
-        """Wait until the next picture is due, drive to its time, and return it.
-
-        Raises:
-            ActiveSteerError: the drive failed; the recording is kept.
-        """
+        """Wait until the next picture is due, drive to its time, and return it."""
         simulation = self._simulation
         until_s = self._pacer.next(simulation.time_s)
         begun_s = time.perf_counter()

@@ -94,11 +94,7 @@ _DECODER: Final = msgspec.json.Decoder(Message)
 
 
 def read(text: str | bytes) -> Message:
-    """Return a message of the page.
-
-    Raises:
-        ParameterError: it is no JSON, too large, or a field is unknown, missing, of another type or out of range.
-    """
+    """Return a message of the page."""
     if len(text) > MAX_MESSAGE_BYTES:
         raise ParameterError(f"a message of the page has {len(text)} letters; {MAX_MESSAGE_BYTES} are allowed")
     try:

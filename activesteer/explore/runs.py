@@ -74,12 +74,7 @@ class Runs:
         )
 
     def run(self, choice: RunRequest, stale: Callable[[], bool]) -> Iterator[Reply]:
-        """Drive the chosen controllers, and yield a reply for each as soon as it is driven.
-
-        Args:
-            choice: The choice, with values of the sliders that were moved.
-            stale: Whether the page has made a newer choice, for which this one is dropped.
-        """
+        """Drive the chosen controllers, and yield a reply for each as soon as it is driven."""
         self.folder.check(choice)
         allowed = {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
         overrides = choice.values

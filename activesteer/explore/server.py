@@ -52,10 +52,6 @@ class ExploreServer:
     def __init__(self, folder: Path, port: int) -> None:
         """Open the port and start the worker process.
 
-        Args:
-            folder: Folder of the user's own files and of recordings.
-            port: Port; 0 for any free one.
-
         Attributes:
             saved: Files of the folder that the page has saved.
         """
@@ -94,11 +90,7 @@ class ExploreServer:
         return int(self._host.rpartition(":")[2])
 
     def serve(self, listening: Callable[[], None]) -> None:
-        """Serve until the process is stopped.
-
-        Args:
-            listening: Function that is called once the server accepts connections.
-        """
+        """Serve until the process is stopped."""
         config = uvicorn.Config(
             self._app(listening), log_level="warning", lifespan="on", ws_max_size=MAX_MESSAGE_BYTES, server_header=False
         )

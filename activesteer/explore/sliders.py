@@ -66,12 +66,7 @@ class Slider(NamedTuple):
 
 
 def sliders(scenario: Scenario, controllers: Sequence[str]) -> list[Slider]:
-    """Return the sliders of a run.
-
-    Args:
-        scenario: Manoeuvre and car with the values of their files.
-        controllers: The controllers, whose gains follow; a file with its folder.
-    """
+    """Return the sliders of a run."""
     found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
     for name in controllers:
         for key, declared in declared_parameters(name, scenario.car.config.controllers).items():

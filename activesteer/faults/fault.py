@@ -203,16 +203,7 @@ class Fault:
 
 
 def check_faults(faults: Sequence[Fault], duration_s: float, fail: Any) -> None:
-    """Check that every fault begins before the end, and that no two act on a part at the same time.
-
-    Args:
-        faults: The faults.
-        duration_s: Length of the manoeuvre [s].
-        fail: Makes the error of a key, such as `config.Source.fail`.
-
-    Raises:
-        ManeuverError: a fault begins too late, or two overlap.
-    """
+    """Check that every fault begins before the end, and that no two act on a part at the same time."""
     for number, fault in enumerate(faults):
         if fault.start_s >= duration_s:
             raise fail(
@@ -239,12 +230,7 @@ _WHEN: Final = "@START[-END]"
 
 
 def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
-    """Read a fault into the table that a manoeuvre file has; the table is checked there.
-
-    Args:
-        text: Part, kind, size with its unit, and time [s].
-        start_s: Start if the text must not give it [s].
-    """
+    """Read a fault into the table that a manoeuvre file has; the table is checked there."""
     found = _FAULT.fullmatch(text.strip())
     if found is None or (found["start"] is None) is (start_s is None):
         if start_s is None:

@@ -166,9 +166,6 @@ def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
     """Return the points at which cones touch the edges of lanes: at both ends, and at most 5 m apart in between.
 
     By the standards the edges of a lane are tangents to the feet of its cones.
-
-    Returns:
-        World x and y of the cones [m], shape (number of cones, 2).
     """
     points: list[tuple[float, float]] = []
     for lane in course:

@@ -30,22 +30,12 @@ _MAX_START_RAD: Final = math.radians(15.0)
 
 
 def read_csv(path: Path) -> tuple[dict[str, list[float]], list[int]]:
-    """Read the points from a CSV with the header x_m,y_m, and speed and width there if it has such columns.
-
-    Returns:
-        Values by column, SI, and the line number of each point.
-    """
+    """Read the points from a CSV with the header x_m,y_m, and speed and width there if it has such columns."""
     return read_columns(path, COLUMNS, OPTIONAL)
 
 
 def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[int], str]) -> None:
-    """Check that a car can start on the path and follow it.
-
-    Args:
-        x_m: World x of the points [m].
-        y_m: World y of the points [m].
-        place: Function from the index of a point to its place in the file, for error messages.
-    """
+    """Check that a car can start on the path and follow it."""
     count = len(x_m)
     if count != len(y_m) or count < MIN_POINTS:
         raise ManeuverError(

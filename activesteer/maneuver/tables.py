@@ -32,9 +32,6 @@ def read_columns(
     """Read required and optional columns of a CSV whose first line names them; other columns are ignored.
 
     A column may be in degrees or km/h, as in a TOML file: `steering_wheel_deg` fills `steering_wheel_rad`.
-
-    Returns:
-        Column name to values in SI, and the line number of each row.
     """
     rows = read_csv(path, ManeuverError)
     if not rows:

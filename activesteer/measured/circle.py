@@ -144,19 +144,7 @@ def validate_circle(
     scheduler: str | None = None,
     progress: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> CircleValidation:
-    """Drive a car on the circle on which it was measured.
-
-    Args:
-        file: The checked file, with a table [circle].
-        samples: Number of samples of the values that vary from lap to lap.
-        jobs: Number of processes; by default the number of processors.
-        scheduler: Address of a Dask scheduler.
-        progress: Called with the finished fraction and the name of the step.
-
-    Raises:
-        ParameterError: fewer than 10 samples.
-        ActiveSteerError: a run failed.
-    """
+    """Drive a car on the circle on which it was measured."""
     if samples < 10:
         raise ParameterError(
             f"{samples} samples make no distribution; at least 10 are needed", key="samples", value=samples
@@ -209,12 +197,7 @@ def validate_circle(
 
 
 def steering_wheel_deg(case: Case, roll_per_ay: float = 0.0) -> float:
-    """Return the steering wheel angle that holds a laterally symmetric car on a circle [deg].
-
-    Args:
-        case: The case.
-        roll_per_ay: Roll angle of the body over lateral acceleration, by which the accelerometer tilts [rad s2/m].
-    """
+    """Return the steering wheel angle that holds a laterally symmetric car on a circle [deg]."""
     per_a, ay_mps2 = roll_per_ay * case.circle["body_roll"], case.circle["ay_mps2"]
     # A body that leans outwards by phi shows a cos(phi) + g sin(phi), and phi is proportional to a.
     for _ in range(20 if per_a else 0):

@@ -64,15 +64,7 @@ class Case(NamedTuple):
     stiff_column: bool = False
 
     def changed_by(self, change: ChangeTable, curves: Mapping[str, Any]) -> Case:
-        """Return the case with a change, whose effects have been removed already.
-
-        Args:
-            change: The change.
-            curves: Axle -> its curves in the vehicle file.
-
-        Raises:
-            ParameterError: the circle has no such value, or the axle no such curve.
-        """
+        """Return the case with a change, whose effects have been removed already."""
         if unknown := sorted(set(change.add) - set(self.circle)):
             raise ParameterError(
                 f"the circle has no {unknown[0]}; {nearest_names(unknown[0], self.circle)}", value=unknown[0]

@@ -31,15 +31,7 @@ _DATED: Final = re.compile(r"(\d{4}-\d\d-\d\d[ T])?" + _CLOCK.pattern + "Z?")
 
 
 def csv_columns(path: Path) -> list[Column]:
-    """Return the columns of a CSV.
-
-    Args:
-        path: The file. Cells are separated by commas, semicolons, tabs, bars or blanks, and may be quoted. Decimal
-            points or commas; lines above the names, and a line of units below them; UTF-8, UTF-16 or Latin-1.
-
-    Raises:
-        RecordingError: the file cannot be read, or holds no table.
-    """
+    """Return the columns of a CSV."""
     import pyarrow as pa  # noqa: PLC0415 - slow to import
     from pyarrow import csv as arrow  # noqa: PLC0415
 
@@ -170,14 +162,7 @@ _MAX_ANSWER_BYTES: Final = 16 * limits.MAX_ROWS + 2**20
 
 
 def read_columns(path: Path) -> list[Column]:
-    """Return the columns of a file.
-
-    Args:
-        path: A CSV (`.csv`, `.txt`, `.tsv`, `.asc`), `.mat`, `.parquet` or `.mf4` (`.mdf`, `.dat`) file.
-
-    Raises:
-        RecordingError: the file cannot be read, or has an unknown ending.
-    """
+    """Return the columns of a file."""
     if not is_file(path):
         raise RecordingError(f"cannot read {shown_path(path)}: it {why_no_file(path)}", value=path)
     reader = _READERS.get(path.suffix.lower())
@@ -204,11 +189,7 @@ def second_of(name: str) -> str:
 
 
 def find(columns: list[Column], name: str, path: Path) -> Column:
-    """Return the column with a name.
-
-    Raises:
-        RecordingError: there is none.
-    """
+    """Return the column with a name."""
     found = [column for column in columns if column.name == name]
     if found:
         return found[0]

@@ -35,9 +35,6 @@ def time_shift(measured: Recording, simulated: Recording) -> float:
 
     The search maximises the normalised cross-correlation over all shifts at which the runs overlap by half of the
     shorter run. Between the steps of the search, the mean square of the difference is minimised.
-
-    Returns:
-        The shift [s]; nan if no signal moves in both runs.
     """
     pairs = _pairs(measured, simulated, INPUTS) or _pairs(measured, simulated, RESPONSES)
     if not pairs:
@@ -345,20 +342,7 @@ def compare(
     tolerances: Mapping[str, Tolerance] = TOLERANCES,
     aligned: bool = True,
 ) -> Comparison:
-    """Compare measured runs of a manoeuvre with its simulation.
-
-    Args:
-        measured: The measured runs.
-        simulated: The simulated run.
-        standard: Key of `STANDARDS`.
-        filtered: Key of `FILTERS`; the filter is applied alike to both sides.
-        noise: Whether to widen the corridor by the noise that remains in the measurement, estimated from it.
-        tolerances: Channel that is compared -> its tolerance.
-        aligned: Whether to find the time shift; else the runs share a clock.
-
-    Raises:
-        RecordingError: the runs share no channel or no time.
-    """
+    """Compare measured runs of a manoeuvre with its simulation."""
     simulated = at_sensor(simulated)
     names = [name for name in tolerances if all(name in run for run in (*measured, simulated))]
     if standard == "iso19364" and _ACROSS not in names:

@@ -69,14 +69,7 @@ channels = ["yaw_rate_degps"]
 
 
 def write_template(folder: Path) -> list[Path]:
-    """Write a folder that `activesteer compare` and `fit` can run, and return its files.
-
-    Args:
-        folder: A new or empty folder.
-
-    Raises:
-        ParameterError: the folder is not empty, or a file cannot be written.
-    """
+    """Write a folder that `activesteer compare` and `fit` can run, and return its files."""
     make_folder(folder, ParameterError)
     if any(folder.iterdir()):
         raise ParameterError(f"{shown_path(folder)} is not empty; give a new folder", value=str(folder))

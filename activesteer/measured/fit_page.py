@@ -19,17 +19,7 @@ from activesteer.units import parameter_title, quantity_of
 
 
 def write_fit(found: Fit, name: str, folder: Path) -> list[Path]:
-    """Write `fit.json`, `overrides.toml` and `fit.html`, and return their paths; existing files are replaced.
-
-    Args:
-        found: Result of the fit.
-        name: Name of the study.
-        folder: Folder for the files; it is created if it does not exist.
-
-    Raises:
-        StudyError: a file cannot be written.
-        ParameterError: matplotlib is not installed.
-    """
+    """Write `fit.json`, `overrides.toml` and `fit.html`, and return their paths; existing files are replaced."""
     make_folder(folder, StudyError)
     texts = {
         "fit.json": json_text(found.to_json()) + "\n",

@@ -74,12 +74,6 @@ def intervals(series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np
     Least squares weights each series by its stated noise. If this noise is not trusted, each series gets the variance
     of its residual, and its n samples count as n/tau, with tau its autocorrelation time. The result is exact if the
     derivatives change slowly compared with the noise, and too wide if they change as fast.
-
-    Args:
-        series: Residuals relative to the noise, shape (n,) each.
-        slopes: Their derivatives, shape (n, p) each.
-        free: Which parameters are free, shape (p,); a parameter at an end of its range is not.
-        stated: Whether the noise is white and as large as stated.
     """
     from scipy.stats import t  # noqa: PLC0415 - slow to import
 

@@ -52,14 +52,7 @@ class FitTable:
 
 
 def read_fit(given: FileOrTable) -> tuple[StudyFile, FitTable]:
-    """Read a study file with a table [fit].
-
-    Args:
-        given: Name or path of the file, or its table.
-
-    Raises:
-        StudyError: the file cannot be read, a key or value is wrong, or the study cannot be fitted.
-    """
+    """Read a study file with a table [fit]."""
     study = read_study(given, "fit")
     fail = study.source.fail
     table = build(FitTable, study.fit or {}, study.source, ("fit",))
@@ -108,11 +101,7 @@ class Measured(NamedTuple):
 
 
 def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[str, float]:
-    """Return the standard deviation of the noise of each channel of the table [fit], SI.
-
-    Raises:
-        StudyError: a channel is not among the `known` ones, or is given twice.
-    """
+    """Return the standard deviation of the noise of each channel of the table [fit], SI."""
     found: dict[str, float] = {}
     for key, value in table.noise.items():
         name, factor = field_in_unit(key, known)
@@ -129,12 +118,7 @@ def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[
 def measured_of(
     recording: Recording, name: str, study: StudyFile, table: FitTable, channels: Collection[str]
 ) -> Measured:
-    """Return the data of a recording that are compared.
-
-    Raises:
-        StudyError: the recording lacks a channel.
-        RecordingError: a channel has too few samples.
-    """
+    """Return the data of a recording that are compared."""
     for channel in channels:
         if channel not in recording:
             have = [each.name for each in recording.channels]
@@ -202,16 +186,7 @@ class Found(NamedTuple):
 def search(
     answers: Callable[[list[Array]], Sequence[Answer]], start: Array, check: Callable[[list[Array]], None]
 ) -> Found:
-    """Minimise the sum of squares of all differences (trust region reflective, SciPy).
-
-    Args:
-        answers: Function that drives several sets of parameters at once.
-        start: Start of the search, shape (p,).
-        check: Called with the derivatives at the start; an exception ends the search.
-
-    Raises:
-        StudyError: the first set, or a set beside a drivable one, cannot be driven.
-    """
+    """Minimise the sum of squares of all differences (trust region reflective, SciPy)."""
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
     rounds: dict[bytes, tuple[list[Array], list[Array]] | None] = {}
@@ -298,22 +273,7 @@ def fit(
     scheduler: str | None = None,
     progress: Callable[[FitProgress], None] | None = None,
 ) -> Fit:
-    """Find values of factors for which the car, driven by recorded inputs, matches recordings best.
-
-    Args:
-        study_file: Name or path of a study file with a table [fit], or its table.
-        jobs: Number of processes; the number of processors by default.
-        scheduler: Address or file of a Dask scheduler to use instead.
-        progress: Called after every run.
-
-    Returns:
-        Values, intervals and residuals.
-
-    Raises:
-        StudyError: the file is wrong, a factor has no measured effect or cannot be separated from another, or the car
-            cannot be driven.
-        ActiveSteerError: a recording, the vehicle, the controller or a key is wrong.
-    """
+    """Find values of factors for which the car, driven by recorded inputs, matches recordings best."""
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, problem.settings)
@@ -398,11 +358,7 @@ class _Problem:
         return series
 
     def check(self, slopes: list[Array]) -> None:
-        """Check that every factor has a measured effect that differs from the effects of the others.
-
-        Raises:
-            StudyError: a factor has none.
-        """
+        """Check that every factor has a measured effect that differs from the effects of the others."""
         source, keys = self._study.source, self._study.keys
         for place in without_effect(slopes):
             raise source.fail(
@@ -456,15 +412,7 @@ class _Problem:
 def drive(
     settings: Settings, recording: int, overrides: dict[str, Any], time_s: Array, channels: tuple[str, ...]
 ) -> dict[str, Array] | str:
-    """Drive once; return channels at the times of a recording, or the reason of a failure.
-
-    Args:
-        settings: What all runs of the study share.
-        recording: Number of its manoeuvre.
-        overrides: Overrides of this run.
-        time_s: Instants [s], shape (n,).
-        channels: Names of the channels.
-    """
+    """Drive once; return channels at the times of a recording, or the reason of a failure."""
     try:
         scenario = scenario_of(settings, recording, 0, overrides)
         run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)

@@ -157,21 +157,7 @@ def validate_measured(
     scheduler: str | None = None,
     progress: Callable[[float, str], None] = lambda _share, _what: None,
 ) -> MeasuredValidation:
-    """Predict, fit and check a car against measured runs.
-
-    Args:
-        file: The checked file.
-        jobs: Number of processes; by default the number of processors.
-        fitted: Whether to fit all factors as well; otherwise only the prediction is judged.
-        scheduler: Address of a Dask scheduler.
-        progress: Called with the finished fraction and the name of the step.
-
-    Returns:
-        The result.
-
-    Raises:
-        ActiveSteerError: a file cannot be imported, a window lies outside its run, or a run failed.
-    """
+    """Predict, fit and check a car against measured runs."""
     free = [factor.key for factor in file.factors if factor.key in file.table.predict.factors]
     with tempfile.TemporaryDirectory() as scratch:
         progress(0.0, "import")

@@ -182,21 +182,13 @@ class MeasuredFile:
         return Case(self.vehicle, values, self.table.overrides)
 
     def changed(self, case: Case, changes: Sequence[ChangeTable]) -> Case:
-        """Return a case with changes.
-
-        Raises:
-            ParameterError: a change does not fit the car.
-        """
+        """Return a case with changes."""
         for change in changes:
             case = self.without(case, change.without).changed_by(change, self.curves)
         return case
 
     def without(self, case: Case, effects: Sequence[str]) -> Case:
-        """Return a case without effects.
-
-        Raises:
-            ParameterError: there is no such effect, or it is no effect of the car.
-        """
+        """Return a case without effects."""
         for name in effects:
             if name not in self.table.effects:
                 raise ParameterError(
@@ -219,11 +211,7 @@ class MeasuredFile:
 
 
 def read_measured(folder: Path) -> MeasuredFile:
-    """Read and check the file of a folder.
-
-    Raises:
-        ParameterError: the file cannot be read, or a key or value is wrong; the error names file, key and line.
-    """
+    """Read and check the file of a folder."""
     given, source = read_toml(folder / NAME)
     table = build(MeasuredTable, given, source)
     foreign, home = (_OF_CIRCLE, "[circle]") if table.circle is None else (_OF_RUNS, "[[runs]]")
@@ -400,11 +388,7 @@ def _value(
 
 
 def measured_folder(name: str) -> Path:
-    """Return the folder of measured runs: the one of a car of the package, or a path.
-
-    Raises:
-        ParameterError: the folder has no `validation.toml`.
-    """
+    """Return the folder of measured runs: the one of a car of the package, or a path."""
     own = models_dir() / "reference" / name
     of_package = [path.name for path in own.parent.iterdir() if is_file(path / NAME)]
     if name in of_package:

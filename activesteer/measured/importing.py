@@ -88,11 +88,7 @@ class MeasurementMap:
 
 
 def read_map(path: Path | None) -> MeasurementMap:
-    """Read a map; return an empty map without a file.
-
-    Raises:
-        RecordingError: the file cannot be read, or a key or value is wrong.
-    """
+    """Read a map; return an empty map without a file."""
     if path is None:
         return MeasurementMap()
     table, source = read_toml(path, RecordingError)
@@ -131,20 +127,7 @@ _Files = Mapping[Path, list[Column]]
 
 
 def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehicle: str = "compact") -> Import:
-    """Read one or several files of measured data of one run.
-
-    Args:
-        path: CSV, MAT, Parquet or MDF; several files may have times of their own.
-        map_path: Map file; without it, columns are recognised by their names.
-        vehicle: Car that represents the measured one in replay.
-
-    Returns:
-        The recording with notes.
-
-    Raises:
-        RecordingError: file or map cannot be read, a column or unit is unknown, or samples are missing.
-        ActiveSteerError: there is no such vehicle.
-    """
+    """Read one or several files of measured data of one run."""
     chosen = read_map(map_path)
     paths = [path] if isinstance(path, Path) else list(path)
     path = paths[0]

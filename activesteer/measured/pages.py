@@ -24,16 +24,7 @@ _EDGE: Final = "#9bbbd4"
 
 
 def comparison_page(found: Comparison, measured: list[str], simulated: str) -> Page:
-    """Return the page.
-
-    Args:
-        found: Result of the comparison.
-        measured: Names of the measured runs.
-        simulated: Name of the simulated run.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-    """
+    """Return the page."""
     lead = [
         f"Measured: {', '.join(measured)}. Simulated: {simulated}. {STANDARDS[found.standard]}.",
         f"Measured {', '.join(map(_shift, found.shifts_s))} than simulated; the runs are shown without this shift.",
@@ -118,11 +109,7 @@ _ORIGINS: Final = {"geometry": "#8a9097", "measured": RUN_COLOURS[2], "assumed":
 
 
 def measured_page(result: MeasuredValidation | CircleValidation) -> Page:
-    """Return the page of a result.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-    """
+    """Return the page of a result."""
     table = result.file.table
     lead, sections = _circle(result) if isinstance(result, CircleValidation) else _runs(result)
     sections.append(Section("Assumptions", points=result.assumptions))

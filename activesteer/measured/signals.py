@@ -157,12 +157,7 @@ _FASTEST_RADPS: Final = 4.0
 
 
 def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]:
-    """Return signs of a wrong unit or sign, one line each.
-
-    Args:
-        channels: Values by channel name, SI, of equal length.
-        step_s: Time between two values [s].
-    """
+    """Return signs of a wrong unit or sign, one line each."""
     rate, ay, wheel = (channels.get(name) for name in ("yaw_rate_radps", "ay_mps2", "steering_wheel_rad"))
     speed = channels.get("speed_mps", channels.get("vx_mps"))
     found: list[str] = []
@@ -273,11 +268,7 @@ class Samples(NamedTuple):
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
-    """Return the finite samples in the order of their times; the last of several at one instant is kept.
-
-    Raises:
-        RecordingError: time and values differ in length, fewer than two samples are left, or the time goes backwards.
-    """
+    """Return the finite samples in the order of their times; the last of several at one instant is kept."""
     if time_s.shape != values.shape or time_s.ndim != 1:
         raise RecordingError(
             f"{name} has {values.shape} values at {time_s.shape} times; one value a time is needed", file=file
@@ -309,13 +300,6 @@ def resampled(signal: Samples, grid_s: Array) -> Array:
     """Resample a signal to a uniform grid, with straight lines between samples.
 
     If the samples are closer than the grid, their mean over a grid step is taken, which prevents aliasing.
-
-    Args:
-        signal: The samples.
-        grid_s: Times within the signal [s], shape (m,).
-
-    Returns:
-        Values, shape (m,).
     """
     step_s = float(grid_s[1] - grid_s[0])
     if float(np.median(np.diff(signal.time_s))) > 0.75 * step_s:
@@ -340,13 +324,6 @@ def with_motion(time_s: Array, channels: Mapping[str, Array]) -> dict[str, Array
 
     Without a position, the path starts at the origin along x. Its direction is the yaw angle, plus the sideslip angle
     if measured.
-
-    Args:
-        time_s: Time, uniform [s], shape (n,).
-        channels: Measured values by channel name, SI.
-
-    Returns:
-        The channels, with `speed_mps`, `sideslip_rad`, `yaw_rad`, `x_m` and `y_m` where they can be derived.
     """
     from scipy.integrate import cumulative_trapezoid  # noqa: PLC0415 - slow to import
 
@@ -373,9 +350,6 @@ def at_sensor(run: Recording) -> Recording:
 
     The point is on the centre line of a rigid body, ahead of the centre of gravity by x: v_y + x r, a_y + x dr/dt,
     a_x - x r^2 with the yaw rate r.
-
-    Args:
-        run: A simulated run. Without the key, or with zero, it is returned itself.
     """
     ahead_m = run.metadata.get("maneuver", {}).get("sensor_ahead_m", 0.0)
     if ahead_m == 0.0:
@@ -394,13 +368,7 @@ def at_sensor(run: Recording) -> Recording:
 
 
 def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) -> Poses | None:
-    """Return poses of a car in its design position, moved along the path, for replay; None without a path.
-
-    Args:
-        vehicle: Vehicle whose bodies are shown.
-        time_s: Time [s], shape (n,).
-        channels: Values by channel name.
-    """
+    """Return poses of a car in its design position, moved along the path, for replay; None without a path."""
     if not {"x_m", "y_m", "yaw_rad"} <= set(channels):
         return None
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import

@@ -44,12 +44,6 @@ def declared_by(origin: Any) -> dict[str, Declared]:
     `Annotated[float, Range(0.0, 2.0), "rad/rad"]` gives range and unit, and so does an entry of the attribute
     `PARAMETERS`, as in `{"gain": {"unit": "rad/rad", "range": (0.0, 2.0)}}`. The end of a name such as `_s` tells the
     unit otherwise. An origin that takes any keywords declares all its parameters in `PARAMETERS`, with `default`.
-
-    Args:
-        origin: A class, or a function that returns a block.
-
-    Raises:
-        ValueError: `PARAMETERS` is wrong.
     """
     notes = getattr(getattr(origin, "func", origin), "PARAMETERS", {})
     maker = getattr(origin, "from_vehicle", origin)

@@ -48,14 +48,6 @@ def from_file(text: str, kind: Kind) -> FromFile:
     """Load the file and look up the class or function.
 
     The file can import modules beside it. Every call loads the file and these modules again.
-
-    Args:
-        text: `path/to/file.py:Name`, optionally followed by `?parameter=value&other=value`.
-        kind: Kind of block that is needed.
-
-    Raises:
-        ActiveSteerError: of the kind's type: the text has another form; or the file does not exist, does not run, or
-            has no such class or function.
     """
 
     def fail(problem: str, value: Any = text, allowed: Any = None) -> Exception:
@@ -150,17 +142,7 @@ class _Neighbours:
 
 
 def source_of(text: str) -> dict[str, bytes]:
-    """Read the file that a text names, and the modules beside it that it imports, without running them.
-
-    Args:
-        text: As in `from_file`.
-
-    Returns:
-        Path in the file's folder -> content; empty for a text that does not name a file, such as a built-in name.
-
-    Raises:
-        ParameterError: a file cannot be read.
-    """
+    """Read the file that a text names, and the modules beside it that it imports, without running them."""
     form = _FORM.fullmatch(text)
     return {} if form is None else _with_neighbours(user_path(form["path"], ParameterError), ParameterError)
 

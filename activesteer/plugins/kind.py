@@ -82,20 +82,7 @@ class Kind:
         return self.error(problem, key=f"{self.word} {name}".rstrip(), value=value, allowed=allowed)
 
     def checked(self, command: Any, name: str, setup: Any, said: str = "step returned") -> Any:
-        """Check and complete a command.
-
-        Args:
-            command: Command that `step` returned, or that was given instead.
-            name: Name of the block, for the message.
-            setup: Argument from which the block was created.
-            said: Words before the command in the message.
-
-        Returns:
-            The command, of exactly the class `result`.
-
-        Raises:
-            ActiveSteerError: of the type `error`: it is not a command, or a value is not a number or out of its range.
-        """
+        """Check and complete a command."""
         try:
             if not self._is_usual(command):
                 command = self._check(command, name, said)

@@ -171,11 +171,7 @@ class Watched:
         self._about = kind, name, setup, files
 
     def step(self, *inputs: Any) -> Any:
-        """Return the checked command of the user's step.
-
-        Raises:
-            ActiveSteerError: of the kind's type: the step raised something, even SystemExit, or returned no command.
-        """
+        """Return the checked command of the user's step."""
         kind, name, setup, files = self._about
         try:
             command = self.inner.step(*inputs)

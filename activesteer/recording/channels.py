@@ -112,16 +112,7 @@ class ChannelTable:
 
 
 def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.uint64]:
-    """Convert times to whole nanoseconds.
-
-    Args:
-        time_s: Times [s], shape (n,).
-        what: Name of the argument, for the error message.
-        after_ns: Time before the first one [ns].
-
-    Raises:
-        RecordingError: a time is not finite, is negative, above 2**35 s, or not later than its predecessor.
-    """
+    """Convert times to whole nanoseconds."""
     times = np.asarray(time_s, np.float64)
     if times.ndim != 1:
         raise RecordingError(f"has shape {times.shape} in place of (n,)", key=what)
@@ -143,11 +134,7 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
 
 
 def shaped(array: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return a float array of a given shape.
-
-    Raises:
-        RecordingError: the shape differs, or a value is not a number.
-    """
+    """Return a float array of a given shape."""
     try:
         numbers = np.asarray(array, np.float64)
     except (TypeError, ValueError) as error:

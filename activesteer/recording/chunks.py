@@ -79,14 +79,7 @@ class BlockEncoder:
         group_ids: Mapping[str, int],
         transforms_id: int,
     ) -> None:
-        """Prepare the layouts of the messages.
-
-        Args:
-            channels: Channels in the order of the columns of `values`.
-            body_names: Names of the bodies, in the order of the second axis of the poses.
-            group_ids: MCAP channel id of each group.
-            transforms_id: MCAP channel id of the poses.
-        """
+        """Prepare the layouts of the messages."""
         layout = FixedMessage()
         table = list(channels)
         self._group_offsets: list[tuple[int, int]] = []
@@ -252,14 +245,7 @@ class BlockDecoder:
     def __init__(
         self, groups: Mapping[int, Group], body_names: Sequence[str], transforms_id: int | None, others: Iterable[int]
     ) -> None:
-        """Prepare the layouts of the messages.
-
-        Args:
-            groups: MCAP channel id -> group.
-            body_names: Names of the bodies.
-            transforms_id: MCAP channel id of the poses; None without poses.
-            others: MCAP channel ids of all other topics.
-        """
+        """Prepare the layouts of the messages."""
         self.body_names = tuple(body_names)
         self._groups = {number: (group, message_record(number, group.layout)) for number, group in groups.items()}
         self._transforms_id = transforms_id
@@ -274,12 +260,7 @@ class BlockDecoder:
         self._last_length, self._last_starts = -1, dict[int, list[int]]()
 
     def decode(self, data: bytes) -> Block:
-        """Decode the messages of a chunk.
-
-        Raises:
-            RecordingError: a message does not match the schema of its topic, a value is implausible, or topics differ
-                in their times.
-        """
+        """Decode the messages of a chunk."""
         # Nearly all chunks of a file have their messages at the same places. The check of a message includes its head,
         # so the places of the last chunk can be tried first.
         if len(data) == self._last_length:

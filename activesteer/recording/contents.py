@@ -105,11 +105,7 @@ them. Any key may be missing. Other keys may hold any JSON within the limits abo
 
 
 def check_metadata(metadata: Mapping[str, Any]) -> None:
-    """Check the size of metadata and the values of all known keys.
-
-    Raises:
-        RecordingError: a value has the wrong type or range, or is too large.
-    """
+    """Check the size of metadata and the values of all known keys."""
     _Sizes().check(metadata, "")
     for key, check in SCHEMA.items():
         value: Any = metadata
@@ -168,11 +164,7 @@ def _letters(value: str, key: str, maximum: int) -> None:
 
 
 def check_metrics(metrics: Mapping[str, Any]) -> None:
-    """Check that metric names are identifiers and that values are plausible numbers.
-
-    Raises:
-        RecordingError: a name or value is wrong, or there are too many.
-    """
+    """Check that metric names are identifiers and that values are plausible numbers."""
     _count(len(metrics), limits.MAX_CHANNELS, "metrics")
     for name, value in metrics.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
@@ -184,11 +176,7 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
 
 
 def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
-    """Check names of bodies, parts or attachments.
-
-    Raises:
-        RecordingError: a name is no text or empty, or there are too many.
-    """
+    """Check names of bodies, parts or attachments."""
     _count(len(names), maximum, what)
     for name in names:
         if not isinstance(name, str) or not 0 < len(name) <= 255 or not name.isprintable():
@@ -196,11 +184,7 @@ def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
 
 
 def check_bodies(names: Sequence[Any]) -> None:
-    """Check the names of bodies.
-
-    Raises:
-        RecordingError: see `check_names`; or a name occurs twice, or is that of the world.
-    """
+    """Check the names of bodies."""
     check_names(names, "bodies", limits.MAX_BODIES)
     if len({WORLD, *names}) != len(names) + 1:
         raise RecordingError(
@@ -209,11 +193,7 @@ def check_bodies(names: Sequence[Any]) -> None:
 
 
 def check_numbers(values: Sequence[Any], what: str, low: float, high: float) -> None:
-    """Check sizes, positions or colours.
-
-    Raises:
-        RecordingError: a value is no number from `low` to `high`.
-    """
+    """Check sizes, positions or colours."""
     for value in values:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
             raise RecordingError(f"{what}: {value!r:.{_SHOWN}} is no number from {low:g} to {high:g}")
@@ -244,17 +224,7 @@ def is_recording_start(data: bytes) -> bool:
 
 
 def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict[str, str]]:
-    """Convert metadata to the texts of an MCAP file.
-
-    Args:
-        metadata: Values that JSON can represent; numpy numbers and arrays become numbers and lists.
-
-    Returns:
-        The values as JSON text, without the keys `metrics` and `events`; and the metrics, as numbers in text.
-
-    Raises:
-        RecordingError: a value cannot be represented or has the wrong type, or a metric is not a number.
-    """
+    """Convert metadata to the texts of an MCAP file."""
     texts: dict[str, str] = {}
     metrics = metadata.get("metrics", {})
     if not isinstance(metrics, Mapping):

@@ -34,11 +34,7 @@ class Event(NamedTuple):
 
 
 def events_of(metadata: Mapping[str, Any]) -> list[Event]:
-    """Return the events in the metadata of a recording.
-
-    Raises:
-        RecordingError: an event is damaged, or there are more than `limits.MAX_EVENTS`.
-    """
+    """Return the events in the metadata of a recording."""
     listed = sequence(metadata.get("events", ()), "events")
     limits.check_count(len(listed), limits.MAX_EVENTS, "entries", RecordingError, file="the metadata", key="events")
     return [_event(entry, f"events.{index}") for index, entry in enumerate(listed)]
@@ -58,11 +54,7 @@ def encode_event(event: Event) -> tuple[int, bytes]:
 
 
 def decode_event(data: bytes) -> Event:
-    """Return the event of a message.
-
-    Raises:
-        RecordingError: it is no event of ours.
-    """
+    """Return the event of a message."""
     message = message_class(LOG_SCHEMA).FromString(data)
     return _event({"time_s": message.timestamp.ToNanoseconds() / 1e9, "kind": message.name, "what": message.message},
                   "events")  # fmt: skip

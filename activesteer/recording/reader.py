@@ -95,11 +95,7 @@ class Records:
     _count: int = 0
 
     def read_next(self, descriptor: int, size: int) -> None:
-        """Read one record and move the position to its end, also if the record is broken.
-
-        Raises:
-            RecordingError: the record is not allowed here, too large, or broken.
-        """
+        """Read one record and move the position to its end, also if the record is broken."""
         start, self.position = self.position, size + 1
         head = read_bytes(descriptor, start, min(_RECORD.size, size - start))
         opcode, length = _RECORD.unpack(head)
@@ -141,11 +137,7 @@ class Records:
 
 
 def opened(path: Path) -> int:
-    """Open a regular file and return its descriptor; a device or pipe may never end.
-
-    Raises:
-        RecordingError: the file cannot be read, or is not a regular file.
-    """
+    """Open a regular file and return its descriptor; a device or pipe may never end."""
     with reading(path, RecordingError):
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
@@ -158,12 +150,7 @@ def opened(path: Path) -> int:
 
 
 def read_records(descriptor: int, size: int) -> Records:
-    """Collect all records up to the end of the data section.
-
-    Args:
-        descriptor: Descriptor of the file.
-        size: Its size [byte].
-    """
+    """Collect all records up to the end of the data section."""
     records = Records()
     while not records.complete:
         start = records.position
@@ -224,9 +211,6 @@ def read_mcap(path: Path) -> Contents:
 
     A file that ends too early, as after a killed process, gives all its complete blocks. A damaged file gives the part
     before the damage, and describes the damage in `damage`.
-
-    Raises:
-        RecordingError: the file cannot be opened, is no recording of ours, or is damaged before its first row.
     """
     descriptor = opened(path)
     kept = False

@@ -86,11 +86,7 @@ class Place(NamedTuple):
 
 
 def read_bytes(descriptor: int, start: int, length: int) -> bytes:
-    """Read bytes of an open file.
-
-    Raises:
-        RecordingError: the file is shorter.
-    """
+    """Read bytes of an open file."""
     pieces = []
     while length > 0:
         piece = os.pread(descriptor, length, start)
@@ -102,11 +98,7 @@ def read_bytes(descriptor: int, start: int, length: int) -> bytes:
 
 
 def messages_of(content: bytes) -> tuple[bytes, int]:
-    """Decompress a chunk; return its messages and their checksum. The declared size is an upper limit.
-
-    Raises:
-        RecordingError: the chunk is too large, or differs from its declaration.
-    """
+    """Decompress a chunk; return its messages and their checksum. The declared size is an upper limit."""
     try:
         chunk = Chunk.read(ReadDataStream(BytesIO(content)))
         size, packed = chunk.uncompressed_size, len(chunk.data)
@@ -168,14 +160,7 @@ class FileRows:
     def __init__(
         self, descriptor: int, decoder: BlockDecoder, channels: Sequence[Channel], places: list[Place]
     ) -> None:
-        """Take over an open file.
-
-        Args:
-            descriptor: File descriptor; closed together with this object.
-            decoder: Decoder of its chunks.
-            channels: The channels.
-            places: Its chunks, all checked.
-        """
+        """Take over an open file."""
         self._descriptor = descriptor
         self._decoder = decoder
         self._types = [np.dtype("<f4" if channel.single else "<f8") for channel in channels]
@@ -185,11 +170,7 @@ class FileRows:
         weakref.finalize(self, _release, descriptor, self._token)
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the chunks.
-
-        Raises:
-            RecordingError: the file was changed since it was opened.
-        """
+        """Yield the chunks."""
         for place in self._places:
             try:
                 data, crc = messages_of(read_bytes(self._descriptor, place.start, place.length))

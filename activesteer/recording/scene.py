@@ -67,9 +67,6 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
 
     Every body with solids becomes an entity that is locked to its frame. A link becomes an entity without a solid, with
     its points in the metadata: Foxglove has no solid that spans two frames.
-
-    Raises:
-        RecordingError: a kind is unknown, a name is wrong, or a number is missing or out of range.
     """
     update = message_class(SCENE_SCHEMA)()
     entities: dict[str, Any] = {}
@@ -148,13 +145,7 @@ def _link_of(table: dict[str, Any]) -> Link:
 
 
 def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
-    """Read a scene: the solids of each body in the order box, cylinder, sphere, and then the links.
-
-    Raises:
-        RecordingError: the scene cannot be drawn; see `check_scene`.
-        google.protobuf.message.DecodeError: the data are no scene.
-        ValueError, TypeError, KeyError: a link is broken.
-    """
+    """Read a scene: the solids of each body in the order box, cylinder, sphere, and then the links."""
     update = message_class(SCENE_SCHEMA).FromString(data)
     limits.check_count(len(update.entities), limits.MAX_PARTS, "entities", RecordingError, key="scene")
     primitives: list[ScenePart] = []
@@ -178,11 +169,7 @@ def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
 
 
 def check_scene(parts: Sequence[ScenePart]) -> None:
-    """Check that a scene can be drawn.
-
-    Raises:
-        RecordingError: a kind is unknown, a name is wrong, or a number is out of range.
-    """
+    """Check that a scene can be drawn."""
     check_names([part.body if isinstance(part, Primitive) else part.name for part in parts], "parts", limits.MAX_PARTS)
     for part in parts:
         check_numbers(part.rgba, "colour", 0.0, 1.0)

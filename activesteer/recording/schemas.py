@@ -73,14 +73,7 @@ def tag(field: int, wire_type: int) -> bytes:
 
 
 def timestamps(time_ns: NDArray[np.uint64]) -> NDArray[np.uint8]:
-    """Encode times as google.protobuf.Timestamp, each number as a varint padded to five bytes.
-
-    Args:
-        time_ns: Time since zero [ns], shape (n,), below 2**35 s.
-
-    Returns:
-        Encoded messages, shape (n, STAMP_LENGTH).
-    """
+    """Encode times as google.protobuf.Timestamp, each number as a varint padded to five bytes."""
     out = np.empty((len(time_ns), STAMP_LENGTH), np.uint8)
     billion = np.uint64(1_000_000_000)
     for field, start, value in ((1, 0, time_ns // billion), (2, 6, time_ns % billion)):
@@ -168,18 +161,7 @@ class FixedMessage:
         ]
 
     def parse(self, block: NDArray[np.uint8], what: str) -> list[NDArray]:
-        """Return the numbers of messages.
-
-        Args:
-            block: The messages, one a row, contiguous, shape (rows, length).
-            what: Topic, for the error message.
-
-        Returns:
-            Views of `block`, one of shape (rows, count) for each run.
-
-        Raises:
-            RecordingError: the messages do not have this layout.
-        """
+        """Return the numbers of messages."""
         template, constant = self._constants
         wrong = np.flatnonzero(((block ^ template) & constant).any(axis=1))
         if len(wrong):
@@ -319,12 +301,7 @@ def state_schema(group: str, channels: Iterable[Channel]) -> bytes:
 
 
 def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessage]:
-    """Return the field names of a schema of `state_schema` in their order, and the layout of the messages.
-
-    Raises:
-        RecordingError: the schema does not describe a group of channels.
-        google.protobuf.message.DecodeError: the data are no schema.
-    """
+    """Return the field names of a schema of `state_schema` in their order, and the layout of the messages."""
     for file in FileDescriptorSet.FromString(schema).file:
         for message in file.message_type:
             if f"{file.package}.{message.name}" == schema_name:

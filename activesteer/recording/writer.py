@@ -54,11 +54,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Check that a recording can be written, without changing anything; only a recording may be replaced.
-
-    Raises:
-        RecordingError: the folder does not exist or is not writeable, or an existing file may not be replaced.
-    """
+    """Check that a recording can be written, without changing anything; only a recording may be replaced."""
     path = Path(path)
     if not path.parent.is_dir():
         raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
@@ -83,9 +79,6 @@ def open_target(path: Path, *, overwrite: bool) -> BinaryIO:
     """Create a locked file in place of an existing one.
 
     A process that has opened the old file keeps it, because it is deleted and not changed.
-
-    Raises:
-        RecordingError: see `check_target`; or another program is writing the file.
     """
     check_target(path, overwrite=overwrite)
     with writing(path, RecordingError):

@@ -102,11 +102,7 @@ class Course:
 
     @classmethod
     def from_table(cls, table: object) -> Course:
-        """Build the course that `to_table` describes; differences between its points give heading and curvature.
-
-        Raises:
-            RecordingError: a key is missing, of the wrong type or out of range.
-        """
+        """Build the course that `to_table` describes; differences between its points give heading and curvature."""
         course = table_of(table, "course")
         path = table_of(course.get("path"), "course.path")
         x_m, y_m = (numbers(path.get(key), f"course.path.{key}") for key in ("x_m", "y_m"))
@@ -128,11 +124,7 @@ class Course:
 
 
 def course_of(metadata: Mapping[str, Any]) -> Course | None:
-    """Return the course of a recorded run; None if its manoeuvre has no course.
-
-    Raises:
-        RecordingError: the recorded course is invalid.
-    """
+    """Return the course of a recorded run; None if its manoeuvre has no course."""
     table = metadata.get("course")
     return None if table is None else Course.from_table(table)
 
@@ -179,11 +171,7 @@ class Footprint(NamedTuple):
 
     @classmethod
     def from_table(cls, table: object) -> Footprint:
-        """Read the dimensions from the table `car` of the metadata.
-
-        Raises:
-            RecordingError: a dimension is missing, of the wrong type or out of range.
-        """
+        """Read the dimensions from the table `car` of the metadata."""
         car = table_of(table, "car")
         width, wheelbase = (number(car.get(key), f"car.{key}", *_RANGE_M) for key in ("width_m", "wheelbase_m"))
         front, rear = numbers(car.get("tyre_width_m"), "car.tyre_width_m", *_RANGE_M, count=2).tolist()
@@ -191,10 +179,6 @@ class Footprint(NamedTuple):
 
 
 def footprint_of(metadata: Mapping[str, Any]) -> Footprint | None:
-    """Return the dimensions of the car of a recorded run; None if they were not recorded.
-
-    Raises:
-        RecordingError: the recorded dimensions are invalid.
-    """
+    """Return the dimensions of the car of a recorded run; None if they were not recorded."""
     table = metadata.get("car")
     return None if table is None else Footprint.from_table(table)

@@ -73,11 +73,7 @@ def packed(files: Mapping[str, bytes]) -> tuple[str, ...]:
 
 @functools.lru_cache(maxsize=4)
 def unpacked(texts: tuple[str, ...]) -> CrgRoad:
-    """Return the surface of `packed` files.
-
-    Raises:
-        ManeuverError: they are damaged, or no OpenCRG file.
-    """
+    """Return the surface of `packed` files."""
     try:
         unpacking = zlib.decompressobj()
         content = unpacking.decompress(
@@ -95,11 +91,7 @@ def unpacked(texts: tuple[str, ...]) -> CrgRoad:
 
 
 def referenced(content: bytes) -> str | None:
-    """Return the name of the file that an OpenCRG file refers to, or None.
-
-    Raises:
-        ManeuverError: the reference uses an environment variable.
-    """
+    """Return the name of the file that an OpenCRG file refers to, or None."""
     lines = _split(content).blocks.get("ROAD_CRG_FILE")
     if lines is None:
         return None
@@ -110,15 +102,7 @@ def referenced(content: bytes) -> str | None:
 
 
 def read_crg(name: str, content_of: Callable[[str], bytes]) -> CrgRoad:
-    """Read a surface.
-
-    Args:
-        name: Name of the file.
-        content_of: Returns the content of a file by its name.
-
-    Raises:
-        ManeuverError: the file is no OpenCRG file, is damaged, too large, has holes, or its grid folds over itself.
-    """
+    """Read a surface."""
     file = _split(content_of(name))
     mods = file.blocks.get("ROAD_CRG_MODS")
     for _ in range(limits.MAX_CRG_FILES):
@@ -164,11 +148,7 @@ def _values(lines: list[str]) -> dict[str, float]:
 
 
 def _number(text: str, key: str) -> float:
-    """Return the number in a text.
-
-    Raises:
-        ManeuverError: it is none, is not finite, or is above `limits.MAX_NUMBER`.
-    """
+    """Return the number in a text."""
     try:
         value = float(text)
     except ValueError:

@@ -28,37 +28,16 @@ class PathSearch:
     """
 
     def __init__(self, path: Path) -> None:
-        """Prepare the arguments of the kernels.
-
-        Args:
-            path: The path; its points have equal distances.
-        """
+        """Prepare the arguments of the kernels."""
         spacing = path.length_m / (len(path.s_m) - 1)
         self.line = spacing, path.x_m, path.y_m, float(path.heading_rad[0]), float(path.heading_rad[-1])
 
     def at(self, s_m: Array) -> tuple[Array, Array]:
-        """Return points at arc lengths, also before the start and beyond the end.
-
-        Args:
-            s_m: Arc lengths [m], shape (k,).
-
-        Returns:
-            World x and y [m], shape (k,) each.
-        """
+        """Return points at arc lengths, also before the start and beyond the end."""
         return _points_at(s_m, *self.line)
 
     def nearest(self, x_m: float, y_m: float, around_m: float, window_m: float) -> float:
-        """Find the arc length of the point of the path nearest to a given point, near its last position.
-
-        Args:
-            x_m: World x of the point [m].
-            y_m: World y of the point [m].
-            around_m: Arc length to search around [m].
-            window_m: Search distance to either side [m].
-
-        Returns:
-            Arc length [m]; below 0 or above the length on the straight continuation of the path.
-        """
+        """Find the arc length of the point of the path nearest to a given point, near its last position."""
         return nearest(x_m, y_m, around_m, window_m, *self.line)
 
 
@@ -66,11 +45,7 @@ class PathSearches:
     """Positions of many cars, each along its own path; see `PathSearch`."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        """Prepare the arguments of the kernel.
-
-        Args:
-            paths: The path of each car.
-        """
+        """Prepare the arguments of the kernel."""
         different = {id(path): path for path in paths}
         places = {key: place for place, key in enumerate(different)}
         self._path = np.array([places[id(path)] for path in paths])
@@ -83,19 +58,7 @@ class PathSearches:
     def ahead(
         self, cars: NDArray[np.intp], x_m: Array, y_m: Array, around_m: Array, window_m: float, ahead_m: Array
     ) -> tuple[Array, Array, Array]:
-        """Find the nearest points of the paths, and points ahead of them.
-
-        Args:
-            cars: Numbers of the cars, shape (n,).
-            x_m: Their world x [m], shape (n,).
-            y_m: Their world y [m], shape (n,).
-            around_m: Arc lengths to search around [m], shape (n,).
-            window_m: Search distance to either side [m].
-            ahead_m: Distances from the nearest point along the path [m], shape (n, k).
-
-        Returns:
-            Arc lengths of the nearest points [m], shape (n,); world x and y of the points ahead [m], shape (n, k) each.
-        """
+        """Find the nearest points of the paths, and points ahead of them."""
         return _ahead(self._path[cars], x_m, y_m, around_m, window_m, ahead_m, self._starts, *self._points, self._ends)
 
 

@@ -44,16 +44,6 @@ class Path:
         """Lay a smooth curve through points: a cubic spline over the chord length.
 
         A spline overshoots between points of very uneven distance; leave gaps where the path is straight.
-
-        Args:
-            x_m: World x of the points in the order of travel [m], at least two.
-            y_m: World y [m], as many.
-
-        Returns:
-            The path. Its points are `SPACING_M` apart, or slightly less, so that the last one is the last point given.
-
-        Raises:
-            ManeuverError: there are too few points, one is not finite, or two in a row are the same.
         """
         from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to import, and not needed to read a path
 
@@ -86,12 +76,7 @@ class Path:
 
     @classmethod
     def between(cls, x_m: Array, y_m: Array) -> Path:
-        """Make a path of known points; differences between them give arc length, heading and curvature.
-
-        Args:
-            x_m: World x of the points in the order of travel [m], at least two, no two in a row the same.
-            y_m: World y [m], as many.
-        """
+        """Make a path of known points; differences between them give arc length, heading and curvature."""
         s = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(y_m)))])
         heading = np.unwrap(np.arctan2(np.gradient(y_m, s), np.gradient(x_m, s)))
         x_m, y_m = np.ascontiguousarray(x_m), np.ascontiguousarray(y_m)
@@ -103,14 +88,7 @@ class Path:
         return float(self.s_m[-1])
 
     def extended(self, by_m: float) -> tuple[Array, Array]:
-        """Append one point, straight ahead beyond the end.
-
-        Args:
-            by_m: Distance beyond the end [m].
-
-        Returns:
-            World x and y [m], shape (n + 1,) each.
-        """
+        """Append one point, straight ahead beyond the end."""
         end = self.heading_rad[-1]
         x = np.append(self.x_m, self.x_m[-1] + by_m * math.cos(end))
         return x, np.append(self.y_m, self.y_m[-1] + by_m * math.sin(end))

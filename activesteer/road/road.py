@@ -352,11 +352,7 @@ class LaidRoad(Road):
 
 
 def road_of(metadata: Mapping[str, Any]) -> Road:
-    """Return the road of a recorded run, laid along its course; a default road if it was not recorded.
-
-    Raises:
-        RecordingError: a recorded key is unknown, missing, of the wrong type or out of range.
-    """
+    """Return the road of a recorded run, laid along its course; a default road if it was not recorded."""
     maneuver = table_of(metadata.get("maneuver", {}), "maneuver")
     table = table_of(maneuver.get("road", {}), "maneuver.road")
     road = build(Road, table, Source("the metadata of the recording", error=RecordingError), ("maneuver", "road"))

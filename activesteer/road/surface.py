@@ -34,25 +34,13 @@ class Surface(NamedTuple):
     obstacles: NDArray[Any]
 
     def at(self, s_m: Array, d_m: Array) -> Array:
-        """Return height [m] and slopes along and across of places.
-
-        Args:
-            s_m: Distances along the road [m], shape (n,).
-            d_m: Distances to the left of its middle [m], shape (n,).
-
-        Returns:
-            Shape (n, 3).
-        """
+        """Return height [m] and slopes along and across of places."""
         s, d = np.ascontiguousarray(s_m, np.float64), np.ascontiguousarray(d_m, np.float64)
         return heights_at(self.head[0], self.numbers, self.obstacles, s, d)
 
 
 def surface_of(road: Road) -> Surface | None:
-    """Return the surface of a road; None if it is plane.
-
-    Raises:
-        ManeuverError: a file of the road is wrong.
-    """
+    """Return the surface of a road; None if it is plane."""
     return _surface_of(road) if road.is_uneven else None
 
 

@@ -154,17 +154,7 @@ def level_at(surface, numbers, obstacles, first, last, s, d):
 
 @compiled
 def height_at(surface, numbers, obstacles, first, last, s, d):
-    """Return height [m] and slopes along s and d of the road at a place.
-
-    Args:
-        surface: A `SURFACE`.
-        numbers: Its numbers.
-        obstacles: The obstacles of the road.
-        first: First obstacle near the place.
-        last: Last one, excluded.
-        s: Distance along the road [m].
-        d: Distance to the left of its middle [m].
-    """
+    """Return height [m] and slopes along s and d of the road at a place."""
     z, z_s, z_d = 0.0, 0.0, 0.0
     rows, columns, count = int(surface.rows), int(surface.columns), int(surface.slopes)
     if s > surface.blend_m:

@@ -65,12 +65,7 @@ _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
 
 
 def model_files(mjcf: Path) -> dict[str, bytes]:
-    """Read an MJCF file, its included files, and the files of its meshes, textures and height fields.
-
-    Returns:
-        Path relative to the model's folder -> content, the model file first. A mesh or picture may be large, so only
-        its SHA-256 is returned, under its path and `.sha256`.
-    """
+    """Read an MJCF file, its included files, and the files of its meshes, textures and height fields."""
     files: dict[str, bytes] = {}
     elements = 0
     waiting, assets, folders = [mjcf], {}, {mjcf.parent}
@@ -241,16 +236,7 @@ class CarSpec:
         return replace(self, config=replace(self.config, sensors=Sensors()))
 
     def on(self, road: Road | None = None, timestep_s: float = DEFAULT_TIMESTEP_S) -> Vehicle:
-        """Build the car in the engine, at rest in static equilibrium.
-
-        Args:
-            road: Friction and grade; level and dry by default.
-            timestep_s: Step of the engine, 0.1 to 5 ms [s].
-
-        Raises:
-            ParameterError: the step is out of range.
-            ModelError: the MJCF does not compile, lacks a part, or has no static equilibrium.
-        """
+        """Build the car in the engine, at rest in static equilibrium."""
         checked_number("timestep_s", timestep_s, TIMESTEP_RANGE_S)
         content = {name: text for name, text in self.files.items() if name.startswith("mjcf/")}
         return Vehicle(self.mjcf, self.config, self.tyres, Road() if road is None else road, timestep_s, content)
@@ -258,10 +244,6 @@ class CarSpec:
 
 def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | None = None) -> CarSpec:
     """Read and check a car.
-
-    Args:
-        vehicle: Name, path, or table of a vehicle.
-        overrides: Dotted key -> value, such as `factors.mass` or `vehicle.tyres.rear`.
 
     Examples:
         >>> from activesteer.road.road import Road
@@ -304,20 +286,7 @@ def _tyre(path: Path, config: VehicleConfig) -> TyreParameters:
 def read_table(
     given: FileOrTable, part: str, find: Any, error: type[ActiveSteerError]
 ) -> tuple[dict[str, Any], Source, Path | None, dict[str, bytes]]:
-    """Read the table of a manoeuvre, vehicle or driver, and add its name.
-
-    Args:
-        given: Name, path, or the table itself.
-        part: `maneuver`, `vehicle` or `driver`.
-        find: Function from a name or path to the file.
-        error: Class of the errors.
-
-    Returns:
-        The table, its source, the folder of its file, and the file by name. A given table has no folder and no file.
-
-    Raises:
-        ActiveSteerError: the file is not found or cannot be read; of class `error`.
-    """
+    """Read the table of a manoeuvre, vehicle or driver, and add its name."""
     if isinstance(given, Mapping):
         return {"name": part, **given}, Source(f"{part} given as a table", error=error), None, {}
     if not isinstance(given, (str, os.PathLike)):

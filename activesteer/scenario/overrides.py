@@ -37,14 +37,7 @@ def plain(overrides: Mapping[str, Any] | None) -> dict[str, Any]:
 def applied(
     cls: type, table: Mapping[str, Any], source: Source, overrides: Sequence[Override]
 ) -> tuple[dict[str, Any], Source]:
-    """Apply overrides to the table of a file.
-
-    Returns:
-        The new table, and its source, which knows the overridden keys.
-
-    Raises:
-        ParameterError: a key does not exist, or two overrides set the same value.
-    """
+    """Apply overrides to the table of a file."""
     paths = [field_path(cls, override.path) for override in overrides]
     for (one, above), (other, below) in combinations(zip(overrides, paths, strict=True), 2):
         shorter = min(len(above), len(below))
@@ -74,11 +67,7 @@ def own_path(key: str) -> tuple[str, str] | None:
 
 
 def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
-    """Return users' controllers by the names that they have in keys; the same class may drive with other parameters.
-
-    Raises:
-        ParameterError: classes of two files have the same name.
-    """
+    """Return users' controllers by the names that they have in keys; the same class may drive with other parameters."""
     found: dict[str, list[Plugin]] = {}
     for plugin in map(controller_spec, controllers):
         if not plugin.is_builtin:
@@ -129,11 +118,7 @@ def read_by(overrides: Mapping[str, Any], controller: Any) -> dict[str, Any]:
 
 
 def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> None:
-    """Check that every override of the table [controllers] is read by one of these controllers.
-
-    Raises:
-        ParameterError: no controller reads an override; `allowed` has the keys that they read.
-    """
+    """Check that every override of the table [controllers] is read by one of these controllers."""
     for key, names in unread_gains(overrides, controllers).items():
         readers = [name for name in CONTROLLER.names() if names & keys_read(name)]
         if own_path(key):

@@ -40,16 +40,6 @@ def open_loop_of(recording: Recording, name: str) -> dict[str, Any]:
 
     The manoeuvre starts at the first row of the recording and has its length.
     A recorded brake pedal (`brake_pedal`, 0 to 1) is pressed again; meanwhile the speed is not held.
-
-    Args:
-        recording: Recording with `steering_wheel_rad` or `rack_m`, and `speed_mps` or `vx_mps`.
-        name: Name of the manoeuvre.
-
-    Returns:
-        The table of the manoeuvre, for `resolve`.
-
-    Raises:
-        RecordingError: steering or speed are missing, not finite, or the recording is too short.
     """
     if len(recording) < 2:
         raise RecordingError(f"{name}: {len(recording)} rows are too few to drive", value=len(recording))

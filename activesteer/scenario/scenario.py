@@ -154,13 +154,7 @@ def _with_speed_in_title(built: Maneuver, of_file: Mapping[str, Any]) -> Maneuve
 
 
 def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequence[str]) -> None:
-    """Check the overrides of a command that sets the manoeuvre or the driver itself.
-
-    Args:
-        overrides: Dotted key -> value, as for `resolve`.
-        scenario: Scenario with these overrides.
-        parts: Parts that overrides may change beside the road: `vehicle`, `driver`.
-    """
+    """Check the overrides of a command that sets the manoeuvre or the driver itself."""
     for key, value in overrides.items():
         part, path = part_of(key, type(scenario.maneuver))
         part = "vehicle" if part == "controllers" else part

@@ -38,12 +38,7 @@ class SensorBlock:
     """
 
     def __init__(self, sensors: Sensors, timestep_s: float) -> None:
-        """Draw the random constants of a run.
-
-        Args:
-            sensors: Table of the vehicle file.
-            timestep_s: Step of the simulation [s].
-        """
+        """Draw the random constants of a run."""
         # The speed comes from the wheels; every other number has the sensor that its field is named after.
         every = [sensors.all()[number.field.rpartition("_")[0]] for number in MEASURED[1:]]
         self.chains = np.zeros(len(every), CHAIN)
@@ -71,27 +66,14 @@ class SensorBlock:
         self.outputs[:] = [number for part in parts for number in part]
 
     def measurement(self, time_s: float) -> Measurement:
-        """Return the current readings.
-
-        Args:
-            time_s: Time of the measurement [s].
-        """
+        """Return the current readings."""
         values = iter(self.outputs.tolist())
         parts = (next(values) if width == 1 else tuple(islice(values, width)) for width in widths_of(Measurement)[1:])
         return Measurement._make((time_s, *parts))
 
 
 def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tuple[float, ...]:
-    """Return the factor of each wheel's rotational speed in the speed of the car [m].
-
-    Args:
-        front_fraction: Fraction of the drive torque at the front axle.
-        rolling_radii_m: Effective rolling radii, order of `CORNERS` [m].
-
-    Returns:
-        For an axle that is not driven, the rolling radii over the number of such wheels, else 0. If both axles are
-        driven, all four wheels count.
-    """
+    """Return the factor of each wheel's rotational speed in the speed of the car [m]."""
     counts = [
         fraction == 0.0 for fraction in (front_fraction, front_fraction, 1.0 - front_fraction, 1.0 - front_fraction)
     ]
@@ -124,18 +106,7 @@ def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float)
 
 @inlined
 def measured(chains, memory, wheel_radii_m, timestep_s, truth):
-    """Return the readings of the sensors after one more step.
-
-    Args:
-        chains: As in `SensorBlock`.
-        memory: As in `SensorBlock`; it is changed.
-        wheel_radii_m: Factors of the wheel speeds, see `speed_radii`; all 0 if the true speed is used.
-        timestep_s: Step of the simulation [s].
-        truth: Members of a true `Measurement`.
-
-    Returns:
-        The members of `Measurement`; the outputs hold them too.
-    """
+    """Return the readings of the sensors after one more step."""
     outputs = truth[1:]
     store_numbers(memory.ctypes.data, outputs)
     for index in range(1, _N_OUTPUTS):

@@ -97,17 +97,7 @@ def _pulse_speed(chain, memory):
 
 @inlined
 def passed_on(chain, memory, truth, timestep_s):
-    """Return the reading of a sensor after one more step.
-
-    Args:
-        chain: Record of `CHAIN`.
-        memory: Memory of all sensors.
-        truth: True value.
-        timestep_s: Step of the simulation [s].
-
-    Returns:
-        The reading, in the unit of the truth.
-    """
+    """Return the reading of a sensor after one more step."""
     at = chain.memory
     if chain.teeth > 0.0:
         _pass_teeth(chain, memory, truth, timestep_s)

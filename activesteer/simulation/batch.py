@@ -425,15 +425,7 @@ class Batch:
 
 
 def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None, n: int) -> list[dict[str, Any]]:
-    """Return the overrides of each car.
-
-    Args:
-        overrides: Key -> value, or array with a value for each car; or a list with overrides of each car.
-        n: Number of cars.
-
-    Raises:
-        ParameterError: a list or an array has another length.
-    """
+    """Return the overrides of each car."""
     if overrides is None or isinstance(overrides, Mapping):
         table = dict(overrides or {})
         arrays = {key: value for key, value in table.items() if isinstance(value, np.ndarray) and value.ndim}
@@ -460,11 +452,7 @@ def _steps(steps: Any, n: int) -> NDArray[np.intp]:
 
 
 def _columns(kind: Kind, message: Any, n: int) -> Array:
-    """Return the rows of a message of arrays, after checking them.
-
-    Raises:
-        ActiveSteerError: of the kind's type: a field has a wrong shape, a value is not finite or out of its range.
-    """
+    """Return the rows of a message of arrays, after checking them."""
     if not isinstance(message, kind.result):
         raise kind.fail("", f"is {shown(message)}; an activesteer.{kind.result.__name__} of arrays is needed", message)
     rows = np.zeros((n, len(numbers_of(kind.result))))

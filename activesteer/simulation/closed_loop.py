@@ -64,11 +64,7 @@ class NonReentrantLock:
         self._lock = threading.Lock()
 
     def __enter__(self) -> None:
-        """Enter, or refuse.
-
-        Raises:
-            ManeuverError: another thread, or the same one further up, is inside.
-        """
+        """Enter, or refuse."""
         if not self._lock.acquire(False):
             raise ManeuverError(
                 "this simulation is already being driven, by another thread or by the caller of its own block; use a "

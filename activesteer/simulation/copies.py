@@ -46,12 +46,7 @@ def pickled(portable: Any) -> bytes:
 
 
 def unpickled(kind: Any, content: bytes) -> Any:
-    """Create a simulation from its pickled inputs and state.
-
-    Args:
-        kind: Class of the simulation.
-        content: Return value of `pickled`.
-    """
+    """Create a simulation from its pickled inputs and state."""
     try:
         portable = pickle.loads(content)
     except ActiveSteerError:
@@ -66,13 +61,7 @@ _WHOLE: Final = (type, ModuleType, FunctionType, BuiltinFunctionType, MethodType
 
 
 def retuned(running: Any, before: Any, after: Any) -> Any:
-    """Return a block with new parameters and the memory of a running one.
-
-    Args:
-        running: The running block, which must not be used any more.
-        before: A block just made with the parameters of the running one.
-        after: A block just made with the new parameters; it is changed.
-    """
+    """Return a block with new parameters and the memory of a running one."""
     return _kept(running, before, after, set())
 
 

@@ -73,13 +73,7 @@ class FramePacer:
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], object] = time.sleep,
     ) -> None:
-        """Take a clock, which starts with the first picture.
-
-        Args:
-            speed: Simulated seconds per second of the clock.
-            clock: Function that returns the time [s].
-            sleep: Function that waits for a time [s].
-        """
+        """Take a clock, which starts with the first picture."""
         self._speed, self._clock, self._sleep = speed, clock, sleep
         self._start_s: float | None = None
         self.lost_s = 0.0
@@ -99,15 +93,7 @@ class FramePacer:
         self._start_s = None
 
     def next(self, shown_s: float) -> float:
-        """Wait until the next picture is due.
-
-        Args:
-            shown_s: Simulated time of the last picture [s].
-
-        Returns:
-            Simulated time of the next picture [s]: the time of the clock, or an earlier time if that step would be too
-            large. The clock is then set back.
-        """
+        """Wait until the next picture is due."""
         now_s = self._clock()
         if self._start_s is None:
             self._start_s = now_s - shown_s / self._speed
@@ -165,14 +151,7 @@ class DriveResult(NamedTuple):
 def scene_for(
     simulation: ClosedLoop, maneuver: Maneuver, controller: str = "none", *, cutaway: bool = False
 ) -> RenderScene:
-    """Return the scene for a simulation's car.
-
-    Args:
-        simulation: The simulation.
-        maneuver: The manoeuvre, whose road and course are shown.
-        controller: Name of the controller, which gives the car its colour.
-        cutaway: Whether the body is transparent.
-    """
+    """Return the scene for a simulation's car."""
     vehicle = simulation.vehicle
     size = Footprint.from_table(vehicle.dimensions())
     colour = run_looks([controller])[controller].on_dark
@@ -186,13 +165,6 @@ def drive(
     """Drive and show a manoeuvre from start to end, or until the window is closed or the drive is restarted.
 
     The drawn model is separate from the simulated one: pulling at the car does not affect the simulation.
-
-    Args:
-        simulation: The simulation, at its start.
-        scene: Scene with its car only.
-        viewer: The viewer of the scene.
-        pacer: Keeper of the pace.
-        keys: Keys of the window.
     """
     vehicle, timestep_s = simulation.vehicle, simulation.vehicle.timestep_s
     follow = _Follow(simulation)

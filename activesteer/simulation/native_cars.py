@@ -75,11 +75,7 @@ class NativeCars:
     """
 
     def __init__(self, loops: Sequence[Any]) -> None:
-        """Bind cars that stand before their first step.
-
-        Args:
-            loops: The loops.
-        """
+        """Bind cars that stand before their first step."""
         self._loops, count = loops, len(loops)
         self.cars = np.zeros(count, CAR)
         self.rows: dict[type[Any], Array] = {}
@@ -177,17 +173,7 @@ class NativeCars:
         controllers_given: bool = False,
         call: Callable[[NDArray[Any]], None] | None = None,
     ) -> dict[int, SimulationDiverged]:
-        """Drive each car for a number of steps.
-
-        Args:
-            left: Numbers of steps.
-            drivers_given: Whether the present commands of the drivers hold; the drivers are not called then.
-            controllers_given: The same for the controllers.
-            call: The native call for all cars; by default in this thread.
-
-        Returns:
-            Number of each car that has diverged -> its error.
-        """
+        """Drive each car for a number of steps."""
         cars, failed, moving = self.cars, {}, left > 0
         for index in np.flatnonzero(moving & ~self._loaded).tolist():
             self.load(index)
@@ -228,11 +214,7 @@ class NativeCars:
         return driver, command
 
     def give_driver_command(self, index: int, command: Any) -> None:
-        """Let a car have a command of its driver.
-
-        Raises:
-            ParameterError: it is not a complete `DriverCommand`.
-        """
+        """Let a car have a command of its driver."""
         write_command(DriverCommand, self._driver_at[index], command)
         torques = command.wheel_torques
         self._set[index] = torques is not None
@@ -242,11 +224,7 @@ class NativeCars:
             self.cars["torques_Nm"][index] = torque_numbers(torques)
 
     def give_actuator_command(self, index: int, command: Any) -> None:
-        """Let a car have a command that reaches its actuators at once.
-
-        Raises:
-            ParameterError: it is not a complete `ActuatorCommand`, or the car has no drive for it.
-        """
+        """Let a car have a command that reaches its actuators at once."""
         write_command(ActuatorCommand, self._actuator_at[index], command)
         self._check_driven(index, command)
         if command.estimate is not None:

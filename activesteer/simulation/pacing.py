@@ -24,15 +24,7 @@ class RealtimePacer:
     """
 
     def __init__(self, factor: float, timestep_s: float) -> None:
-        """Prepare the clock; it starts with the first step.
-
-        Args:
-            factor: Simulated seconds per second, 0.01 to 100.
-            timestep_s: Step of the simulation [s].
-
-        Raises:
-            ParameterError: the factor is out of range.
-        """
+        """Prepare the clock; it starts with the first step."""
         self.factor = checked_number("realtime", factor, FACTOR)
         self._interval_s = timestep_s / self.factor
         self._start_s: float | None = None

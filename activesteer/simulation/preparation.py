@@ -52,19 +52,7 @@ _ROUNDED_RAD: Final = math.radians(0.1)
 
 
 def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
-    """Find the steering wheel angle that a manoeuvre needs.
-
-    Args:
-        scenario: Manoeuvre, car and driver.
-        search: Search of the manoeuvre.
-        timestep_s: Step of the simulation [s].
-
-    Returns:
-        Steering wheel angle [rad].
-
-    Raises:
-        ManeuverError: no angle gives the lateral acceleration.
-    """
+    """Find the steering wheel angle that a manoeuvre needs."""
     probed = replace(scenario, maneuver=search.probe, driver=scenario.driver.for_searches())
     key = _key(probed, search, timestep_s)
     angle = amplitude_store.recall(key)
@@ -214,11 +202,7 @@ def single_track_of(scenarios: list[Scenario], run: Run) -> SingleTrackParameter
 
 
 def with_identified_single_track(scenario: Scenario, run: Run) -> Scenario:
-    """Return the scenario with the single-track model of the car as it is, including its load.
-
-    Raises:
-        ModelError: the car oversteers, so it has no characteristic speed.
-    """
+    """Return the scenario with the single-track model of the car as it is, including its load."""
     car = scenario.car
     single_track = single_track_of([replace(test, car=car) for test in linear_tests("compact")], run)
     return replace(scenario, car=replace(car, config=replace(car.config, single_track=single_track)))

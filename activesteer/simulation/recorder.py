@@ -76,15 +76,7 @@ class Recorder(Uncopyable):
         keep: bool = True,
         interval_s: float | None = None,
     ) -> None:
-        """Allocate the memory of the run.
-
-        Args:
-            vehicle: The car to record.
-            steps: Maximum number of steps.
-            writer: File to write to.
-            keep: Whether all rows stay in memory; otherwise only the block being filled does.
-            interval_s: Length of a block [s].
-        """
+        """Allocate the memory of the run."""
         self.channels = vehicle.channels.channels
         self._vehicle = vehicle
         self._writer = writer
@@ -120,11 +112,7 @@ class Recorder(Uncopyable):
         return int(self._tape["room"][0])
 
     def make_room(self) -> None:
-        """Take the rows from the tape, and flush a full block.
-
-        Raises:
-            SimulationDiverged: see `flush`.
-        """
+        """Take the rows from the tape, and flush a full block."""
         if self.rows - self._flushed == self._block_rows:
             self.flush()
         elif not self._tape["room"][0]:
@@ -159,14 +147,7 @@ class Recorder(Uncopyable):
         return raw if count == len(raw.sensordata) else type(raw)(*(array[:count] for array in raw))
 
     def flush(self, *, checked: bool = True) -> None:
-        """Turn the rows since the last flush into channels, and write them.
-
-        Args:
-            checked: Whether to raise an error for a value that is not finite; it is recorded in any case.
-
-        Raises:
-            SimulationDiverged: a channel or a pose is not finite, or larger than a file can hold.
-        """
+        """Turn the rows since the last flush into channels, and write them."""
         self._take()
         first, last = self._flushed, self.rows
         if first == last:
@@ -193,12 +174,7 @@ class Recorder(Uncopyable):
         return self._times(first, last), self._kept.values[: last - first], self._poses_between(first, last)
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> dict[str, float]:
-        """Return the values of all channels at the present instant, by name, without recording them.
-
-        Args:
-            driver_command: Last command of the driver.
-            actuator_command: Last command of the controller.
-        """
+        """Return the values of all channels at the present instant, by name, without recording them."""
         self._take()
         for raw, now in zip(self._raw, self._vehicle.rows.present(driver_command, actuator_command), strict=True):
             raw[0] = now[0]
@@ -217,12 +193,7 @@ class Recorder(Uncopyable):
         return RecordedRows(self._kept, self.rows, self._yaw_rad)
 
     def check_state(self, state: RecordedRows) -> None:
-        """Check that this recorder can go back to the rows of a saved state.
-
-        Raises:
-            RecordingError: the rows are already in a file.
-            ParameterError: `state` is not a state of a recorder of this run.
-        """
+        """Check that this recorder can go back to the rows of a saved state."""
         if self._writer is not None:
             raise RecordingError("a run that is being written to a file cannot go back to a saved state")
         if not (

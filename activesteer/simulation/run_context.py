@@ -158,11 +158,7 @@ class RunContext(NamedTuple):
         )
 
     def writer(self, path: Path) -> McapWriter:
-        """Open a file for the rows.
-
-        Raises:
-            RecordingError: the file cannot be written.
-        """
+        """Open a file for the rows."""
         return McapWriter(path, self.channels, self.body_names, self.metadata, self.files, self.scene)
 
 

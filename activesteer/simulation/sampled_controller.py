@@ -39,14 +39,6 @@ def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: flo
     """Time between two calls of a controller [s].
 
     It is `controllers.interval_s` of the vehicle file, else the controller's attribute `interval_s`, else the step.
-
-    Args:
-        plugin: The controller.
-        parameters: The table [controllers] of the vehicle file.
-        timestep_s: Step of the simulation [s].
-
-    Raises:
-        ParameterError: the interval is not a whole number of steps.
     """
     given = parameters.interval_s
     own = getattr(plugin.origin, "interval_s", None)
@@ -58,20 +50,7 @@ def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: flo
 def control_unit(
     plugin: Plugin, scenario: Scenario, vehicle: Vehicle
 ) -> tuple[ControllerSetup, ControlUnit, Controller]:
-    """Create a controller and its control unit.
-
-    Args:
-        plugin: The controller.
-        scenario: Manoeuvre and car.
-        vehicle: The car in the engine.
-
-    Returns:
-        The properties of the car that the controller may know, its control unit, and the controller.
-
-    Raises:
-        ParameterError: its interval or the delay of the bus is not a whole number of steps.
-        ControllerError: it cannot be created.
-    """
+    """Create a controller and its control unit."""
     car, timestep_s = scenario.car.config, vehicle.timestep_s
     setup = _with_rates(scenario.controller_setup(interval_s(plugin, car.controllers, timestep_s)), scenario, vehicle)
     unit = ControlUnit(

@@ -39,13 +39,7 @@ _EVERY: Final = 10
 
 
 def two_track_of(vehicle: FileOrTable, run: Run, overrides: Mapping[str, Any] | None = None) -> TwoTrackParameters:
-    """Return the two-track properties of a car.
-
-    Args:
-        vehicle: Name, path, or table of a vehicle; it needs no table [two_track].
-        run: Function that runs a scenario.
-        overrides: Dotted key -> value, for the vehicle or the road.
-    """
+    """Return the two-track properties of a car."""
     scenario = resolve(_steps(vehicle, overrides), vehicle, overrides)
     car = scenario.car.on()
     body = mass_properties(car.model, car.data)

@@ -26,11 +26,7 @@ STANDARDS: Final[dict[str, Standard]] = {
 
 
 def standard_of(name: str) -> Standard:
-    """Return a standard by its name.
-
-    Raises:
-        ParameterError: no standard has this name, or the name is empty.
-    """
+    """Return a standard by its name."""
     if not name:
         raise ParameterError(f"which standard? {nearest_names('', STANDARDS)}", value=name, allowed=tuple(STANDARDS))
     if name not in STANDARDS:

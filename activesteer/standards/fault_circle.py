@@ -85,11 +85,7 @@ def fault_circles(
     workers: Workers,
     progress: Callable[[int, int], None],
 ) -> list[dict[str, Any]]:
-    """Drive every usual fault in both circles.
-
-    Returns:
-        A row for each fault and direction: `fault`, `direction` and `FIGURES`. An incomplete run has nan and `error`.
-    """
+    """Drive every usual fault in both circles."""
     faults = usual_faults(str(controller))
     drive = functools.partial(fault_circle, controller, driver, vehicle, overrides, faults)
     done = in_parallel(

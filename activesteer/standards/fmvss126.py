@@ -36,12 +36,7 @@ _RAMP: Final = {"steer.end_deg": 120.0, "duration_s": 10.0, "road.mu": 0.9}
 
 
 def amplitudes(a_deg: float) -> list[tuple[float, float]]:
-    """Return the amplitudes of a series.
-
-    Returns:
-        Multiple of A and amplitude [deg] of each run: from 1.5 A in steps of 0.5 A to the greater of 6.5 A and 270 deg,
-        but at most to 300 deg.
-    """
+    """Return the amplitudes of a series."""
     last = LAST_FACTOR * a_deg
     last = MOST_DEG if last > MOST_DEG else max(last, LEAST_LAST_DEG)
     found = []

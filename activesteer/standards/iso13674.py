@@ -45,15 +45,7 @@ Signals = Mapping[str, Array]
 
 
 def weave_loops(signals: Signals) -> list[dict[str, Any]]:
-    """Return gradient and dead bands of every cross-plot.
-
-    Args:
-        signals: Steering wheel angle, yaw rate, lateral acceleration, hand torque, over whole periods.
-
-    Returns:
-        For each plot `abscissa`, `ordinate`, and in their units for display `gradient`, `ordinate_dead_band`,
-        `abscissa_dead_band`; None if a signal does not pass through zero.
-    """
+    """Return gradient and dead bands of every cross-plot."""
     found = []
     for abscissa, ordinate in _PLOTS:
         x, y = (quantity_of(name).factor * signals[name] for name in (abscissa, ordinate))
@@ -130,15 +122,7 @@ def _through_centre(runs: list[StandardRun]) -> dict[str, Array]:
 
 
 def transition_lines(signals: Signals) -> list[dict[str, Any]]:
-    """Return the slopes of the car's response at the centre, and the lines of the hand torque beside the centre.
-
-    Args:
-        signals: As for `weave_loops`, from one side through straight ahead to the other.
-
-    Returns:
-        For each plot `abscissa`, `ordinate` and `slope`. Plots of the hand torque also have `intercept`, the value at
-        zero of the line beyond 0.5 m/s², which is the friction of the steering; it is None in the other plots.
-    """
+    """Return the slopes of the car's response at the centre, and the lines of the hand torque beside the centre."""
     ay = signals["ay_mps2"]
     near = np.abs(ay) <= _CENTRE_MPS2
     found = []

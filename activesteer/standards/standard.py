@@ -58,11 +58,7 @@ class StandardRun:
         return {}
 
     def __getitem__(self, channel: str) -> Array:
-        """Return a channel over `time_s`.
-
-        Raises:
-            RecordingError: the run failed, or the channel was not kept.
-        """
+        """Return a channel over `time_s`."""
         if channel not in self.channels:
             raise RecordingError(self.error or f"{channel} was not kept", value=channel, allowed=tuple(self.channels))
         return self.channels[channel]
@@ -82,13 +78,7 @@ class StandardRun:
         return self.metrics.get(name, math.nan)
 
     def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
-        """Return a channel in its unit for display, from shortly before time zero.
-
-        Args:
-            channel: A kept channel.
-            begin_s: Instant that time counts from [s].
-            **words: Further attributes of `Curve`.
-        """
+        """Return a channel in its unit for display, from shortly before time zero."""
         values = self.channels.get(channel, np.empty(0))
         time_s = self.time_s[: len(values)] - begin_s
         shown = time_s >= -_LEAD_S
@@ -110,18 +100,7 @@ class TestRunner(Protocol):
         overrides: Mapping[str, Any] | None = None,
         curves: Sequence[str] = (),
     ) -> list[StandardRun]:
-        """Drive a series of runs.
-
-        Args:
-            series: Name of the series, unique within a test.
-            maneuver: Name, path or table.
-            cases: Dotted key -> value of each run, the same keys in all of them.
-            overrides: Dotted key -> value of all runs.
-            curves: Channels that are kept over time.
-
-        Returns:
-            The runs, in the order of the cases.
-        """
+        """Drive a series of runs."""
         ...
 
     def fault_circles(self) -> list[dict[str, Any]]:
@@ -193,11 +172,7 @@ _LONGEST_S: Final = 30.0
 
 
 def steering_wheel_at(runner: TestRunner, speed_kmh: float, ay_mps2: float) -> float:
-    """Return the angle from a slow ramp to the left at constant speed.
-
-    Returns:
-        Steering wheel angle, to 0.1 deg [deg].
-    """
+    """Return the angle from a slow ramp to the left at constant speed."""
     [run] = runner.drive(
         f"ramp_{speed_kmh:g}kmh",
         "slowly_increasing_steer",

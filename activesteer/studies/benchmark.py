@@ -349,14 +349,7 @@ _INTERVAL: Final = 10
 
 
 def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure batches of cars in the sine with dwell, with ideal sensors, and keep the best of some interleaved rounds.
-
-    Returns:
-        `batch_cpu_us_per_car_step` (processor time, native code alone, one thread), `batch_cpu_us_two_threads` (the
-        same with two threads), `batch_threads_2_speedup` (by the clock), `batch_car_steps_per_s` (all processors, with
-        measurements and the vectorised `ars` every 10 ms); these four for 256 cars, and with the number of cars in the
-        name for all `SIZES`; `batch_MB_per_car`.
-    """
+    """Measure batches of cars in the sine with dwell with ideal sensors; the best of some interleaved rounds counts."""
     found: dict[str, float] = {}
     for size in SIZES:
         before, threads = _memory_MB(), os.cpu_count() or 1
@@ -541,11 +534,7 @@ def _flat(baseline: Baseline) -> dict[tuple[str, str, str], float]:
 
 
 def read_baseline(path: Path = BASELINE) -> Baseline:
-    """Return the stored baseline; null stands for nan.
-
-    Raises:
-        RecordingError: the file is missing or is no baseline; renew it with `activesteer bench --maneuvers --renew`.
-    """
+    """Return the stored baseline; null stands for nan."""
     try:
         stored = json.loads(read_text(path, RecordingError))
         for maneuver, controller, name in _flat(stored):

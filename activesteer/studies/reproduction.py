@@ -149,11 +149,7 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
 
 
 def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None) -> list[Claim]:
-    """Return the claims of the nominal scenarios, without files.
-
-    Returns:
-        All claims, in the order of the paper.
-    """
+    """Return the claims of the nominal scenarios, without files."""
     found = in_parallel(_claims_of, [(name, vehicle) for name in SCENARIOS], jobs)
     return [claim for claims in found for claim in claims]
 
@@ -178,13 +174,7 @@ def write_page(results: Iterable[Reproduction], folder: Path) -> Path | None:
 
 
 def draw_figures(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle: str) -> list[Path]:
-    """Draw all figures that these runs allow, and the figure of the suspension: PNG, SVG and PDF.
-
-    Args:
-        recordings: Scenario -> system -> recording.
-        folder: Folder for the figures.
-        vehicle: Name or path of the vehicle, for the rig and the linear models.
-    """
+    """Draw all figures that these runs allow, and the figure of the suspension: PNG, SVG and PDF."""
     files = draw_runs(recordings, folder)
     camber = rear_camber_figure(kinematics_compliance(vehicle))
     files += [save(camber, folder / f"figure_01_rear_camber{ending}") for ending in FORMATS]
@@ -196,11 +186,7 @@ def draw_figures(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehi
 
 
 def models_beside(run: Recording) -> dict[str, dict[str, Array]]:
-    """Return responses of linear models to the steering of a run: single track and, on a level road, the full car.
-
-    Returns:
-        Name of the model -> channel -> values over the time of the run.
-    """
+    """Return responses of linear models to the steering of a run: single track and, on a level road, the full car."""
     maneuver, vehicle = run.metadata["maneuver"], run.metadata["vehicle"]
     single_track = SingleTrackParameters(**vehicle["single_track"])
     models = {"single-track model": single_track_response(run, single_track, vehicle["steering"]["ratio"])}

@@ -33,17 +33,7 @@ def _scalar_calls(tyre, count, pressure_Pa):
 
 
 def bench(params: TyreParameters, rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measure the full evaluation (combined slip with camber, all five outputs) on one core.
-
-    Args:
-        params: The tyre.
-        rounds: Number of measurements; the best counts.
-
-    Returns:
-        `scalar_us`: microseconds per call of the compiled function from compiled code, as in the engine's callback;
-        `vectorised_us_per_row`: microseconds per row of `MagicFormula.evaluate` over 100 000 rows;
-        `python_call_us`: microseconds for one `MagicFormula.evaluate` of a single point from Python.
-    """
+    """Measure the full evaluation (combined slip with camber, all five outputs) on one core."""
     record, pressure = np.atleast_1d(params.record), params["INFLPRES"]
     rng = np.random.default_rng(0)
     rows = [rng.uniform(low, high, _CALLS) for low, high in ((500, 8000), (-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.05))]

@@ -31,20 +31,12 @@ _MF52: Final = 52.0
 
 
 def is_finite(tyre: np.record) -> bool:
-    """Return True if forces, radii and relaxation lengths are finite over the tyre's ranges, rolling and at rest.
-
-    Args:
-        tyre: A `TYRE_RECORD`.
-    """
+    """Return True if forces, radii and relaxation lengths are finite over the tyre's ranges, rolling and at rest."""
     return _is_finite(np.atleast_1d(tyre).tobytes())
 
 
 def culprit(tyre: np.record, names: Iterable[str]) -> str | None:
-    """Return the enormous coefficient whose default makes the tyre finite; the largest one if there are several.
-
-    Returns:
-        Its name; None if no single coefficient is the cause.
-    """
+    """Return the enormous coefficient whose default makes the tyre finite; the largest one if there are several."""
     enormous = (name for name in names if abs(tyre[name]) > _ENORMOUS)
     for name in sorted(enormous, key=lambda name: -abs(tyre[name])):
         tried = np.atleast_1d(tyre).copy()

@@ -30,14 +30,7 @@ def _slips(low: float, high: float) -> np.ndarray:
 
 
 def key_figures(params: TyreParameters) -> dict[str, Any]:
-    """Return numbers that characterise a tyre, for a table or as JSON.
-
-    Returns:
-        Identification (`file`, `version`, `fittyp`, `side`, `size`, `nominal_load_N`, `pressure_Pa`,
-        `unloaded_radius_m` ...), the ranges of validity, and under `over_load` one list per quantity, in the order of
-        `over_load["load_N"]`: peak friction and the slip at the peak, stiffnesses, trail, relaxation lengths
-        and radii, without camber, at the file's pressure and speed of measurement.
-    """
+    """Return numbers that characterise a tyre, for a table or as JSON."""
     nominal = params["FNOMIN"]
     loads = [fraction * nominal for fraction in _LOADS if params["FZMIN"] <= fraction * nominal <= params["FZMAX"]]
     return {
@@ -122,11 +115,7 @@ _TABLE: Final = (
 
 
 def describe(params: TyreParameters) -> str:
-    """Describe a tyre and its unusual properties as text for a terminal.
-
-    Returns:
-        Several lines, without a line break at the end.
-    """
+    """Describe a tyre and its unusual properties as text for a terminal."""
     figures = key_figures(params)
     ranges = figures["ranges"]
     name = params.source.name if params.source else "tyre"
@@ -179,16 +168,6 @@ def draw(params: TyreParameters, folder: str | os.PathLike[str]) -> list[Path]:
     The pictures are `side_force.png` (side force and aligning moment over slip angle, for loads and for cambers),
     `longitudinal_force.png`, `friction_ellipse.png`, `combined_slip.png` and `relaxation_lengths.png`. All of them are
     at the file's pressure and speed of measurement and within its ranges of validity.
-
-    Args:
-        params: The tyre, as mounted.
-        folder: Folder for the files; it is created if it does not exist.
-
-    Returns:
-        The paths written, in this order.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or a file cannot be written.
     """
     formula = MagicFormula(params)
     name = params.source.name if params.source else "tyre"
@@ -272,17 +251,7 @@ def _longitudinal_force(formula: MagicFormula) -> Picture:
 
 
 def envelope(formula: MagicFormula, load_N: float, directions: int = _DIRECTIONS) -> tuple[np.ndarray, np.ndarray]:
-    """Return the greatest horizontal force of a tyre in every direction.
-
-    Args:
-        formula: The tyre.
-        load_N: Load [N].
-        directions: Number of sectors of the plane; each gives its outermost point.
-
-    Returns:
-        F_x and F_y [N] at the outermost of all combinations of slips within the ranges of the file, around the plane
-        from the left over the front, closed; shape (directions + 1,), less where a sector is empty.
-    """
+    """Return the greatest horizontal force of a tyre in every direction."""
     params = formula.parameters
     # Closer together near zero, where the forces change fastest.
     fraction = np.linspace(-1.0, 1.0, _GRID)

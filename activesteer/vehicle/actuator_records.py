@@ -18,14 +18,7 @@ class ActuatorRecords:
     """Views of the records of a compiled car; a change acts from the next step on."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """Find the block.
-
-        Args:
-            model: The car, compiled and with its block.
-
-        Raises:
-            ModelError: it has no actuators for rear steering.
-        """
+        """Find the block."""
         self._model = model
         self._actuators = fb.section_of(model, "actuators")
         self._links, self._screws = fb.section_of(model, "links"), fb.section_of(model, "screws")

@@ -177,15 +177,7 @@ _INTERVALS: Final = 32
 
 
 def fit_curve_axles(spec: mujoco.MjSpec, curves: Curves) -> None:
-    """Add tendons to each wheel of a curve axle, for the fast natural modes of its knuckle.
-
-    Args:
-        spec: The model; changed.
-        curves: The curves of its axles.
-
-    Raises:
-        ModelError: the model's joints are not those of a curve axle's knuckle.
-    """
+    """Add tendons to each wheel of a curve axle, for the fast natural modes of its knuckle."""
     corners = [corner for corner in CORNERS if curves.axle(corner) is not None]
     if not corners:
         return
@@ -206,15 +198,7 @@ def fit_curve_axles(spec: mujoco.MjSpec, curves: Curves) -> None:
 
 
 def curve_axle_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDArray[Any]], list[NDArray[np.float64]]]:
-    """Return the records of all wheels of curve axles, and the tables of their curves.
-
-    Args:
-        model: The car with its tendons, compiled.
-        curves: The curves of its axles.
-
-    Returns:
-        `CURVE_AXLE_WHEEL` records and consecutive tables; both empty without curve axles.
-    """
+    """Return the records of all wheels of curve axles, and the tables of their curves."""
     records: list[NDArray[Any]] = []
     tables: list[NDArray[np.float64]] = []
     places: dict[str, tuple[int, int]] = {}
@@ -349,9 +333,6 @@ def _modes(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> tuple[NDArra
 
     The inertia is that of a fast motion of the five coordinates with the rest free to move. A wheel that turns on its
     bearing takes no part in the rotation of its knuckle in side view.
-
-    Returns:
-        Squares, shape (5,), rising [1/s2]; one row for each mode, shape (5, 5), the left wheel's.
     """
     from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only curve axles need it
 

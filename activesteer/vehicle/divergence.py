@@ -33,17 +33,7 @@ def engine_warnings_held() -> Iterator[None]:
 
 
 def raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Array, speed_mps: float) -> None:
-    """Look for warnings of the engine and for values that are not finite, commands first.
-
-    Args:
-        model: The car.
-        data: Its state.
-        commands: The last commands, as `write_commands` leaves them.
-        speed_mps: Its speed.
-
-    Raises:
-        SimulationDiverged: there is one.
-    """
+    """Look for warnings of the engine and for values that are not finite, commands first."""
     for name in CARRIED_OUT:
         value = commands[COMMANDS.index(name)]
         if not math.isfinite(value):

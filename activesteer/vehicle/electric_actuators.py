@@ -58,11 +58,7 @@ class ElectricActuator:
     """Speed loop: rate at which a speed error decays, if the motor is strong enough [1/s]."""
 
     def refuse_keys(self, problem: str) -> None:
-        """Refuse keys of a motor for an actuator without one.
-
-        Raises:
-            ParameterError: a key other than `preset` is given.
-        """
+        """Refuse keys of a motor for an actuator without one."""
         for item in fields(self):
             if item.name != "preset" and (value := getattr(self, item.name)) is not None:
                 raise ParameterError(problem, key=item.name, value=value)
@@ -205,11 +201,7 @@ STRAIN_WAVE: Final = presets_of(SuperpositionActuator, "superposition_actuator")
 
 
 def fit_motor(spec: mujoco.MjSpec) -> None:
-    """Give the superposition of a model a motor: a state without a force, and a sensor of torque and limits.
-
-    Raises:
-        ModelError: the model has no superposition, or it does not turn the column.
-    """
+    """Give the superposition of a model a motor: a state without a force, and a sensor of torque and limits."""
     if spec.joint(NAME) is None or spec.actuator(NAME) is None or spec.tendon(_COLUMN) is None:
         raise ModelError(f"a motor for the superposition needs joint and actuator {NAME!r} and the tendon {_COLUMN!r}")
     added = spec.add_actuator(
@@ -222,12 +214,7 @@ def fit_motor(spec: mujoco.MjSpec) -> None:
 
 
 def motor_record(model: mujoco.MjModel, actuator: SuperpositionActuator) -> NDArray[Any]:
-    """Return the `SCREW` record for the callbacks.
-
-    Args:
-        model: The model with the motor, compiled.
-        actuator: The actuator with all keys.
-    """
+    """Return the `SCREW` record for the callbacks."""
     index, column = model.actuator(NAME).id, model.tendon(_COLUMN).id
     values = actuator.motor_numbers() | {
         "act": float(model.actuator_actadr[index]),

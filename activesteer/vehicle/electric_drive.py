@@ -207,12 +207,7 @@ _UNLIMITED: Final = 1e12
 
 
 def motor_records(motors: Motors, timestep_s: float) -> NDArray[Any]:
-    """Return the records of a car's motors, in the order of their places.
-
-    Args:
-        motors: The motors.
-        timestep_s: Step of the engine [s].
-    """
+    """Return the records of a car's motors, in the order of their places."""
     records = np.zeros(len(list(motors)), MOTOR)
     for record, (place, motor) in zip(records, motors, strict=True):
         wheels = AXLES.get(place, (place, place))

@@ -109,14 +109,7 @@ def engine_layout() -> EngineLayout:
 
 
 def measure_engine_layout() -> EngineLayout:
-    """Measure the offsets and confirm them on a second, different model.
-
-    Returns:
-        The offsets for the installed MuJoCo.
-
-    Raises:
-        ModelError: the structures do not look as expected in this MuJoCo version.
-    """
+    """Measure the offsets and confirm them on a second, different model."""
     first = _measure(*_probe(7919, 0.00123456789), 7919)
     second = _measure(*_probe(6421, 0.00098765432), 6421)
     if first != second:

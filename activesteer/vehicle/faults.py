@@ -38,15 +38,7 @@ class Faults:
     """The faults of a run."""
 
     def __init__(self, vehicle: Vehicle, faults: Sequence[Fault] = ()) -> None:
-        """Look up the faulty parts. Nothing is changed yet, except that brakes use sensors that may fail.
-
-        Args:
-            vehicle: The car.
-            faults: Its faults; times count from the start of the recording.
-
-        Raises:
-            ManeuverError: this car does not have one of the parts.
-        """
+        """Look up the faulty parts. Nothing is changed yet, except that brakes use sensors that may fail."""
         self._vehicle = vehicle
         self._acting: list[_Acting] = []
         vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
@@ -172,13 +164,7 @@ class _DemandFault(_Acting):
 
 
 def part_of(vehicle: Vehicle, part: str, name: str) -> NDArray[Any]:
-    """Return one of the actuators of a part as compiled code takes it, a `native_faults.PART` of shape (1,).
-
-    Args:
-        vehicle: The car.
-        part: A part of `ACTUATORS`.
-        name: One of its members.
-    """
+    """Return one of the actuators of a part as compiled code takes it, a `native_faults.PART` of shape (1,)."""
     model, about, record = vehicle.model, ACTUATORS[part], np.zeros(1, native.PART)
     index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     block = fb.header_of(model).ctypes.data

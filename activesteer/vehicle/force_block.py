@@ -136,16 +136,7 @@ def wheel_outputs(data: mujoco.MjData, count: int) -> NDArray[Any]:
 
 
 def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> NDArray[Any]:
-    """Return a header with the sizes of a model.
-
-    Args:
-        model: The model, compiled without the block; the block does not change its sizes and addresses.
-        chassis: Index of the body that drag acts on.
-        chassis_dofs: Degrees of freedom between the world and it.
-
-    Returns:
-        The header, shape (1,).
-    """
+    """Return a header with the sizes of a model."""
     return filled(
         HEADER, n_dofs=model.nv, n_bodies=model.nbody, n_userdata=model.nuserdata, n_activations=model.na,
         n_controls=model.nu, n_tendons=model.ntendon, n_tendon_jacobian=model.nJten, n_coordinates=model.nq,
@@ -166,15 +157,7 @@ def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
 
 
 def pack(header: NDArray[Any], sections: Mapping[str, list[NDArray[Any]]]) -> NDArray[np.float64]:
-    """Return the block without its trailer.
-
-    Args:
-        header: As from `new_header`; starts and numbers of the sections are written into it.
-        sections: Records of each section, in pieces; missing ones are empty.
-
-    Returns:
-        The numbers.
-    """
+    """Return the block without its trailer."""
     parts = [header.view(np.float64)]
     start = parts[0].size
     for name, kind in _SECTIONS.items():

@@ -255,9 +255,6 @@ class ImplicitPlan:
         """Plan again if the model has changed in what the plan has frozen.
 
         This takes two microseconds if nothing has changed. All other changes count in each step anyway.
-
-        Raises:
-            ModelError: the time step has changed, or a mass, moment of inertia or armature is negative.
         """
         state = watch(*self._watch)
         if state == UNCHANGED and self._current_settings() == self._settings:
@@ -277,12 +274,7 @@ _options: Final = operator.attrgetter(*OPTIONS)
 
 
 def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Have the engine forget what it prepared for its own solution; otherwise it renews a part of that in every step.
-
-    Args:
-        model: A car that steps with a plan.
-        data: Its state, with positions as the engine finds them.
-    """
+    """Discard what the engine prepared for its own solution; otherwise it renews a part of it in every step."""
     integrator = model.opt.integrator
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_EULER)
     mujoco.mj_fwdPosition(model, data)
@@ -382,15 +374,7 @@ def _chain(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def _elimination(cliques: Sequence[NDArray[Any]], size: int) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
-    """Find an order of elimination with little fill: always the unknown with the fewest neighbours left.
-
-    Args:
-        cliques: Sets of unknowns that are all coupled with each other.
-        size: Number of unknowns.
-
-    Returns:
-        The unknowns in their order, and for each of them the later unknowns that are coupled with it.
-    """
+    """Find an order of elimination with little fill: always the unknown with the fewest neighbours left."""
     meets = np.eye(size, dtype=bool)
     for clique in cliques:
         meets[np.ix_(clique, clique)] = True

@@ -56,11 +56,7 @@ class LocalState:
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Take the present state of the vehicle, which rolls along the world's x axis, as the reference.
-
-        Raises:
-            ParameterError: the road is uneven or banked.
-        """
+        """Take the present state of the vehicle, which rolls along the world's x axis, as the reference."""
         self.vehicle = vehicle
         model = vehicle.model
         if model.opt.gravity[1] != 0.0 or fb.header_of(model)["n_surfaces"][0] != 0.0:
@@ -210,19 +206,7 @@ class Mode:
 
 
 def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: float) -> list[Mode]:
-    """Find the modes of a system in discrete time.
-
-    Args:
-        a: System matrix of one step, shape (n, n).
-        states: Names of the states, n.
-        timestep_s: Length of a step [s].
-
-    Returns:
-        Modes by natural frequency; of a conjugate pair the one with positive imaginary part.
-
-    Raises:
-        ModelError: the matrix is not finite, or its eigenvectors do not span the states.
-    """
+    """Find the modes of a system in discrete time."""
     try:
         values, right = np.linalg.eig(a)
         left = np.linalg.inv(right)

@@ -23,13 +23,6 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
 
     Masses are points fixed to the chassis. The site `cg`, whose motion is recorded, moves with the centre of gravity of
     the whole car. A car without load stays exactly as it is.
-
-    Args:
-        spec: The model; changed.
-        parameters: Load and factors.
-
-    Raises:
-        ModelError: there is no chassis, or its mass would not be positive.
     """
     chassis = spec.body("chassis")
     if chassis is None:

@@ -51,22 +51,7 @@ def load_model(
     timestep_s: float,
     content: Mapping[str, bytes] | None = None,
 ) -> mujoco.MjModel:
-    """Compile a car, or copy it if it was compiled recently.
-
-    Args:
-        mjcf: The model file.
-        parameters: Parameters beyond the MJCF.
-        tyres: Tyres of the front and of the rear axle.
-        road: Friction and grade.
-        timestep_s: Step of the engine [s].
-        content: Content of the model's files by name, which reveals a changed file; without it nothing is copied.
-
-    Returns:
-        The model, ready for the native forces.
-
-    Raises:
-        ModelError: the MJCF does not compile, or lacks a part that a car must have.
-    """
+    """Compile a car, or copy it if it was compiled recently."""
     if not content:
         return _compile(mjcf, parameters, tyres, road, timestep_s)
     # Controllers and their single-track model are in the vehicle file, but are not part of the car.

@@ -8,11 +8,7 @@ from activesteer.errors import ModelError, nearest_names
 
 
 def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """Return the index of a named object.
-
-    Raises:
-        ModelError: no object has this name.
-    """
+    """Return the index of a named object."""
     index = mujoco.mj_name2id(model, kind, name)
     if index < 0:
         word = kind.name.removeprefix("mjOBJ_").lower()
@@ -34,11 +30,7 @@ def is_there(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
 
 
 def sensor_columns(model: mujoco.MjModel, name: str) -> slice:
-    """Return the places of a sensor's values in `sensordata`.
-
-    Raises:
-        ModelError: no sensor has this name.
-    """
+    """Return the places of a sensor's values in `sensordata`."""
     index = find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
     start = int(model.sensor_adr[index])
     return slice(start, start + int(model.sensor_dim[index]))

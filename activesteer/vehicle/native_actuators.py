@@ -168,18 +168,7 @@ _SLOW = 1e-4
 def friction_rate(
     deflection_m: float, speed_mps: float, vibration_mps: float, slip_m: float, timestep_s: float
 ) -> float:
-    """Return the mean rate of the elastic deflection over a step, exact for a constant speed.
-
-    Args:
-        deflection_m: Elastic deflection w [m].
-        speed_mps: Speed of the motion v [m/s].
-        vibration_mps: Standard deviation of the vibration s [m/s], >= 0.
-        slip_m: Deflection at which it slips F/k [m]; 0 means no friction and no deflection.
-        timestep_s: Step h [s].
-
-    Returns:
-        dw/dt [m/s].
-    """
+    """Return the mean rate of the elastic deflection over a step, exact for a constant speed."""
     if slip_m <= 0.0:
         return -deflection_m / timestep_s
     speed = abs(speed_mps)
@@ -333,20 +322,7 @@ def _use_battery(motors, states, battery, given, qvel, spins):
 def step_motors(
     motors_address, count, battery_address, states_address, ctrl, drives, qvel, spins, timestep_s, torques_set
 ):  # fmt: skip
-    """Make one step.
-
-    Args:
-        motors_address: Address of `MOTOR` records.
-        count: Their number.
-        battery_address: Address of a `BATTERY`.
-        states_address: Address of a `BATTERY_STATE`, followed by a `MOTOR_STATE` for each motor; advanced.
-        ctrl: Inputs of the actuators, with the demands of the wheels [N m]; the torques of the motors replace them.
-        drives: Places of the four wheels in `ctrl`.
-        qvel: Velocities of the engine's degrees of freedom.
-        spins: Places of the four wheels in `qvel`.
-        timestep_s: Step of the engine [s].
-        torques_set: Whether the torques of the wheels are given, so that the motors are off and `ctrl` stays.
-    """
+    """Make one step."""
     motors = carray(_motor_pointer(motors_address), (count,))
     states = carray(_motor_state_pointer(states_address + _BATTERY_BYTES), (count,))
     for index in range(count):

@@ -65,12 +65,7 @@ point in steps of `_CAM_STEP_M`, and half the width over which the sideways slop
 
 
 def cam_record(tyre: TyreParameters, pressure_Pa: float) -> NDArray[Any]:
-    """Return the cams of a tyre, a `CAM` of shape (1,).
-
-    Args:
-        tyre: The tyre.
-        pressure_Pa: Inflation pressure [Pa].
-    """
+    """Return the cams of a tyre, a `CAM` of shape (1,)."""
     radius = tyre["UNLOADED_RADIUS"]
     half_length, half_height, order = (
         tyre["ELLIPS_LENGTH"] * radius, tyre["ELLIPS_HEIGHT"] * radius, tyre["ELLIPS_ORDER"],
@@ -84,22 +79,7 @@ def cam_record(tyre: TyreParameters, pressure_Pa: float) -> NDArray[Any]:
 
 @compiled
 def _cam_height(surface, numbers, obstacles, first, last, cam, reach, coarse, s, d, ahead_s, ahead_d):
-    """Return height of the lowest point of a cam, and its change per metre forwards.
-
-    Args:
-        surface: The road; this and the next four arguments as for `height_at`.
-        numbers: Its numbers.
-        obstacles: Its obstacles.
-        first: First obstacle near.
-        last: Last one, excluded.
-        cam: A `CAM`.
-        reach: Distance within which the road may touch the cam [m].
-        coarse: Distance at which to look first [m].
-        s: Place of the cam's middle.
-        d: Its other coordinate.
-        ahead_s: Change of s per metre forwards.
-        ahead_d: Change of d per metre forwards.
-    """
+    """Return height of the lowest point of a cam, and its change per metre forwards."""
     best, at = -math.inf, 0.0
     count = math.ceil(reach / coarse)
     for index in range(-count, count + 1):
@@ -157,22 +137,7 @@ def _drop(cam, x):
 def contact_plane(
     surface, numbers, obstacles, cam, along, across, cos, sin, stretch, heading_x, heading_y, free_radius
 ):
-    """Return height, forward slope, sideways slope and forward change of slope [1/m] of the plane that a tyre feels.
-
-    Args:
-        surface: A `SURFACE`.
-        numbers: Its numbers.
-        obstacles: Its obstacles.
-        cam: The `CAM` of the wheel.
-        along: Distance along the road of the place below the wheel [m].
-        across: Its distance to the left of the middle [m].
-        cos: Cosine of the road's direction against world x.
-        sin: Its sine.
-        stretch: Distance along the road's middle per distance along the road at this place.
-        heading_x: Heading of the wheel in the world, a horizontal unit vector.
-        heading_y: Its y component.
-        free_radius: Free radius of the tyre [m].
-    """
+    """Return height, forward slope, sideways slope and forward change of slope [1/m] of the plane that a tyre feels."""
     first, last, highest = near_obstacles(obstacles, along, across)
     if first >= last and surface.rows == 0.0 and surface.slopes == 0.0:
         return 0.0, 0.0, 0.0, 0.0
@@ -213,14 +178,7 @@ def contact_plane(
 
 @compiled
 def plane_axes(forward, sideways, heading_x, heading_y):
-    """Return normal and two axes of a plane, nine components in world axes; the first axis lies above world x.
-
-    Args:
-        forward: Slope along the heading.
-        sideways: Slope to the left of the heading.
-        heading_x: Heading, a horizontal unit vector.
-        heading_y: Its y component.
-    """
+    """Return normal and two axes of a plane, nine components in world axes; the first axis lies above world x."""
     slope_x = forward * heading_x - sideways * heading_y
     slope_y = forward * heading_y + sideways * heading_x
     nz = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
@@ -237,14 +195,6 @@ def spin_on_bend(p, spin, speed, bend, loaded_radius, pressure_Pa):
 
     The tread rolls off on the road at the effective rolling radius relative to the normal of the plane, which turns
     with the speed times the bend. The contact point lags behind the centre by the loaded radius times that rate.
-
-    Args:
-        p: Record of the tyre.
-        spin: Spin of the wheel [rad/s].
-        speed: Speed along the heading [m/s].
-        bend: Forward change of the forward slope [1/m]; negative over a crest.
-        loaded_radius: Distance of the wheel centre from the plane [m].
-        pressure_Pa: Inflation pressure [Pa].
     """
     rolling = effective_rolling_radius(p, p.FNOMIN, spin, pressure_Pa)
     return spin - (loaded_radius - rolling) / rolling * bend * speed

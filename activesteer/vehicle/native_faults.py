@@ -131,18 +131,7 @@ def exchange_health(part, block, gain, bias, healthy, save):
 
 @inlined
 def fail_part(part, block, gain, bias, healthy, kind, offset, held):
-    """Write a fault of an actuator into the model, in place of what was there.
-
-    Args:
-        part: A `PART`.
-        block: The force block.
-        gain: Gains of all actuators.
-        bias: Their biases.
-        healthy: Its healthy numbers; see `exchange_health`.
-        kind: Kind of the fault.
-        offset: Offset of the demand of a part that works, at the road wheel [rad] or as a torque [N m].
-        held: Torque at which a brake sticks [N m].
-    """
+    """Write a fault of an actuator into the model, in place of what was there."""
     exchange_health(part, block, gain, bias, healthy, False)
     record = part.record
     if kind == WORKS:

@@ -368,11 +368,7 @@ _installing: Final = threading.Lock()
 
 
 def install_native_forces() -> None:
-    """Install the callbacks in this process, if they are not installed already.
-
-    Raises:
-        ModelError: another part of the program has replaced them by its own callback.
-    """
+    """Install the callbacks in this process, if they are not installed already."""
     with _installing:
         _install()
 

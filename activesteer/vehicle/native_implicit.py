@@ -134,11 +134,7 @@ def _assemble(plan):
 
 @inlined
 def _factorise(plan):
-    """Factorise into unit upper triangular rows times diagonal, in place; store reciprocals of the diagonal.
-
-    Returns:
-        The last place whose pivot is not positive; -1 if the matrix is positive definite.
-    """
+    """Factorise into unit upper triangular rows times diagonal, in place; store reciprocals of the diagonal."""
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
     update = _indices(plan.update)
     target = 0
@@ -206,11 +202,7 @@ def _accelerate(plan):
 
 @inlined
 def advance(plan):
-    """Make one step of the engine.
-
-    Args:
-        plan: An `IMPLICIT_PLAN`.
-    """
+    """Make one step of the engine."""
     if _engine_must(plan):
         _engine(plan.mj_step, plan)
         return

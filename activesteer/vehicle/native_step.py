@@ -166,14 +166,7 @@ _SENSED: Final = types.Tuple([types.boolean, native_type(Measurement), native_ty
 
 @compiled_call(_SENSED, types.intp)
 def sense(bindings_address):
-    """Read the ideal sensors.
-
-    Args:
-        bindings_address: Address of a `STEP_BINDINGS`.
-
-    Returns:
-        Whether the state is sane, and the fields of `Measurement` and of `Motion`.
-    """
+    """Read the ideal sensors."""
     return _sense(carray(_bindings_pointer(bindings_address), (1,))[0])
 
 
@@ -240,16 +233,6 @@ def carry_out(bindings_address, driver_command, actuator_command, torques_set):
 
     The commands stay in the first recorded array after the engine's. The step is recorded on the tape of the bindings,
     unless the state is not sane.
-
-    Args:
-        bindings_address: Address of a `STEP_BINDINGS`.
-        driver_command: A `DriverCommand`.
-        actuator_command: An `ActuatorCommand`.
-        torques_set: Whether drive and brakes have their inputs already; drive torque demands and the pedal then have
-            no effect.
-
-    Returns:
-        Whether the state is sane, and the fields of `Measurement` and of `Motion`.
     """
     bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
     commands_address = bindings.sources[_ENGINE_ARRAYS]
@@ -279,12 +262,7 @@ def step(bindings_address, driver_command, actuator_command, torques_set):
 
 @compiled_call(types.void, types.intp, types.Array(types.float64, 2, "C"))
 def replay(bindings_address, inputs):
-    """Advance the engine by one step for each row of inputs, and do nothing else.
-
-    Args:
-        bindings_address: Address of a `STEP_BINDINGS`.
-        inputs: Inputs of all actuators, shape (steps, number of actuators).
-    """
+    """Advance the engine by one step for each row of inputs, and do nothing else."""
     bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
     implicit = carray(implicit_plan_pointer(bindings.implicit), (1,))[0]
     ctrl = f64_pointer(bindings.ctrl)

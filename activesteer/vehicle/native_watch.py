@@ -17,18 +17,7 @@ _bytes: Final = pointer_to(types.uint8)
 
 @compiled_call(types.intp, types.intp, types.intp, types.intp, types.intp, others_run=False)
 def watch(copies, n_copies, positive, n_positive):
-    """Compare arrays with their copies, and look for negative numbers.
-
-    Args:
-        copies: Address of rows of three words: address of an array, address of its copy, bytes.
-        n_copies: Number of these rows.
-        positive: Address of rows of two words: address of an array of float64, its size.
-        n_positive: Number of these rows.
-
-    Returns:
-        `NEGATIVE` if one of the `positive` arrays holds a negative number, else `CHANGED` if an array differs from
-        its copy, else `UNCHANGED`.
-    """
+    """Compare arrays with their copies, and look for negative numbers."""
     changed = negative = False
     rows = word_pointer(copies)
     for index in range(n_copies):

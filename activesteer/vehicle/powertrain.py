@@ -39,19 +39,7 @@ idling at 800 1/min in first gear."""
 def drive_limits(
     speed_radps: float, gear: int, torque_Nm: float, power_W: float, limit_radps: float, drag_Nm: float
 ) -> tuple[float, float]:
-    """Return the least and the greatest torque of the drive.
-
-    Args:
-        speed_radps: Mean speed of the driven wheels, forward positive [rad/s].
-        gear: 1 forward, -1 reverse.
-        torque_Nm: Highest torque at all wheels together, T_max [N m].
-        power_W: Highest power at the wheels, P [W].
-        limit_radps: Speed above which the drive gives no torque [rad/s].
-        drag_Nm: Drag of the engine at all wheels together, in first gear, T_drag [N m].
-
-    Returns:
-        Least and greatest torque at all wheels together, forward positive [N m].
-    """
+    """Return the least and the greatest torque of the drive."""
     speed = gear * speed_radps
     high, low = torque_Nm, 0.0
     if speed > 0.0:
@@ -99,18 +87,9 @@ class PowertrainLimits:
         )
 
     def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float]) -> float:
-        """Return the mean speed of the driven wheels [rad/s], weighted by their fractions of the torque.
-
-        Args:
-            wheel_speeds_radps: Speeds of the four wheels [rad/s], order of `CORNERS`.
-        """
+        """Return the mean speed of the driven wheels [rad/s], weighted by their fractions of the torque."""
         return engine_speed(self.fractions, wheel_speeds_radps)
 
     def limits_Nm(self, speed_radps: float, gear: int) -> tuple[float, float]:
-        """Return the least and the greatest torque at all wheels together, forward positive [N m].
-
-        Args:
-            speed_radps: Mean speed of the driven wheels [rad/s].
-            gear: 1 forward, -1 reverse.
-        """
+        """Return the least and the greatest torque at all wheels together, forward positive [N m]."""
         return _limits_Nm(speed_radps, gear, self.numbers)

@@ -21,15 +21,7 @@ from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS, RawRows
 
 
 def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
-    """Numbers of a row, in the order in which `write_commands` stores them.
-
-    Args:
-        messages: Sender -> message class. Its name precedes the names of fields that several messages have
-            (`driver_saturated`).
-
-    Returns:
-        Name of each number -> its description.
-    """
+    """Numbers of a row, in the order in which `write_commands` stores them."""
     count = Counter(field for message in messages.values() for field in message._fields)
     return {
         f"{sender}_{number.name}" if count[number.field] > 1 else number.name: number
@@ -76,13 +68,7 @@ _SIZE_DRIVER: Final = 8 * len(numbers_of(DriverCommand))
 
 @inlined
 def write_commands(address, driver_command, actuator_command):
-    """Write a row.
-
-    Args:
-        address: Address of `len(COMMANDS)` float64.
-        driver_command: A `DriverCommand`.
-        actuator_command: An `ActuatorCommand`.
-    """
+    """Write a row."""
     store_numbers(address, driver_command)
     store_numbers(address + _SIZE_DRIVER, actuator_command)
 
@@ -104,16 +90,7 @@ _WRITERS: Final[dict[type[Any], tuple[Any, str, int]]] = {
 
 
 def write_command(kind: type[Any], address: int, command: Any) -> None:
-    """Write the numbers of a command that comes from Python.
-
-    Args:
-        kind: `DriverCommand` or `ActuatorCommand`.
-        address: Address of the numbers.
-        command: The command.
-
-    Raises:
-        ParameterError: it is not exactly such a message, or holds something that is not a number.
-    """
+    """Write the numbers of a command that comes from Python."""
     write, key, count = _WRITERS[kind]
     # Native code reads a fixed number of fields; an incomplete message would end the process.
     if type(command) is not kind or len(command) != count:
@@ -146,15 +123,7 @@ class RecordedArrays:
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, measured: Array, brakes: Array, electric: Array
     ) -> None:
-        """Collect the arrays of a car.
-
-        Args:
-            model: The car.
-            data: Its state.
-            measured: Outputs of the sensors; empty with ideal sensors.
-            brakes: A `BRAKE_STATE` as numbers.
-            electric: State of an `ElectricDrive`.
-        """
+        """Collect the arrays of a car."""
         self._model, self._data = model, data
         self._measured, self._brakes, self._electric = measured, brakes, electric
         self.commands: Array = np.zeros(len(COMMANDS))

@@ -29,14 +29,6 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
 
     The car must stand near the equilibrium. Velocities and activations are set to zero: the tyres carry their load, and
     no lateral force except that of their own asymmetry.
-
-    Args:
-        model: The model.
-        data: Its state; `qpos` is the first guess and becomes the result.
-        held: Fixed degrees of freedom: position and heading on the road, rotation of the wheels.
-
-    Raises:
-        ModelError: no equilibrium was found.
     """
     free = np.setdiff1d(np.arange(model.nv), held)
     data.qvel[:] = 0.0
@@ -105,16 +97,7 @@ class MassProperties(NamedTuple):
 def mass_properties(
     model: mujoco.MjModel, data: mujoco.MjData | None = None, *, without: Collection[str] = ()
 ) -> MassProperties:
-    """Return the mass properties of a car.
-
-    Args:
-        model: The car.
-        data: State with the positions of its bodies; default the design position.
-        without: Names of bodies that are left out.
-
-    Returns:
-        Mass properties of the other bodies together.
-    """
+    """Return the mass properties of a car."""
     placed = _in_design_position(model) if data is None else data
     places, frames = placed.xipos, placed.ximat
     left_out = {0, *(model.body(name).id for name in without)}
@@ -145,12 +128,7 @@ YAW_DOF: Final = 5
 
 
 def turn_chassis_back(data: mujoco.MjData, half_rad: float) -> None:
-    """Turn orientation and velocity of the chassis about the world's z axis; its position stays.
-
-    Args:
-        data: State of the car, whose first joint is the free joint of the chassis; changed.
-        half_rad: Half the angle, positive clockwise [rad].
-    """
+    """Turn orientation and velocity of the chassis about the world's z axis; its position stays."""
     turned = np.empty(4)
     mujoco.mju_mulQuat(turned, np.array([math.cos(half_rad), 0.0, 0.0, -math.sin(half_rad)]), data.qpos[3:7])
     data.qpos[3:7] = turned

@@ -25,12 +25,7 @@ class SteeringRates(NamedTuple):
 
 
 def steering_rates(model: mujoco.MjModel, parameters: VehicleParameters) -> SteeringRates:
-    """Return the rates of the actuators without load, near the middle of their travel.
-
-    Args:
-        model: The car in the engine.
-        parameters: Its vehicle file.
-    """
+    """Return the rates of the actuators without load, near the middle of their travel."""
     rear, superposition = parameters.rear_actuator, parameters.superposition_actuator
     present = {model.actuator(index).name for index in range(model.nu)}
     front_radps = rear_radps = math.inf

@@ -113,25 +113,7 @@ def bind_step(
     brakes: tuple[NDArray[Any], NDArray[Any]],
     electric: ElectricDrive,
 ) -> NDArray[Any]:
-    """Look up all addresses and indices.
-
-    Args:
-        model: The car.
-        data: Its state. The bindings keep no reference: model and data must outlive them, as must all arrays below.
-        implicit: `IMPLICIT_PLAN` of the car, shape (1,).
-        recorded: The arrays that a row is copied from.
-        wheels: Actuators of the wheels.
-        ratio: Overall steering ratio.
-        sensors: Sensors between the truth and the measurement; None for ideal sensors.
-        brakes: `BRAKE_SETUP` and `BRAKE_STATE`.
-        electric: Motors and battery.
-
-    Returns:
-        The bindings, shape (1,), at a fixed address, without a tape.
-
-    Raises:
-        ModelError: the model lacks an actuator or a sensor.
-    """
+    """Look up all addresses and indices."""
     bindings = np.zeros(1, STEP_BINDINGS)
     values: Mapping[str, int] = {
         "implicit": implicit.ctypes.data,
@@ -169,23 +151,13 @@ def bind_step(
 
 
 def record_from(bindings: NDArray[Any], recorded: RawRows) -> None:
-    """Bind the arrays that rows are copied from.
-
-    Args:
-        bindings: A `STEP_BINDINGS`; changed.
-        recorded: The arrays; they must outlive the bindings.
-    """
+    """Bind the arrays that rows are copied from."""
     bindings["sources"] = [array.ctypes.data for array in recorded]
     bindings["sizes"] = [array.size for array in recorded]
 
 
 def read_through(bindings: NDArray[Any], sensors: SensorBlock | None) -> None:
-    """Bind the sensors between the truth and the measurement.
-
-    Args:
-        bindings: A `STEP_BINDINGS`; changed.
-        sensors: The sensors, which must outlive the bindings; None for ideal sensors.
-    """
+    """Bind the sensors between the truth and the measurement."""
     bindings["n_sensors"] = 0
     if sensors is not None:
         bindings["n_sensors"], bindings["sensors"] = len(sensors.chains), sensors.chains.ctypes.data

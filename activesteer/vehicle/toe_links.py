@@ -69,20 +69,7 @@ def evaluated(coefficients: NDArray[np.float64], x: NDArray[np.float64] | float)
 
 
 def toe_link_map(model: mujoco.MjModel, corner: str, link: str, limit_rad: float) -> ToeLinkMap:
-    """Solve the map of a corner.
-
-    Args:
-        model: The car, compiled, without a hinge between knuckle and wheel.
-        corner: `rl` or `rr`.
-        link: Name of the tendon of the toe link.
-        limit_rad: Largest angle on either side [rad].
-
-    Returns:
-        The map.
-
-    Raises:
-        ModelError: the link does not steer the wheel so far.
-    """
+    """Solve the map of a corner."""
     solver = _Corner(model, corner, link)
     slope = (solver.angle(1e-4) - solver.angle(-1e-4)) / 2e-4
     if abs(slope) < 0.5:
@@ -201,11 +188,7 @@ SCREW: Final = "_screw"
 
 
 def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:
-    """Replace the hinges of a model by actuators along its rear toe links.
-
-    Raises:
-        ModelError: the rear suspension has no toe link whose stiffness is one number, or no hinge.
-    """
+    """Replace the hinges of a model by actuators along its rear toe links."""
     spec.nuserdata += len(CORNERS)
     for key in list(spec.keys):
         spec.delete(key)  # made for a car with hinges
@@ -247,11 +230,7 @@ def _add(spec: mujoco.MjSpec, name: str, tendon: str, gain: float, actuator: Rea
 
 
 def toe_link_of(spec: Any, corner: str) -> Any:
-    """Return the tendon that is the toe link of a rear corner.
-
-    Raises:
-        ModelError: there is none.
-    """
+    """Return the tendon that is the toe link of a rear corner."""
     for name in LINKS:
         if (tendon := spec.tendon(f"{corner}_{name}")) is not None:
             return tendon
@@ -275,11 +254,7 @@ class Screws:
 
 
 def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
-    """Solve the kinematics and build the records for the callbacks.
-
-    Raises:
-        ModelError: the toe links do not steer the wheels so far.
-    """
+    """Solve the kinematics and build the records for the callbacks."""
     limit = known(actuator.limit_rad)
     names = [_tendon(model, corner) for corner in CORNERS]
     left = toe_link_map(model, "rl", names[0], limit)

@@ -31,11 +31,7 @@ class WheelSet:
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, parameters: VehicleParameters) -> None:
-        """Look the wheels up.
-
-        Raises:
-            ModelError: the model lacks a part of a wheel.
-        """
+        """Look the wheels up."""
 
         def found(kind: mujoco.mjtObj, ending: str) -> list[int]:
             return [find(model, kind, corner + ending) for corner in CORNERS]
@@ -61,11 +57,7 @@ class WheelSet:
         self._bodies = found(mujoco.mjtObj.mjOBJ_BODY, "_wheel")
 
     def check_driven(self, torques_Nm: Sequence[float]) -> None:
-        """Check that no torque is demanded of a wheel without a drive.
-
-        Raises:
-            ParameterError: one is.
-        """
+        """Check that no torque is demanded of a wheel without a drive."""
         for corner, torque in zip(CORNERS, torques_Nm, strict=True):
             if torque != 0.0 and corner not in self._driven:
                 raise ParameterError(
@@ -85,11 +77,7 @@ class WheelSet:
         return self._data.xpos[self._bodies, 2]
 
     def effective_radii_m(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
-        """Return the rolling radii under the present loads; with fitted sensors, the car stands still.
-
-        Args:
-            tyres: Tyres of the front and of the rear axle.
-        """
+        """Return the rolling radii under the present loads; with fitted sensors, the car stands still."""
         loads_N = fb.wheel_outputs(self._data, len(CORNERS))["fz_N"]
         return [
             float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)
@@ -104,11 +92,7 @@ class WheelSet:
 
 
 def torque_numbers(torques: WheelTorques) -> tuple[float, ...]:
-    """Return the drive torques and the brake torques of the wheels [N m].
-
-    Raises:
-        ParameterError: they are not four numbers each.
-    """
+    """Return the drive torques and the brake torques of the wheels [N m]."""
     try:
         numbers = (*map(float, torques.drive_Nm), *map(float, torques.brake_Nm))
     except (AttributeError, TypeError, ValueError) as reason:

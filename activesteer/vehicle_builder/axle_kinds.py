@@ -163,15 +163,7 @@ def kinds_for(axle: str) -> dict[str, AxleKind]:
 
 
 def kind_of(axle: str, name: str) -> AxleKind:
-    """Return a kind of suspension.
-
-    Args:
-        axle: `front` or `rear`.
-        name: Name of the kind.
-
-    Raises:
-        ParameterError: this axle has no kind of this name.
-    """
+    """Return a kind of suspension."""
     kinds = kinds_for(axle)
     if name not in kinds:
         raise ParameterError(f"no {axle} suspension is named {name!r}; {nearest_names(name, kinds)}", value=name)

@@ -63,20 +63,6 @@ def new_vehicle(
 ) -> NewVehicle:
     """Make a car from a table of hardpoints, masses, springs and bushings, or from measurements of a K&C rig.
 
-    Args:
-        name: Name of the car: letters, digits, `_` and `-`.
-        table: The table, .toml or .csv. Default: `car.toml` in the folder of measurements.
-        folder: Folder of the new files. Default: `vehicles/NAME` in the current folder.
-        front: Kind of the front suspension. Default: the kind in the table.
-        rear: Kind of the rear suspension. Default: the kind in the table.
-        kc: Folder with the measurements of axles whose kind is `curves`.
-        overwrite: Replace files of an earlier car in this folder.
-
-    Raises:
-        ParameterError: the table is wrong, or the folder has files already.
-        TyreFileError: a tyre file is not found or wrong.
-        ModelError: the car cannot stand.
-
     Examples:
         >>> from activesteer.resources import models_dir
         >>> from activesteer.vehicle_builder import check_vehicle, new_vehicle

@@ -47,22 +47,7 @@ def complete(
     log: Log,
     tables: KcTables | None = None,
 ) -> CarDesign:
-    """Make a car from a table in vehicle coordinates.
-
-    Args:
-        name: Name of the car.
-        table: The table, points in vehicle coordinates.
-        kinds: Suspension of each axle.
-        tyres: Tyre of each axle: name of its file, and its parameters.
-        log: Log of the assumptions.
-        tables: Measurements of a K&C rig, for axles of curves.
-
-    Returns:
-        The car, complete but for the values that `trim` finds.
-
-    Raises:
-        ParameterError: the geometry is impossible.
-    """
+    """Make a car from a table in vehicle coordinates."""
     steering, brakes = table.steering, table.brakes
     column_Npm = log.take(
         "steering.column_stiffness_Npm", steering.column_stiffness_Npm, 4e6, "the compact's: torsion bar and assist",
@@ -315,11 +300,7 @@ def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:
 
 
 def check_origin(car: CarDesign, given: CarTable) -> None:
-    """Check that the vehicle coordinates begin on the road below the front axle.
-
-    Raises:
-        ParameterError: they do not.
-    """
+    """Check that the vehicle coordinates begin on the road below the front axle."""
     centre, radius = car.front.wheel_centre_m, car.front.radius_m
     if abs(centre[0]) > 0.05 or not 0.75 * radius < centre[2] < 1.15 * radius:
         off = np.array([centre[0], 0.0, centre[2] - 0.94 * radius]) / known_unit(given.units).factor

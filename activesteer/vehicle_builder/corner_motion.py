@@ -31,11 +31,7 @@ class CornerMotion:
 
 
 def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
-    """Return the motion of a corner with held chassis and rack, without springs.
-
-    Raises:
-        ModelError: the links do not leave exactly one degree of freedom.
-    """
+    """Return the motion of a corner with held chassis and rack, without springs."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     dofs, scale = _freedoms(model, corner)

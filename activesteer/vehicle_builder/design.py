@@ -184,11 +184,7 @@ class Log:
 
 
 def chassis_of(car: CarDesign, model: mujoco.MjModel, log: Log) -> Solid:
-    """Return the chassis of the table, or the rest of the whole car without its other bodies.
-
-    Raises:
-        ParameterError: the rest is impossible for a body.
-    """
+    """Return the chassis of the table, or the rest of the whole car without its other bodies."""
     table, others = car.table.mass, mass_properties(model, without=["chassis"])
     base = car.wheelbase_m
     if table.chassis_kg is not None and table.chassis_cg is not None:
@@ -280,11 +276,7 @@ class Hardware(Protocol):
 
 
 def hardware_tables(part: Hardware) -> dict[str, Any]:
-    """Return the tables of actuators, motors, battery and sensors that are not empty.
-
-    Returns:
-        Name to table, without the values of its preset, angles in degrees.
-    """
+    """Return the tables of actuators, motors, battery and sensors that are not empty."""
     tables = {
         "rear_actuator": to_table(part.rear_actuator or RearActuator(), defaults=False),
         "superposition_actuator": to_table(part.superposition_actuator or SuperpositionActuator(), defaults=False),

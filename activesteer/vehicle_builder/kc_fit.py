@@ -153,14 +153,7 @@ def _wanted(load: Load) -> Array:
 
 
 def deflections(forces: Array, compliance: Array, springs: Array, square: Array) -> Array:
-    """Return deflections under loads, by Newton's method.
-
-    Args:
-        forces: Loads, shape (n, 5).
-        compliance: Inverse of the stiffness, shape (5, 5).
-        springs: Directions of the hardening springs, shape (2, 5).
-        square: Quadratic parts of these springs, shape (2,).
-    """
+    """Return deflections under loads, by Newton's method."""
     moved, stiffness = forces @ compliance, np.linalg.inv(compliance)
     if not springs.any():
         return moved
@@ -225,19 +218,7 @@ def measured_axle(
     kingpin_m: tuple[Array, Array],
     in_series: tuple[float, float],
 ) -> MeasuredAxle:
-    """Return curves and compliance of an axle.
-
-    Args:
-        axle: `front` or `rear`.
-        tables: All tests.
-        wheel_centre_m: Left wheel centre in the standing car; its height is the arm of forces on the road [m].
-        kingpin_m: Lower and upper point of the rear steering axis.
-        in_series: Stiffnesses in series with the compliance of the wheel: steering column at the rack [N/m], and rear
-            steering servo [N m/rad].
-
-    Raises:
-        ParameterError: a necessary channel was not measured, or the stiffness is not positive definite.
-    """
+    """Return curves and compliance of an axle."""
     tests, rolling_radius_m = tables.tests[axle], float(wheel_centre_m[2])
     check_signs(tests)
     rough: dict[str, float] = {}

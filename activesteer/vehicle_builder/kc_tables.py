@@ -74,11 +74,6 @@ def smoothed(x: Array, y: Array, at: Array) -> Array:
     """Evaluate a least-squares cubic spline through samples, with both branches of a loop.
 
     Knots are evenly spaced, at most one for two different positions, so that noise and hysteresis are averaged.
-
-    Args:
-        x: Positions, in any order.
-        y: Samples.
-        at: Positions of the result; the spline is straight beyond the samples.
     """
     places = len(np.unique(np.round(x / np.ptp(x), 3)))
     intervals = int(np.clip(places // 2, 1, _MOST_INTERVALS))
@@ -107,11 +102,7 @@ class KcTables:
 
 
 def read_kc(folder: Path, axles: list[str]) -> KcTables:
-    """Read the tests of a folder.
-
-    Raises:
-        ParameterError: there is no such folder, no table in it, or a table is wrong.
-    """
+    """Read the tests of a folder."""
     if not is_folder(folder):
         raise ParameterError(f"there is no folder {folder}")
     names, signs = _translation(folder)
@@ -328,11 +319,7 @@ _MUST_RISE: Final = (
 
 
 def check_signs(tests: dict[str, Samples]) -> None:
-    """Check the signs of the slopes.
-
-    Raises:
-        ParameterError: a slope has the wrong sign.
-    """
+    """Check the signs of the slopes."""
     for name, channel, words in _MUST_RISE:
         if name not in tests or (slope := _slope(name, tests[name], channel)) is None:
             continue
@@ -341,12 +328,7 @@ def check_signs(tests: dict[str, Samples]) -> None:
 
 
 def unusual(axle: str, tests: dict[str, Samples]) -> Iterator[str]:
-    """Return questions about unusual measurements.
-
-    Args:
-        axle: `front` or `rear`.
-        tests: All tests of the axle.
-    """
+    """Return questions about unusual measurements."""
     per_m, per_kN = np.degrees(1.0), np.degrees(1e3)
     front = axle == "front"
     rows: tuple[tuple[str, str, float, Callable[[float], bool], str], ...] = (

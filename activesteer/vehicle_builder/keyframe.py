@@ -8,14 +8,7 @@ from activesteer.scenario import FileOrTable, load_car
 
 
 def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
-    """Return the text of keyframes.xml, and the path of this file.
-
-    Args:
-        vehicle: Name, path, or table of a vehicle.
-
-    Raises:
-        ActiveSteerError: the car cannot be built, or has no static equilibrium.
-    """
+    """Return the text of keyframes.xml, and the path of this file."""
     car = load_car(vehicle)
     qpos = " ".join(f"{value:.15g}" for value in car.on().data.qpos)
     text = f"""<mujocoinclude>

@@ -43,19 +43,7 @@ class Mount:
 
 
 def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, Array], ratio: float = 1.0) -> Mount:
-    """Attach a spring or damper.
-
-    Args:
-        axle: Name of the axle, for messages.
-        part: `spring` or `damper`.
-        carrier: Carrier of its lower end, one of the carriers of the kind.
-        kind: The suspension.
-        points: Points of the axle.
-        ratio: Shortening per wheel travel, if it acts along the travel.
-
-    Raises:
-        ParameterError: the arm cannot carry it there.
-    """
+    """Attach a spring or damper."""
     if carrier in ("strut", "travel"):
         return Mount(carrier, 1.0 if carrier == "strut" else ratio, "", None, 0.0)
     upper, lower = points[f"{part}_inner"], points[f"{part}_outer"]

@@ -232,17 +232,7 @@ POINT_FIELDS: Final = {"knuckle_cg", "carrier_cg", "strut_cg", "chassis_cg", "ax
 
 
 def read_table(path: Path) -> tuple[CarTable, Source]:
-    """Read a table, and check it as far as possible without other files.
-
-    Args:
-        path: A .toml or .csv file.
-
-    Returns:
-        The table as the user wrote it, and its source for later messages.
-
-    Raises:
-        ParameterError: the file cannot be read, has unknown keys, or values of the wrong type.
-    """
+    """Read a table, and check it as far as possible without other files."""
     if path.suffix.lower() == ".csv":
         raw, source = _read_csv(path)
     elif path.suffix.lower() == ".toml":
@@ -289,11 +279,7 @@ def _value(cell: str) -> float | str:
 
 
 def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = None) -> dict[str, AxleKind]:
-    """Return the suspension of each axle: the argument, else the kind in the table, else the default.
-
-    Raises:
-        ParameterError: there is no such kind.
-    """
+    """Return the suspension of each axle: the argument, else the kind in the table, else the default."""
     chosen = {"front": front, "rear": rear}
     return {axle: kind_of(axle, chosen[axle] or table.axle(axle).type or DEFAULTS[axle]) for axle in ("front", "rear")}
 

@@ -40,11 +40,7 @@ _STIFFNESS: Final = ("stiffness_Npm", "bushings_Npm", "bushing")
 
 
 def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source) -> None:
-    """Check names, number and units of all points, and units of other values.
-
-    Raises:
-        ParameterError: with one line for each error.
-    """
+    """Check names, number and units of all points, and units of other values."""
     problems = [
         *_name_problems(table, kinds),
         *_axle_contradictions("front", table.front),

@@ -53,14 +53,7 @@ _REMARKS: Final = {
 def vehicle_text(
     car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None = None
 ) -> str:
-    """Return the text of the vehicle file.
-
-    Args:
-        car: The car.
-        trimmed: Result of the trim.
-        model: Compiled car, for its single-track model; None for a placeholder during the trim.
-        two_track: Result of drives of the car.
-    """
+    """Return the text of the vehicle file."""
     remarks = _REMARKS | {
         "steering": f"Ratio at the centre without load; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
         "single_track": (

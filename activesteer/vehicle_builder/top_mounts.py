@@ -26,19 +26,7 @@ _BELOW_MOUNT_M = 0.07
 def top_mount(
     axle: str, table: TopMountTable | None, kind: AxleKind, points: dict[str, Array], damper: Mount, log: Log
 ) -> TopMount | None:
-    """Complete the top mount of an axle; None if it is rigid.
-
-    Args:
-        axle: Name of the axle, for messages.
-        table: Its keys. Without them a strut has the compact's top mount, and a damper a rigid one.
-        kind: The suspension.
-        points: Points of the axle.
-        damper: Attachment of the damper.
-        log: Receives what is assumed.
-
-    Raises:
-        ParameterError: a key does not apply to this axle.
-    """
+    """Complete the top mount of an axle; None if it is rigid."""
     if table is None and not kind.strut:
         return None
     key, table = f"{axle}.top_mount", table or TopMountTable()

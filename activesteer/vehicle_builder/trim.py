@@ -90,13 +90,7 @@ _CASTER: Final = 0.02
 
 
 def match_travel(axles: tuple[Axle, ...], trimmed: dict[str, TrimmedAxle], held: HeldCar) -> float:
-    """Correct the curves over travel of all guided axles, and return the largest correction [m, rad].
-
-    Args:
-        axles: The guided axles.
-        trimmed: Their curves; changed.
-        held: The car on the rig.
-    """
+    """Correct the curves over travel of all guided axles, and return the largest correction [m, rad]."""
     heights = np.zeros((len(_measured_curves(axles[0]).travel_m), 4))
     for axle in axles:
         heights[:, _wheels(axle)] = np.array(_measured_curves(axle).travel_m)[:, None]
@@ -124,14 +118,7 @@ def match_travel(axles: tuple[Axle, ...], trimmed: dict[str, TrimmedAxle], held:
 
 
 def match_steering(axle: Axle, trimmed: TrimmedAxle, held: HeldCar, pinion_m: float) -> float:
-    """Correct the curves over the rack, and return the largest correction [m, rad].
-
-    Args:
-        axle: The front axle, guided.
-        trimmed: Its curves; changed.
-        held: The car on the rig.
-        pinion_m: Rack travel per steering wheel angle [m/rad].
-    """
+    """Correct the curves over the rack, and return the largest correction [m, rad]."""
     measured, curves = _measured_curves(axle), trimmed.curves
     assert curves is not None
     rack = np.array(measured.rack_m)
@@ -264,11 +251,7 @@ class _Stand:
 
 
 def trim(car: CarDesign, write: Write, log: Log) -> Trimmed:
-    """Find all values of `Trimmed`, and write the files with them.
-
-    Raises:
-        ActiveSteerError: the car cannot stand.
-    """
+    """Find all values of `Trimmed`, and write the files with them."""
     guided = tuple(axle for axle in car.axles if axle.measured is not None)
     trimmed = Trimmed(pinion_radius_m=car.table.steering.pinion_radius_m or rack_per_steer_m(car.front) / _RATIO)
     for axle in guided:

@@ -129,18 +129,7 @@ class Scenario:
     compared: Callable[[Mapping[str, RecordingLike], RunMetrics, bool], RunMetrics] = lambda *_: {}
 
     def __call__(self, recordings: Mapping[str, RecordingLike]) -> list[Claim]:
-        """Check the statements, in order.
-
-        Args:
-            recordings: Recordings of the manoeuvre by system, all of `SYSTEMS`; further runs are ignored.
-
-        Returns:
-            A claim for each statement. An undefined value (nan) fails its claim.
-
-        Raises:
-            ParameterError: A run is missing.
-            RecordingError: A run is of another manoeuvre, or lacks its course or a channel.
-        """
+        """Check the statements, in order."""
         if missing := [system for system in SYSTEMS if system not in recordings]:
             raise ParameterError(
                 f"the claims about the {self.what} need the runs {', '.join(SYSTEMS)}; missing: {', '.join(missing)}",
@@ -203,9 +192,6 @@ def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> 
     A run must be whole. The run of ars must turn the rear wheels and the run of afs the superposition gear, by
     `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`largest_action`). No run may
     demand as much of an actuator that its system does not have: an action that a system did not perform proves nothing.
-
-    Returns:
-        A sentence, empty without an obstacle; the largest missing part of an action.
     """
     if cut:
         return ", ".join(f"the run {system} ends too early" for system in cut), 1.0

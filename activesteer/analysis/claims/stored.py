@@ -123,11 +123,7 @@ def claims_for(recording: RecordingLike) -> Scenario | None:
 
 
 def not_reproduced(vehicle: str, path: Path = NOT_REPRODUCED) -> dict[str, str]:
-    """Return the claims that are not reproduced with a vehicle.
-
-    Returns:
-        Number of the claim -> reason; empty for a vehicle that is not listed.
-    """
+    """Return the claims that are not reproduced with a vehicle."""
     table, source = read_toml(path, ParameterError)
     for name, reasons in table.items():
         _check_reasons(reasons, source, name)

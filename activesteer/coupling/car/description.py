@@ -19,15 +19,7 @@ _ABOUT: Final = (
 def model_description(
     variables: Sequence[Variable], identifier: str, token: str, version: int, timestep_s: float
 ) -> str:
-    """Return the content of modelDescription.xml.
-
-    Args:
-        variables: The variables; the value reference is the place.
-        identifier: Name of the library.
-        token: GUID or instantiation token.
-        version: FMI version, 2 or 3.
-        timestep_s: Length of a step [s].
-    """
+    """Return the content of modelDescription.xml."""
     units = dict.fromkeys(variable.unit for variable in variables if variable.unit)
     defined = "".join(f"<Unit name={quoteattr(unit)}>{_base(unit)}</Unit>" for unit in units)
     state = "canGetAndSetFMU{0}='true' canSerializeFMU{0}='true'".format("state" if version == 2 else "State")

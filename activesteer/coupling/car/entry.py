@@ -30,15 +30,7 @@ _DRIVER_BYTES: Final = _BYTES * len(numbers_of(DriverCommand))
 
 @compiled_callback(types.void, types.intp, types.intp, types.intp, types.intp)
 def car_step(bindings, commands, torques_set, out):
-    """Make one step of the car.
-
-    Args:
-        bindings: Address of a `STEP_BINDINGS`.
-        commands: Address of the numbers of a `DriverCommand` and of an `ActuatorCommand`, float64.
-        torques_set: 1 if the torques of the wheels are set in `ctrl`, else 0.
-        out: Address of the result, float64: 1 if the state is sane, else 0; then the numbers of a `Measurement` and of
-            a `Motion`.
-    """
+    """Make one step of the car."""
     driver = load_numbers(commands, _DRIVER)
     actuator = load_numbers(commands + _DRIVER_BYTES, _ACTUATOR)
     sane, measurement, motion = carry_out(bindings, driver, actuator, torques_set != 0)
@@ -58,20 +50,7 @@ _limit_pointer: Final = pointer_to(from_dtype(record_of(Actuator)))
 
 @compiled_callback(types.void, *(types.intp,) * 10)
 def derive(rows, places, design, gravity, forces, n_forces, limits, n_limits, numbers, motion):
-    """Compute the channels of the last row that are not copies.
-
-    Args:
-        rows: Address of the addresses of the arrays of `RawRows`.
-        places: Address of the places of sensors (`variables.PLACES`), machine words.
-        design: Address of the heights of the four wheels in the design position [m], and of the steering ratio.
-        gravity: Address of the gravitational acceleration in the world [m/s2].
-        forces: Address of the laws of axial forces (`AxialForce`).
-        n_forces: Their number.
-        limits: Address of the limits of actuators (`Actuator`).
-        n_limits: Their number.
-        numbers: Address of the forces [N] and of the flags of the limits, to write.
-        motion: Address of the numbers of `variables.MOTION`, to write.
-    """
+    """Compute the channels of the last row that are not copies."""
     row = word_pointer(rows)
     out = f64_pointer(numbers)
     length, speed = f64_pointer(row[_LENGTH]), f64_pointer(row[_SPEED])

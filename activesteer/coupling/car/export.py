@@ -88,17 +88,7 @@ class Export(NamedTuple):
 
 
 def export_fmu(scenario: Scenario, path: Path, version: int = 2) -> Export:
-    """Write a car as an FMU for co-simulation.
-
-    Args:
-        scenario: Car, and manoeuvre for the road and the speed at the start.
-        path: The file.
-        version: FMI version, 2 or 3.
-
-    Raises:
-        ParameterError: the file cannot be written.
-        ModelError: the car cannot be exported, or there is no C compiler.
-    """
+    """Write a car as an FMU for co-simulation."""
     export = _export(scenario)
     folder = "binaries/linux64" if version == 2 else "binaries/x86_64-linux"
     name = _identifier(export.name)
@@ -112,16 +102,7 @@ def export_fmu(scenario: Scenario, path: Path, version: int = 2) -> Export:
 
 
 def export_library(scenario: Scenario, folder: Path) -> Export:
-    """Write a car as a shared library with a C header and a table of its variables.
-
-    Args:
-        scenario: Car, and manoeuvre for the road and the speed at the start.
-        folder: The folder; created if needed.
-
-    Raises:
-        ParameterError: a file cannot be written.
-        ModelError: the car cannot be exported, or there is no C compiler.
-    """
+    """Write a car as a shared library with a C header and a table of its variables."""
     export = _export(scenario)
     table = io.StringIO()
     rows = csv.writer(table, lineterminator="\n")
@@ -343,11 +324,7 @@ def _renamed_engine(path: Path, token: str) -> tuple[str, bytes]:
 
 
 def _compiled(files: Mapping[str, bytes], engine: tuple[str, bytes], token: str) -> bytes:
-    """Return the library.
-
-    Raises:
-        ModelError: there is no C compiler, or it fails.
-    """
+    """Return the library."""
     compiler = os.environ.get("CC", "cc")
     if shutil.which(compiler) is None:
         raise ModelError(

@@ -27,11 +27,7 @@ class Code(NamedTuple):
 
 
 def car_code() -> dict[str, Code]:
-    """Return the code of `step`, `derive` and `fault` (`entry`), and of the callbacks `passive`, `act_dyn`, `sensor`.
-
-    Raises:
-        ModelError: this version of numba keeps its modules elsewhere.
-    """
+    """Return the code of `step`, `derive` and `fault` (`entry`) and of the callbacks `passive`, `act_dyn`, `sensor`."""
     # Compiles for half a minute at first use.
     from activesteer.coupling.car.entry import car_step, derive, fault  # noqa: PLC0415
     from activesteer.vehicle.engine_layout import engine_layout  # noqa: PLC0415

@@ -64,14 +64,7 @@ class Memory(NamedTuple):
 
 
 def native_memory(vehicle: Vehicle) -> Memory:
-    """Return the native memory of a car.
-
-    Args:
-        vehicle: The car; not driven meanwhile.
-
-    Raises:
-        ModelError: a record holds an address that points to nothing known.
-    """
+    """Return the native memory of a car."""
     rows = vehicle.rows.live()._asdict()
     parts = vehicle.native_parts() | {f"row_{name}": array for name, array in rows.items() if not array.size}
     places, size = {}, 0

@@ -82,12 +82,7 @@ _MEANINGS: Final = {
 
 
 def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
-    """Return the inputs; those of the native step come first, in the order of `CARRIED_OUT`.
-
-    Args:
-        loop: The loop at the start; its last commands are the start values.
-        road_mu: Friction of the road.
-    """
+    """Return the inputs; those of the native step come first, in the order of `CARRIED_OUT`."""
     driver, actuator = loop.commands
     starts = dict(zip(COMMANDS, (*numbers_in(driver), *numbers_in(actuator)), strict=True))
     numbers = {number.name: number for command in (driver, actuator) for number in numbers_of(type(command))}
@@ -143,12 +138,7 @@ def _fault_inputs(part: str) -> list[Variable]:
 
 
 def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], Laws]:
-    """Return the outputs: measurement, motion, and the recorded channels, with the laws of those that are computed.
-
-    Args:
-        loop: The loop at the start.
-        taken: Names of the inputs.
-    """
+    """Return the outputs: measurement, motion, and the recorded channels, with the laws of those that are computed."""
     found = [
         Variable(f"measured_{number.name}", number.recorded.unit, f"{number.recorded.meaning}, measured", OUTPUT,
                  source=FROM_RESULT, column=1 + place)
@@ -188,12 +178,7 @@ SEEDS: Final = 256
 
 
 def parameters_of(speed_mps: float, seed: int) -> list[Variable]:
-    """Return the parameters, in the order of car.c.
-
-    Args:
-        speed_mps: Speed of the manoeuvre [m/s].
-        seed: Seed of the sensors.
-    """
+    """Return the parameters, in the order of car.c."""
     given: tuple[tuple[str, str, str, float, float, float], ...] = (
         ("start_speed_mps", "m/s", "speed at the start", speed_mps, 1.0, 100.0),
         ("added_mass_kg", "kg", "mass fixed to the chassis", 0.0, -300.0, 2000.0),

@@ -43,15 +43,7 @@ class Archive:
     """
 
     def __init__(self, path: Path, kind: Kind) -> None:
-        """Read and check the archive without unpacking it.
-
-        Args:
-            path: The file.
-            kind: Kind of block, whose error is raised.
-
-        Raises:
-            ActiveSteerError: of the kind's type: the file cannot be read, is no archive, or is hostile or too large.
-        """
+        """Read and check the archive without unpacking it."""
         self.path = path
         self._error = kind.error
         self._fail = functools.partial(kind.fail, path.name)
@@ -91,11 +83,7 @@ class Archive:
         return {f"{self.path.stem}.sha256": self.key.encode(), f"{self.path.stem}.xml": self.description}
 
     def unpacked(self) -> Path:
-        """Return the folder with description, resources, and the binaries for this platform.
-
-        Raises:
-            ActiveSteerError: of the kind's type: the archive is damaged, or the disk is full.
-        """
+        """Return the folder with description, resources, and the binaries for this platform."""
         if (folder := _unpacked.get(self.key)) is None:
             folder = Path(tempfile.mkdtemp(prefix="activesteer-fmu-"))
             atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -191,16 +179,7 @@ class Description(NamedTuple):
 
 
 def describe_fmu(archive: Archive, kind: Kind) -> Description:
-    """Read and check the description of an FMU.
-
-    Args:
-        archive: The FMU.
-        kind: Kind of block, whose error is raised.
-
-    Raises:
-        ActiveSteerError: of the kind's type: FMPy is missing, the description is invalid, or the FMU cannot be used
-            here.
-    """
+    """Read and check the description of an FMU."""
     name = archive.path.name
     try:
         from fmpy import read_model_description  # noqa: PLC0415 - an extra, and slow to import

@@ -132,11 +132,7 @@ class LocalInstance:
     """An instance in this process."""
 
     def __init__(self, spec: Spec) -> None:
-        """Load the library, instantiate and initialise.
-
-        Raises:
-            FmuFault: the library cannot be loaded, lacks a function, or reports a failure.
-        """
+        """Load the library, instantiate and initialise."""
         self._spec, self._steps, self._step_s, self._log = spec, 0, spec.step_s, ""
         self._flags: Any = None
         self._prefix = f"fmi{spec.version}"
@@ -325,15 +321,7 @@ class IsolatedInstance:
     """An instance in a process of its own, which may crash or hang without harm to this one."""
 
     def __init__(self, spec: Spec, limit_s: float) -> None:
-        """Start the process, and initialise the FMU in it.
-
-        Args:
-            spec: The instance.
-            limit_s: Time after which a call counts as hanging [s].
-
-        Raises:
-            FmuFault: see `LocalInstance`; or the process ended or does not answer.
-        """
+        """Start the process, and initialise the FMU in it."""
         self._limit_s, self._step_s, self._steps = limit_s, spec.step_s, 0
         self._child = Child(__file__)
         self._step_bytes = 8 * sum(group.size for group in spec.outputs)
@@ -397,15 +385,7 @@ class IsolatedInstance:
 
 
 def make_instance(spec: Spec, isolate_s: float | None) -> Instance:
-    """Return an instance of an FMU.
-
-    Args:
-        spec: The instance.
-        isolate_s: Time limit of a call, in a process of its own [s]; None for an instance in this process.
-
-    Raises:
-        FmuFault: the FMU cannot be loaded or initialised.
-    """
+    """Return an instance of an FMU."""
     return LocalInstance(spec) if isolate_s is None else IsolatedInstance(spec, isolate_s)
 
 

@@ -88,9 +88,6 @@ def signals_of(messages: Sequence[type[Any]]) -> Signals:
 
     A field of the four wheels is one signal of four numbers, and four signals of one number. If several messages have
     a field, its name means the first of them; `message.field` means any of them.
-
-    Args:
-        messages: Message classes, in the order of a block's arguments.
     """
     places: dict[str, tuple[Place, ...]] = {}
     others = set()
@@ -116,21 +113,7 @@ def signals_of(messages: Sequence[type[Any]]) -> Signals:
 def linked(
     variables: Mapping[str, Variable], signals: Signals, given: Mapping[str, Any], source: Source
 ) -> tuple[list[Link], list[str]]:
-    """Match variables with signals.
-
-    Args:
-        variables: Inputs or outputs of the FMU.
-        signals: The signals.
-        given: The map: name of a variable -> table of signal and unit.
-        source: The map's file.
-
-    Returns:
-        The links, and the names of the variables without a signal.
-
-    Raises:
-        ActiveSteerError: of the type of the source: an entry of the map is wrong, a unit does not fit or is unknown, or
-            a signal is no number.
-    """
+    """Match variables with signals."""
     links, left = [], []
     for name, variable in variables.items():
         entry = given.get(name)
@@ -223,18 +206,7 @@ class FmuBlock:
     """
 
     def __init__(self, wiring: Wiring, kind: Kind, name: str, setup: Any, revive: Callable[[Any], FmuBlock]) -> None:
-        """Instantiate and initialise the FMU.
-
-        Args:
-            wiring: The FMU and its connection.
-            kind: Controllers or drivers.
-            name: Name in messages.
-            setup: Argument from which the block is made.
-            revive: Function that makes such a block from `setup`, also in another process.
-
-        Raises:
-            ActiveSteerError: of the kind's type: the FMU fails.
-        """
+        """Instantiate and initialise the FMU."""
         self._about = wiring, kind, name, setup, revive
         try:
             shared = _Shared(make_instance(wiring.spec, wiring.isolate_s))
@@ -263,11 +235,7 @@ class FmuBlock:
         self._unchecked = kind.completes or any(names[field] in kind.unchecked for field in fields)
 
     def step(self, *messages: Any) -> Any:
-        """Return the command of the FMU; see `Controller.step` and `Driver.step`.
-
-        Raises:
-            ActiveSteerError: of the kind's type: the FMU fails, or its outputs are no command.
-        """
+        """Return the command of the FMU; see `Controller.step` and `Driver.step`."""
         self._steps += 1
         if self._every > 1 and (self._steps - 1) % self._every:
             return self._held
@@ -441,15 +409,7 @@ class Fmu:
     reads = ()
 
     def __init__(self, path: Path, kind: Kind) -> None:
-        """Read the FMU and its map, and match its variables with our signals.
-
-        Args:
-            path: The file.
-            kind: Controllers or drivers.
-
-        Raises:
-            ActiveSteerError: of the kind's type: the FMU cannot be used.
-        """
+        """Read the FMU and its map, and match its variables with our signals."""
         self.path, self.kind, self.__name__ = path, kind, path.stem
         self._archive = Archive(path, kind)
         about = self.description = describe_fmu(self._archive, kind)
@@ -494,16 +454,7 @@ class Fmu:
         return sorted(inputs, key=_type_of), sorted(outputs, key=_type_of)
 
     def from_vehicle(self, setup: Any, **parameters: Any) -> FmuBlock:
-        """Make the block of one run.
-
-        Args:
-            setup: `ControllerSetup` or `DriverSetup`.
-            parameters: Parameters that replace the FMU's start values. `isolate` is the time limit of a call in a
-                process of its own [s].
-
-        Raises:
-            ActiveSteerError: of the kind's type: the FMU cannot make steps of this length, or fails.
-        """
+        """Make the block of one run."""
         about, every, step_s = self.description, 1, setup.timestep_s
         if self.kind.word == "driver" and self.interval_s is not None:
             every = max(1, round(self.interval_s / step_s))
@@ -564,14 +515,6 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
     A file with the same name and the ending `.toml` beside it is its map: a table for each variable whose name or unit
     differs from ours, such as `r = { signal = "yaw_rate_radps", unit = "deg/s" }`.
-
-    Args:
-        given: Path of the FMU, with `?parameter=value` for its parameters. `isolate=5` runs it in a process of its own,
-            in which no call may take more than 5 s.
-        kind: Controllers or drivers.
-
-    Raises:
-        ActiveSteerError: of the kind's type: the FMU cannot be used.
     """
     text, _, rest = os.fspath(given).partition("?")
     path = user_path(text, kind.error)
@@ -586,12 +529,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
 
 def isolated(given: Any, limit_s: float | None) -> Any:
-    """Return an FMU that runs in a process of its own; other blocks, and all without a limit, are returned unchanged.
-
-    Args:
-        given: A driver or controller, as given.
-        limit_s: Time limit of a call [s].
-    """
+    """Return an FMU in its own process; other blocks, and all without a limit, are returned unchanged."""
     if limit_s is None or not is_fmu(given):
         return given
     text = os.fspath(given)

@@ -64,18 +64,7 @@ def _moved(points: str, axis: int, *, outwards: bool = False) -> Callable[[Sweep
 
 
 def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
-    """Draw kinematics and compliance of a car as PNG files, and all of them on the page `kc.html`.
-
-    Args:
-        result: Result of the rig.
-        folder: Folder for the files; it is created if it does not exist.
-
-    Returns:
-        The paths written; the page comes last.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or a file cannot be written.
-    """
+    """Draw kinematics and compliance of a car as PNG files, and all of them on the page `kc.html`."""
     pictures = _pictures(result)
     paths = save_all(pictures, folder, f"{result.vehicle}: ")
     return [*paths, _write_page(result, [make() for make in pictures.values()], Path(folder))]

@@ -89,14 +89,7 @@ class HeldCar:
     """
 
     def __init__(self, vehicle: Vehicle, springs: Springs = "in") -> None:
-        """Put the car on the rig, in its standing attitude.
-
-        Args:
-            vehicle: The car, in static ride on a level road.
-            springs: `in`; `out`: without springs, stops, anti-roll bars and weight, so that the links are unloaded and
-                have their design lengths; `locked`: like `out`, with fixed damper lengths, to turn the wheels about
-                their steering axes.
-        """
+        """Put the car on the rig, in its standing attitude."""
         self.model = model = copy.copy(vehicle.model)
         # The rig stays within the torque of the servo, but a step of the search may leave it, where there is no
         # stiffness.
@@ -168,11 +161,7 @@ class HeldCar:
         return np.array([scale * x * z, scale * y * z, -self._radii[corner] * across])
 
     def equilibrium(self, case: Case) -> None:
-        """Move the car from its present position into equilibrium.
-
-        Raises:
-            ModelError: there is no equilibrium.
-        """
+        """Move the car from its present position into equilibrium."""
         self._command(case)
         residual = self._residual(case)
         size = np.abs(residual).max()

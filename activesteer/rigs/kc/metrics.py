@@ -73,13 +73,7 @@ class Axle(NamedTuple):
         return self.measured.sweeps[name]
 
     def slope(self, sweep: str, values: Array, over: Array | None = None) -> Array:
-        """Return the slopes of the axle's wheels about static ride, within 15 mm, 1 kN or 100 N m, shape (2,).
-
-        Args:
-            sweep: Name of the sweep.
-            values: Its values, shape (n, 4).
-            over: Variable of the slope, shape (n, 4). Default: the variable of the sweep.
-        """
+        """Return the slopes of the axle's wheels about static ride, within 15 mm, 1 kN or 100 N m, shape (2,)."""
         x = self.sweep(sweep).x
         near = np.abs(x) <= _SMALL[sweep.split("_", maxsplit=1)[0]] * (1.0 + 1e-9)
         rows = values[near][:, self.wheels]
@@ -88,13 +82,7 @@ class Axle(NamedTuple):
         return np.sum(base * (rows - rows.mean(axis=0)), axis=0) / np.sum(base * base, axis=0)
 
     def mean_slope(self, sweep: str, quantity: str, axis: int | None = None) -> float:
-        """Return the mean slope of both wheels over the variable of the sweep.
-
-        Args:
-            sweep: Name of the sweep.
-            quantity: One of the arrays of a `Sweep`.
-            axis: Coordinate of a point.
-        """
+        """Return the mean slope of both wheels over the variable of the sweep."""
         values = getattr(self.sweep(sweep), quantity)
         return float(self.slope(sweep, values if axis is None else values[..., axis]).mean())
 
@@ -606,16 +594,7 @@ Targets = dict[tuple[str, str], Target]
 
 
 def load_targets(vehicle: str, path: str | os.PathLike[str] | None = None) -> Targets:
-    """Read the target bands of a vehicle.
-
-    Args:
-        vehicle: Name of the vehicle, whose bands are in `models/targets/NAME_kc.toml`; without this file there are
-            none.
-        path: Another file.
-
-    Raises:
-        ParameterError: the file cannot be read, or names a metric that does not exist.
-    """
+    """Read the target bands of a vehicle."""
     file = Path(path) if path is not None else models_dir() / "targets" / f"{vehicle}_kc.toml"
     if path is None and not file.is_file():
         return {}

@@ -37,13 +37,7 @@ class TyreStiffness:
 
 
 def tyre_stiffness(tyre: TyreParameters, pressure_Pa: float | None, load_N: float) -> TyreStiffness:
-    """Return the stiffnesses of an upright standing tyre.
-
-    Args:
-        tyre: Parameters of the tyre.
-        pressure_Pa: Inflation pressure [Pa]; None for the pressure of the tyre file.
-        load_N: Vertical load [N].
-    """
+    """Return the stiffnesses of an upright standing tyre."""
     record = tyre.record
     pressure = tyre["INFLPRES"] if pressure_Pa is None else pressure_Pa
     deflection = deflection_under_load(record, load_N, 0.0, pressure, 0.0, 0.0, 0.0)
@@ -179,16 +173,7 @@ class _Linear:
 
 
 def modes(vehicle: Vehicle, load_N: Array, tyres: tuple[TyreStiffness, TyreStiffness]) -> Modes:
-    """Linearise the standing car and name its modes.
-
-    Args:
-        vehicle: The car, in static ride.
-        load_N: Wheel loads [N], shape (4,).
-        tyres: Front and rear tyres.
-
-    Raises:
-        ModelError: a mode of the body does not oscillate.
-    """
+    """Linearise the standing car and name its modes."""
     stuck = _Linear(vehicle, load_N, tyres, grip=1.0)
     sliding = _Linear(vehicle, load_N, tyres, grip=0.0)
     named = _named(stuck)

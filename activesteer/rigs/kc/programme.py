@@ -109,18 +109,7 @@ def _read(car: HeldCar) -> dict[str, Array]:
 
 
 def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float, Case]) -> Sweep:
-    """Measure the points of a sweep, from zero outwards to either side.
-
-    Args:
-        car: The car on the rig; returned to its first equilibrium.
-        title: Title of the sweep.
-        variable: Variable of the sweep.
-        unit: SI unit of the variable.
-        cases: Loads and positions that the rig imposes, by value of the variable; 0 must be among them.
-
-    Raises:
-        ModelError: a point has no equilibrium.
-    """
+    """Measure the points of a sweep, from zero outwards to either side."""
     points: dict[float, dict[str, Array]] = {}
     for side in (sorted(x for x in cases if x >= 0.0), sorted((x for x in cases if x < 0.0), reverse=True)):
         car.reset()
@@ -235,15 +224,7 @@ class Measured:
 
 
 def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> Measured:
-    """Run the whole programme.
-
-    Args:
-        vehicle: The car, in static ride on a level road.
-        tyres: Tyres of the front and of the rear axle.
-
-    Raises:
-        ModelError: the car has no equilibrium at a point of a sweep.
-    """
+    """Run the whole programme."""
     load_N = fb.wheel_outputs(vehicle.data, 4)["fz_N"].copy()
     stiffness = (
         tyre_stiffness(tyres[0], vehicle.parameters.tyres.front_pressure_Pa, float(load_N[:2].mean())),

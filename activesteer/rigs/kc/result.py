@@ -205,15 +205,7 @@ OF_THE_AXLE: Final = ("rack", "force", "moment", "steering_wheel")
 
 
 def write_tables(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
-    """Write all tests of both axles, and return the paths.
-
-    Args:
-        result: Result of the rig.
-        folder: Folder of the files; created if it does not exist.
-
-    Raises:
-        ParameterError: a file cannot be written.
-    """
+    """Write all tests of both axles, and return the paths."""
     target = make_folder(folder, ParameterError)
     written = []
     for first, axle in ((0, "front"), (2, "rear")):

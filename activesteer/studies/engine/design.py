@@ -120,11 +120,7 @@ def cases(given: Iterable[Mapping[str, Any]]) -> Samples:
 
 
 def read_cases(path: Path) -> Samples:
-    """Read a list of cases from a CSV file. Its header holds the keys; an empty cell leaves a key unchanged.
-
-    Returns:
-        The cases; a cell becomes a number or a truth value if possible, and otherwise a text.
-    """
+    """Read a list of cases from a CSV file. Its header holds the keys; an empty cell leaves a key unchanged."""
 
     def fail(problem: str, line: int, key: str | None = None) -> StudyError:
         return StudyError(problem, file=path.name, line=line, key=key)

@@ -19,11 +19,7 @@ class FactorValues:
     """Conversion of sample values to overrides; each pair of manoeuvre and vehicle is resolved once."""
 
     def __init__(self, study: StudyFile) -> None:
-        """Prepare the conversion for a study.
-
-        Raises:
-            StudyError: a factor names a manoeuvre, or a value of another factor, that the study does not have.
-        """
+        """Prepare the conversion for a study."""
         self.study = study
         self._factors = {factor.key: factor for factor in study.factors}
         self._nominal: dict[tuple[int, int], dict[str, Any]] = {}

@@ -96,20 +96,7 @@ class Factor:
 
 
 def read_factor(key: str, table: object, source: Source) -> Factor:
-    """Read a factor from its table in a study file.
-
-    Args:
-        key: The key that is varied.
-        table: `{ grid = [70, 80] }`, `{ choice = ["a", "b"], weights = [1, 2] }`, `{ uniform = [low, high] }`,
-            `{ log_uniform = [low, high] }` or `{ normal = [mean, deviation], truncate = [low, high] }`. Without bounds,
-            a normal distribution is truncated at three standard deviations. With `nominal = "times"` the values
-            multiply the value of the files, with `nominal = "plus"` they are added to it; `of = "KEY"` takes the value
-            of an earlier factor in place of that of the files. With `grows_with = { "road.mu" = 0.5 }` the values also
-            grow with the root of the friction. With
-            `maneuvers = ["slalom"]` the key varies in these manoeuvres only, with
-            `when = { "sensors.preset" = "production" }` only where another factor has that value.
-        source: Source of the study, for error messages.
-    """
+    """Read a factor from its table in a study file."""
     where = ("factors", key)
     if not isinstance(table, Mapping):
         raise source.fail(

@@ -239,11 +239,7 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
 
 
 def task_size(runs: int, controllers: int, in_flight: int) -> int:
-    """Return the number of runs per task: 8 to 64, whole samples, and enough tasks for all workers to end together.
-
-    Returns:
-        Runs per task; fewer than 8 only if the study is small.
-    """
+    """Return the number of runs per task: 8 to 64, whole samples, and enough tasks for all workers to end together."""
     wanted = int(np.clip(runs // (8 * in_flight), 8, 64))
     if runs < 8 * in_flight:
         wanted = max(1, runs // in_flight)

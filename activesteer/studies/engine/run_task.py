@@ -61,16 +61,7 @@ Row = dict[str, Any]
 
 
 def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.inf) -> list[Row]:
-    """Make some runs.
-
-    Args:
-        settings: What all runs of the study share.
-        requests: The runs, grouped by sample, so that a search by driving is made once per sample.
-        most_s: Time after which no further sample is begun [s].
-
-    Returns:
-        The rows of the first requests, at least of one sample.
-    """
+    """Make some runs."""
     end_s = time.monotonic() + most_s
     if problem := _problem(digest({"expected": settings.expected}), settings):
         return [failed_row(settings, request, Status.FAILED, problem) for request in requests]

@@ -92,11 +92,7 @@ def controller_digest(controller: str) -> str:
 
 
 def run_id(scenario: Scenario, controller: str, seed: int, timestep_s: float) -> str:
-    """Return the identity of a run: equal if and only if everything that decides the result is equal.
-
-    Returns:
-        16 hexadecimal digits.
-    """
+    """Return the identity of a run: equal if and only if everything that decides the result is equal."""
     parts = {
         "scenario": describe(scenario) | {"overrides": None},
         "files": scenario.files,

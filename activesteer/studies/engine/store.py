@@ -304,11 +304,7 @@ def _refusing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Lock the folder of this file while it is in use; on a file system without locks, do nothing.
-
-    Raises:
-        StudyError: another process works in the folder.
-    """
+    """Lock the folder of this file while it is in use; on a file system without locks, do nothing."""
     with writing(path, StudyError):
         file = path.open("w")
     with file:

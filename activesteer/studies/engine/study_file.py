@@ -146,13 +146,7 @@ class StudyFile:
 
 
 def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
-    """Read a study file and check everything that needs neither manoeuvres nor vehicles.
-
-    Args:
-        given: Name of a study of the package, a path, or a table. Relative paths in a file start at its folder, those
-            in a table at the working directory.
-        search: `tune` or `fit` if the study must have that table.
-    """
+    """Read a study file and check everything that needs neither manoeuvres nor vehicles."""
     if isinstance(given, StudyFile):
         return given
     if isinstance(given, Mapping):

@@ -167,10 +167,6 @@ def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str |
     """Yield this machine's processes, by default one per processor, or a Dask cluster; abandon tasks if the body fails.
 
     With one job, this process does the work. The scheduler is given by its address or its file.
-
-    Raises:
-        ParameterError: `jobs` is below 1 or above four times the number of processors, or is given with a scheduler.
-        StudyError: there is no such scheduler, it has no workers, or `distributed` is not installed.
     """
     most = max(_MOST_JOBS, 4 * _processors())
     if jobs is not None and not 1 <= jobs <= most:
@@ -240,13 +236,7 @@ class TaskQueue:
         self._running: dict[Future[Any], _Task] = {}
 
     def add(self, key: Any, function: Callable[..., Any], *arguments: Any) -> None:
-        """Append a task.
-
-        Args:
-            key: Key of the task in its outcome.
-            function: Function of a module, so that it can be pickled.
-            arguments: Its arguments.
-        """
+        """Append a task."""
         self._waiting.append(_Task(key, function, arguments))
 
     def add_alone(self, key: Any, function: Callable[..., Any], *arguments: Any) -> None:
@@ -257,9 +247,6 @@ class TaskQueue:
         """Do the tasks and yield their outcomes, in the order in which they end.
 
         The caller may add tasks while iterating.
-
-        Args:
-            more: Further tasks, as arguments of `add`, taken only if there is room for them.
         """
         more = iter(()) if more is None else more
         while True:

@@ -83,14 +83,7 @@ class DiscreteTimeMap:
         self.local.take_reference()
 
     def derivatives(self, of: str) -> tuple[Array, Array]:
-        """Return the derivatives of the state after the step and of the outputs before it.
-
-        Args:
-            of: Variable to differentiate by, `x` or `u`.
-
-        Returns:
-            Shapes (n, m) and (len(OUTPUTS) + len(ACTUATORS), m), m being the size of x or u.
-        """
+        """Return the derivatives of the state after the step and of the outputs before it."""
         size, rest = len(self.local.names), (np.zeros(len(self.local.names)), np.zeros(len(INPUTS)))
         count = size if of == "x" else len(INPUTS)
         following = np.empty((2 * count, size))

@@ -233,12 +233,7 @@ def driver_loops(
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
 ) -> list[LoopAtSpeed]:
-    """Return the loop with every controller at every speed.
-
-    Raises:
-        DriverError: the driver is a user's own class, which has no linear form.
-        ActiveSteerError: an input is wrong.
-    """
+    """Return the loop with every controller at every speed."""
     scenario = resolve("straight_line", vehicle, overrides, driver, controllers)
     check_gains(overrides or {}, controllers)
     if not scenario.driver.plugin.is_builtin:

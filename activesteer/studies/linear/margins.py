@@ -81,13 +81,7 @@ class Margins:
 
 
 def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) -> Margins:
-    """Return the margins of a loop from its frequency response.
-
-    Args:
-        loop: Loop gain L, with 1 + L = 0 at the limit of stability, shape (m,).
-        frequencies_radps: Frequencies, ascending, shape (m,) [rad/s].
-        stable: Whether the closed loop is stable; an unstable one has no margins.
-    """
+    """Return the margins of a loop from its frequency response."""
     if not stable:
         return Margins(math.nan, math.nan, math.nan, 0.0)
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
@@ -119,18 +113,7 @@ def _least(values: Array) -> float:
 def round_trip(
     car: LinearCar, answer: Callable[[Array], Response], scenario: Scenario, unit_s: float, frequencies_radps: Array
 ) -> Response:
-    """Return the return ratio M of the demands; the closed loop is u = M u.
-
-    Args:
-        car: The linearised car.
-        answer: The controller's frequency response, demands per measurement, shape (m, 2, len(SIGNALS)).
-        scenario: Sensors and bus.
-        unit_s: Interval of the control unit [s].
-        frequencies_radps: Frequencies, shape (m,) [rad/s].
-
-    Returns:
-        Return ratio, shape (m, 2, 2), in the order of `LOOPS`.
-    """
+    """Return the return ratio M of the demands; the closed loop is u = M u."""
     h, config = car.timestep_s, scenario.car.config
     back = np.exp(-1j * frequencies_radps * h)  # one step
     states = np.linalg.solve(
@@ -167,12 +150,7 @@ def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Respon
 
 
 def opened(returned: Response, loop: str) -> Response:
-    """Return the loop gain L opened at one demand with the other closed; 1 + L = 0 is the limit of stability.
-
-    Args:
-        returned: As from `round_trip`.
-        loop: A name of `LOOPS`.
-    """
+    """Return the loop gain L opened at one demand with the other closed; 1 + L = 0 is the limit of stability."""
     own = LOOPS.index(loop)
     other = 1 - own
     through = returned[:, own, other] * returned[:, other, own] / (1.0 - returned[:, other, other])
@@ -180,11 +158,7 @@ def opened(returned: Response, loop: str) -> Response:
 
 
 def opened_at_both(returned: Response) -> tuple[Response, Response]:
-    """Return the loops of a common factor f on both demands: det(1 - f M) = 0 where 1 + f L = 0, -L an eigenvalue of M.
-
-    Args:
-        returned: As from `round_trip`.
-    """
+    """Return the loops of a common factor f on both demands: det(1 - f M) = 0 if 1 + f L = 0, -L an eigenvalue of M."""
     values: Response = np.asarray(np.linalg.eigvals(returned), dtype=np.complex128)
     for before, here in itertools.pairwise(values):
         if np.abs(here - before).sum() > np.abs(here[::-1] - before).sum():

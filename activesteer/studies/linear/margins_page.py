@@ -26,16 +26,7 @@ _LEAD: Final = (
 
 
 def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str | os.PathLike[str]) -> Path:
-    """Write `margins.html` and return its path.
-
-    Args:
-        found: The margins; margins over many cars have no curves and get a table only.
-        vehicle: Name of the car.
-        folder: Folder for the page; it is created if it does not exist.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or the file cannot be written.
-    """
+    """Write `margins.html` and return its path."""
     sections = []
     for (controller, loop), rows in groupby(
         sorted(found, key=lambda each: (each.controller, each.loop)), lambda each: (each.controller, each.loop)

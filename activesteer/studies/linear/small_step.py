@@ -52,17 +52,6 @@ def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
 
     They belong to the decaying oscillation that fits best by least squares. This equals the logarithmic decrement if
     all decrements are alike; the friction of the rack makes those of small amplitudes smaller.
-
-    Args:
-        time_s: Time since the beginning of a small step [s], equidistant, shape (n,).
-        y_m: Lateral position of the centre of gravity [m]; the path is `STEP_M` to the left of its start.
-
-    Returns:
-        Damping ratio [-], negative for a growing oscillation, and natural frequency [rad/s]; 1 and nan if the car
-        reaches the path without crossing it.
-
-    Raises:
-        StudyError: the car does not reach the path.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 

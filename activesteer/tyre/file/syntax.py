@@ -53,11 +53,7 @@ class Syntax:
 
 
 def read_text(path: Path) -> str:
-    """Read a file of limited size as Latin-1, in which every byte is a character.
-
-    Raises:
-        TyreFileError: the file cannot be read, or is not a text of the size of a tyre file.
-    """
+    """Read a file of limited size as Latin-1, in which every byte is a character."""
     raw = read_bytes(path, TyreFileError, limits.MAX_TYRE_BYTES)
     return raw.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
 
@@ -94,12 +90,7 @@ def _value(text: str) -> float | str:
 
 
 def parse(text: str, source: str) -> Syntax:
-    """Split a .tir file into its entries and tables.
-
-    Raises:
-        TyreFileError: a line is neither a section, `KEY = value`, a row of numbers, a `{heading}` nor a comment; or a
-            value is not finite or above `limits.MAX_NUMBER`.
-    """
+    """Split a .tir file into its entries and tables."""
     section = ""
     entries: list[Entry] = []
     tables: dict[str, list[tuple[float, ...]]] = {}

@@ -60,12 +60,7 @@ DIMENSIONS: dict[str, dict[str, int]] = {
 
 
 def si_factor(quantity: str, units: Mapping[str, float]) -> float:
-    """Return the factor from a file's number to SI.
-
-    Args:
-        quantity: A key of `DIMENSIONS`.
-        units: Sizes in SI of the file's base units, by key of `BASE_UNITS`; missing ones are SI.
-    """
+    """Return the factor from a file's number to SI."""
     if quantity == "pressure" and "PRESSURE" in units:
         return units["PRESSURE"]
     return math.prod(units.get(base, 1.0) ** power for base, power in DIMENSIONS[quantity].items())

@@ -22,12 +22,7 @@ _OWN_SECTIONS = ("MDI_HEADER", "UNITS")
 
 
 def tir_text(parameters: TyreParameters, comment: str = "") -> str:
-    """Return the content of a .tir file.
-
-    Args:
-        parameters: The tyre.
-        comment: Lines for the top of the file, without comment signs.
-    """
+    """Return the content of a .tir file."""
     lines = [f"! {line}" for line in comment.splitlines()] + _HEADER.splitlines()
     names: dict[str, list[str]] = {"MODEL": [f"TYRESIDE = '{parameters.side}'"]}
     for coefficient in COEFFICIENTS:

@@ -50,11 +50,7 @@ MOTION_CHANNELS: Final = tuple(
 
 
 def motion_copied(model: mujoco.MjModel) -> dict[str, Column]:
-    """Return the channels of `MOTION_CHANNELS` that are copied from the engine's sensors.
-
-    Raises:
-        ModelError: a sensor is missing.
-    """
+    """Return the channels of `MOTION_CHANNELS` that are copied from the engine's sensors."""
     x, y, z = sensor(model, "cg_position")
     front_x, front_y, _ = sensor(model, "front_axle_position")
     _, _, vertical = sensor(model, "cg_velocity")
@@ -66,11 +62,7 @@ def motion_copied(model: mujoco.MjModel) -> dict[str, Column]:
 
 
 def motion_inputs(model: mujoco.MjModel) -> tuple[Column, ...]:
-    """Return the inputs of the other channels: orientation, velocity, acceleration, two of the body's angular rates.
-
-    Raises:
-        ModelError: a sensor is missing.
-    """
+    """Return the inputs of the other channels: orientation, velocity, acceleration, two of the body's angular rates."""
     orientation, velocity, acceleration, rates = (
         sensor(model, name) for name in ("chassis_orientation", "cg_velocity", "cg_accelerometer", "cg_gyro")
     )
@@ -150,11 +142,6 @@ class CarMotion:
         """Evaluate all quantities, which have the names of their channels.
 
         Sines and angles use numpy, which computes eight at a time; recordings keep its last digits.
-
-        Args:
-            columns: Columns of `motion_inputs`, shape (n, 11), by column.
-            gravity_mps2: Gravitational acceleration in the world [m/s2].
-            last_yaw_rad: Yaw angle of the row before the first one, from which the angle is unwrapped [rad].
         """
         sides, angles, turned = (np.empty((len(columns), count), order="F") for count in (5, 3, 6))
         _all_angle_sides(columns, sides)

@@ -43,11 +43,7 @@ class ChannelMap:
     """
 
     def __init__(self, model: mujoco.MjModel, parameters: VehicleParameters) -> None:
-        """Look up everything by name, once.
-
-        Raises:
-            ModelError: a sensor, tendon or actuator is missing.
-        """
+        """Look up everything by name, once."""
         self._gravity_mps2 = model.opt.gravity
         self._motion_copied, self._motion_inputs = motion_copied(model), motion_inputs(model)
         measured = () if parameters.sensors.is_ideal else MEASURED
@@ -106,19 +102,7 @@ class ChannelMap:
         return np.empty((count, len(self._inputs)), order="F")
 
     def take(self, rows: RawRows, out: Array, inputs: Array) -> bool:
-        """Compute the channels of compiled code, best for few rows that are still in the processor's caches.
-
-        Args:
-            rows: Raw rows of n steps, n > 0.
-            out: Values of the channels, shape (n, len(channels)), by column; written.
-            inputs: Intermediate values for `compute`, n rows of `inputs`; written.
-
-        Returns:
-            Whether all values are finite and at most `MAX_VALUE`.
-
-        Raises:
-            ParameterError: an array has another type, shape or memory layout.
-        """
+        """Compute the channels of compiled code, best for few rows that are still in the processor's caches."""
         count = self._checked(inputs, out)
         for name, array, width in zip(RawRows._fields, rows, self._widths, strict=True):
             if not _is_matrix(array, count, width) or (width > 1 and array.strides[1] != array.itemsize):
@@ -128,19 +112,7 @@ class ChannelMap:
         )
 
     def compute(self, inputs: Array, out: Array, last_yaw_rad: float = 0.0) -> bool:
-        """Compute the channels of numpy, best for many rows at a time.
-
-        Args:
-            inputs: Intermediate values of `take`, n rows.
-            out: Values of the channels, shape (n, len(channels)); written.
-            last_yaw_rad: Yaw angle of the row before the first one, from which the angle is unwrapped [rad].
-
-        Returns:
-            Whether all values are finite and at most `MAX_VALUE`.
-
-        Raises:
-            ParameterError: an array has another type, shape or memory layout.
-        """
+        """Compute the channels of numpy, best for many rows at a time."""
         self._checked(inputs, out)
         # The last rows of a diverged run are not finite; record them without a warning.
         with np.errstate(invalid="ignore", over="ignore"):

@@ -119,22 +119,7 @@ def _take(rows, start, count, copies, input_copies, forces, actuators, out, inpu
 
 @compiled_call(types.boolean, _ROWS, _COPIES, _COPIES, _FORCES, _ACTUATORS, _ARRAY, _ARRAY, types.float64)
 def take_rows(rows, copies, input_copies, forces, actuators, out, inputs, largest):
-    """Compute all channels of compiled code.
-
-    Args:
-        rows: The arrays of a `RawRows`, shape (n, m) each.
-        copies: Copies to channels: for each array the end of its part in the two other tables, columns of the array,
-            columns of `out`.
-        input_copies: Copies to `inputs`, in the same form.
-        forces: Laws of springs, stops and links, and the columns of `out` for their forces [N].
-        actuators: Actuators, and the columns of `out` for their flags: 1 at a limit of angle, rate or force, else 0.
-        out: Channels, shape (n, k), by column; written.
-        inputs: The other copies, shape (n, j), by column; written.
-        largest: Largest allowed magnitude.
-
-    Returns:
-        Whether all channels are finite and within this magnitude.
-    """
+    """Compute all channels of compiled code."""
     good, whole = True, len(out) - len(out) % _ROWS_AT_ONCE
     # The compiler knows this count and keeps these rows of a column in one register.
     for start in range(0, whole, _ROWS_AT_ONCE):
@@ -144,13 +129,7 @@ def take_rows(rows, copies, input_copies, forces, actuators, out, inputs, larges
 
 @compiled_call(types.boolean, _ARRAY, _PLACES, types.float64)
 def within(values, columns, largest):
-    """Return whether all values in some columns are finite and within a magnitude.
-
-    Args:
-        values: Channels, shape (n, k).
-        columns: Columns to check.
-        largest: Largest allowed magnitude.
-    """
+    """Return whether all values in some columns are finite and within a magnitude."""
     good = True
     for index in range(len(columns)):
         column = values[:, columns[index]]

@@ -95,11 +95,7 @@ Values: TypeAlias = Column | AxialForce | Actuator | Computed
 
 
 def sensor(model: mujoco.MjModel, name: str) -> tuple[Column, ...]:
-    """Return the columns of a sensor of the engine.
-
-    Raises:
-        ModelError: there is no sensor of this name.
-    """
+    """Return the columns of a sensor of the engine."""
     place = sensor_columns(model, name)
     return tuple(Column("sensordata", column) for column in range(place.start, place.stop))
 

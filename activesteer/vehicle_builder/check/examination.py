@@ -20,17 +20,7 @@ from activesteer.vehicle_builder.check.standing import standing
 
 
 def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
-    """Check a car before it is driven.
-
-    Args:
-        vehicle: A name, the path of a vehicle file, or a folder with one.
-
-    Returns:
-        The findings; the first stage that fails gives an error.
-
-    Raises:
-        ParameterError: there is no such vehicle.
-    """
+    """Check a car before it is driven."""
     file = find_vehicle(vehicle)
     findings: list[Finding] = []
     try:

@@ -102,13 +102,7 @@ class Usual:
     """Axle and name of a metric of the rig."""
 
     def judged(self, value: float, unit: str = "", **words: str) -> Finding:
-        """Return the finding about a value; nan counts as a warning.
-
-        Args:
-            value: The value.
-            unit: Its unit, if the table has none; `-` for a pure number.
-            words: Words that `words` has in braces.
-        """
+        """Return the finding about a value; nan counts as a warning."""
         unit = (self.unit or unit).removesuffix("-")
         level: Level = "warning"
         if not math.isnan(value):

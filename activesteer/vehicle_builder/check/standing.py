@@ -23,12 +23,7 @@ _STILL_MPS: Final = 0.01
 
 
 def standing(vehicle: Vehicle, car: CarSpec) -> Iterator[Finding]:
-    """Return all findings about the car at rest.
-
-    Args:
-        vehicle: The car in static ride; it is stepped.
-        car: Files of the car.
-    """
+    """Return all findings about the car at rest."""
     model, data = vehicle.model, vehicle.data
     load = fb.wheel_outputs(data, 4)["fz_N"].copy()
     body = mass_properties(model)
