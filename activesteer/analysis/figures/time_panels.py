@@ -29,7 +29,7 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure
-from activesteer.recording.events import events_of
+from activesteer.recording.contents import events_of
 from activesteer.units import Quantity
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from activesteer.conventions import CORNERS, Array
 from activesteer.drawing import wheel_angles
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
-from activesteer.recording.events import events_of
+from activesteer.recording.contents import events_of
 from activesteer.road.course import CONE_RADIUS_M, Course
 from activesteer.units import ESTIMATED, MEASURED, Quantity, quantity_of
 
