@@ -8,6 +8,7 @@ from typing import Final
 import rerun.blueprint as rrb
 
 from activesteer.drawing.bodywork import CHASSIS
+from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Panel, panels_in
 from activesteer.playback import events, plots
 from activesteer.playback.car import body_path, ghost_path
 from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
@@ -70,7 +71,7 @@ def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
     )
 
 
-def _tab(name: str, shown: Sequence[plots.Plot], run: Run, *, alone: bool) -> rrb.Vertical:
+def _tab(name: str, shown: Sequence[Panel], run: Run, *, alone: bool) -> rrb.Vertical:
     views, curves = plots.views(shown, [run]), plots.curves(shown, run, alone=alone)
     names = legend(f"{LEGEND}/{run.name}/{name}", curves)
     high = height(curves)
@@ -81,7 +82,7 @@ def _tab(name: str, shown: Sequence[plots.Plot], run: Run, *, alone: bool) -> rr
 
 def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
     """Return the page of all runs: a view for each car, with the others as ghosts, and overlaid plots."""
-    loads, use = plots.WHEELS[:2]
+    loads, use = panels_in(WHEELS)[:2]
     return rrb.Horizontal(
         rrb.Vertical(
             rrb.Horizontal(*(_chase(run, runs) for run in runs)),
@@ -92,9 +93,7 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
         rrb.Vertical(
             legend(LEGEND_OF_RUNS, {run.label: run.colour for run in runs}),
             rrb.Tabs(
-                rrb.Vertical(*plots.views(plots.MOTION, runs), name="Motion"),
-                rrb.Vertical(*plots.views(plots.DRIVING, runs), name="Driving"),
-                rrb.Vertical(*plots.views(plots.BODY, runs), name="Body"),
+                *(rrb.Vertical(*plots.views(panels_in(name), runs), name=name) for name in (MOTION, DRIVING, BODY)),
                 rrb.Vertical(*plots.views_by_corner(loads, runs), name="Wheel loads"),
                 rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction utilisation"),
                 active_tab=page,

@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw
 
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.cars import bytes_of
+from activesteer.drawing.panels import FILM, PANELS, panels_in
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, footprint_of
 from activesteer.units import quantity_of
@@ -45,11 +46,9 @@ MIN_SPEED_MPS: Final = 1.0
 _SIDE: Final = 3
 """Factor by which plans are drawn larger and then scaled down, because Pillow's lines have hard edges."""
 
-READINGS: Final = tuple(
-    quantity_of(channel) for channel in ("speed_mps", "sideslip_rad", "rear_steer_rad", "superposition_rad")
-)
+READINGS: Final = tuple(quantity_of(line.channel) for panel in panels_in(FILM) for line in panel.lines_in(FILM))
 """Values in a row; a narrow frame shows the first ones only."""
-_ADDED: Final = ("rear_steer_rad", "superposition_rad")
+_ADDED: Final = tuple(line.channel for line in PANELS["added"].lines)
 _WIDEST: Final = {"speed_mps": "188.8", "sideslip_rad": "-18.8"}
 
 
