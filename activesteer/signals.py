@@ -4,7 +4,7 @@ Messages are named tuples because the loop creates them every millisecond, and a
 as long to create. Where even the call of the class takes too long, use `new_message`.
 
 The fields of a message are the one description of it. The channels of a recording and the memory layout of native code
-are derived from them; see `numbers_of` and `native_messages`.
+are derived from them; see `numbers_of` and `native_memory`.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ import numpy as np
 
 from activesteer import simulate
 from activesteer.analysis.claims.statements import SCENARIOS
-from activesteer.analysis.energy import METRICS as ENERGIES
+from activesteer.analysis.general import METRICS as ENERGIES
 from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.report.significance import Change, significance
 from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, Runs

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 
-from activesteer.vehicle_builder.keyframe import keyframe_xml
+from activesteer.vehicle_builder.build import keyframe_xml
 
 
 def main() -> None:

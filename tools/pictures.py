@@ -31,7 +31,7 @@ from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.engine.run_task import CLAIM
+from activesteer.studies.engine.runs import CLAIM
 from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops
 from activesteer.theory.single_track import SingleTrack

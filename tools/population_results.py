@@ -17,9 +17,8 @@ import pyarrow as pa
 
 from activesteer.analysis.claims.judge import Claim
 from activesteer.analysis.claims.stored import NO_FACTOR, ClaimProportion, read_claims, stored_table
-from activesteer.analysis.harm import MEASURES, harms, severity, track_harm_m
+from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity, track_harm_m
 from activesteer.analysis.harm import changes as growth_of
-from activesteer.analysis.loss_of_control import has_spun, is_lost
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, StudyError
 from activesteer.files import finite
@@ -28,8 +27,7 @@ from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.analysis import strongest
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.run_task import CLAIM, CURVE, Row
-from activesteer.studies.engine.runs import run_command, versions
+from activesteer.studies.engine.runs import CLAIM, CURVE, Row, run_command, versions
 from activesteer.studies.engine.study import StudyProgress, study
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.reproduction import nominal_claims
@@ -115,7 +113,7 @@ class WorstRun:
 class SystemEffect:
     """Effect of a controller in a scenario, relative to the same samples without control.
 
-    `loss_of_control.is_lost` decides whether a car is lost.
+    `harm.is_lost` decides whether a car is lost.
 
     Attributes:
         controller: The controller.

@@ -30,7 +30,7 @@ from activesteer.files import atomic_write, make_folder, write_text
 from activesteer.metric_table import metric
 from activesteer.resources import find_study, studies_dir
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_task import CLAIM, CURVE, DISTANCE, drive
+from activesteer.studies.engine.runs import CLAIM, CURVE, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import read_study

@@ -1,4 +1,4 @@
-"""Lanes, cones and the track of a car: distances of its outline and of its front axle.
+"""Lanes, corridors and bands of a run.
 
 The body is a rectangle of the car's width with a usual overhang beyond the axles (`Footprint`).
 """
@@ -230,3 +230,14 @@ def view_of(course: Course) -> CourseView:
     else:
         left, right = course.first_gate_x_m - BEFORE_M, course.last_gate_x_m + AFTER_M
     return CourseView((left, right), (low, high), *path.extended(right - left))
+
+
+TIME_TOLERANCE_S: Final = 0.02
+"""Tolerance in time, to either side [s]; agreed for comparisons with another code."""
+
+
+def corridor(time_s: Array, values: Array, width: float | Array) -> tuple[Array, Array]:
+    """Return the lower and the upper edge around a signal: `TIME_TOLERANCE_S` in time, and a tolerance in the value."""
+    fine = np.linspace(-TIME_TOLERANCE_S, TIME_TOLERANCE_S, 9)
+    moved = np.stack([np.interp(time_s + shift, time_s, values) for shift in fine])
+    return moved.min(axis=0) - width, moved.max(axis=0) + width

@@ -7,12 +7,10 @@ from typing import Final, NamedTuple
 
 from activesteer.analysis import (
     brake_in_turn,
-    energy,
     frequency_response,
     general,
     handling,
     path_following,
-    ride,
     rollover,
     sine_with_dwell,
     slow_ramp,
@@ -87,9 +85,9 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
             than two rows, or the run is not what its kind promises.
         ParameterError: the evaluation returns a metric that `metric_table` does not declare.
     """
-    values = evaluation_of(recording).metrics(Evaluable(recording)) | energy.energy_metrics(recording)
-    if ride.is_uneven(recording):
-        values |= ride.ride_metrics(Evaluable(recording))
+    values = evaluation_of(recording).metrics(Evaluable(recording)) | general.energy_metrics(recording)
+    if general.is_uneven(recording):
+        values |= general.ride_metrics(Evaluable(recording))
     for name in values:
         metric(name)
     return values

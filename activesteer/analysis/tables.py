@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from activesteer.analysis.loss_of_control import LOST, shown
+from activesteer.analysis.harm import LOST, shown
 from activesteer.metric_table import FRICTION_UTILISATION, recorded_metric
 from activesteer.text_table import text_table, wrapped_line
 

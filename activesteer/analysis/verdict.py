@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from activesteer.analysis.loss_of_control import kept, losses
+from activesteer.analysis.harm import kept, losses
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.judgement import judge
 from activesteer.metric_table import SIDESLIP_PEAKS, metric

@@ -109,7 +109,7 @@ def _check(options: argparse.Namespace) -> int:
 def _keyframe(options: argparse.Namespace) -> int:
     from activesteer.errors import ParameterError
     from activesteer.files import write_text
-    from activesteer.vehicle_builder.keyframe import keyframe_xml
+    from activesteer.vehicle_builder.build import keyframe_xml
 
     text, path = keyframe_xml(options.vehicle)
     print(write_text(path, text, ParameterError))
@@ -162,7 +162,7 @@ def _kc(options: argparse.Namespace) -> int:
         from activesteer.files import write_text
         from activesteer.rigs.kc.result import write_tables
         from activesteer.scenario import load_car
-        from activesteer.vehicle_builder.car_table import car_table
+        from activesteer.vehicle_builder.texts import car_table
 
         written = write_tables(result, options.tables)
         text = car_table(load_car(options.vehicle, overrides_of(options)), result)

@@ -237,7 +237,7 @@ def _paint(
     metrics: Mapping[str, Mapping[str, float]], run: str, name: str, value: float, first: float, text: str
 ) -> str:
     """Return a value in green if it is better than in the first run, in red if it is worse; plain if a run is lost."""
-    from activesteer.analysis.loss_of_control import is_controlled
+    from activesteer.analysis.harm import is_controlled
     from activesteer.analysis.report.significance import Change, significance
 
     if not (is_controlled(metrics[run]) and is_controlled(next(iter(metrics.values())))):
@@ -248,7 +248,7 @@ def _paint(
 
 def _print_outcomes(metrics: Mapping[str, Mapping[str, float]]) -> None:
     """Print in words for each run a loss of control, or that the car kept its lane."""
-    from activesteer.analysis.loss_of_control import kept, losses
+    from activesteer.analysis.harm import kept, losses
 
     for label, found in metrics.items():
         for words, colour in ((losses(found), BAD), (kept(found), GOOD)):

@@ -57,10 +57,10 @@ _CORNERS: Final = ("fl", "fr", "rl", "rr")
     JSON,
 )  # fmt: skip
 def _info(options: argparse.Namespace) -> int:
-    from activesteer.analysis.loss_of_control import kept, losses
+    from activesteer.analysis.harm import kept, losses
     from activesteer.analysis.tables import comparison
     from activesteer.recording import Recording
-    from activesteer.recording.events import events_of
+    from activesteer.recording.contents import events_of
 
     recording = Recording.open(options.file, recover=True)
     if options.recover is not None:
@@ -168,7 +168,7 @@ def _report(options: argparse.Namespace) -> int:
 )  # fmt: skip
 def _compare(options: argparse.Namespace) -> int:
     if options.new is not None:
-        from activesteer.measured.example_folder import write_template
+        from activesteer.measured.folder_file import write_template
 
         if options.files:
             raise ParameterError("makes a new folder and compares nothing", key="--new")
@@ -250,7 +250,7 @@ def _replay(options: argparse.Namespace) -> int:
         raise PlaybackError("replay needs the viewer rerun: pip install rerun-sdk") from error
     from activesteer.analysis.verdict import verdict
     from activesteer.recording import Recording
-    from activesteer.recording.run_names import run_names
+    from activesteer.recording.recording import run_names
 
     if options.compare and len(options.files) < 2:
         raise ParameterError(f"--compare needs at least two files, and {options.files[0]} is one")
@@ -304,7 +304,7 @@ def _size(text: str) -> tuple[int, int]:
 def _video(options: argparse.Namespace) -> int:
     from activesteer.analysis.verdict import verdict
     from activesteer.recording import Recording
-    from activesteer.recording.run_names import run_names
+    from activesteer.recording.recording import run_names
     from activesteer.video import Settings, make_film
 
     files = [options.file, *(options.compare or ())]

@@ -236,7 +236,7 @@ def _values(trial: Trial, indent: str = "  ") -> Iterator[str]:
 def _draw(found: list[Tuning], folder: Path) -> list[Path]:
     """Draw each search; nothing without matplotlib."""
     from activesteer.errors import ParameterError
-    from activesteer.studies.engine.tuning_figure import draw_tuning
+    from activesteer.studies.engine.report import draw_tuning
 
     try:
         return [path for one in found for path in draw_tuning(one, folder)]
@@ -270,7 +270,7 @@ def _fit(options: argparse.Namespace) -> int:
         found = fit(options.study, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
     files = []
     if options.output is not None:
-        from activesteer.measured.fit_page import write_fit
+        from activesteer.measured.fit_result import write_fit
 
         files = write_fit(found, Path(options.study).stem, options.output)
     print_notes(found.notes)
@@ -445,7 +445,7 @@ def _controller_loop(options: argparse.Namespace) -> int:
         lines.append(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
     tell(options, rows, lines)
     if options.output is not None:
-        from activesteer.studies.linear.margins_page import write_margins_page
+        from activesteer.studies.linear.margins import write_margins_page
 
         tell_files(options, [write_margins_page(found, str(options.vehicle), options.output)], "page")
     return 0
@@ -458,7 +458,7 @@ def _margins(options: argparse.Namespace) -> list[LoopMargins]:
     controllers = options.controller or ("ars", "afs")
     if options.study is None:
         return loop_margins(controllers, options.vehicle, speeds_kmh, overrides)
-    from activesteer.studies.linear.worst_margins import worst_margins
+    from activesteer.studies.linear.margins import worst_margins
 
     with RunCounter("margins", quiet=options.json) as counter:
         return worst_margins(

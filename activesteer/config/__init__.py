@@ -24,8 +24,7 @@ from activesteer.config.keys import (
     merged,
     spellings,
 )
-from activesteer.config.source import Range, Source
-from activesteer.config.toml import parse_value, read_toml, toml_text, toml_value
+from activesteer.config.source import Range, Source, parse_value, read_toml, toml_text, toml_value
 from activesteer.config.values import build, checked_number, convert, to_table
 
 __all__ = [

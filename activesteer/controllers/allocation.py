@@ -22,7 +22,7 @@ import math
 
 from activesteer.controllers.axle_slopes import AxleSlopes, slopes
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.native_blocks import NativeBlock
+from activesteer.native_records import NativeBlock
 from activesteer.shared_laws import shared
 from activesteer.signals import Estimate
 

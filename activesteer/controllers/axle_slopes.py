@@ -11,7 +11,7 @@ import numpy as np
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation import KnownTyre
-from activesteer.native_blocks import NativeBlock, Table, table
+from activesteer.native_records import NativeBlock, Table, table
 from activesteer.shared_laws import shared
 from activesteer.signals import Estimate
 

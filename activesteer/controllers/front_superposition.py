@@ -16,7 +16,7 @@ from activesteer.controllers.corrector import (
     reset,
 )
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
-from activesteer.native_blocks import NativeBlock
+from activesteer.native_records import NativeBlock
 from activesteer.shared_laws import law_of
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack

@@ -60,7 +60,7 @@ from activesteer.controllers.turn_reference import (
 )
 from activesteer.conventions import Array
 from activesteer.estimation.estimator import Estimator
-from activesteer.native_blocks import NativeBlock, Table, table
+from activesteer.native_records import NativeBlock, Table, table
 from activesteer.shared_laws import shared
 from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement, PerWheel, steering
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters

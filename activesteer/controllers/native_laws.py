@@ -12,8 +12,8 @@ import numpy as np
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, call_at, compiled_call
-from activesteer.native_blocks import NativeBlock, record_type
 from activesteer.native_memory import f64_pointer, pointer_to
+from activesteer.native_records import NativeBlock, record_type
 from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, numbers_of, record_fields
 
 N_STEERING: Final = 6

@@ -12,8 +12,8 @@ from activesteer.controllers.native_laws import CALL, N_COMMAND, N_HELD
 from activesteer.estimation.advance import advance
 from activesteer.estimation.records import KNOWN, MEMORY, SAID
 from activesteer.estimation.setup import GRID
-from activesteer.native_blocks import record_type
 from activesteer.native_memory import f64_pointer, pointer_to
+from activesteer.native_records import record_type
 from activesteer.signals import DriverCommand, Measurement, numbers_of
 
 _MEASURED: Final = [number.name for number in numbers_of(Measurement)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from activesteer.controllers.corrector import DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.native_blocks import NativeBlock
+from activesteer.native_records import NativeBlock
 from activesteer.shared_laws import law_of
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack

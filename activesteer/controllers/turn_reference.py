@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from activesteer.controllers.parameters import ControllerSetup, EscParameters, TorqueVectoringParameters
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation.estimator import Estimator
-from activesteer.native_blocks import NativeBlock
+from activesteer.native_records import NativeBlock
 from activesteer.shared_laws import shared
 from activesteer.signals import Estimate, new_message
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, yaw_rate_gain

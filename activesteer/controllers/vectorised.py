@@ -13,7 +13,7 @@ from activesteer.controllers.find import controller_spec
 from activesteer.controllers.native_laws import N_COMMAND, N_HELD, call_law, law_address
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import Array
-from activesteer.native_blocks import record_type, values
+from activesteer.native_records import record_type, values
 from activesteer.signals import (
     ActuatorCommand,
     DriverCommand,

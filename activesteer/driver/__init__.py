@@ -1,10 +1,9 @@
 """The driver: from the setpoint, and the path ahead, to steering wheel, drive and brake."""
 
 from activesteer.driver.base import Driver, DriverParameters, DriverSetup
-from activesteer.driver.constant_radius import ConstantRadiusDriver
 from activesteer.driver.find import DRIVER, driver_spec, is_driver_file
 from activesteer.driver.human import HumanDriver
-from activesteer.driver.open_loop import OpenLoopDriver, SpeedHold
+from activesteer.driver.open_loop import ConstantRadiusDriver, OpenLoopDriver, SpeedHold
 from activesteer.driver.path_preview import PathPreviewDriver
 
 __all__ = [

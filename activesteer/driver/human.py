@@ -1,14 +1,30 @@
-"""The driver of every manoeuvre: follows a path, a curvature or a steering wheel angle."""
+"""The human driver, in Python and in compiled code."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numba import carray
+from numpy.typing import NDArray
+
+from activesteer.compilation import inlined
 from activesteer.driver.base import DriverSetup
-from activesteer.driver.constant_radius import ConstantRadiusDriver
-from activesteer.driver.open_loop import OpenLoopDriver
-from activesteer.driver.path_preview import N_SPEEDS, SPEED_STEP_MPS, PathPreviewDriver
-from activesteer.errors import SimulationDiverged
-from activesteer.native_blocks import NativeBlock
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
+from activesteer.driver.open_loop import (
+    NO_RACK,
+    ConstantRadiusDriver,
+    OpenLoopDriver,
+    circle_angle,
+    correct_circle,
+    turned,
+)
+from activesteer.driver.path_preview import N_SPEEDS, SPEED_STEP_MPS, PathPreviewDriver, look, looks, moved
+from activesteer.errors import ManeuverError, SimulationDiverged
+from activesteer.native_memory import array_of, f64_pointer, word_pointer
+from activesteer.native_records import ARRAY, NativeBlock
+from activesteer.road.path import Path
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, numbers_of
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -58,3 +74,114 @@ class HumanDriver(NativeBlock):
         if setpoint.curvature_demand_1pm is not None:
             return self._constant_radius.step(setpoint, measurement, motion)
         return self._open_loop.step(setpoint, measurement, motion)
+
+
+ANGLE, CURVATURE, PATH = range(3)
+"""Kinds of a setpoint: steering wheel angle, curvature, path."""
+SETPOINT: Final = np.dtype(
+    (
+        np.record,
+        [
+            *((name, np.float64) for name in ("steering_wheel_rad", "speed_mps", "brake_pedal", "parking_brake")),
+            ("curvature_1pm", np.float64),
+            *((name, np.intp) for name in ("kind", "holds_speed", "torques_set")),
+            ("torques_Nm", np.float64, (8,)),
+        ],
+    )
+)
+"""A `Setpoint` for compiled code; `torques_Nm` holds the drive torques and the brake torques of the wheels."""
+LINE: Final = np.dtype(
+    (np.record, [("spacing_m", np.float64), ("x_m", ARRAY), ("y_m", ARRAY), ("headings_rad", np.float64, (2,))])
+)
+"""A path as `PathSearch.line` describes it."""
+
+_NO_TORQUES: Final = (0.0,) * 8
+_DRIVER: Final = [number.name for number in numbers_of(DriverCommand)]
+_WHEEL, _DRIVE, _PEDAL, _SATURATED, _GEAR, _FRONT, _PARKING = map(
+    _DRIVER.index,
+    ("steering_wheel_demand_rad", "drive_torque_demand_Nm", "brake_pedal", "saturated", "gear",
+     "front_steer_demand_rad", "parking_brake"),
+)  # fmt: skip
+_MEASURED: Final = [number.name for number in numbers_of(Measurement)]
+_SPEED, _YAW_RATE = map(_MEASURED.index, ("speed_mps", "yaw_rate_radps"))
+_MOTION_SPEED: Final = Motion._fields.index("speed_mps")
+
+
+class SetpointTable(NamedTuple):
+    """Setpoints of successive steps for compiled code; the last one holds on.
+
+    Attributes:
+        rows: Records of `SETPOINT`.
+        path: The path of all steps.
+        steps: Number of steps that the table is for.
+    """
+
+    rows: NDArray[Any]
+    path: Path | None
+    steps: int
+
+
+def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | None) -> SetpointTable:
+    """Return setpoints as a table, up to where the path changes."""
+    path = setpoints[0].path
+    steps = next((step for step, setpoint in enumerate(setpoints) if setpoint.path is not path), len(setpoints))
+    count = steps
+    while count > 1 and setpoints[count - 1] is setpoints[count - 2]:
+        count -= 1
+    rows = [setpoint_row(setpoint, rack_per_steering_wheel_m) for setpoint in setpoints[:count]]
+    return SetpointTable(np.array(rows, SETPOINT), path, steps)
+
+
+def setpoint_row(setpoint: Setpoint, rack_per_steering_wheel_m: float | None) -> tuple[Any, ...]:
+    """Return a setpoint as its record takes it; see `tabulate`."""
+    turn, speed, pedal, holds, curvature, rack, wheels, path, parking = setpoint
+    kind = ANGLE
+    if path is not None:
+        kind = PATH
+    elif curvature is not None:
+        kind = CURVATURE
+    elif rack is not None:
+        if rack_per_steering_wheel_m is None:
+            raise ManeuverError(NO_RACK, key="steering.rack_m")
+        turn = rack / rack_per_steering_wheel_m
+    torques = _NO_TORQUES if wheels is None else (*wheels.drive_Nm, *wheels.brake_Nm)
+    return turn, speed, pedal, parking, curvature or 0.0, kind, holds, wheels is not None, torques
+
+
+@inlined
+def follow(human, setpoint, line, measured, motion, engine_radps, low_Nm, high_Nm, command):
+    """Write the command of a `HumanDriver`."""
+    robot = human._open_loop
+    angle, slow_arms = setpoint.steering_wheel_rad, False
+    if setpoint.kind == PATH:
+        path = human._path
+        if path._steps % path._preview_every_steps == 0:
+            decided, address = array_of(path._decided_rad), 0
+            if looks(motion[_MOTION_SPEED]):
+                rounded = int(np.rint(motion[_MOTION_SPEED] / SPEED_STEP_MPS))
+                if rounded < path._known.size:
+                    address = word_pointer(path._known.address)[rounded]
+                if address == 0:
+                    return False
+            gains = carray(f64_pointer(address), (path._row_size,)) if address != 0 else decided
+            look(
+                path, robot.steering_wheel_limit_rad, decided,
+                motion[0], motion[1], motion[2], motion[3], motion[4], motion[5],
+                line.spacing_m, array_of(line.x_m), array_of(line.y_m), line.headings_rad[0], line.headings_rad[1],
+                gains,
+            )  # fmt: skip
+        path._steps += 1
+        angle, slow_arms = moved(path)
+    elif setpoint.kind == CURVATURE:
+        angle = circle_angle(human._constant_radius, robot, setpoint.curvature_1pm)
+    turn, torque, saturated, gear = turned(
+        robot, angle, setpoint.holds_speed != 0, setpoint.speed_mps, measured[_SPEED], engine_radps, low_Nm, high_Nm
+    )
+    if setpoint.kind == PATH:
+        human._path._wheel_rad = turn
+    elif setpoint.kind == CURVATURE and turn == angle:
+        correct_circle(human._constant_radius, setpoint.curvature_1pm, measured[_YAW_RATE], measured[_SPEED])
+    command[_WHEEL], command[_DRIVE], command[_PEDAL] = turn, torque, setpoint.brake_pedal
+    command[_SATURATED], command[_GEAR] = 1.0 if saturated or slow_arms else 0.0, float(gear)
+    command[_FRONT], command[_PARKING] = turn / robot.steering_ratio, setpoint.parking_brake
+    return True

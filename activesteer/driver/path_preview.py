@@ -24,7 +24,7 @@ from activesteer.compilation import compiled
 from activesteer.conventions import Array
 from activesteer.driver.base import DriverParameters
 from activesteer.driver.open_loop import OpenLoopDriver
-from activesteer.native_blocks import NativeBlock
+from activesteer.native_records import NativeBlock
 from activesteer.road.native_path import PathSearch, nearest, point_at
 from activesteer.shared_laws import shared
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint

@@ -13,7 +13,7 @@ from activesteer.conventions import Array
 from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.records import MEMORY, SAID, known_of
 from activesteer.estimation.setup import GRID, EstimatorSetup
-from activesteer.native_blocks import NativeBlock
+from activesteer.native_records import NativeBlock
 from activesteer.signals import Estimate, Measurement, new_message
 
 _pack_into = struct.Struct(f"{len(SAID)}d").pack_into

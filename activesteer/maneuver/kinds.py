@@ -10,8 +10,7 @@ from activesteer.errors import ManeuverError, nearest_names, shown
 from activesteer.faults import check_faults
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.braking import BrakeInTurn, StraightBraking
-from activesteer.maneuver.constant_radius import ConstantRadius
-from activesteer.maneuver.follow_path import FollowPath
+from activesteer.maneuver.follow_path import ConstantRadius, FollowPath
 from activesteer.maneuver.lane_changes import LaneChange, Slalom
 from activesteer.maneuver.open_loop import OpenLoop
 from activesteer.maneuver.phases import Phases

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
+from activesteer.analysis.lanes import TIME_TOLERANCE_S, corridor
 from activesteer.analysis.series import low_pass, rms
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError

@@ -12,8 +12,7 @@ from markupsafe import Markup
 from activesteer.conventions import RUN_COLOURS, Array
 from activesteer.measured.circle import CircleValidation
 from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
-from activesteer.measured.fit_page import correlation_table, parameter_table
-from activesteer.measured.fit_result import Fit, rests_on
+from activesteer.measured.fit_result import Fit, correlation_table, parameter_table, rests_on
 from activesteer.measured.folder import Band, MeasuredValidation, Part
 from activesteer.measured.folder_file import STEERING
 from activesteer.pages import Page, Section, Table, Text, failed, passed

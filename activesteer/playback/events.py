@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 
 from activesteer.playback.runs import Run
 from activesteer.playback.timeline import times
-from activesteer.recording.events import events_of
+from activesteer.recording.contents import events_of
 from activesteer.units import display_unit
 
 _LIMIT: Final = "_saturated"

@@ -1,8 +1,7 @@
 """Drivers and controllers of a user: by name, from a file, or as a class, an instance or a factory."""
 
-from activesteer.plugins.declared import Declared, declared_in
 from activesteer.plugins.file import is_user_module
 from activesteer.plugins.kind import Kind, in_one_line
-from activesteer.plugins.plugin import Plugin, find
+from activesteer.plugins.plugin import Declared, Plugin, declared_in, find
 
 __all__ = ["Declared", "Kind", "Plugin", "declared_in", "find", "in_one_line", "is_user_module"]

@@ -1,9 +1,9 @@
 """Recordings: channel table, MCAP writer and reader, and `Recording`, the arrays of a run by channel name."""
 
-from activesteer.recording.channels import ChannelTable
 from activesteer.recording.recording import Recording
 from activesteer.recording.rows import Poses
 from activesteer.recording.scene import Link, Primitive, ScenePart
+from activesteer.recording.schemas import ChannelTable
 from activesteer.recording.writer import McapWriter, check_target
 
 __all__ = ["ChannelTable", "Link", "McapWriter", "Poses", "Primitive", "Recording", "ScenePart", "check_target"]

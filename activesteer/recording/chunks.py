@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from activesteer import limits
 from activesteer.errors import RecordingError
-from activesteer.recording.channels import ChannelTable
 from activesteer.recording.container import ChunkData
 from activesteer.recording.contents import TRANSFORMS_TOPIC
-from activesteer.recording.schemas import FixedMessage, state_layout, timestamps, transforms_layout
+from activesteer.recording.schemas import ChannelTable, FixedMessage, state_layout, timestamps, transforms_layout
 
 MESSAGE_HEAD = 22
 """Length of a message record between its length and its data: channel, sequence, two times [bytes]."""

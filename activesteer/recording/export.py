@@ -16,8 +16,8 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, not_installed
 from activesteer.files import atomic_write, finite
-from activesteer.recording.channels import TIME, ChannelTable
 from activesteer.recording.contents import metadata_texts
+from activesteer.recording.schemas import TIME, ChannelTable
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from activesteer import limits
 from activesteer.errors import RecordingError
 from activesteer.files import reading, shown_path
-from activesteer.recording.channels import ChannelTable
 from activesteer.recording.chunks import Block, BlockDecoder, Group
 from activesteer.recording.contents import (
     EVENTS_TOPIC,
@@ -40,8 +39,9 @@ from activesteer.recording.contents import (
     check_metadata,
     check_metrics,
     check_names,
+    decode_event,
+    tables_of,
 )
-from activesteer.recording.events import decode_event, tables_of
 from activesteer.recording.rows import (
     BROKEN,
     FileRows,
@@ -53,7 +53,7 @@ from activesteer.recording.rows import (
     values_of,
 )
 from activesteer.recording.scene import ScenePart, decode_scene
-from activesteer.recording.schemas import state_fields
+from activesteer.recording.schemas import ChannelTable, state_fields
 from activesteer.signals import Channel as SignalChannel
 
 _RECORD: Final = struct.Struct("<BQ")

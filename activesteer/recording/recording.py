@@ -1,8 +1,9 @@
-"""Recorded run: arrays by channel name, poses, metadata, metrics, and source files."""
+"""A recording in memory, and the names of several."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -11,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from activesteer.errors import RecordingError
 from activesteer.recording import export
-from activesteer.recording.channels import ChannelTable, nanoseconds, shaped
 from activesteer.recording.reader import read_mcap
 from activesteer.recording.rows import FileRows, Poses, values_of
 from activesteer.recording.scene import ScenePart
+from activesteer.recording.schemas import ChannelTable, nanoseconds, shaped
 from activesteer.recording.writer import McapWriter
 from activesteer.signals import Channel
 
@@ -241,3 +242,18 @@ def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
     view = array.view()
     view.flags.writeable = False
     return view
+
+
+def run_names(sources: Sequence[str | Path], recordings: Iterable[Recording]) -> list[str]:
+    """Return a name for each run: its controller if all differ, else its file, with the folder if needed."""
+    # A user's controller is named by file and class; the class is enough.
+    controllers = [
+        str(run.metadata.get("controller", "run")).rpartition(":")[2]
+        + ("+truth" if run.metadata.get("controller_uses_truth") else "")
+        for run in recordings
+    ]
+    if len(set(controllers)) == len(controllers):
+        return controllers
+    paths = [str(source).removesuffix(".mcap") for source in sources]
+    stems = Counter(Path(path).name for path in paths)
+    return [Path(path).name if stems[Path(path).name] == 1 else path for path in paths]

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from activesteer import limits
 from activesteer.errors import RecordingError
 from activesteer.files import reading, shown_path, writing
-from activesteer.recording.channels import ChannelTable, nanoseconds, shaped
 from activesteer.recording.chunks import BlockEncoder, few_messages
 from activesteer.recording.container import McapFile
 from activesteer.recording.contents import (
@@ -32,18 +31,23 @@ from activesteer.recording.contents import (
     SCENE_TOPIC,
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
+    Event,
     check_bodies,
     check_names,
+    encode_event,
+    events_of,
     is_recording_start,
     metadata_texts,
 )
-from activesteer.recording.events import Event, encode_event, events_of
 from activesteer.recording.scene import ScenePart, encode_scene
 from activesteer.recording.schemas import (
     LOG_SCHEMA,
     SCENE_SCHEMA,
     TRANSFORMS_SCHEMA,
+    ChannelTable,
     foxglove_schema,
+    nanoseconds,
+    shaped,
     state_schema,
     state_schema_name,
 )

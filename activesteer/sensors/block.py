@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from activesteer.compilation import inlined
 from activesteer.conventions import CORNERS
-from activesteer.native_messages import load_numbers, store_numbers
+from activesteer.native_memory import load_numbers, store_numbers
 from activesteer.sensors.parameters import RANDOM, Sensor, Sensors
 from activesteer.sensors.signal_chain import CHAIN, FILTERED, HELD, LINE, PHASE, SPEED, passed_on
 from activesteer.signals import Measurement, numbers_of, widths_of

@@ -21,7 +21,7 @@ from activesteer.faults import Fault, check_faults, fault_table
 from activesteer.maneuver import Maneuver
 from activesteer.maneuver.phases import seen_of
 from activesteer.scenario import Scenario
-from activesteer.scenario.changing import changed
+from activesteer.scenario.scenario import changed
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint, numbers_in
 from activesteer.simulation.copies import retuned
 from activesteer.simulation.native_cars import NativeCars

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from activesteer.controllers.native_laws import N_COMMAND, N_HELD, law_address
 from activesteer.conventions import Array
-from activesteer.driver.human import HumanDriver
-from activesteer.driver.native_driver import SetpointTable, setpoint_row, tabulate
+from activesteer.driver.human import HumanDriver, SetpointTable, setpoint_row, tabulate
 from activesteer.errors import SimulationDiverged
-from activesteer.native_blocks import record_type, take, values
+from activesteer.native_records import record_type, take, values
 from activesteer.road.native_path import PathSearch
 from activesteer.signals import (
     NO_TORQUES,
@@ -47,7 +46,7 @@ from activesteer.simulation.native_loop import (
     drive_cars,
 )
 from activesteer.vehicle.car import check_gear
-from activesteer.vehicle.recorded_rows import write_command
+from activesteer.vehicle.step_bindings import write_command
 from activesteer.vehicle.wheel_set import torque_numbers
 
 _WINDOW: Final = 250

@@ -13,14 +13,20 @@ from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, call_at, compiled_call, inlined
 from activesteer.controllers.native_laws import N_COMMAND, N_HELD, call_law
-from activesteer.driver.human import HumanDriver
-from activesteer.driver.native_driver import LINE, SETPOINT, follow
-from activesteer.native_blocks import ARRAY, record_type
-from activesteer.native_memory import array_of, f64_pointer, pointer_to
-from activesteer.native_messages import load_numbers, native_type, store_numbers, zeros_of
+from activesteer.driver.human import LINE, SETPOINT, HumanDriver, follow
+from activesteer.native_memory import (
+    array_of,
+    f64_pointer,
+    load_numbers,
+    native_type,
+    pointer_to,
+    store_numbers,
+    zeros_of,
+)
+from activesteer.native_records import ARRAY, record_type
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_of
 from activesteer.vehicle import native_step
-from activesteer.vehicle.powertrain import drive_limits, engine_speed
+from activesteer.vehicle.parameters import drive_limits, engine_speed
 
 GIVEN, NATIVE, PYTHON = range(3)
 """Kinds of a driver or controller: its present command holds; compiled code; a block in Python."""

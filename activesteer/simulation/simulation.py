@@ -23,7 +23,7 @@ from activesteer.faults import Fault
 from activesteer.limits import MAX_EVENTS
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording
-from activesteer.recording.events import Event, tables_of
+from activesteer.recording.contents import Event, tables_of
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint

@@ -10,8 +10,7 @@ from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S
 from activesteer.analysis.slow_ramp import FIT, REFERENCE_MPS2
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.page_parts import cell
-from activesteer.standards.standard import SIDES, Findings, NoResult, Standard, StandardRun, TestRunner
+from activesteer.standards.standard import SIDES, Findings, NoResult, Standard, StandardRun, TestRunner, cell
 
 RAMP_DEGPS: Final = 13.5
 """Rate of the slowly increasing steer [deg/s]; S7.6."""

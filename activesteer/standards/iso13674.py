@@ -13,8 +13,16 @@ from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.page_parts import axis_label, cell
-from activesteer.standards.standard import Findings, NoResult, Standard, StandardRun, TestRunner, steering_wheel_at
+from activesteer.standards.standard import (
+    Findings,
+    NoResult,
+    Standard,
+    StandardRun,
+    TestRunner,
+    axis_label,
+    cell,
+    steering_wheel_at,
+)
 from activesteer.units import quantity_of
 
 SPEED_KMH: Final = 100.0

@@ -6,8 +6,7 @@ import math
 from typing import Final
 
 from activesteer.plotting import Picture
-from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.standard import Findings, Standard, StandardRun, TestRunner
+from activesteer.standards.standard import Findings, Standard, StandardRun, TestRunner, metrics_table, time_panels
 
 AFTER_S: Final = 1.0
 """Time after the beginning of braking at which the car is evaluated [s]."""

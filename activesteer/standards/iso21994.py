@@ -6,8 +6,7 @@ import math
 from typing import Final
 
 from activesteer.plotting import Picture
-from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.standard import Findings, Standard, TestRunner
+from activesteer.standards.standard import Findings, Standard, TestRunner, metrics_table, time_panels
 
 SPEED_KMH: Final = 100.0
 """Speed at which the brake is pressed [km/h]."""

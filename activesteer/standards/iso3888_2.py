@@ -9,8 +9,7 @@ from typing import Final
 
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.page_parts import cell, time_panels
-from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner
+from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, cell, time_panels
 
 DRIVER: Final = "expert"
 """The standard requires a skilled driver."""

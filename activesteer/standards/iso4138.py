@@ -12,8 +12,7 @@ from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.metric_table import metric
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.page_parts import axis_label, metrics_table
-from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner
+from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, axis_label, metrics_table
 from activesteer.units import quantity_of
 
 RADIUS_M: Final = 100.0

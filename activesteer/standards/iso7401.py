@@ -21,8 +21,16 @@ from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, steering_wheel_at
+from activesteer.standards.standard import (
+    SIDES,
+    Findings,
+    Standard,
+    StandardRun,
+    TestRunner,
+    metrics_table,
+    steering_wheel_at,
+    time_panels,
+)
 from activesteer.units import DisplayUnit, display_unit
 
 SPEED_KMH: Final = 80.0

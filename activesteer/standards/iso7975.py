@@ -7,8 +7,16 @@ from typing import Final
 
 from activesteer.metric_table import metric
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.page_parts import metrics_table, time_panels
-from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, steering_wheel_at
+from activesteer.standards.standard import (
+    SIDES,
+    Findings,
+    Standard,
+    StandardRun,
+    TestRunner,
+    metrics_table,
+    steering_wheel_at,
+    time_panels,
+)
 
 SPEED_KMH: Final = 80.0
 AY_MPS2: Final = 5.0

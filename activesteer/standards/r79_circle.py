@@ -11,8 +11,16 @@ import numpy as np
 from activesteer.errors import SimulationDiverged
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.page_parts import cell, time_panels
-from activesteer.standards.standard import SIDES, Findings, NoResult, Standard, StandardRun, TestRunner
+from activesteer.standards.standard import (
+    SIDES,
+    Findings,
+    NoResult,
+    Standard,
+    StandardRun,
+    TestRunner,
+    cell,
+    time_panels,
+)
 from activesteer.units import display_unit
 
 

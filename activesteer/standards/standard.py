@@ -1,4 +1,4 @@
-"""Structure of a standard and of the findings of its test."""
+"""A standard, its findings, the parts of its page, and the interface of its test runner."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ import numpy as np
 from activesteer.config import Range
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import ManeuverError, RecordingError
+from activesteer.metric_table import metric
 from activesteer.pages import Table
-from activesteer.plotting import Curve, Picture
+from activesteer.plotting import Curve, Panel, Picture
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.units import quantity_of
 
@@ -193,3 +194,44 @@ def steering_wheel_at(runner: TestRunner, speed_kmh: float, ay_mps2: float) -> f
     end = int(np.argmax(ay >= ay_mps2))
     rising = np.maximum.accumulate(ay[: end + 1])
     return round(math.degrees(float(np.interp(ay_mps2, rising, run["steering_wheel_rad"][: end + 1]))), 1)
+
+
+def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
+    """Return a table of metrics with a column for each run; a run without a metric has an empty cell."""
+    names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
+    rows = [
+        [shown.label, shown.unit.name, *(shown.text(metrics.get(shown.name, math.nan)) for metrics in runs.values())]
+        for shown in map(metric, names)
+    ]
+    return Table(title, ("", "unit", *runs), rows)
+
+
+def axis_label(name: str) -> str:
+    """Return label and unit of a channel, for an axis."""
+    shown = quantity_of(name)
+    return f"{shown.label} [{shown.unit.name}]"
+
+
+class OverTime(Protocol):
+    """A run whose channels can be drawn."""
+
+    def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
+        """Return a channel over the time from an instant [s]."""
+        ...
+
+
+def time_panels(runs: Mapping[str, OverTime], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
+    """Return channels of runs over time, a panel each; time counts from an instant, which is also given in words."""
+    return [
+        Panel(
+            f"time from {begin} [s]",
+            axis_label(channel),
+            [run.over_time(channel, begin_s=begin_s, label=label) for label, run in runs.items()],
+        )
+        for channel in channels
+    ]
+
+
+def cell(value: float | None, digits: int) -> str:
+    """Format a number for a table: a hyphen for None or nan, and no minus before a zero."""
+    return "-" if value is None or math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"

@@ -12,7 +12,7 @@ import numpy as np
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.standards.fault_circle import fault_circles
 from activesteer.standards.standard import StandardRun
-from activesteer.studies.engine import run_task
+from activesteer.studies.engine import runs
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.workers import Workers
 
@@ -86,9 +86,9 @@ def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> StandardRun:
         case,
         {name: value for name, value in row.items() if isinstance(value, float) and name not in told},
         {
-            name.removeprefix(run_task.CURVE): np.asarray(value, dtype=np.float64)
+            name.removeprefix(runs.CURVE): np.asarray(value, dtype=np.float64)
             for name, value in row.items()
-            if name.startswith(run_task.CURVE) and value is not None
+            if name.startswith(runs.CURVE) and value is not None
         },
-        "" if row["status"] == run_task.Status.OK else row["error"] or row["status"],
+        "" if row["status"] == runs.Status.OK else row["error"] or row["status"],
     )

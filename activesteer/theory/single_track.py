@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
-from activesteer.native_blocks import NativeBlock
+from activesteer.native_records import NativeBlock
 from activesteer.shared_laws import shared
 
 if TYPE_CHECKING:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from activesteer.tyre.evaluation import MagicFormula, TyreForces
-from activesteer.tyre.file.tir import load_tir
-from activesteer.tyre.file.writer import write_tir
+from activesteer.tyre.file.tir import load_tir, write_tir
 from activesteer.tyre.kernels.magic_formula import Limit
 from activesteer.tyre.tyre_parameters import TyreParameters
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from activesteer.tyre.evaluation import MagicFormula
-from activesteer.tyre.file.coefficients import COEFFICIENTS
+from activesteer.tyre.file.syntax import COEFFICIENTS
 from activesteer.tyre.tyre_parameters import TyreParameters
 
 _BAR_PA: Final = 1e5

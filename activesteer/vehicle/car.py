@@ -33,15 +33,13 @@ from activesteer.vehicle.actuator_records import ActuatorRecords
 from activesteer.vehicle.channels import ChannelMap
 from activesteer.vehicle.divergence import Uncopyable, raise_if_diverged
 from activesteer.vehicle.electric_drive import ENERGY, ElectricDrive
+from activesteer.vehicle.engine_layout import find, tendon_arms
 from activesteer.vehicle.implicit_plan import ImplicitPlan, drop_metric
 from activesteer.vehicle.loading import load_model
-from activesteer.vehicle.named_parts import find, tendon_arms
 from activesteer.vehicle.native_forces import install_native_forces
-from activesteer.vehicle.parameters import VehicleParameters
-from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.recorded_rows import RecordedArrays, write_estimate
+from activesteer.vehicle.parameters import CLUTCH_OPEN, VehicleParameters
 from activesteer.vehicle.statics import YAW_DOF, static_ride, turn_chassis_back
-from activesteer.vehicle.step_bindings import Tape, bind_step, read_through, record_from
+from activesteer.vehicle.step_bindings import RecordedArrays, Tape, bind_step, read_through, record_from, write_estimate
 from activesteer.vehicle.wheel_set import WheelSet
 
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -470,7 +468,7 @@ class Vehicle(Uncopyable):
                 self.sensors.reset(self.truth()[0])
 
     def act_in_every_step(self, faults: NDArray[Any] | None) -> None:
-        """Let these records of `native_faults.FAULT` act in every step; None for no faults."""
+        """Let these records of `faults.FAULT` act in every step; None for no faults."""
         acting = None if faults is None or not faults.size else faults
         self._faults, self._bindings["n_faults"] = acting, 0 if acting is None else acting.size
         self._bindings["faults"] = 0 if acting is None else acting.ctypes.data

@@ -13,7 +13,7 @@ import numpy as np
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, SimulationDiverged
 from activesteer.vehicle.native_step import FASTEST_MPS
-from activesteer.vehicle.recorded_rows import CARRIED_OUT, COMMANDS, engine_arrays
+from activesteer.vehicle.step_bindings import CARRIED_OUT, COMMANDS, engine_arrays
 
 
 @contextlib.contextmanager

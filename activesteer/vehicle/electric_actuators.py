@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from activesteer.config import Range, build, read_toml
 from activesteer.errors import ModelError, ParameterError
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.named_parts import tendon_arms
+from activesteer.vehicle.engine_layout import tendon_arms
 
 Positive = Annotated[float, Range(1e-9)]
 STOP_BEYOND: Final = 1.03

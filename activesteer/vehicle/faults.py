@@ -20,7 +20,7 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_faults as native
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.electric_drive import FULL_TORQUE_NM, HEALTHY
-from activesteer.vehicle.named_parts import find
+from activesteer.vehicle.engine_layout import find
 
 _NEVER: Final = 2**62
 _SAVE: Final = -1
@@ -109,7 +109,7 @@ class _Acting:
         begins: Step at which it begins; `ends`: step from which the part works again.
         delay: Steps by which it delays demands or readings.
         listens: Step from which on it must know the demands.
-        memory: The last demands for a delay, or the demand at which a brake sticks; see `native_faults`.
+        memory: The last demands for a delay, or the demand at which a brake sticks; see `set_fault`.
     """
 
     def __init__(self, fault: Fault, timestep_s: float) -> None:
@@ -127,7 +127,7 @@ class _Acting:
 
     @property
     def state(self) -> int:
-        """What compiled code does with the fault now; see `native_faults`."""
+        """What compiled code does with the fault now; see `set_fault`."""
         return int(self._own["state"])
 
     def bind(self, record: Any) -> None:
@@ -164,7 +164,7 @@ class _DemandFault(_Acting):
 
 
 def part_of(vehicle: Vehicle, part: str, name: str) -> NDArray[Any]:
-    """Return one of the actuators of a part as compiled code takes it, a `native_faults.PART` of shape (1,)."""
+    """Return one of the actuators of a part as compiled code takes it, a `PART` of shape (1,)."""
     model, about, record = vehicle.model, ACTUATORS[part], np.zeros(1, native.PART)
     index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     block = fb.header_of(model).ctypes.data

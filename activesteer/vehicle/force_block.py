@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from activesteer.native_records import numbers_type
 from activesteer.road.obstacles import OBSTACLE
-from activesteer.road.surface_kernels import SURFACE
+from activesteer.road.surface import SURFACE
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle.native_contact import CAM
 
@@ -91,7 +91,7 @@ CURVE_AXLE_WHEEL: Final = numbers_type(
     ("held_stiffness", 25), ("held_damping", 25), ("square", 2), ("hardening", 10), ("travel_slope", 5),
     ("rack_slope", 5),
 )  # fmt: skip
-"""A wheel of a curve axle (`native_curve_axle`): addresses, sign of its side, start of its tables among `curves`;
+"""A wheel of a curve axle (`curve_axles`): addresses, sign of its side, start of its tables among `curves`;
 stiffness and damping, row by row, and the part of them in the engine's tendons; hardening springs, and slopes of the
 curves in the design position."""
 
@@ -111,7 +111,7 @@ HEADER: Final = numbers_type(
     "areas_felt", "screw_sensors", "n_screw_sensors", *_SECTIONS, *(f"n_{name}" for name in _SECTIONS),
 )  # fmt: skip
 """Sizes of the engine's arrays, the chassis and the point where drag acts on it, the arguments of
-`powertrain.drive_limits`, the first place of the screws' sensors in `sensordata`, and start and number of each section,
+`parameters.drive_limits`, the first place of the screws' sensors in `sensordata`, and start and number of each section,
 counted in numbers from the block's start."""
 
 WHEEL_OUTPUT: Final = numbers_type(

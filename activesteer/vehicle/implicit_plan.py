@@ -1,4 +1,4 @@
-"""The plan of the direct solution of the engine's implicit step, and which models it covers.
+"""The plan of the implicit solution, and looking for changes in the engine's memory.
 
 All features of MuJoCo 4.0's models, and who computes a step that has them. "Engine" is the engine's own `mj_step`.
 
@@ -50,11 +50,37 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 from mujoco import _functions
+from numba import carray, types
 from numpy.typing import NDArray
 
+from activesteer.compilation import compiled_call
 from activesteer.errors import ModelError
+from activesteer.native_memory import f64_pointer, pointer_to, word_pointer
 from activesteer.native_records import numbers_type
-from activesteer.vehicle.native_watch import NEGATIVE, UNCHANGED, watch
+
+UNCHANGED: Final = 0
+CHANGED: Final = 1
+NEGATIVE: Final = 2
+_bytes: Final = pointer_to(types.uint8)
+
+
+@compiled_call(types.intp, types.intp, types.intp, types.intp, types.intp, others_run=False)
+def watch(copies, n_copies, positive, n_positive):
+    """Compare arrays with their copies, and look for negative numbers."""
+    changed = negative = False
+    rows = word_pointer(copies)
+    for index in range(n_copies):
+        size = rows[3 * index + 2]
+        now, then = carray(_bytes(rows[3 * index]), (size,)), carray(_bytes(rows[3 * index + 1]), (size,))
+        for place in range(size):
+            changed |= now[place] != then[place]
+    rows = word_pointer(positive)
+    for index in range(n_positive):
+        values = f64_pointer(rows[2 * index])
+        for place in range(rows[2 * index + 1]):
+            negative |= values[place] < 0.0
+    return 2 if negative else 1 if changed else 0
+
 
 _REQUIRED: Final = int(mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 _PERMITTED: Final = _REQUIRED | int(mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)

@@ -46,7 +46,7 @@ from activesteer.compilation import compiled, inlined
 from activesteer.native_memory import pointer_to, records_at
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.electric_drive import BATTERY, BATTERY_STATE, MOTOR, MOTOR_STATE
-from activesteer.vehicle.powertrain import CLUTCH_OPEN, drive_limits
+from activesteer.vehicle.parameters import CLUTCH_OPEN, drive_limits
 
 _CONTACT_S: Final = 3e-4
 """Time in which a screwed link settles in its play; at 0, the linearised car would lack this mode [s]."""

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from activesteer.compilation import compiled
 from activesteer.native_records import numbers_type
 from activesteer.road.obstacles import PLATEAU
-from activesteer.road.surface_kernels import (
+from activesteer.road.surface import (
     COARSE_M,
     ENVELOPING,
     SINGLE_POINT,

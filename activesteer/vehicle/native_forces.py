@@ -22,14 +22,14 @@ from activesteer.errors import ModelError
 from activesteer.native_memory import array_at, f64_pointer, records_at, word
 from activesteer.road.native_path import along_path
 from activesteer.road.obstacles import OBSTACLE
-from activesteer.road.surface_kernels import SURFACE, left_grid
+from activesteer.road.surface import SURFACE, left_grid
 from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.curve_axles import add_curve_axle_forces
 from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
 from activesteer.vehicle.native_actuators import brake_rate, drive_rate, dry_friction_rate, screw_rate, servo_rate
 from activesteer.vehicle.native_contact import CAM, contact_plane, plane_axes, spin_on_bend
-from activesteer.vehicle.native_curve_axle import add_curve_axle_forces
 
 _MARKER: Final = fb.MARKER
 _headers_at: Final = records_at(fb.HEADER)

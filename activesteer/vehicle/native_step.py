@@ -15,26 +15,30 @@ from activesteer.brakes.brake_control_unit import step_brakes
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS
-from activesteer.native_memory import f64_pointer, pointer_to
-from activesteer.native_messages import load_numbers, native_type
+from activesteer.native_memory import f64_pointer, load_numbers, native_type, pointer_to
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import Measurement, Motion
-from activesteer.vehicle.channels.raw_rows import ENGINE_ARRAYS
+from activesteer.vehicle.channels.native_channels import ENGINE_ARRAYS
 from activesteer.vehicle.native_actuators import step_motors
 from activesteer.vehicle.native_faults import give_late, keep_demands, misread
 from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
-from activesteer.vehicle.powertrain import CLUTCH_OPEN
-from activesteer.vehicle.recorded_rows import (
+from activesteer.vehicle.parameters import CLUTCH_OPEN
+from activesteer.vehicle.statics import YAW_DOF
+from activesteer.vehicle.step_bindings import (
     ACTUATOR_COMMAND,
     BRAKES,
     COMMAND_ROW,
     DRIVER_COMMAND,
+    ENGINE,
+    MOTOR,
+    N_SOURCES,
+    N_WARNINGS,
+    STEP_BINDINGS,
+    TAPE,
     TORQUES,
     write_commands,
 )
-from activesteer.vehicle.statics import YAW_DOF
-from activesteer.vehicle.step_bindings import ENGINE, MOTOR, N_SOURCES, N_WARNINGS, STEP_BINDINGS, TAPE
 
 FASTEST_MPS: Final = 200.0
 """No car of this package drives faster; a run with a higher speed, or a speed that is NaN, has diverged [m/s]."""

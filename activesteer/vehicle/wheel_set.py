@@ -14,7 +14,7 @@ from activesteer.signals import WheelTorques
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.named_parts import find
+from activesteer.vehicle.engine_layout import find
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.step_bindings import ENGINE, MOTOR, NOTHING, Wheels
 

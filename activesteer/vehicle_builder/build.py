@@ -1,4 +1,4 @@
-"""From a table to a folder with a standing car: `activesteer vehicle new`."""
+"""Build a car from its table, step by step."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import mujoco
 from activesteer.errors import ActiveSteerError, ParameterError, TyreFileError, nearest_names, shown
 from activesteer.files import is_file, user_path, writing
 from activesteer.resources import models_dir
+from activesteer.scenario import FileOrTable, load_car
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.two_track_search import two_track_of
 from activesteer.tyre.file.tir import load_tir
@@ -24,12 +25,25 @@ from activesteer.vehicle_builder.axle_kinds import AxleKind
 from activesteer.vehicle_builder.completion import DEFAULT_TYRE, check_origin, complete
 from activesteer.vehicle_builder.design import Assumption, CarDesign, Log
 from activesteer.vehicle_builder.kc_tables import KcTables, read_kc
-from activesteer.vehicle_builder.keyframe import keyframe_xml
 from activesteer.vehicle_builder.mjcf import mjcf_files
-from activesteer.vehicle_builder.table import CarTable, chosen_kinds, in_vehicle_axes, read_table
-from activesteer.vehicle_builder.table_checks import check_points
+from activesteer.vehicle_builder.table import CarTable, check_points, chosen_kinds, in_vehicle_axes, read_table
 from activesteer.vehicle_builder.texts import readme_text, vehicle_text
 from activesteer.vehicle_builder.trim import Trimmed, trim
+
+
+def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
+    """Return the text of keyframes.xml, and the path of this file."""
+    car = load_car(vehicle)
+    qpos = " ".join(f"{value:.15g}" for value in car.on().data.qpos)
+    text = f"""<mujocoinclude>
+  <!-- Written by tools/make_keyframe.py: static equilibrium on the tyres. -->
+  <keyframe>
+    <key name="static_ride"
+      qpos="{qpos}"/>
+  </keyframe>
+</mujocoinclude>
+"""
+    return text, car.mjcf.parent / "keyframes.xml"
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,12 @@
-"""Complete a table: rules give the missing values, and every rule that was used is noted."""
+"""From the table of a car to its design: what the table leaves open follows from published proportions.
+
+The engine's step is implicit in the stiffness of tendons, so the bushings are tendons along the slides, like all other
+springs of a car.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -13,14 +18,109 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.units import known_unit
 from activesteer.vehicle.electric_drive import Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
-from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind
-from activesteer.vehicle_builder.design import Axle, CarDesign, Link, Log, Solid
+from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind, Mount, mount
+from activesteer.vehicle_builder.design import Axle, CarDesign, Link, Log, Solid, TopMount
 from activesteer.vehicle_builder.kc_fit import MeasuredAxle, measured_axle
 from activesteer.vehicle_builder.kc_tables import KcTables
-from activesteer.vehicle_builder.levers import mount
-from activesteer.vehicle_builder.steering_geometry import rack_limit_m, rack_sign
-from activesteer.vehicle_builder.table import AxleTable, CarTable, LinkTable
-from activesteer.vehicle_builder.top_mounts import top_mount
+from activesteer.vehicle_builder.table import AxleTable, CarTable, LinkTable, TopMountTable
+
+
+def _steering_axis(front: Axle) -> tuple[Array, Array]:
+    """Return lower and upper point of the front steering axis, without elasticity."""
+    upper = front.points["strut_top" if front.kind.strut else "uca_outer"]
+    return front.points["lca_outer"], upper
+
+
+def rack_sign(front: Axle) -> float:
+    """Return the sign of the rack's y when the left wheel steers left; default: that of tie rods behind the axle."""
+    if front.kind.guided:
+        return -1.0
+    return math.copysign(1.0, _rack_per_steer(_steering_axis(front), *_tie_rod(front)))
+
+
+def _tie_rod(front: Axle) -> tuple[Array, Array]:
+    return front.points["tie_rod_inner"], front.points["tie_rod_outer"]
+
+
+def _rack_per_steer(axis: tuple[Array, Array], inner: Array, outer: Array) -> float:
+    """Return the rack travel to the left per steer angle of the left wheel, rigid links [m/rad]."""
+    along = (axis[1] - axis[0]) / np.linalg.norm(axis[1] - axis[0])
+    rod = outer - inner
+    if abs(rod[1]) < 1e-3:
+        raise ParameterError(
+            "the tie rod does not run across the car: tie_rod_inner and tie_rod_outer have the same y", key="front"
+        )
+    moved = np.cross(along, outer - axis[0])
+    per_steer = float(rod @ moved / rod[1])
+    if abs(per_steer) < 0.02:
+        raise ParameterError(
+            f"the tie rod passes the steering axis at {1e3 * abs(per_steer):.0f} mm and cannot steer the wheel; "
+            "tie_rod_outer has to lie ahead of or behind the line through the upper and the lower joint",
+            key="front",
+        )
+    return per_steer
+
+
+def rack_per_steer_m(front: Axle) -> float:
+    """Return the rack travel per steer angle about straight ahead, positive, rigid links [m/rad]."""
+    if front.measured is not None:
+        rack, steer = front.measured.curves.rack_m, front.measured.curves.rack_steer_rad
+        near = np.argsort(np.abs(rack))[:5]
+        return 1.0 / float(np.polyfit(np.array(rack)[near], np.array(steer)[near], 1)[0])
+    return abs(_rack_per_steer(_steering_axis(front), *_tie_rod(front)))
+
+
+def rack_limit_m(front: Axle) -> float:
+    """Return the travel of the rack to its stops: the measured range, or 36 deg of steer angle [m]."""
+    if front.measured is not None:
+        return min(-front.measured.curves.rack_m[0], front.measured.curves.rack_m[-1])
+    return round(0.92 * rack_per_steer_m(front) * math.sin(math.radians(36.0)), 4)
+
+
+_RADIAL_NPM, _AXIAL_NPM = 3e5, 1.2e6
+_DAMPING_S = 1e-3
+"""Damping per stiffness: a loss factor of 0.09 at the 15 Hz of a wheel, as rubber has."""
+_ROD_KG = 1.2
+_ROD_INERTIA_KGM2 = (0.008, 0.008, 0.0006)
+_BELOW_MOUNT_M = 0.07
+
+
+def top_mount(
+    axle: str, table: TopMountTable | None, kind: AxleKind, points: dict[str, Array], damper: Mount, log: Log
+) -> TopMount | None:
+    """Complete the top mount of an axle; None if it is rigid."""
+    if table is None and not kind.strut:
+        return None
+    key, table = f"{axle}.top_mount", table or TopMountTable()
+    if kind.strut:
+        upper, lower = points["strut_top"], points["strut_bottom"]
+    elif damper.start_m is None or damper.lever != 1.0:
+        raise ParameterError(f"a damper on {damper.carrier} has no rod in the model; leave the key out", key=key)
+    else:
+        upper, lower = points["damper_inner"], points["damper_outer"]
+    along = (upper - lower) / np.linalg.norm(upper - lower)
+    axial = log.take(f"{key}.axial_Npm", table.axial_Npm, _AXIAL_NPM, "as in the compact", "N/m")
+    directions, stiffness, rod = {"z": along}, {"z": axial}, None
+    if kind.strut:
+        if table.rod_mass_kg is not None:
+            raise ParameterError(f"a strut has {axle}.strut_mass_kg instead", key=f"{key}.rod_mass_kg")
+        radial = log.take(f"{key}.radial_Npm", table.radial_Npm, _RADIAL_NPM, "as in the compact", "N/m")
+        forward = np.array([1.0, 0.0, 0.0]) - along[0] * along
+        forward /= np.linalg.norm(forward)
+        directions = {"x": forward, "y": np.cross(along, forward), "z": along}
+        stiffness = {"x": radial, "y": radial, "z": axial}
+    else:
+        for name in ("radial_Npm", "radial_damping_Nspm"):
+            if getattr(table, name) is not None:
+                raise ParameterError("a damper between two joints has no force across its axis", key=f"{key}.{name}")
+        kg = log.take(f"{key}.rod_mass_kg", table.rod_mass_kg, _ROD_KG, "piston and rod", "kg")
+        rod = Solid(kg, upper - _BELOW_MOUNT_M * along, np.array(_ROD_INERTIA_KGM2) * kg / _ROD_KG)
+    damping = {}
+    for name, value in stiffness.items():
+        given = table.axial_damping_Nspm if name == "z" else table.radial_damping_Nspm
+        damping[name] = _DAMPING_S * value if given is None else given
+    return TopMount(directions, stiffness, damping, rod)
+
 
 DEFAULT_TYRE: Final = "compact_205_55R16.tir"
 BUSHINGS_NPM: Final = {"ball_joint": 1e8, "hard": 1e7, "medium": 1e6, "soft": 3e5}

@@ -20,9 +20,8 @@ from activesteer.vehicle.electric_actuators import RearActuator, SuperpositionAc
 from activesteer.vehicle.electric_drive import Battery, Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle.statics import mass_properties, point_mass_inertia
-from activesteer.vehicle_builder.axle_kinds import AxleKind
+from activesteer.vehicle_builder.axle_kinds import AxleKind, Mount
 from activesteer.vehicle_builder.kc_fit import MeasuredAxle
-from activesteer.vehicle_builder.levers import Mount
 from activesteer.vehicle_builder.table import AxleTable, CarTable
 
 

@@ -8,7 +8,7 @@ from string import Template
 
 import numpy as np
 
-from activesteer.vehicle_builder import mjcf_tendons as tendons
+from activesteer.vehicle_builder import mjcf_axles as tendons
 from activesteer.vehicle_builder.design import CarDesign
 from activesteer.vehicle_builder.mjcf_axles import axle_file
 from activesteer.vehicle_builder.texts import num, sig, vec

@@ -32,9 +32,9 @@ from activesteer.vehicle import Vehicle
 from activesteer.vehicle.curve_axles import OVER_RACK, OVER_TRAVEL, AxleCurves
 from activesteer.vehicle.parameters import Friction
 from activesteer.vehicle.statics import mass_properties
+from activesteer.vehicle_builder.completion import rack_per_steer_m
 from activesteer.vehicle_builder.corner_motion import corner_motion
 from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, chassis_of
-from activesteer.vehicle_builder.steering_geometry import rack_per_steer_m
 
 
 @dataclass

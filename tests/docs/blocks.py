@@ -7,8 +7,8 @@ The convention, which a reader of the source sees:
 - `sh` are command lines, all run. In `console` they follow a `$`, and what they print stands below; a line `...` leaves
   lines out, numbers may differ by 2 % or by two units of their last digit.
 - `text` is neither.
-- A command with a comment that begins with `slow` is run by the slow tests only, one with `window` (it opens one) by
-  none. Both are checked as far as the command line's own parser goes.
+- A command with a comment that begins with `slow` is run by the slow tests only, one with `window` (it opens one) or
+  `long` (it takes more than two minutes) by none. All are checked as far as the command line's own parser goes.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ class Command:
         return self.comment.startswith("slow")
 
     @property
-    def window(self) -> bool:
-        return self.comment.startswith("window")
+    def never(self) -> bool:
+        return self.comment.startswith(("window", "long"))
 
 
 def blocks(page: Path) -> list[Block]:

@@ -16,7 +16,7 @@ PUBLIC = (
     "activesteer.driver.base.Driver",
     "activesteer.maneuver.base.Maneuver",
     "activesteer.recording.recording.Recording",
-    "activesteer.rigs.kc.rig.kinematics_compliance",
+    "activesteer.rigs.kc.result.kinematics_compliance",
     "activesteer.rigs.tyre_rig.TyreRig",
     "activesteer.scenario.car.load_car",
     "activesteer.scenario.scenario.resolve",

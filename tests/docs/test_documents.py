@@ -78,7 +78,7 @@ def _do(block: Block, namespace: dict[str, object], *, slow: bool) -> None:
                 exec(code, namespace)
         case "sh" | "console":
             for command in block.commands():
-                leave_out = command.window or (command.slow and not slow)
+                leave_out = command.never or (command.slow and not slow)
                 act: Callable[..., None] = shell.check if leave_out else shell.run
                 act(command)
 

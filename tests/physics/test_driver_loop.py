@@ -13,8 +13,7 @@ import pytest
 from activesteer import simulate
 from activesteer.analysis.metrics import metrics
 from activesteer.scenario import resolve
-from activesteer.studies.linear.driver_loop import LoopAtSpeed, driver_loops
-from activesteer.studies.linear.small_step import damping_of, small_step
+from activesteer.studies.linear.driver_loop import LoopAtSpeed, damping_of, driver_loops, small_step
 
 ALWAYS_ACTIVE = {
     "none": {},

@@ -10,7 +10,7 @@ from activesteer.conventions import CORNERS
 from activesteer.recording import Recording
 from activesteer.resources import list_maneuvers
 from activesteer.scenario import resolve
-from activesteer.vehicle.powertrain import PowertrainLimits
+from activesteer.vehicle.parameters import PowertrainLimits
 
 AT_THE_LIMIT = ("double_lane_change", "drive_off_and_stop", "slalom")
 """Those that reach the limit or start from rest; the others are driven in the long run of the tests."""

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lsim
 
 from activesteer import simulate
-from activesteer.analysis.loss_of_control import LOST_SIDESLIP_RAD
+from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.cli import main
 from activesteer.controllers import CONTROLLER
 from activesteer.errors import ControllerError

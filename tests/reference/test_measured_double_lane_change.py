@@ -11,9 +11,8 @@ import pytest
 
 import activesteer
 from activesteer.errors import ActiveSteerError
-from activesteer.measured.example_folder import write_template
 from activesteer.measured.folder import validate_measured
-from activesteer.measured.folder_file import measured_folder, read_measured
+from activesteer.measured.folder_file import measured_folder, read_measured, write_template
 from activesteer.measured.importing import import_file
 from activesteer.measured.pages import measured_page
 from activesteer.measured.signals import at_sensor

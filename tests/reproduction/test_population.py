@@ -16,10 +16,10 @@ import pytest
 from activesteer.analysis.bands import TRACK, bands_of
 from activesteer.analysis.claims.judge import SYSTEMS
 from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
-from activesteer.analysis.loss_of_control import is_lost
+from activesteer.analysis.harm import is_lost
 from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_task import CLAIM, Row, drive
+from activesteer.studies.engine.runs import CLAIM, Row, drive
 from tools.population_results import CHANGES, Population, population_study, read_population, summarise
 from tools.population_store import CHASSIS_CONTROL, PAGE, comparison_page, page, stored_runs
 

@@ -36,7 +36,7 @@ from activesteer.analysis.claims.judge import (
     Statement,
     mean_straight_ahead,
 )
-from activesteer.analysis.loss_of_control import LOST_SIDESLIP_RAD
+from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.analysis.path_following import AFTER_S
 from activesteer.analysis.series import crossing_time, rms, smooth, timestep
 from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS

@@ -21,7 +21,7 @@ from activesteer.conventions import CORNERS, RUN_COLOURS, RUN_DASHES, Array, Run
 from activesteer.drawing.panels import FIGURE, PANELS, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure, save
-from activesteer.recording.events import events_of
+from activesteer.recording.contents import events_of
 from activesteer.units import quantity_of
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.bands import Band, bands_of
-from activesteer.analysis.loss_of_control import LOST_SIDESLIP_RAD
+from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RunLook, run_looks

@@ -18,7 +18,7 @@ from activesteer.drawing import wheel_angles
 from activesteer.drawing.panels import PATH_DISTANCE, REPORT, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
-from activesteer.recording.events import events_of
+from activesteer.recording.contents import events_of
 from activesteer.road.course import CONE_RADIUS_M, Course
 
 RATE_HZ: Final = 200.0

@@ -12,7 +12,7 @@ from activesteer.analysis.claims.stored import PAPER, SETTINGS, setting_of
 from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
-from activesteer.recording.run_names import run_names
+from activesteer.recording.recording import run_names
 
 MAX_RUNS: Final = 60
 """Most runs of a report; with more runs, nobody can read the page and a browser is slow to open it."""

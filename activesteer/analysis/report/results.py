@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from activesteer.analysis.loss_of_control import LOST, is_controlled, kept, losses, shown
+from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
 from activesteer.analysis.report.groups import Group, Run
 from activesteer.analysis.report.significance import Change, is_near, significance
 from activesteer.analysis.report.tables import difference_text, number

@@ -28,7 +28,7 @@ from activesteer.errors import ParameterError
 from activesteer.files import write_text
 from activesteer.pages import render
 from activesteer.recording import Recording
-from activesteer.recording.events import events_of
+from activesteer.recording.contents import events_of
 from activesteer.theory.proportions import percent
 from activesteer.units import typeset
 

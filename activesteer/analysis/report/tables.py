@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
-from activesteer.analysis.loss_of_control import LOST, shown
+from activesteer.analysis.harm import LOST, shown
 from activesteer.analysis.report.groups import Group, Run, entry
 from activesteer.metric_table import recorded_metric
 from activesteer.units import parameter_label, typeset

@@ -12,12 +12,17 @@ from numba import carray, from_dtype, types
 
 from activesteer.compilation import compiled_callback
 from activesteer.coupling.car.variables import PLACE_GROUPS, PLACES
-from activesteer.native_memory import f64_pointer, pointer_to, word_pointer
-from activesteer.native_messages import load_numbers, store_numbers, zeros_of
+from activesteer.native_memory import f64_pointer, load_numbers, pointer_to, store_numbers, word_pointer, zeros_of
 from activesteer.signals import ActuatorCommand, DriverCommand, numbers_of
 from activesteer.vehicle.channels.car_motion import angle_sides, in_the_road_plane, sideslip_share
-from activesteer.vehicle.channels.native_channels import axial_force, is_limited, record_of
-from activesteer.vehicle.channels.raw_rows import Actuator, AxialForce, RawRows
+from activesteer.vehicle.channels.native_channels import (
+    Actuator,
+    AxialForce,
+    RawRows,
+    axial_force,
+    is_limited,
+    record_of,
+)
 from activesteer.vehicle.native_faults import SET_FAULT, set_fault
 from activesteer.vehicle.native_step import carry_out
 
@@ -91,5 +96,5 @@ def derive(rows, places, design, gravity, forces, n_forces, limits, n_limits, nu
 
 @compiled_callback(types.void, *SET_FAULT)
 def fault(part, block, gain, bias, healthy, kind, offset, held):
-    """Write a fault of an actuator into the model; see `native_faults.set_fault`."""
+    """Write a fault of an actuator into the model; see `faults.set_fault`."""
     set_fault(part, block, gain, bias, healthy, kind, offset, held)

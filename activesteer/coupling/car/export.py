@@ -18,9 +18,7 @@ import mujoco
 import numpy as np
 
 from activesteer.brakes.records import BRAKE_SETUP
-from activesteer.coupling.car.description import model_description
-from activesteer.coupling.car.objects import car_code
-from activesteer.coupling.car.relocation import Memory, native_memory
+from activesteer.coupling.car.objects import Memory, car_code, native_memory
 from activesteer.coupling.car.variables import (
     INPUT,
     MOTION,
@@ -32,6 +30,7 @@ from activesteer.coupling.car.variables import (
     Variable,
     faulty_parts,
     inputs_of,
+    model_description,
     outputs_of,
     parameters_of,
 )  # fmt: skip
@@ -46,10 +45,10 @@ from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.kernels.record import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.corners import design_heights_m
+from activesteer.vehicle.engine_layout import sensor_columns
 from activesteer.vehicle.faults import part_of
-from activesteer.vehicle.named_parts import sensor_columns
 from activesteer.vehicle.native_faults import N_HEALTH
-from activesteer.vehicle.recorded_rows import BRAKES, CARRIED_OUT, COMMANDS
+from activesteer.vehicle.step_bindings import BRAKES, CARRIED_OUT, COMMANDS
 from activesteer.version import __version__
 
 _SOURCES: Final = Path(__file__).parent / "c"

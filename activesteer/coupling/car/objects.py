@@ -1,14 +1,26 @@
-"""Object code of the native step and of the engine's callbacks, for any processor with AVX2.
+"""Compiled objects of an exported car: compilation and relocation.
 
 The code comes from the same kernels as that of a simulation, so that both give the same numbers to the last bit.
 numba keeps the compiled module in an interface of its own (`_library`), which may change with a new version.
+
+The native step finds everything by addresses in its records. Here each address becomes a `Relocation`: the place of the
+word, and what it points to. A word that looks like an address but points to nothing known is an error, so that a new
+array of the native step cannot be forgotten.
 """
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
+import mujoco
+import numpy as np
+from mujoco import _functions
+from numpy.typing import NDArray
+
 from activesteer.errors import ModelError
+from activesteer.vehicle import Vehicle
 
 PROCESSOR: Final = "x86-64-v3"
 """Processor for which code is made: x86-64 with AVX2 and FMA (Haswell, 2013; Zen, 2017)."""
@@ -63,3 +75,145 @@ def _code(name: str, function: Any) -> Code:
         cpu=PROCESSOR, opt=3, reloc="pic", codemodel="default"
     )
     return Code(entry.name, machine.emit_object(module))
+
+
+_ALIGNMENT: Final = 64
+_LEAST_ADDRESS: Final = 1 << 32
+"""A larger number in a record is an address: no size or index is so large."""
+_STRUCT_BYTES: Final = {"model": 8192, "data": 262_144}
+
+SEGMENT, FUNCTION, MODEL, MODEL_ARRAY, DATA, DATA_ARRAY = range(6)
+"""Kinds of targets: the memory of the car, a function of the engine, the structs of the engine, and arrays to which a
+word of such a struct points."""
+
+
+class Relocation(NamedTuple):
+    """A word that holds an address.
+
+    Attributes:
+        place: Offset of the word in the memory of the car.
+        kind: What it points to.
+        base: Place of the function in `Memory.functions`, or offset of the word in the engine's struct.
+        added: Distance from there.
+    """
+
+    place: int
+    kind: int
+    base: int
+    added: int
+
+
+class Memory(NamedTuple):
+    """Native memory of a car.
+
+    Attributes:
+        content: Its bytes, with zeros in place of addresses.
+        relocations: The addresses.
+        functions: Names of the engine's functions that are called by address.
+        places: Name of a part -> its offset.
+        targets: Name of an array that a recorded row is copied from -> what its address points to, and its size.
+    """
+
+    content: bytes
+    relocations: list[Relocation]
+    functions: list[str]
+    places: dict[str, int]
+    targets: dict[str, tuple[Relocation, int]]
+
+
+def native_memory(vehicle: Vehicle) -> Memory:
+    """Return the native memory of a car."""
+    rows = vehicle.rows.live()._asdict()
+    parts = vehicle.native_parts() | {f"row_{name}": array for name, array in rows.items() if not array.size}
+    places, size = {}, 0
+    for name, array in parts.items():
+        places[name] = size
+        size += -(-max(array.nbytes, 1) // _ALIGNMENT) * _ALIGNMENT
+    known = _Known(vehicle, parts, places)
+    content, relocations = bytearray(size), []
+    for name, array in parts.items():
+        raw = np.frombuffer(array.tobytes(), np.uint8).copy()
+        for offset, field in _words(array):
+            value = int(raw[offset : offset + 8].view(np.int64)[0])
+            if (found := known.target(value)) is not None:
+                relocations.append(found._replace(place=places[name] + offset))
+                raw[offset : offset + 8] = 0
+            elif abs(value) >= _LEAST_ADDRESS:
+                raise ModelError(
+                    f"the car cannot be exported: {name}.{field} of the native step points to memory that "
+                    "activesteer.coupling.car does not know; Vehicle.native_parts must name it",
+                    key=f"{name}.{field}",
+                )
+        content[places[name] : places[name] + raw.size] = raw.tobytes()
+    targets = {name: (known.sure(array), array.size) for name, array in rows.items()}
+    return Memory(bytes(content), relocations, known.functions, places, targets)
+
+
+def _words(array: Any) -> list[tuple[int, str]]:
+    """Return offset and field of every machine word of an array of records."""
+    if array.dtype.names is None:
+        return []
+    found: list[tuple[int, str]] = []
+    for record in range(array.size):
+        for name in array.dtype.names:
+            kind, offset = array.dtype.fields[name][:2]
+            if kind.base == np.intp:
+                count = kind.itemsize // 8
+                start = record * array.itemsize + offset
+                found += [(start + 8 * index, f"{name}[{index}]" if count > 1 else name) for index in range(count)]
+    return found
+
+
+class _Known:
+    """All memory that an address may point to."""
+
+    def __init__(self, vehicle: Vehicle, parts: Mapping[str, NDArray[Any]], places: Mapping[str, int]) -> None:
+        self.functions: list[str] = []
+        engine = ctypes.CDLL(_functions.__file__)
+        names = [name for name in dir(_functions) if name.startswith("mj_")]
+        self._functions = {
+            ctypes.cast(getattr(engine, name), ctypes.c_void_p).value: name for name in names if hasattr(engine, name)
+        }
+        self._ranges: list[tuple[int, int, Relocation]] = [
+            (array.ctypes.data, max(array.nbytes, 1), Relocation(0, SEGMENT, 0, places[name]))
+            for name, array in parts.items()
+        ]
+        # The arrays of the engine come before its structs: mjData holds no array itself.
+        for kind, owner in (("model", vehicle.model), ("data", vehicle.data)):
+            self._ranges += _arrays(kind, owner)
+        self._ranges += [
+            (vehicle.model._address, _STRUCT_BYTES["model"], Relocation(0, MODEL, 0, 0)),
+            (vehicle.data._address, _STRUCT_BYTES["data"], Relocation(0, DATA, 0, 0)),
+        ]
+
+    def target(self, address: int) -> Relocation | None:
+        """Return what an address points to; None for a number that is no known address."""
+        if address in self._functions:
+            name = self._functions[address]
+            if name not in self.functions:
+                self.functions.append(name)
+            return Relocation(0, FUNCTION, self.functions.index(name), 0)
+        for start, size, relocation in self._ranges:
+            if start <= address < start + size:
+                return relocation._replace(added=relocation.added + address - start)
+        return None
+
+    def sure(self, array: NDArray[Any]) -> Relocation:
+        """Return the place of an array that is known."""
+        found = self.target(array.ctypes.data)
+        return Relocation(0, SEGMENT, 0, 0) if found is None or not array.size else found
+
+
+def _arrays(kind: str, owner: mujoco.MjModel | mujoco.MjData) -> list[tuple[int, int, Relocation]]:
+    """Return address, size and place of all arrays that words of a struct of the engine point to."""
+    words = np.ctypeslib.as_array((ctypes.c_uint64 * (_STRUCT_BYTES[kind] // 8)).from_address(owner._address))
+    code, found = {"model": MODEL_ARRAY, "data": DATA_ARRAY}[kind], []
+    for name in dir(owner):
+        if name.startswith("_"):
+            continue
+        array = getattr(owner, name)
+        if isinstance(array, np.ndarray) and array.size and array.flags.c_contiguous:
+            hits = np.flatnonzero(words == np.uint64(array.ctypes.data))
+            if hits.size:
+                found.append((array.ctypes.data, array.nbytes, Relocation(0, code, 8 * int(hits[0]), 0)))
+    return found

@@ -21,9 +21,8 @@ from activesteer.coupling.fmu.instance import FmuFault, Group, Instance, Spec, m
 from activesteer.errors import nearest_names, shown
 from activesteer.files import is_file, shown_path, user_path, why_no_file
 from activesteer.plugins import Kind, Plugin
-from activesteer.plugins.declared import read_values
 from activesteer.plugins.file import parse_parameters
-from activesteer.plugins.plugin import allowed
+from activesteer.plugins.plugin import allowed, read_values
 from activesteer.signals import DriverCommand, Measurement, Motion, PerWheel, Setpoint, new_message
 from activesteer.units import UNIT_NAMES, find_unit, split_ending
 

@@ -2,7 +2,6 @@
 
 from activesteer.rigs.kc.figures import draw, rear_camber_figure
 from activesteer.rigs.kc.programme import Sweep
-from activesteer.rigs.kc.result import KcMetric, KcResult
-from activesteer.rigs.kc.rig import kinematics_compliance
+from activesteer.rigs.kc.result import KcMetric, KcResult, kinematics_compliance
 
 __all__ = ["KcMetric", "KcResult", "Sweep", "draw", "kinematics_compliance", "rear_camber_figure"]

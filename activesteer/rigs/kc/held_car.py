@@ -6,7 +6,7 @@ Each pad holds the height of its wheel, pushes straight up at the contact point,
 moment. A wheel is fastened to its pad, which can also pull.
 
 The wheel is rigid, with its loaded radius in the standing car: the rig measures the suspension. Joint limits are
-constraints of the engine and play no part. The rig removes dry friction from the car (see `rig`).
+constraints of the engine and play no part. The rig removes dry friction from the car (see `result`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Result of the kinematics and compliance rig: metrics in customary units, curves in SI, tables.
+"""Result of the K&C rig, and the rig.
 
 A column is a channel and its unit: `left_toe [deg]`. Signs are those of ISO 8855 and of `Sweep`: toe positive toe-in,
 camber negative with the top inwards, caster positive with the top to the rear, motion of a wheel outwards or
@@ -7,9 +7,11 @@ forwards positive; for forces and moments see `TESTS`.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import textwrap
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -17,11 +19,13 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from activesteer.conventions import Array
-from activesteer.errors import ParameterError, nearest_names
+from activesteer.errors import ModelError, ParameterError, nearest_names
 from activesteer.files import make_folder, write_text
-from activesteer.rigs.kc.metrics import DEFINITIONS, Axle, Target, Targets
-from activesteer.rigs.kc.programme import INWARDS, Measured, Sweep
+from activesteer.rigs.kc.metrics import DEFINITIONS, Axle, Target, Targets, load_targets
+from activesteer.rigs.kc.programme import INWARDS, Measured, Sweep, measure
+from activesteer.scenario import FileOrTable, check_gains, load_car
 from activesteer.units import known_unit
+from activesteer.vehicle.parameters import Friction
 
 
 @dataclass(frozen=True)
@@ -249,3 +253,48 @@ def _csv(remark: str, columns: dict[str, Array]) -> str:
         values.append(column / known_unit(unit).factor)
     rows = [",".join(f"{value:.8g}" for value in row) for row in np.array(values).T]
     return "\n".join([f"# {remark}", ",".join(heads), *rows, ""])
+
+
+def kinematics_compliance(
+    vehicle: FileOrTable = "compact",
+    overrides: Mapping[str, Any] | None = None,
+    targets: str | os.PathLike[str] | None = None,
+) -> KcResult:
+    """Measure kinematics and compliance of a car with a held chassis and its wheels on pads.
+
+    Args:
+        vehicle: Name, path, or table of a vehicle.
+        overrides: Dotted key of the vehicle, such as `factors.mass`, to value.
+        targets: File with target bands. Default: the file with the vehicle's name in `models/targets`.
+
+    Returns:
+        Metrics with their bands, and all curves, of the car without the dry friction of its dampers and rack.
+
+    Raises:
+        ParameterError: the vehicle or the targets are not found or wrong.
+        ModelError: the model is not found, lacks a part, or has no equilibrium.
+        TyreFileError: a tyre file is not found or wrong.
+
+    Examples:
+        >>> from activesteer.rigs.kc.result import kinematics_compliance
+        >>> result = kinematics_compliance("compact")
+        >>> result["front", "bump_steer"] < 0.0
+        True
+    """
+    car = load_car(vehicle, overrides)
+    check_gains(overrides or {}, ())
+    bands = load_targets(car.name, targets)
+    # Dry friction acts equally in both directions: without it the rig finds the mean of both directions of a sweep.
+    # The play of screws is removed for the same reason: the rig would find one of its ends by chance.
+    rear = car.config.rear_actuator.smooth()
+    smooth = dataclasses.replace(car, config=dataclasses.replace(car.config, friction=Friction(), rear_actuator=rear))
+    try:
+        measured = measure(smooth.on(), car.tyres)
+    except np.linalg.LinAlgError as reason:
+        raise ModelError(f"{car.mjcf}: the car has no equilibrium on the rig: {reason}") from reason
+    except KeyError as reason:
+        # The message of the engine's look-up by name lists the known names.
+        raise ModelError(
+            f"{car.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"
+        ) from reason
+    return evaluated(car.name, measured, bands)

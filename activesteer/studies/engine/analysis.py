@@ -24,7 +24,7 @@ from activesteer.errors import StudyError, not_installed
 from activesteer.studies.engine.design import FOR_INDICES, MORRIS_LEVELS
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_task import Row, Status, drive
+from activesteer.studies.engine.runs import Row, Status, drive
 from activesteer.studies.engine.store import IDENTITY, OUTCOME
 
 MAX_SAMPLES: Final = 16384

@@ -1,4 +1,4 @@
-"""The page of a study: distributions, scatter and paired differences, sensitivities, worst and best runs."""
+"""Report of a study, with the figure of a search."""
 
 from __future__ import annotations
 
@@ -11,20 +11,22 @@ from typing import Any, Final
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
+from scipy.stats import rankdata
 
 from activesteer.controllers import controller_spec
 from activesteer.conventions import Array, run_looks
 from activesteer.driver import driver_spec
 from activesteer.errors import ActiveSteerError, StudyError
-from activesteer.files import write_text
+from activesteer.files import file_word, write_text
 from activesteer.metric_table import recorded_metric
 from activesteer.pages import render
+from activesteer.plotting import Curve, Panel, Picture, draw, save
 from activesteer.studies.engine.analysis import MAX_SAMPLES, indices
 from activesteer.studies.engine.factor_values import FactorValues, label_of
-from activesteer.studies.engine.run_task import CURVE
-from activesteer.studies.engine.runs import run_command
+from activesteer.studies.engine.runs import CURVE, run_command
 from activesteer.studies.engine.store import IDENTITY, OUTCOME, Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.engine.tuning import Goal, Trial, Tuning
 from activesteer.units import parameter_label
 
 _SHOWN_ROWS: Final = 3000
@@ -257,3 +259,88 @@ def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
 def _json(column: Array) -> list[float | None]:
     """Return numbers for the page: five digits, and None for a value that is not finite."""
     return [float(f"{value:.5g}") if np.isfinite(value) else None for value in column.tolist()]
+
+
+_FACTORS: Final = 5
+"""Number of factors that are drawn: those with which the margin correlates most."""
+_KEPT, _BROKEN, _GREY = "#5b9fd0", "#b3261e", "0.6"
+
+
+def draw_tuning(found: Tuning, folder: Path) -> list[Path]:
+    """Draw a search into the folder of its command, and return the files; none if no set could be judged."""
+    if not found.trials:
+        return []
+    if found.goal is Goal.VIOLATE:
+        below = folder / f"{file_word(found.controller)}-{file_word(found.maneuver)}"
+        return [save(draw(_violations(found)), below / "violations.png")]
+    figure = draw(Picture("Sets that were tried", [_front(found)], None, 1, 6.0, 4.5))
+    return [save(figure, folder / f"front.{kind}") for kind in ("png", "svg")]
+
+
+def _front(found: Tuning) -> Panel:
+    """Return two objectives against each other, one over the sets, or the statements over the implausibility."""
+    names = list(found.trials[0].objectives)
+    x, y = names[:2] if len(names) > 1 else ("set", *names, "statements that hold")[:2]
+    if found.goal is Goal.SATISFY:
+        x = "implausibility"
+
+    def place(trial: Trial) -> tuple[float, float]:
+        if found.goal is Goal.SATISFY:
+            return trial.implausibility, len(trial.holding)
+        return trial.objectives.get(x, trial.number), trial.objectives[y]
+
+    curves = []
+    for trials, label, look in (
+        ([trial for trial in found.trials if not trial.allowed], "breaks a constraint", (_GREY, "", 1.2, "x")),
+        ([trial for trial in found.trials if trial.allowed], "tried", (_GREY, "", 1.2, "o")),
+        (found.front, "best", (_BROKEN, "", 1.2, "o")),
+    ):
+        if trials:
+            places = np.array([place(trial) for trial in trials])
+            curves.append(Curve(places[:, 0], places[:, 1], label, *look))
+    return Panel(f"{x} [-]", f"{y} [-]", curves)
+
+
+def _violations(found: Tuning) -> Picture:
+    """Return how the margin fell, and where violations are."""
+    ((name, _),) = found.trials[0].margins.items()
+    margins = np.array([trial.margins[name] for trial in found.trials])
+    judged = np.abs(margins) < 0.99e6  # others define no metric
+    # A set far below zero is drawn at the edge, so that the others can be told apart.
+    floor = 1.1 * float(np.min(margins[judged], initial=0.0)) - 1e-9
+    shown = np.clip(margins, floor, float(np.max(margins[judged], initial=1e-9)))
+    falls = np.maximum([value for _, value in found.fall], floor)
+    limits = ((0.0, "violated below"),)
+    runs = [run for run, _ in found.fall]
+    panels = [Panel("runs", "least margin so far [-]", [Curve(runs, falls, marker="o")], limits=limits)]
+    broken = margins < 0.0
+    columns = {key: [trial.values.get(key) for trial in found.trials] for key in found.front[0].values}
+    texts = {key: [] if _all_numbers(column) else sorted(set(map(str, column))) for key, column in columns.items()}
+    numbers = {
+        key: np.array([texts[key].index(str(value)) if texts[key] else value for value in column], dtype=np.float64)
+        for key, column in columns.items()
+    }
+    for key in sorted(numbers, key=lambda key: -_correlation(numbers[key], shown))[:_FACTORS]:
+        points = [
+            Curve(numbers[key][part], shown[part], label, colour, "", 0.0, "o")
+            for part, label, colour in ((~broken, "holds", _KEPT), (broken, "violated", _BROKEN))
+            if part.any()
+        ]
+        panels.append(Panel(_label_tuning_figure(key, texts[key]), "margin [-]", points, limits=limits))
+    title = f"{found.controller}, {found.maneuver}: {found.requirement}"
+    return Picture(title, panels, None, 3, 12.0, 7.0)
+
+
+def _all_numbers(values: Sequence[object]) -> bool:
+    return all(isinstance(value, int | float) for value in values)
+
+
+def _label_tuning_figure(key: str, texts: Sequence[str]) -> str:
+    return f"{key} ({', '.join(f'{place}: {text}' for place, text in enumerate(texts))})" if texts else key
+
+
+def _correlation(x: np.ndarray, y: np.ndarray) -> float:
+    """Return the magnitude of Spearman's rank correlation; 0 for a constant."""
+    if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return 0.0
+    return abs(float(np.corrcoef(rankdata(x), rankdata(y))[0, 1]))

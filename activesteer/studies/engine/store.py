@@ -24,8 +24,7 @@ import pyarrow.parquet as pq
 
 from activesteer.errors import StudyError
 from activesteer.files import atomic_write, make_folder, reading, write_text, writing
-from activesteer.studies.engine.run_task import CURVE, Row
-from activesteer.studies.engine.runs import versions
+from activesteer.studies.engine.runs import CURVE, Row, versions
 from activesteer.units import unit_of
 
 IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.analysis import MAX_ROWS, without_effect
 from activesteer.studies.engine.plan import Plan, task_size
-from activesteer.studies.engine.run_task import CURVE, Status, drive, failed_row
-from activesteer.studies.engine.runs import Request, prepare
+from activesteer.studies.engine.runs import CURVE, Request, Status, drive, failed_row, prepare
 from activesteer.studies.engine.store import IDENTITY, OUTCOME, Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import TaskQueue, WorkerDied, Workers, workers_for

@@ -20,7 +20,7 @@ from activesteer.metric_table import METRICS
 from activesteer.studies.engine.factor_values import Prior
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_task import DISTANCE, Row, Status
+from activesteer.studies.engine.runs import DISTANCE, Row, Status
 from activesteer.studies.engine.store import IDENTITY, OUTCOME
 from activesteer.studies.engine.study_file import StudyFile
 

@@ -25,8 +25,7 @@ from activesteer.studies.engine.analysis import without_effect
 from activesteer.studies.engine.factor_values import Plausibility
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.run_task import Row, Status, drive
-from activesteer.studies.engine.runs import Request, prepare, run_command
+from activesteer.studies.engine.runs import Request, Row, Status, drive, prepare, run_command
 from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import StudyFile, label_of, read_study
 from activesteer.studies.engine.tune_table import TABLE, Goal, Judge, TuneTable, read_table

@@ -1,4 +1,4 @@
-"""Stability margins of a controller's loops: gain, phase, delay and disk margins over speed.
+"""Stability margins of the loop of controller, actuators, car and sensors, the worst ones of a study, and their page.
 
 The loop runs from the demand of an actuator through the linearised car (`linearisation`: servo, suspensions, tyres),
 the sensors (bandwidth, delay), the control unit (its interval, the bus) and the controller back to the demand. It is
@@ -18,14 +18,21 @@ stays stable for every gain from (2 - alpha) / (2 + alpha) to its inverse togeth
 `control.stability_margins` gives gain, phase and delay margins; `control.disk_margins` accepts no frequency
 response. Source: P. Seiler, A. Packard, P. Gahinet, An introduction to disk margins, IEEE Control Systems Magazine 40
 (5), 2020.
+
+A study varies the plant. Controllers keep the car of the files, except for keys under `controllers` or `single_track`
+that the study varies.
 """
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
+from itertools import groupby
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -40,13 +47,18 @@ from activesteer.controllers.linear_form import (
     response_of,
 )
 from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.pages import Page, Section, Table, write_page
+from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
 from activesteer.signals import Measurement
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.sampled_controller import interval_s
-from activesteer.studies.linear.discrete_time_map import OUTPUTS
-from activesteer.studies.linear.linearisation import LinearCar, linear_cars
+from activesteer.studies.engine.plan import Plan, task_size
+from activesteer.studies.engine.study import StudyProgress
+from activesteer.studies.engine.study_file import StudyFile, read_study
+from activesteer.studies.engine.workers import in_parallel, workers_for
+from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_cars
 
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 """Default speeds [km/h]."""
@@ -336,3 +348,143 @@ def _answer_to_samples(
         return to_samples(frequencies_radps) / holds[:, None, :]
 
     return response
+
+
+_SHOWN: Final = (-3.2, 1.6), (-2.4, 2.4)
+"""Range of the real and of the imaginary part in a picture."""
+_LEAD: Final = (
+    "Each curve is the loop gain L over frequency, from 0.008 to 48 Hz, with its mirror image left out. The loop is "
+    "marginal where L = -1 (cross). The red disk has the smallest disk margin alpha of all speeds: the curve of that "
+    "speed touches it. Gain and phase may then change together by any complex factor f with |f - 1| / |f + 1| < "
+    "alpha / 2, such as gains from (2 - alpha) / (2 + alpha) to (2 + alpha) / (2 - alpha)."
+)
+
+
+def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str | os.PathLike[str]) -> Path:
+    """Write `margins.html` and return its path."""
+    sections = []
+    for (controller, loop), rows in groupby(
+        sorted(found, key=lambda each: (each.controller, each.loop)), lambda each: (each.controller, each.loop)
+    ):
+        loops = list(rows)
+        pictures = [as_svg(draw(_picture(loops)))] if loops[0].curves else []
+        sections.append(Section(f"{controller}, opened at {loop}", pictures=pictures, tables=[_table(loops)]))
+    title = f"Stability margins: {vehicle}"
+    lead = [_LEAD] if any(each.curves for each in found) else []
+    return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
+
+
+def disk(alpha: float) -> tuple[float, float]:
+    """Return centre and radius of the disk that a loop gain with a disk margin does not enter.
+
+    It holds all L with |1 + L| < alpha / 2 |1 - L|, on whose edge a factor of the size alpha makes the loop marginal.
+
+    Args:
+        alpha: Balanced disk margin, above 0 and below 2 [-]; at 2 the disk is a half-plane.
+
+    Source: P. Seiler, A. Packard, P. Gahinet, An Introduction to Disk Margins, 2020, section IV.
+    """
+    half = 0.5 * alpha
+    near, far = -(1.0 - half) / (1.0 + half), -(1.0 + half) / (1.0 - half)
+    return 0.5 * (near + far), 0.5 * (near - far)
+
+
+def _picture(loops: Sequence[LoopMargins]) -> Picture:
+    speeds = [each.speed_kmh for each in loops]
+    low, high = min(speeds), max(speeds)
+    curves = [
+        Curve(part.real, part.imag, shade=(each.speed_kmh - low) / (high - low) if high > low else 0.5)
+        for each in loops
+        for part in each.curves
+    ]
+    curves.append(Curve([-1.0], [0.0], "", "#b3261e", "", marker="x", size=7.0, width=1.6))
+    alpha = min(each.margins.disk for each in loops)
+    areas = []
+    if 0.0 < alpha < 2.0:
+        centre, radius = disk(alpha)
+        angle = np.linspace(0.0, math.pi, 181)
+        x, y = centre + radius * np.cos(angle), radius * np.sin(angle)
+        areas.append(Area(x, -y, y, f"disk margin {alpha:.2f}", "#d9534f", 0.25, "#b3261e"))
+    panel = Panel(
+        "real part of L [-]", "imaginary part of L [-]", curves, areas=areas,
+        x_range=_SHOWN[0], y_range=_SHOWN[1], zero=True, equal=True,
+    )  # fmt: skip
+    scale = ("speed [km/h]", low, high) if high > low else None
+    return Picture("", [panel], scale=scale, width_in=6.4, height_in=4.8)
+
+
+def _table(loops: Sequence[LoopMargins]) -> Table:
+    least = min(range(len(loops)), key=lambda row: loops[row].margins.disk)
+    heads = ["speed [km/h]", "gain margin [dB]", "phase margin [deg]", "delay margin [ms]", "disk margin [-]"]
+    heads += ["changed"] if any(each.factors for each in loops) else []
+    rows = []
+    for each in loops:
+        margins = each.margins
+        values = (margins.gain_dB, math.degrees(margins.phase_rad), 1e3 * margins.delay_s, margins.disk)
+        numbers = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
+        changed = ", ".join(f"{key} = {value}" for key, value in each.factors.items())
+        rows.append([f"{each.speed_kmh:g}", *numbers, changed][: len(heads)])
+    return Table("", heads, rows, frozenset([least]))
+
+
+def worst_margins(
+    study_file: FileOrTable | StudyFile,
+    controllers: Sequence[Any] = ("lqr",),
+    vehicle: FileOrTable = "compact",
+    speeds_kmh: Sequence[float] = SPEEDS_KMH,
+    overrides: Mapping[str, Any] | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+) -> list[LoopMargins]:
+    """Return the smallest margins of every loop at every speed over the samples of a study.
+
+    Factors for single manoeuvres are left out; manoeuvres, cars and controllers of the study have no effect. Overrides
+    may not set a key that the study varies. With more than one process, controllers must be picklable. `factors` are
+    those of the smallest disk margin; each margin is the smallest over all samples.
+    """
+    given, changed = read_study(study_file), dict(overrides or {})
+    for key in changed:
+        if key in given.keys:
+            raise given.source.fail(("factors", key), "is varied by the study; it cannot be given beside it")
+    names = tuple(name for name in controllers if isinstance(name, str))
+    study = replace(
+        given, maneuvers=(straight_on(speeds_kmh[0] / 3.6),), vehicles=(vehicle,), controllers=names or ("none",),
+        overrides=given.overrides | changed, factors=tuple(each for each in given.factors if not each.maneuvers),
+        claims=False, curves=(),
+    )  # fmt: skip
+    check_gains(changed, controllers)
+    plan = Plan(study)
+    requests = plan.requests(range(0, len(plan), len(study.controllers)))
+    with workers_for(jobs, scheduler=scheduler) as workers:
+        # Cars that are evaluated together share the controller's response.
+        cars, size = [request.overrides for request in requests], task_size(len(requests), 1, workers.in_flight)
+        parts = [cars[start : start + size] for start in range(0, len(cars), size)]
+        looked_at = 0
+
+        def report(place: int, _: int) -> None:
+            nonlocal looked_at
+            looked_at += len(parts[place])
+            if progress is not None:
+                progress(StudyProgress(looked_at, len(requests), 0, looked_at))
+
+        look = functools.partial(_margins, controllers, vehicle, speeds_kmh)
+        found = in_parallel(look, [(part,) for part in parts], report=report, workers=workers)
+    every = list(itertools.chain.from_iterable(found))
+    worst = []
+    for row in zip(*every, strict=True):
+        least = min(range(len(row)), key=lambda number: row[number].margins.disk)
+        worst.append(
+            replace(row[least], margins=weakest([each.margins for each in row]), factors=requests[least].factors)
+        )
+    return worst
+
+
+def _margins(
+    controllers: Sequence[Any],
+    vehicle: FileOrTable,
+    speeds_kmh: Sequence[float],
+    cars: Sequence[Mapping[str, Any]],
+) -> list[list[LoopMargins]]:
+    return list(margins_of_cars(controllers, vehicle, speeds_kmh, cars))

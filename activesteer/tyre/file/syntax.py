@@ -1,11 +1,24 @@
-"""The syntax of .tir files: sections, keys, values, table rows and comments. This module knows nothing about tyres."""
+"""Syntax of .tir files: sections, tables, units.
+
+A file states base units; the unit of every other quantity follows from them, so that a stiffness in a file with
+millimetres is in newton per millimetre. Magic Formula coefficients are pure numbers in every system of units.
+
+The columns of the table are: key, default, quantity, meaning. A default of `!` means that the file must give the key;
+`-` means that it may be absent and that another quantity replaces it (see `parameters.parameter_array`).
+The quantity decides how `[UNITS]` of a file is applied; `1` is a pure number.
+
+Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, appendix 3; the names are those of the TNO/Siemens MF-Tyre
+and the MSC PAC2002 property files.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from activesteer import limits
 from activesteer.errors import TyreFileError
@@ -124,3 +137,100 @@ def parse(text: str, source: str) -> Syntax:
             )
         tables.setdefault(section, []).append(tuple(value for value in row if value is not None))
     return Syntax(tuple(entries), {name: tuple(rows) for name, rows in tables.items()})
+
+
+_LENGTH = {
+    "meter": 1.0, "metre": 1.0, "meters": 1.0, "m": 1.0, "millimeter": 1e-3, "millimetre": 1e-3, "mm": 1e-3,
+    "centimeter": 1e-2, "centimetre": 1e-2, "cm": 1e-2, "kilometer": 1e3, "km": 1e3, "inch": 0.0254, "in": 0.0254,
+    "foot": 0.3048, "ft": 0.3048,
+}  # fmt: skip
+_FORCE = {
+    "newton": 1.0, "newtons": 1.0, "n": 1.0, "kilonewton": 1e3, "knewton": 1e3, "kn": 1e3,
+    "pound_force": 4.4482216152605, "pound": 4.4482216152605, "lbf": 4.4482216152605,
+    "kilogram_force": 9.80665, "kg_force": 9.80665, "kgf": 9.80665,
+}  # fmt: skip
+_ANGLE = {
+    "radian": 1.0, "radians": 1.0, "rad": 1.0, "degree": math.pi / 180, "degrees": math.pi / 180, "deg": math.pi / 180,
+}  # fmt: skip
+_MASS = {
+    "kilogram": 1.0, "kilograms": 1.0, "kg": 1.0, "gram": 1e-3, "g": 1e-3, "tonne": 1e3, "pound_mass": 0.45359237,
+    "pound": 0.45359237, "lbm": 0.45359237, "lb": 0.45359237, "slug": 14.593902937206,
+}  # fmt: skip
+_TIME = {
+    "second": 1.0, "seconds": 1.0, "sec": 1.0, "s": 1.0, "millisecond": 1e-3, "ms": 1e-3, "minute": 60.0, "min": 60.0,
+    "hour": 3600.0,
+}  # fmt: skip
+_PRESSURE = {"pascal": 1.0, "pa": 1.0, "kilopascal": 1e3, "kpa": 1e3, "bar": 1e5, "psi": 6894.757293168}
+
+BASE_UNITS: dict[str, dict[str, float]] = {
+    "LENGTH": _LENGTH,
+    "FORCE": _FORCE,
+    "ANGLE": _ANGLE,
+    "MASS": _MASS,
+    "TIME": _TIME,
+    "PRESSURE": _PRESSURE,
+}
+"""Keys of `[UNITS]`, the unit names that each accepts (in lower case), and the size of the unit in SI."""
+
+DIMENSIONS: dict[str, dict[str, int]] = {
+    "1": {},
+    "length": {"LENGTH": 1},
+    "speed": {"LENGTH": 1, "TIME": -1},
+    "acceleration": {"LENGTH": 1, "TIME": -2},
+    "mass": {"MASS": 1},
+    "inertia": {"MASS": 1, "LENGTH": 2},
+    "force": {"FORCE": 1},
+    "pressure": {"FORCE": 1, "LENGTH": -2},
+    "stiffness": {"FORCE": 1, "LENGTH": -1},
+    "damping": {"FORCE": 1, "LENGTH": -1, "TIME": 1},
+    "angular_stiffness": {"FORCE": 1, "LENGTH": 1, "ANGLE": -1},
+    "angle": {"ANGLE": 1},
+}
+"""Quantities of the coefficient table as powers of the base units."""
+
+
+def si_factor(quantity: str, units: Mapping[str, float]) -> float:
+    """Return the factor from a file's number to SI."""
+    if quantity == "pressure" and "PRESSURE" in units:
+        return units["PRESSURE"]
+    return math.prod(units.get(base, 1.0) ** power for base, power in DIMENSIONS[quantity].items())
+
+
+class Coefficient(NamedTuple):
+    """One key of a .tir file.
+
+    Attributes:
+        name: Key as in the file, upper case.
+        section: Section that the writer puts it in.
+        default: Default in SI; None if another quantity replaces it.
+        required: Whether a file without the key is refused.
+        quantity: Kind of quantity, as in `DIMENSIONS`; `1` is a pure number.
+        meaning: One line.
+    """
+
+    name: str
+    section: str
+    default: float | None
+    required: bool
+    quantity: str
+    meaning: str
+
+
+def _parse(table: str) -> tuple[Coefficient, ...]:
+    """Turn the table into records, in its order."""
+    section, rows = "", []
+    for line in table.splitlines():
+        if line.startswith("["):
+            section = line.strip("[]")
+            continue
+        name, default, quantity, meaning = line.split(maxsplit=3)
+        value = None if default in ("!", "-") else float(default)
+        rows.append(Coefficient(name, section, value, default == "!", quantity, meaning))
+    return tuple(rows)
+
+
+COEFFICIENTS: tuple[Coefficient, ...] = _parse(Path(__file__).with_name("coefficients.txt").read_text(encoding="utf-8"))
+"""Every numeric key that the package knows, in the order of the table."""
+
+BY_NAME: dict[str, Coefficient] = {coefficient.name: coefficient for coefficient in COEFFICIENTS}
+"""The same records by key."""

@@ -1,4 +1,4 @@
-"""Reader of .tir tyre property files: MF 5.2, 6.0, 6.1, 6.2 and PAC2002, into SI.
+"""Read and write .tir files.
 
 Nothing in a file is executed, and no memory is allocated by what a file claims. A bad file ends in a `TyreFileError`
 that names the file, the line, the key, the value and the allowed range.
@@ -11,9 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from activesteer.errors import ParameterError, TyreFileError
-from activesteer.tyre.file.coefficients import BY_NAME
-from activesteer.tyre.file.syntax import Entry, parse, read_text
-from activesteer.tyre.file.units import BASE_UNITS, si_factor
+from activesteer.tyre.file.syntax import BASE_UNITS, BY_NAME, COEFFICIENTS, Entry, parse, read_text, si_factor
 from activesteer.tyre.tyre_parameters import Side, TyreParameters
 
 ALIASES: dict[str, str] = {
@@ -157,3 +155,44 @@ def _side(words: Mapping[str, str], source: Path) -> Side:
             value=side,
         )
     return "LEFT"
+
+
+_HEADER = """[MDI_HEADER]
+FILE_TYPE = 'tir'
+FILE_VERSION = 3.0
+FILE_FORMAT = 'ASCII'
+[UNITS]
+LENGTH = 'meter'
+FORCE = 'newton'
+ANGLE = 'radians'
+MASS = 'kg'
+TIME = 'second'
+"""
+_OWN_SECTIONS = ("MDI_HEADER", "UNITS")
+
+
+def tir_text(parameters: TyreParameters, comment: str = "") -> str:
+    """Return the content of a .tir file."""
+    lines = [f"! {line}" for line in comment.splitlines()] + _HEADER.splitlines()
+    names: dict[str, list[str]] = {"MODEL": [f"TYRESIDE = '{parameters.side}'"]}
+    for coefficient in COEFFICIENTS:
+        if coefficient.name in parameters.given:
+            number = f"{coefficient.name:<24} = {parameters.given[coefficient.name]!r}"
+            names.setdefault(coefficient.section, []).append(f"{number:<50} $ {coefficient.meaning}")
+    for (section, key), value in parameters.unused.items():
+        if section not in _OWN_SECTIONS:
+            names.setdefault(section, []).append(f"{key:<24} = {value!r}")
+    for (section, key), word in parameters.texts.items():
+        if section not in _OWN_SECTIONS and key != "TYRESIDE":
+            quote = '"' if "'" in word else "'"
+            names.setdefault(section, []).append(f"{key:<24} = {quote}{word}{quote}")
+    for section, rows in parameters.tables.items():
+        names.setdefault(section, []).extend(" ".join(repr(value) for value in row) for row in rows)
+    for section, content in names.items():
+        lines += ([f"[{section}]"] if section else []) + content
+    return "\n".join(lines) + "\n"
+
+
+def write_tir(parameters: TyreParameters, path: str | Path, comment: str = "") -> None:
+    """Write a tyre to a .tir file, Latin-1; see `tir_text`."""
+    Path(path).write_text(tir_text(parameters, comment), encoding="latin-1")

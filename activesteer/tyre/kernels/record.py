@@ -10,7 +10,7 @@ from typing import Final
 
 from activesteer.native_records import numbers_type
 from activesteer.tyre.conventions import TyreConventions
-from activesteer.tyre.file.coefficients import COEFFICIENTS
+from activesteer.tyre.file.syntax import COEFFICIENTS
 
 _WORKED_OUT: Final = (
     "MF_VERSION",  # 52, 60, 61 or 62

@@ -1,6 +1,6 @@
 """The recorded channels, computed from the engine's raw rows: units, axes, signs."""
 
 from activesteer.vehicle.channels.channel_map import MAX_VALUE, ChannelMap
-from activesteer.vehicle.channels.raw_rows import RawRows
+from activesteer.vehicle.channels.native_channels import RawRows
 
 __all__ = ["MAX_VALUE", "ChannelMap", "RawRows"]

@@ -11,7 +11,7 @@ from numba import types
 from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import Array
 from activesteer.signals import Channel
-from activesteer.vehicle.channels.raw_rows import Column, sensor
+from activesteer.vehicle.channels.native_channels import Column, sensor
 
 STANDSTILL_MPS: Final = 0.2
 """Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]: a car at rest swings on its tyres."""

@@ -12,12 +12,9 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.sensors.block import MEASURED
-from activesteer.vehicle.channels.actuators import actuator_signals, electric_signals, motor_signals
 from activesteer.vehicle.channels.car_motion import MOTION_CHANNELS, CarMotion, motion_copied, motion_inputs
 from activesteer.vehicle.channels.corners import brake_signals, corner_signals
-from activesteer.vehicle.channels.links import link_signals
-from activesteer.vehicle.channels.native_channels import record_of, take_rows, within
-from activesteer.vehicle.channels.raw_rows import (
+from activesteer.vehicle.channels.native_channels import (
     Actuator,
     AxialForce,
     Column,
@@ -25,11 +22,20 @@ from activesteer.vehicle.channels.raw_rows import (
     RawRows,
     Signal,
     Values,
+    record_of,
     signal,
+    take_rows,
+    within,
 )
-from activesteer.vehicle.channels.steering import steering_signals
+from activesteer.vehicle.channels.steering import (
+    actuator_signals,
+    electric_signals,
+    link_signals,
+    motor_signals,
+    steering_signals,
+)
 from activesteer.vehicle.parameters import VehicleParameters
-from activesteer.vehicle.recorded_rows import COMMAND_CHANNELS, ESTIMATE_CHANNELS
+from activesteer.vehicle.step_bindings import COMMAND_CHANNELS, ESTIMATE_CHANNELS
 
 MAX_VALUE: Final = float(np.finfo(np.float32).max)
 """Largest recorded value: files store most channels with 32 bits."""

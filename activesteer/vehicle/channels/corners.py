@@ -12,7 +12,7 @@ from activesteer.brakes.records import PER_WHEEL, PLACES
 from activesteer.conventions import CORNERS, Array
 from activesteer.signals import CORNERS_IN_WORDS
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.channels.raw_rows import Column, Computed, Signal, Values, sensor, signal
+from activesteer.vehicle.channels.native_channels import Column, Computed, Signal, Values, sensor, signal
 
 _TYRE: Final = (
     ("fx_N", "tyre_fx_N", "N", "longitudinal tyre force at the contact point, ISO-W"),

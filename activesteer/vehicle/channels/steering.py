@@ -1,16 +1,145 @@
-"""Channels of the steering, from the steering wheel to the wheels, with the torque of the hands."""
+"""Channels of steering, actuators and links."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from functools import partial
 
 import mujoco
+import numpy as np
 
+from activesteer.conventions import Array
 from activesteer.vehicle.channels.corners import toe
-from activesteer.vehicle.channels.links import axial_force
-from activesteer.vehicle.channels.raw_rows import AxialForce, Column, Computed, Signal, sensor, signal
-from activesteer.vehicle.named_parts import find, tendon_arms
+from activesteer.vehicle.channels.native_channels import (
+    Actuator,
+    AxialForce,
+    Column,
+    Computed,
+    Signal,
+    Values,
+    sensor,
+    signal,
+)
+from activesteer.vehicle.curve_axles import HOLDING_TENDON
+from activesteer.vehicle.electric_actuators import MOTOR, NAME
+from activesteer.vehicle.electric_drive import Motors
+from activesteer.vehicle.engine_layout import find, is_there, tendon_arms
 from activesteer.vehicle.parameters import Steering
+from activesteer.vehicle.toe_links import SCREW
+
+
+def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:
+    """Yield torques of drive and brakes, dry friction, and flags of servos without a motor that are at a limit."""
+    for index in range(model.nu):
+        name, force = model.actuator(index).name, Column("actuator_force", index)
+        if name.endswith(("_drive", "_brake")):
+            yield signal("vehicle", f"{name}_torque_Nm", "Nm", f"torque of {name} on the wheel", force)
+        elif name.endswith("_friction"):
+            part = name.removesuffix("_friction")
+            sign = "positive resists compression" if part.endswith("damper") else "positive pushes to the left"
+            yield signal("links", f"{name}_N", "N", f"dry friction of {part}, {sign}", force)
+        elif (
+            model.actuator_actadr[index] >= 0
+            and model.actuator_gainprm[index, 0] > 0.0
+            and model.actuator_trntype[index] != int(mujoco.mjtTrn.mjTRN_TENDON)
+            and not _has_motor(model, name)
+        ):
+            yield signal("vehicle", f"{name}_torque_Nm", "Nm", f"torque of the servo of {name}", force)
+            meaning = f"1 if {name} is at its angle, rate or torque limit"
+            yield signal("vehicle", f"{name}_saturated", "", meaning, _limits(model, index))
+
+
+def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
+    """Yield the signals of the motors of screws in the toe links, and of the superposition."""
+    for name, words in (
+        ("rl", "of the left toe link"), ("rr", "of the right toe link"), ("rear", "of both toe links"),
+        (NAME, "of the superposition"),
+    ):  # fmt: skip
+        if not _has_motor(model, name):
+            continue
+        torque, limited = sensor(model, name + MOTOR)[:2]
+        flag = "saturated" if name == NAME else "steer_saturated"
+        for what, unit, meaning, values in (
+            *([] if name == NAME else [("screw_m", "m", "travel of the screw", _state(model, name + SCREW))]),
+            ("motor_speed_radps", "rad/s", "speed of the motor", _state(model, name + MOTOR)),
+            ("motor_torque_Nm", "Nm", "torque of the motor", torque),
+            (flag, "", "1 at a limit of angle, speed, torque or supply of the motor", limited),
+        ):
+            yield signal("vehicle", f"{name}_{what}", unit, f"{meaning} {words}", values)
+
+
+def electric_signals(motors: Motors) -> Iterator[Signal]:
+    """Yield the signals of electric motors on wheels or axles, and of their battery."""
+    if not list(motors):
+        return
+    place = itertools.count()
+    for name, unit, meaning in (
+        ("power_W", "W", "power at the terminals of the battery, positive when it gives power"),
+        ("energy_J", "J", "energy that the battery has given since the start"),
+        ("limited", "", "1 while a limit of the battery reduces the torques"),
+    ):
+        yield signal("vehicle", f"battery_{name}", unit, meaning, Column("electric", next(place)))
+    for motor, _ in motors:
+        for name, unit, meaning in (
+            ("torque_Nm", "Nm", "torque at its wheels together, forward positive"),
+            ("difference_Nm", "Nm", "torque of the right wheel less that of the left one"),
+            ("demand_Nm", "Nm", "torque demand at its wheels together"),
+            ("power_W", "W", "electric power, positive when it drives"),
+            ("limited", "", "1 while a limit of speed, torque, power or battery acts"),
+        ):
+            column = Column("electric", next(place))
+            yield signal("vehicle", f"motor_{motor}_{name}", unit, f"{meaning}, motor {motor}", column)
+
+
+def _has_motor(model: mujoco.MjModel, name: str) -> bool:
+    return is_there(model, mujoco.mjtObj.mjOBJ_SENSOR, name + MOTOR)
+
+
+def _state(model: mujoco.MjModel, name: str) -> Column:
+    """The activation of an actuator."""
+    return Column("act", int(model.actuator_actadr[model.actuator(name).id]))
+
+
+def _limits(model: mujoco.MjModel, index: int) -> Actuator:
+    force = model.actuator_forcerange[index] if model.actuator_forcelimited[index] else (-np.inf, np.inf)
+    lag_and_rate, angle = model.actuator_dynprm[index, :2], model.actuator_ctrlrange[index]
+    return Actuator._make((index, model.actuator_actadr[index], *lag_and_rate, *angle, *force))
+
+
+def link_signals(model: mujoco.MjModel) -> Iterator[Signal]:
+    """Yield the axial forces of all tendons with a stiffness, tension positive."""
+    for index in range(model.ntendon):
+        if model.tendon_stiffness[index] == 0.0 and not model.tendon_stiffnesspoly[index].any():
+            continue
+        if model.tendon(index).name.endswith(HOLDING_TENDON):
+            # Five springs replace all links of a wheel; they are not parts of the car.
+            continue
+        # The stiffness of a damper's tendon represents the stops at both ends of its travel.
+        name = model.tendon(index).name.replace("_damper", "_stop")
+        yield signal("links", f"{name}_force_N", "N", f"axial force of {name}, tension positive", _force(model, index))
+
+
+def axial_force(model: mujoco.MjModel, tendon: int) -> AxialForce:
+    """Return the law of a tendon's stiffness."""
+    stiffness = model.tendon_stiffness[tendon], *model.tendon_stiffnesspoly[tendon]
+    return AxialForce._make((tendon, *stiffness, model.tendon_damping[tendon], *model.tendon_lengthspring[tendon]))
+
+
+def _force(model: mujoco.MjModel, tendon: int) -> Values:
+    """Return the axial force of a tendon; a screw in the link adds the force of its actuator."""
+    law = axial_force(model, tendon)
+    along = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+    screws = np.flatnonzero(along & (model.actuator_trnid[:, 0] == tendon) & (model.actuator_gainprm[:, 0] > 0.0))
+    if not screws.size:
+        return law
+
+    def force(length_m: Array, velocity_mps: Array, added_N: Array) -> Array:
+        passive = law.stiffness_Npm * (length_m - law.low_m) + law.damping_Nspm * velocity_mps
+        return passive - added_N
+
+    places = (("ten_length", tendon), ("ten_velocity", tendon), ("actuator_force", int(screws[0])))
+    return Computed(force, tuple(Column(*place) for place in places))
 
 
 def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:

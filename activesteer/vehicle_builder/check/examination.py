@@ -14,8 +14,7 @@ from activesteer.resources import find_vehicle
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.scenario import load_car
 from activesteer.vehicle_builder.check.findings import CheckReport, Finding, Level, judged, usual_values
-from activesteer.vehicle_builder.check.geometry import geometry
-from activesteer.vehicle_builder.check.parts import missing_parts
+from activesteer.vehicle_builder.check.geometry import geometry, missing_parts
 from activesteer.vehicle_builder.check.standing import standing
 
 

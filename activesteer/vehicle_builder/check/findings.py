@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import textwrap
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -13,6 +14,7 @@ from activesteer.config import build, read_toml
 Level = Literal["ok", "warning", "error"]
 _ROUNDING: Final = 1e-7
 """Smallest value that is not printed as 0."""
+_WRAPPED: Final = textwrap.TextWrapper(80, subsequent_indent=11 * " ", break_long_words=False)
 
 
 @dataclass(frozen=True)
@@ -67,17 +69,15 @@ class CheckReport:
 
     def table(self) -> str:
         """Return the report as text, with advice below warnings and errors."""
-        wide = max((len(finding.what) for finding in self.findings), default=0)
-        value = max((len(finding.value) for finding in self.findings if len(finding.value) < 30), default=0)
         lines, topic = [], ""
         for finding in self.findings:
             if finding.topic != topic:
                 topic = finding.topic
                 lines += ["", topic] if lines else [topic]
-            usual = f"usual: {finding.usual}" if finding.usual else ""
-            lines.append(f"  {finding.level:7}  {finding.what:{wide}}  {finding.value:{value}}  {usual}".rstrip())
+            usual = f" (usual: {finding.usual})" if finding.usual else ""
+            lines += _WRAPPED.wrap(f"  {finding.level:7}  {finding.what}: {finding.value}{usual}")
             if finding.advice:
-                lines.append(f"           -> {finding.advice}")
+                lines += _WRAPPED.wrap(f"           -> {finding.advice}")
         errors, warnings = self.count("error"), self.count("warning")
         return "\n".join([*lines, "", f"{self.vehicle}: {errors} errors, {warnings} warnings, {self.count('ok')} ok"])
 

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.analysis.corridor import TIME_TOLERANCE_S, corridor
+from activesteer.analysis.lanes import TIME_TOLERANCE_S, corridor
 from activesteer.conventions import Array
 from tests.reference.chrono.comparison import Comparison, absolute, relative
 from tests.reference.chrono.reference import Table

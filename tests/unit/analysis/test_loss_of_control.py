@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from activesteer.analysis.loss_of_control import has_spun, is_controlled, is_lost
+from activesteer.analysis.harm import has_spun, is_controlled, is_lost
 from activesteer.metric_table import CONES_MISSED, STAYS_IN_LANES
 
 PEAK = "sideslip_peak_abs_rad"

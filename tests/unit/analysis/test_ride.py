@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.ride import weighted, weighting
+from activesteer.analysis.general import weighted, weighting
 
 
 def test_the_weighting_has_the_factors_of_iso_2631() -> None:

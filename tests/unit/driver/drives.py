@@ -3,8 +3,7 @@
 from dataclasses import replace
 
 from activesteer.driver import DriverParameters
-from activesteer.vehicle.parameters import Powertrain
-from activesteer.vehicle.powertrain import PowertrainLimits
+from activesteer.vehicle.parameters import Powertrain, PowertrainLimits
 
 ENGINE = Powertrain(front_fraction=1.0, max_torque_Nm=1900.0, max_power_W=100e3, engine_brake_torque_Nm=350.0)
 DRIVE = PowertrainLimits(ENGINE)

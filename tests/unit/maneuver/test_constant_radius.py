@@ -10,7 +10,7 @@ import pytest
 from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.constant_radius import ConstantRadius
+from activesteer.maneuver.follow_path import ConstantRadius
 from tests.raising import raises
 
 SOURCE = Source("mine.toml", error=ManeuverError)

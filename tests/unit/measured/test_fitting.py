@@ -12,7 +12,7 @@ import pytest
 import activesteer
 from activesteer.config import read_toml
 from activesteer.errors import ActiveSteerError, StudyError
-from activesteer.measured.fit_page import write_fit
+from activesteer.measured.fit_result import write_fit
 from activesteer.measured.fitting import fit
 from activesteer.recording import Recording
 from tests.raising import raises

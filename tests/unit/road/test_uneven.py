@@ -12,10 +12,10 @@ import pytest
 
 from activesteer.errors import ManeuverError
 from activesteer.road import path as lines
+from activesteer.road.course import ProfileTable
 from activesteer.road.crg import CrgRoad, packed, read_crg, referenced, unpacked
 from activesteer.road.drawn import DrawnSurface, places_to_draw
 from activesteer.road.obstacles import CLASSES, STEP_M, Obstacle, Roughness
-from activesteer.road.profile import ProfileTable
 from activesteer.road.road import BankingTable, LaidRoad, Road
 from activesteer.road.surface import Surface, surface_of
 from activesteer.scenario import resolve

@@ -12,7 +12,7 @@ import activesteer
 from activesteer import ActuatorCommand, Simulation
 from activesteer.errors import ManeuverError, ParameterError
 from activesteer.recording import Recording
-from activesteer.recording.events import events_of
+from activesteer.recording.contents import events_of
 from activesteer.scenario import value_of
 from tests.raising import raises
 

@@ -19,8 +19,7 @@ from activesteer.standards.catalogue import STANDARDS, standard_of
 from activesteer.standards.examination import Examination, examine
 from activesteer.standards.iso14512 import after_one_second
 from activesteer.standards.iso21994 import corrected_distance
-from activesteer.standards.page_parts import metrics_table
-from activesteer.standards.standard import Findings, StandardRun, steering_wheel_at
+from activesteer.standards.standard import Findings, StandardRun, metrics_table, steering_wheel_at
 from activesteer.standards.study_test_runner import StudyTestRunner
 from tests.raising import raises
 from tests.unit.standards.signals import run_of, times

@@ -12,7 +12,7 @@ from activesteer.conventions import CORNERS
 from activesteer.errors import ParameterError
 from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Tape, Vehicle
-from activesteer.vehicle.powertrain import PowertrainLimits
+from activesteer.vehicle.parameters import PowertrainLimits
 from tests.raising import raises
 from tests.unit.vehicle.cars import activation, actuator, dof, floating, standing, step
 

@@ -9,7 +9,7 @@ import pytest
 from numba import njit, types
 
 from activesteer.conventions import CORNERS
-from activesteer.native_messages import load_numbers, native_type, store_numbers
+from activesteer.native_memory import load_numbers, native_type, store_numbers
 from activesteer.sensors import SensorBlock, Sensors
 from activesteer.sensors.block import MEASURED
 from activesteer.signals import (
@@ -22,7 +22,7 @@ from activesteer.signals import (
     numbers_of,
     widths_of,
 )
-from activesteer.vehicle.recorded_rows import (
+from activesteer.vehicle.step_bindings import (
     CARRIED_OUT,
     COMMANDS,
     ESTIMATE_CHANNELS,

@@ -18,7 +18,7 @@ from activesteer.scenario import CarSpec, load_car
 from activesteer.studies.linear.linearisation import linear_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle_builder import new_vehicle
-from activesteer.vehicle_builder.car_table import car_table
+from activesteer.vehicle_builder.texts import car_table
 from tests.raising import raises
 from tests.unit.vehicle_builder.other_curves import other_axle, other_curves
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.vehicle.parameters import Powertrain
-from activesteer.vehicle.powertrain import PowertrainLimits
+from activesteer.vehicle.parameters import Powertrain, PowertrainLimits
 
 ENGINE = Powertrain(
     front_fraction=0.3,

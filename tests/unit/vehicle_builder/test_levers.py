@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from activesteer.errors import ParameterError
-from activesteer.vehicle_builder.axle_kinds import DOUBLE_WISHBONE, MULTILINK
-from activesteer.vehicle_builder.levers import Mount, mount
+from activesteer.vehicle_builder.axle_kinds import DOUBLE_WISHBONE, MULTILINK, Mount, mount
 from tests.raising import raises
 
 FRONT, REAR, OUTER = np.array([0.2, 0.4, 0.15]), np.array([-0.2, 0.45, 0.16]), np.array([0.0, 0.74, 0.1])

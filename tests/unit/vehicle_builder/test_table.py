@@ -8,8 +8,7 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.vehicle_builder import new_vehicle
-from activesteer.vehicle_builder.table import chosen_kinds, in_vehicle_axes, read_table
-from activesteer.vehicle_builder.table_checks import check_points
+from activesteer.vehicle_builder.table import check_points, chosen_kinds, in_vehicle_axes, read_table
 from tests.raising import raises
 from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed
 

@@ -15,14 +15,14 @@ import pytest
 
 import activesteer
 from activesteer.coupling.car import export_fmu, export_library
-from activesteer.coupling.car.relocation import native_memory
+from activesteer.coupling.car.objects import native_memory
 from activesteer.coupling.car.variables import MOTION
 from activesteer.errors import ModelError
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.recorded_rows import CARRIED_OUT, COMMANDS
+from activesteer.vehicle.step_bindings import CARRIED_OUT, COMMANDS
 
 fmpy = pytest.importorskip("fmpy")
 fmi1, fmi2, validation = (importlib.import_module(f"fmpy.{name}") for name in ("fmi1", "fmi2", "validation"))

@@ -13,9 +13,8 @@ from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains
 from activesteer.errors import ControllerError, DriverError
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand
-from activesteer.studies.linear.discrete_time_map import INPUTS, OUTPUTS
 from activesteer.studies.linear.driver_loop import DriverLoop, driver_loop, driver_loops
-from activesteer.studies.linear.linearisation import LinearCar
+from activesteer.studies.linear.linearisation import INPUTS, OUTPUTS, LinearCar
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
 from tests.unit.driver.drives import parameters

@@ -15,12 +15,12 @@ from activesteer.errors import ControllerError, ParameterError, StudyError
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand
 from activesteer.simulation.runner import simulate
-from activesteer.studies.linear.discrete_time_map import ACTUATORS, INPUTS, OUTPUTS
-from activesteer.studies.linear.linearisation import LinearCar
+from activesteer.studies.linear.linearisation import ACTUATORS, INPUTS, OUTPUTS, LinearCar
 from activesteer.studies.linear.margins import (
     BOTH,
     FREQUENCIES_RADPS,
     LoopMargins,
+    disk,
     is_stable,
     loop_margins,
     margins_of,
@@ -28,9 +28,9 @@ from activesteer.studies.linear.margins import (
     opened_at_both,
     round_trip,
     weakest,
+    worst_margins,
+    write_margins_page,
 )
-from activesteer.studies.linear.margins_page import disk, write_margins_page
-from activesteer.studies.linear.worst_margins import worst_margins
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup
 

@@ -7,9 +7,8 @@ import pytest
 
 from activesteer.tyre import MagicFormula, load_tir
 from activesteer.tyre.conventions import TyreConventions
-from activesteer.tyre.file.coefficients import COEFFICIENTS
-from activesteer.tyre.file.tir import tir_from_text
-from activesteer.tyre.file.writer import tir_text
+from activesteer.tyre.file.syntax import COEFFICIENTS
+from activesteer.tyre.file.tir import tir_from_text, tir_text
 from tests.unit.tyre.tyres import TYRES, tyre
 
 FILES = sorted(TYRES.glob("*.tir"))
