@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from markupsafe import Markup
 
+from activesteer.plotting.model import Picture
 from activesteer.text_table import text_table, wrapped_line
 
 Text = str | Markup
 """Text is escaped; markup must be made by `Markup`."""
+
+
+_NARROW: Final = 3
+"""Most columns that fit on a phone."""
+_LONG: Final = 60
+"""Length of a cell that needs a line of its own there."""
 
 
 class Table(NamedTuple):
@@ -33,6 +40,11 @@ class Table(NamedTuple):
     quiet: frozenset[int] = frozenset()
     kind: str = "findings"
 
+    @property
+    def cards(self) -> bool:
+        """True if a phone shows each row as a card, because the table is too wide for it."""
+        return len(self.columns) > _NARROW or any(len(cell) > _LONG for row in self.rows for cell in row)
+
     def lines(self) -> Iterator[str]:
         """Yield the table as aligned text; `!` marks rows that break a limit, `~` rows that nothing is asked of."""
         rows = [[_plain(cell) for cell in row] for row in (self.columns, *self.rows)]
@@ -47,7 +59,7 @@ class Section(NamedTuple):
     Attributes:
         title: Its heading; empty for none.
         texts: Paragraphs.
-        pictures: SVG elements.
+        pictures: Pictures, whose panels the page draws.
         tables: Tables.
         points: Items of a list.
         level: Level of its heading: 2, or 3 for a part of the section before.
@@ -55,7 +67,7 @@ class Section(NamedTuple):
 
     title: str = ""
     texts: Sequence[Text] = ()
-    pictures: Sequence[Markup] = ()
+    pictures: Sequence[Picture] = ()
     tables: Sequence[Table] = ()
     points: Sequence[str] = ()
     level: int = 2

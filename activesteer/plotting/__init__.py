@@ -1,7 +1,7 @@
 """Plots: one model of a curve, a panel and a picture, drawn by matplotlib without a screen."""
 
 from activesteer.plotting.drawing import draw, save_all
-from activesteer.plotting.files import as_svg, new_figure, plain_axis, save
+from activesteer.plotting.files import new_figure, plain_axis, save
 from activesteer.plotting.model import Area, Curve, Heat, Panel, Picture
 
 __all__ = [
@@ -10,7 +10,6 @@ __all__ = [
     "Heat",
     "Panel",
     "Picture",
-    "as_svg",
     "draw",
     "new_figure",
     "plain_axis",

@@ -1,12 +1,9 @@
-"""Figures of matplotlib: made without a screen, written to files, or put into pages."""
+"""Figures of matplotlib: made without a screen and written to files."""
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
-
-from markupsafe import Markup
 
 from activesteer.errors import ActiveSteerError, ParameterError, not_installed
 from activesteer.files import atomic_write, shown_path
@@ -40,14 +37,6 @@ def plain_axis(axis: Axes) -> None:
     """Draw a grid, and remove the frame above and on the right."""
     axis.grid(visible=True, color="#dddddd", linewidth=0.6)
     axis.spines[["top", "right"]].set_visible(False)
-
-
-def as_svg(figure: Figure) -> Markup:
-    """Return a figure as an SVG element for a page of any colour; matplotlib escapes its texts."""
-    text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None}, transparent=True)
-    svg = text.getvalue()
-    return Markup(svg[svg.index("<svg") :])
 
 
 def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:
