@@ -1,6 +1,8 @@
-"""No control; only the desired yaw rate is computed, for comparison."""
+"""Controllers that command nothing: no control, and an observer that records the estimate."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from activesteer.controllers.corrector import DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup
@@ -8,6 +10,9 @@ from activesteer.native_records import NativeBlock
 from activesteer.shared_laws import law_of
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.theory.single_track import SingleTrack
+
+if TYPE_CHECKING:
+    from activesteer.estimation.estimator import Estimator
 
 
 class NoControl(NativeBlock):
@@ -38,3 +43,22 @@ def no_control(
     """Law of `NoControl.step`; returns the first fields of an `ActuatorCommand`."""
     desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, measurement.speed_mps)
     return 0.0, 0.0, desired, 0.0, 0.0, False
+
+
+class Observer:
+    """No control; an estimator records speed, sideslip, yaw rate and friction."""
+
+    reads = ("estimator",)
+
+    def __init__(self, estimator: Estimator) -> None:
+        """Take the estimator."""
+        self._estimator = estimator
+
+    @classmethod
+    def from_vehicle(cls, setup: ControllerSetup) -> Observer:
+        """Make the controller for a car; raises as `ControllerSetup.estimator` does."""
+        return cls(setup.estimator())
+
+    def step(self, _command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
+        """Return no angles; the estimate is recorded."""
+        return ActuatorCommand(estimate=self._estimator.step(measurement))

@@ -1,18 +1,23 @@
-"""Searches by driving before a scenario can run: the single-track model, and the amplitude of the steering wheel.
+"""From a scenario to one that can be driven: a car that settles, the search for a steering amplitude, its store.
 
-The result is the input for every controller. It is kept under a key of everything that it depends on; see
-`amplitude_store`.
+A found amplitude is the input for every controller. It is kept under a key of everything that it depends on, in the
+process and in `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`. You can delete
+this folder at any time. A file holds the number and a hash of key and number, so a damaged or misplaced file is
+ignored. If the folder cannot be read or written, nothing is stored there.
 
 Mass, yaw inertia and axle distances are those of the model at static ride; see `studies.linear.identification`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
+import os
 import platform
-from collections.abc import Callable, Mapping
+import secrets
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -27,18 +32,101 @@ from activesteer.compilation import content_key, processor
 from activesteer.config import to_table
 from activesteer.controllers import controller_spec
 from activesteer.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
-from activesteer.errors import ManeuverError, ModelError
+from activesteer.errors import ActiveSteerError, ManeuverError, ModelError
+from activesteer.files import read_bytes
 from activesteer.maneuver.base import Search
 from activesteer.maneuver.steering_tests import RampAngle, SteadyTurn, StepSteer
 from activesteer.recording import Recording
 from activesteer.scenario import CarSpec, FileOrTable, Scenario, resolve
-from activesteer.simulation import amplitude_store
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.run_context import RunContext
 from activesteer.theory.single_track import IDENTIFIED, IDENTIFY, SingleTrackParameters, characteristic_speed
 from activesteer.vehicle.statics import mass_properties
 from activesteer.version import __version__
+
+MAX_KEPT: Final = 1000
+"""Maximum of numbers in the process and in the folder; the oldest are deleted first."""
+_MAX_BYTES: Final = 200
+_SUFFIX: Final = ".amplitude"
+_in_process: dict[str, float] = {}
+_reads = True
+_writes = True
+
+
+def folder() -> Path:
+    """Return the folder of the numbers, which need not exist."""
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    # XDG base directory specification: ignore a path that is not absolute.
+    cache = given if given.is_absolute() else Path.home() / ".cache"
+    return cache / "activesteer" / "amplitudes"
+
+
+def recall(key: str) -> float | None:
+    """Return a stored number, bit for bit; None if there is none."""
+    if _reads and key not in _in_process:
+        with contextlib.suppress(ActiveSteerError, RuntimeError, ValueError):
+            text = read_bytes(folder() / f"{key}{_SUFFIX}", ActiveSteerError, _MAX_BYTES).decode("ascii")
+            value = float.fromhex(text.partition(" ")[0])
+            if text == _line(key, value) and math.isfinite(value):
+                _remember(key, value)
+    return _in_process.get(key)
+
+
+def keep(key: str, value: float) -> None:
+    """Store a number."""
+    _remember(key, value)
+    if not _writes:
+        return
+    with contextlib.suppress(OSError, RuntimeError):
+        place = folder()
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        part = place / f"{key}-{secrets.token_hex(4)}{_SUFFIX}"
+        try:
+            part.write_text(_line(key, value), encoding="ascii")
+            # Not `files.atomic_write`, which follows links: a link here may point to any file of the user.
+            part.replace(place / f"{key}{_SUFFIX}")
+        finally:
+            part.unlink(missing_ok=True)
+        kept = sorted(place.glob(f"*{_SUFFIX}"), key=lambda file: file.lstat().st_mtime)
+        for file in kept[:-MAX_KEPT]:
+            with contextlib.suppress(OSError):
+                file.unlink()
+
+
+@contextlib.contextmanager
+def not_on_disk() -> Iterator[None]:
+    """Keep numbers found inside in the process only, because the many cars of a study do not occur again."""
+    global _writes  # noqa: PLW0603 - one setting for the process, like the numbers
+    before, _writes = _writes, False
+    try:
+        yield
+    finally:
+        _writes = before
+
+
+@contextlib.contextmanager
+def searched_anew() -> Iterator[None]:
+    """Search amplitudes inside as if none had been kept, and write none to disk."""
+    global _in_process, _reads
+    before, _in_process, _reads = (_in_process, _reads), {}, False
+    try:
+        with not_on_disk():
+            yield
+    finally:
+        _in_process, _reads = before
+
+
+def _remember(key: str, value: float) -> None:
+    _in_process[key] = value
+    for oldest in list(_in_process)[:-MAX_KEPT]:
+        _in_process.pop(oldest, None)
+
+
+def _line(key: str, value: float) -> str:
+    digits = value.hex()
+    return f"{digits} {hashlib.sha256(f'{key} {digits}'.encode()).hexdigest()}\n"
+
 
 _TOLERANCE: Final = 5e-4
 """Relative error of the lateral acceleration at which the search for a steady turn stops."""
@@ -55,14 +143,14 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
     """Find the steering wheel angle that a manoeuvre needs."""
     probed = replace(scenario, maneuver=search.probe, driver=scenario.driver.for_searches())
     key = _key(probed, search, timestep_s)
-    angle = amplitude_store.recall(key)
+    angle = recall(key)
     if angle is None:
         if isinstance(search, RampAngle):
             angle = _ramp_angle(probed, search, timestep_s)
         else:
             assert isinstance(search, SteadyTurn)
             angle = _steady_turn(probed, search, timestep_s)
-        amplitude_store.keep(key, angle)
+        keep(key, angle)
     return angle
 
 

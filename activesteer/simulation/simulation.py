@@ -14,7 +14,6 @@ from typing import Any, Final, NamedTuple, Protocol, Self
 
 import mujoco
 
-from activesteer.analysis.metrics import metrics
 from activesteer.controllers import CONTROLLER, controller_spec
 from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.driver import DRIVER
@@ -490,6 +489,9 @@ class Simulation:
         elif not self.done:
             recording.metadata["error"] = f"driven to {self.time_s:g} of {self.scenario.maneuver.duration_s:g} s"
         else:
+            # A car that is only stepped needs no evaluation.
+            from activesteer.analysis.metrics import metrics  # noqa: PLC0415
+
             try:
                 recording.metrics.update(metrics(recording))
             except RecordingError as error:

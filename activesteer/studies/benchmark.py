@@ -35,10 +35,9 @@ from activesteer.metric_table import recorded_metric
 from activesteer.scenario import Scenario, resolve
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
-from activesteer.simulation.amplitude_store import searched_anew
 from activesteer.simulation.batch import Batch
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.preparation import with_amplitude_found
+from activesteer.simulation.preparation import searched_anew, with_amplitude_found
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation

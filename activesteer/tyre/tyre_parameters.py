@@ -15,6 +15,7 @@ import numpy as np
 
 from activesteer.compilation import compiled
 from activesteer.errors import ParameterError, nearest_names
+from activesteer.native_records import numbers_type
 from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.file.syntax import BY_NAME, COEFFICIENTS
 from activesteer.tyre.kernels.contact import tyre_on_road
@@ -25,7 +26,6 @@ from activesteer.tyre.kernels.magic_formula import (
     evaluate_rows,
     rolling_rows,
 )
-from activesteer.tyre.kernels.record import TYRE_RECORD
 
 _MAX_FORCE: Final = 1e12
 """No result of a tyre exceeds this [N, Nm, m ...]; beyond it, the engine's state soon overflows too."""
@@ -33,6 +33,22 @@ _ENORMOUS: Final = 1e7
 """No coefficient of a tyre is larger in SI: pressures and stiffnesses are some 1e6."""
 _TURN_SLIP_1PM: Final = 0.1
 _MF52: Final = 52.0
+
+_WORKED_OUT: Final = (
+    "MF_VERSION",  # 52, 60, 61 or 62
+    "SLIP_TANGENT",  # 0: alpha* = alpha and gamma* = gamma; 1: alpha* = tan(alpha) and gamma* = sin(gamma)
+    "SIDE",  # +1: mounted on the side of the file; -1: on the other side, everything mirrored
+    "PTX_GIVEN",  # 1 where the file gives PTX1 (MF 5.2 relaxation length of Fx)
+    "PTY_GIVEN",  # 1 where the file gives PTY1 (MF 5.2 relaxation length of Fy)
+    "Q_RA_GIVEN",  # 1 where the file gives the contact length
+    "Q_RB_GIVEN",  # 1 where the file gives the contact width
+)
+"""Fields that no file holds; `TyreParameters.record` sets them."""
+
+_FIELDS: Final = (*(coefficient.name for coefficient in COEFFICIENTS), *_WORKED_OUT, *TyreConventions().numbers())
+
+TYRE_RECORD: Final = numbers_type(*_FIELDS)
+"""Coefficients in the order of their table, derived fields, and the conventions."""
 
 
 def is_finite(tyre: np.record) -> bool:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from activesteer.native_records import numbers_type
 from activesteer.road.obstacles import OBSTACLE
 from activesteer.road.surface import SURFACE
-from activesteer.tyre.kernels.record import TYRE_RECORD
+from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle.native_contact import CAM
 
 BLOCK_NAME: Final = "activesteer"

@@ -24,7 +24,7 @@ from activesteer.road.native_path import along_path
 from activesteer.road.obstacles import OBSTACLE
 from activesteer.road.surface import SURFACE, left_grid
 from activesteer.tyre.kernels.contact import tyre_on_road
-from activesteer.tyre.kernels.record import TYRE_RECORD
+from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.curve_axles import add_curve_axle_forces
 from activesteer.vehicle.engine_layout import EngineLayout, engine_layout

@@ -42,7 +42,7 @@ from activesteer.sensors.signal_chain import CHAIN
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
-from activesteer.tyre.kernels.record import TYRE_RECORD
+from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.corners import design_heights_m
 from activesteer.vehicle.engine_layout import sensor_columns

@@ -35,7 +35,7 @@ from activesteer.plugins.file import format_of, source_of
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario, describe, resolve
-from activesteer.simulation import amplitude_store
+from activesteer.simulation import preparation
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.study_file import StudyFile
@@ -319,7 +319,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
         scenario, key = scenario_of(settings, *place), files_key(settings, *place)
         if files_digest(scenario) != settings.expected[key]:
             raise StudyError(f"{key}: changed while the study ran")
-        with amplitude_store.not_on_disk():
+        with preparation.not_on_disk():
             ready = with_amplitude_found(scenario, settings.study.timestep_s)
     except ActiveSteerError as error:
         return [failed_row(settings, request, Status.FAILED, _words_of(error)) for request in requests]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from activesteer.scenario import resolve
-from activesteer.simulation import amplitude_store, preparation
+from activesteer.simulation import preparation
 from activesteer.simulation.preparation import with_amplitude_found
 
 KEY, ANGLE_RAD = "0123456789abcdef" * 4, 0.1 + 0.2
@@ -18,7 +18,7 @@ KEY, ANGLE_RAD = "0123456789abcdef" * 4, 0.1 + 0.2
 def folder(monkeypatch, tmp_path):
     """Return an empty store; the process has stored nothing."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(amplitude_store, "_in_process", {})
+    monkeypatch.setattr(preparation, "_in_process", {})
     return tmp_path / "activesteer" / "amplitudes"
 
 
@@ -48,12 +48,12 @@ def test_changed_car_gain_processor_or_version_gives_a_new_amplitude(searches, m
 
 def test_stored_amplitude_is_found_by_another_process_and_a_damaged_one_is_searched_for(searches, folder):
     first = angle()
-    amplitude_store._in_process.clear()
+    preparation._in_process.clear()
     assert angle() == first  # bit for bit, from the disk
     [file] = folder.iterdir()
     whole = file.read_bytes()
     for wrong in (b"", whole[:-9], whole.replace(b"0", b"1"), whole + b"0", b"nan \n", b"\xff" * 40, b"0" * 10**6):
-        amplitude_store._in_process.clear()
+        preparation._in_process.clear()
         file.write_bytes(wrong)
         assert angle() == searches[-1] != first
     assert len(searches) == 8
@@ -64,16 +64,16 @@ def test_concurrent_writers_leave_whole_files_and_only_so_many(folder, monkeypat
 
     def write(key: str) -> None:
         for _ in range(50):
-            amplitude_store.keep(key, ANGLE_RAD)
+            preparation.keep(key, ANGLE_RAD)
 
     threads = [threading.Thread(target=write, args=(key,)) for key in (*keys, *keys)]
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
-        amplitude_store._in_process.clear()
-        assert amplitude_store.recall(keys[0]) in (None, ANGLE_RAD)
+        preparation._in_process.clear()
+        assert preparation.recall(keys[0]) in (None, ANGLE_RAD)
     assert [file.stem for file in sorted(folder.iterdir())] == keys
-    monkeypatch.setattr(amplitude_store, "MAX_KEPT", 5)
+    monkeypatch.setattr(preparation, "MAX_KEPT", 5)
     for number in range(9):
-        amplitude_store.keep(f"{number + 9:064x}", ANGLE_RAD)
+        preparation.keep(f"{number + 9:064x}", ANGLE_RAD)
     assert len(list(folder.iterdir())) == 5

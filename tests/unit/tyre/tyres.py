@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from activesteer.tyre import TyreParameters, load_tir
-from activesteer.tyre.kernels.record import TYRE_RECORD
+from activesteer.tyre.tyre_parameters import TYRE_RECORD
 
 TYRES = Path(__file__).parents[3] / "models" / "tyres"
 

@@ -1,4 +1,4 @@
-"""One fault: the part, its kind, its time and its size; in a file and on the command line."""
+"""Faults of actuators and sensors in files and on the command line; `vehicle.faults` activates them."""
 
 from __future__ import annotations
 
