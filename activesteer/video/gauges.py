@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.cars import bytes_of
@@ -16,8 +17,17 @@ from activesteer.drawing.panels import FILM, PANELS, panels_in
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, footprint_of
 from activesteer.units import quantity_of
-from activesteer.video.lettering import GREY, LEGIBLE, PANEL, WHITE, Colour, font, text_scale, write
 
+Colour = tuple[int, int, int, int]
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+
+PANEL: Final = (16, 18, 22, 190)
+"""Background colour of texts."""
+WHITE: Final = (245, 246, 248, 255)
+GREY: Final = (176, 181, 189, 255)
+
+LEGIBLE: Final = 0.85
+"""Smallest scale at which texts can be read: letters of 8 pixels."""
 _YELLOW: Final = (255, 205, 70, 255)
 _BODY: Final = (70, 76, 86, 255)
 # The sizes below are pixels of a frame of 640 x 480; see `text_scale`.
@@ -299,3 +309,26 @@ def used(recording: Recording, channel: str) -> bool:
         return False
     values = np.abs(recording[channel])
     return bool(np.max(values[np.isfinite(values)], initial=0.0) >= _MIN_ANGLE_RAD)
+
+
+def text_scale(size: tuple[int, int]) -> float:
+    """Return the scale of texts relative to a frame of 640 x 480, at least so large that they can be read.
+
+    Args:
+        size: Width and height of the frames [pixels].
+    """
+    high = size[1] / 480.0
+    return max(min(high, math.sqrt(size[0] / 640.0 * high)), LEGIBLE)
+
+
+def write(
+    layer: Image.Image, place: tuple[float, float], text: str, colour: Colour, face: Font, anchor: str = "lm"
+) -> None:
+    """Draw a text with its anchor, as Pillow names it, at a place [pixels]."""
+    ImageDraw.Draw(layer).text(place, text, colour, face, anchor)
+
+
+@lru_cache(maxsize=100)
+def font(points: float) -> Font:
+    """Return the font of all texts over frames in a size [pixels]."""
+    return ImageFont.load_default(max(6.0, points))

@@ -21,7 +21,6 @@ from activesteer.road.course import Course, Footprint
 from activesteer.road.drawn import DrawnSurface
 from activesteer.road.road import Road
 from activesteer.video.road import Edges, add_areas, add_course, add_edges, add_road
-from activesteer.video.sky import SKY, add_sky
 
 _PAINT: Final = (0.23, 0.46, 0.72)
 """Colour of a car without a colour of its own."""
@@ -52,6 +51,9 @@ _BASE: Final = """
     <!-- Round parts are small; with the usual 28 x 16 faces each they would cost a third of a picture. -->
     <quality shadowsize="0" offsamples="4" numslices="20" numstacks="6" numquads="2"/>
   </visual>
+  <asset>
+    <texture type="skybox" builtin="gradient" rgb1="0.82 0.87 0.91" rgb2="0.36 0.52 0.72" width="64" height="384"/>
+  </asset>
   <statistic center="0 0 0.5" extent="4"/>
   <worldbody>
     <light name="sun" type="directional" pos="0 0 20" dir="0.35 0.25 -1" diffuse="0.62 0.6 0.56" specular="0.2 0.2 0.2"
@@ -123,7 +125,6 @@ class RenderScene:
                 add_edges(spec, edges)
             for number, car in enumerate(cars):
                 _add_car(spec, car, f"{number}/")
-            add_sky(spec)
             self.model = spec.compile()
         except (ValueError, KeyError, TypeError) as reason:
             raise PlaybackError(f"car, course or road of the recording cannot be drawn: {reason!r}") from reason
@@ -133,7 +134,6 @@ class RenderScene:
         ]
         self._chassis = [car.bodies.index(CHASSIS) for car in cars]
         self._shadow = [self._mocap_id(f"{number}/shadow") for number in range(len(cars))]
-        self._sky = self._mocap_id(SKY)
         self._opacity = self.model.geom_rgba[:, 3].copy(), self.model.tendon_rgba[:, 3].copy()
         self._tails = [
             [index for index in self._drawn(number)[0] if self.model.geom(index).name.endswith(_TAIL)]
@@ -185,7 +185,6 @@ class RenderScene:
             share = share_seen(apart)
             self.model.geom_rgba[geoms, 3] = share * self._opacity[0][geoms]
             self.model.tendon_rgba[tendons, 3] = share * self._opacity[1][tendons]
-        self.data.mocap_pos[self._sky, :2] = chassis[0][:2]
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
@@ -217,8 +216,6 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
                 quat=part.quaternion,
                 # The round solid of a shell is the greenhouse.
                 rgba=_colour_of(part.rgba, car, shell=part.rgba[3] < SEE_THROUGH, glass=part.kind == "sphere"),
-                contype=0,
-                conaffinity=0,
             )
         elif all(body in bodies for body, _ in part.points):
             tendon = spec.add_tendon(name=f"{prefix}{part.name}", width=part.radius_m, rgba=_colour_of(part.rgba, car))
@@ -248,9 +245,7 @@ def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car,
     if panel.shell and car.shell_opacity < _SHADED_BELOW:
         rgb = tuple(_CUTAWAY_SHADE * value for value in rgb)
     opacity = (car.shell_opacity if panel.shell else 1.0) * (_GHOST_OPACITY if car.ghost else 1.0)
-    body.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity), contype=0, conaffinity=0
-    )
+    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity))
 
 
 def _colour_of(
@@ -290,8 +285,6 @@ def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], o
         size=(half_m[0] + _SHADOW_FADE_M, half_m[1] + _SHADOW_FADE_M, 1.0),
         material=name,
         rgba=(1.0, 1.0, 1.0, 0.99),
-        contype=0,
-        conaffinity=0,
     )
 
 

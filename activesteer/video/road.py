@@ -14,7 +14,6 @@ from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course
 from activesteer.road.drawn import DrawnSurface
 from activesteer.road.path import Path
 from activesteer.road.road import Road
-from activesteer.video.markings import Label
 
 _TEXTURE: Final = "road"
 _SURFACE: Final = "uneven_road"
@@ -48,8 +47,6 @@ _BESIDE_CAR_M, _BEYOND_M = 2.5, 60.0
 _MARKS_M, _POSTS_M, _POST_M, _POST_HEIGHT_M = 10.0, 50.0, 0.6, 0.9
 """Spacing of marks and of posts, distance of a post from its edge, and its height [m]."""
 _MAX_POSTS: Final = 200
-_READ_M: Final = 70.0
-"""Distance up to which the label of a post is written [m]."""
 _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 """Largest numbers of pieces of patches, lanes, cones and dashes drawn: a scene holds a limited number of solids."""
 
@@ -83,8 +80,6 @@ def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None)
         size=(0.0, 0.0, 1.0),
         material=_TEXTURE,
         pos=(0.0, 0.0, 0.0 if drawn is None else drawn.plane_below_m),
-        contype=0,
-        conaffinity=0,
     )
     if drawn is not None:
         _add_surface(spec, *drawn.mesh(road))
@@ -105,9 +100,7 @@ def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray
         mesh.uservert, mesh.userface = corners[kept].ravel(), faces.ravel()
         mesh.usertexcoord = (0.5 / _SURFACE_TILE_M * corners[kept, :2]).ravel()
         mesh.userfacetexcoord = faces.ravel()
-        geom = spec.worldbody.add_geom(
-            name=mesh.name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, contype=0, conaffinity=0
-        )
+        geom = spec.worldbody.add_geom(name=mesh.name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name)
         if band == 0:
             geom.material = _SURFACE
         else:
@@ -162,11 +155,6 @@ class Edges(NamedTuple):
     start_m: float
     end_m: float
     half_width_m: float
-
-    def labels(self) -> list[Label]:
-        """Return the distances from the start of the run, written at the posts."""
-        places = ((x, np.array([x, self.half_width_m + _POST_M, _POST_HEIGHT_M + 0.25])) for x in self.posts_m())
-        return [Label(f"{x:.0f} m", place, place + np.array([0.0, 0.0, 1.0]), far_m=_READ_M) for x, place in places]
 
     def posts_m(self) -> Array:
         """Return world x of the posts [m]."""
@@ -233,18 +221,9 @@ def _add_cones(spec: mujoco.MjSpec, cones: np.ndarray) -> None:
             size=(1.25 * CONE_RADIUS_M, 1.25 * CONE_RADIUS_M, 0.015),
             pos=(x, y, 0.015),
             rgba=_BASE,
-            contype=0,
-            conaffinity=0,
         )
         for mesh, height, colour in rings:
-            spec.worldbody.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_MESH,
-                meshname=mesh,
-                pos=(x, y, height),
-                rgba=colour,
-                contype=0,
-                conaffinity=0,
-            )
+            spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, pos=(x, y, height), rgba=colour)
 
 
 def _box(
@@ -255,11 +234,7 @@ def _box(
 
 
 def _beam(
-    spec: mujoco.MjSpec,
-    ends: tuple[float, float, float, float],
-    width: float,
-    height: float,
-    rgba: tuple[float, ...],
+    spec: mujoco.MjSpec, ends: tuple[float, float, float, float], width: float, height: float, rgba: tuple[float, ...]
 ) -> None:
     """Add a flat box from one place on the road to another."""
     x0, y0, x1, y1 = ends
@@ -270,8 +245,6 @@ def _beam(
         pos=(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0),
         quat=(np.cos(half), 0.0, 0.0, np.sin(half)),
         rgba=rgba,
-        contype=0,
-        conaffinity=0,
     )
 
 
