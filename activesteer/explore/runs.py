@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
-from activesteer.analysis.report.results import KEY_FIGURES
 from activesteer.analysis.report.run_page import write_report
+from activesteer.analysis.report.tables import KEY_FIGURES
 from activesteer.controllers import controller_spec
 from activesteer.conventions import run_looks
 from activesteer.drawing.panels import EXPLORE

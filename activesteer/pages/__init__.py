@@ -12,8 +12,7 @@ from markupsafe import Markup
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, write_text
-from activesteer.pages.model import Page, Section, Table, Text, failed, passed
-from activesteer.pages.pictures import picture_values
+from activesteer.pages.model import Page, Section, Table, Text, failed, passed, picture_values
 from activesteer.units import parameter_title, typeset
 from activesteer.version import __version__
 

@@ -11,9 +11,8 @@ import rerun as rr
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS
 from activesteer.drawing.cars import bytes_of, height_colours
-from activesteer.playback.geometry import rotated
-from activesteer.playback.runs import Run
-from activesteer.playback.timeline import times
+from activesteer.playback.car import rotated
+from activesteer.playback.runs import Run, times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
 from activesteer.road.recorded import LIMIT_M

@@ -13,8 +13,7 @@ import rerun.blueprint as rrb
 from activesteer.conventions import CORNERS
 from activesteer.drawing.cars import bytes_of
 from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Line, Panel, link_panels, panels_in
-from activesteer.playback.runs import Run
-from activesteer.playback.timeline import times
+from activesteer.playback.runs import Run, times
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
 """Number of plots on a page -> number of tick labels that fit on one axis in a window of 1280 x 800."""

@@ -23,8 +23,7 @@ from activesteer.drawing.wheel_angles import (
     wheel_centres,
     words,
 )  # fmt: skip
-from activesteer.playback.runs import Run
-from activesteer.playback.timeline import times
+from activesteer.playback.runs import Run, times
 from activesteer.road.course import Footprint, footprint_of
 
 PLAN: Final = "plan"

@@ -1,7 +1,6 @@
 """Plots: one model of a curve, a panel and a picture, drawn by matplotlib without a screen."""
 
-from activesteer.plotting.drawing import draw, save_all
-from activesteer.plotting.files import new_figure, plain_axis, save
+from activesteer.plotting.drawing import draw, new_figure, plain_axis, save, save_all
 from activesteer.plotting.model import Area, Curve, Heat, Panel, Picture
 
 __all__ = [

@@ -14,7 +14,7 @@ from activesteer.drawing.panels import WHEELS, panels_in
 from activesteer.playback import Showing, runs_of, save
 from activesteer.playback.layout import blueprint
 from activesteer.playback.plots import links
-from activesteer.playback.stream import fill
+from activesteer.playback.viewer import fill
 from activesteer.playback.wheel_angles import plan_view
 from activesteer.recording import Recording
 from tests.render.headless import Headless, Picture, save_pictures

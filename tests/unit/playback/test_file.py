@@ -15,9 +15,9 @@ from activesteer.drawing.panels import MOTION, panels_in
 from activesteer.drawing.wheel_angles import SLICES, factors, tips_beside
 from activesteer.errors import PlaybackError
 from activesteer.playback import runs_of, save
+from activesteer.playback.car import use_colours
 from activesteer.playback.course import extent, map_bounds
 from activesteer.playback.plots import axis_range, views
-from activesteer.playback.tyres import use_colours
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
 from activesteer.signals import Channel
