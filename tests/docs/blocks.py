@@ -9,6 +9,7 @@ The convention, which a reader of the source sees:
 - `text` is neither.
 - A command with a comment that begins with `slow` is run by the slow tests only, one with `window` (it opens one) or
   `long` (it takes more than two minutes) by none. All are checked as far as the command line's own parser goes.
+- A comment with `exit status 1` announces a negative verdict.
 """
 
 from __future__ import annotations
@@ -64,6 +65,10 @@ class Command:
     @property
     def slow(self) -> bool:
         return self.comment.startswith("slow")
+
+    @property
+    def exit_status(self) -> int:
+        return 1 if "exit status 1" in self.comment else 0
 
     @property
     def never(self) -> bool:

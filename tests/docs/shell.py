@@ -23,7 +23,7 @@ ORDINARY = frozenset({"mkdir", "cp", "mv", "ls", "cat", "sed", "python"})
 
 def run(command: Command) -> None:
     """Run a command line and compare its output with the page."""
-    printed = "".join(_run(part.strip()) for part in command.words.split("&&"))
+    printed = "".join(_run(part.strip(), command.exit_status) for part in command.words.split("&&"))
     if command.output:
         assert same_output(command.output, printed), f"$ {command.words}\nprinted\n{printed}"
 
@@ -44,11 +44,11 @@ def check(command: Command) -> None:
             assert words[0] in ORDINARY | {"rerun", "cd"}, f"{words[0]}: no program of ours"
 
 
-def _run(line: str) -> str:
+def _run(line: str, exit_status: int = 0) -> str:
     words = shlex.split(line)
     match words[0]:
         case "activesteer":
-            return _activesteer(words[1:])
+            return _activesteer(words[1:], exit_status)
         case "cd":
             os.chdir(words[1])
         case "make":
@@ -65,7 +65,7 @@ def _run(line: str) -> str:
     return ""
 
 
-def _activesteer(words: list[str]) -> str:
+def _activesteer(words: list[str], exit_status: int) -> str:
     """Run the program in this process, where the kernels are already loaded."""
     target = Path(words.pop()) if len(words) > 1 and words[-2] == ">" else None
     if target is not None:
@@ -76,7 +76,9 @@ def _activesteer(words: list[str]) -> str:
             status = main(given)
         except SystemExit as end:  # argparse
             status = end.code
-    assert status == 0, f"activesteer {shlex.join(given)}: status {status}\n{out.getvalue()}\n{told.getvalue()}"
+    assert status == exit_status, (
+        f"activesteer {shlex.join(given)}: status {status}\n{out.getvalue()}\n{told.getvalue()}"
+    )
     if target is not None:
         target.write_text(out.getvalue(), encoding="utf-8")
         return ""
