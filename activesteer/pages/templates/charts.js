@@ -10,7 +10,7 @@ const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
 // Least size of a cone [px], otherwise cones and cars have their true size; distance between drawn cars [px].
 const LEAST_CONE = 2, CARS_APART = 110;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
-const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 118, PRINTED_TRACK_HEIGHT = 190;
+const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 106, PRINTED_TRACK_HEIGHT = 170;
 
 const SVG = "http://www.w3.org/2000/svg";
 const element = (name, attributes = {}, ...children) => {
@@ -120,7 +120,7 @@ class Chart {
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
     const { curves, areas, limits, names, log } = this.panel, given = this.panel[`${key}_range`] || [null, null];
-    if (key === "y" && names.length) return [-0.7, names.length - 0.3];
+    if (key === "y" && names.length) return [-1, names.length - 0.3];
     const all = [...curves.flatMap((curve) => curve[key]), ...(key === "x" ? areas.flatMap((area) => area.x) : [...areas.flatMap((area) => [...area.low, ...area.high]), ...limits.map(([value]) => value)])];
     const logged = log.includes(key);
     let low = Infinity, high = -Infinity;
@@ -160,7 +160,7 @@ class Chart {
   fit(width = null) {
     const columns = this.holder.parentElement.classList.contains("wide") ? 1 : 2;
     const room = width == null ? this.holder.clientWidth : columns === 1 ? width : (width - PRINTED_GAP) / 2;
-    if (room > 0 && room !== this.plot.width) { this.plot.setSize({ width: room, height: this.height }); this.whole(); }
+    if (room > 0 && (room !== this.plot.width || width != null)) { this.plot.setSize({ width: room, height: width == null ? this.height : Math.round(0.65 * this.height) }); this.whole(); }
   }
 
   repaint() { this.plot.redraw(false, true); }
