@@ -53,11 +53,7 @@ class Line(NamedTuple):
     views: tuple[str, ...] = _EVERYWHERE
 
     def of(self, recording: Channels) -> Array | None:
-        """Return the values of a run [SI]; None if they have no meaning.
-
-        Raises:
-            RecordingError: the run does not hold the channel.
-        """
+        """Return the values of a run [SI]; None if they have no meaning."""
         if self.beside and not _holds(recording, self.beside):
             return None
         values = recording[self.channel]
@@ -192,11 +188,7 @@ def added_lines(recording: Channels) -> list[Line]:
 
 
 def link_panels(channels: Iterable[str]) -> tuple[Panel, ...]:
-    """Return a panel for each corner with the axial forces of its links and springs.
-
-    Args:
-        channels: Recorded channels of links, such as `fl_spring_force_N`.
-    """
+    """Return a panel for each corner with the forces of its links and springs, from channels like `fl_spring_force_N`."""
     named = {corner: [name[3:] for name in channels if name.startswith(f"{corner}_")] for corner in CORNERS}
     # A part that all corners have, such as a spring, has the same colour in all of them.
     everywhere = [name for name in named[CORNERS[0]] if all(name in names for names in named.values())]

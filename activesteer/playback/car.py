@@ -20,15 +20,7 @@ from activesteer.road.course import Footprint, footprint_of
 
 
 def rotated(quaternions: Array, point: ArrayLike) -> Array:
-    """Rotate one point of a body by the orientations of that body.
-
-    Args:
-        quaternions: Orientations of the body over time, shape (n, 4).
-        point: The point in the frame of the body, shape (3,).
-
-    Returns:
-        Rotated point, shape (n, 3).
-    """
+    """Rotate one point of a body by the orientations of that body."""
     vector = np.asarray(point, np.float64)
     w, axis = quaternions[:, :1], quaternions[:, 1:]
     cross = 2.0 * np.cross(axis, vector)
@@ -47,16 +39,7 @@ def xyzw(quaternions: ArrayLike) -> Array:
 
 
 def between(start_m: Array, end_m: Array) -> tuple[Array, Array, Array]:
-    """Place a solid along the line between two points, with its own z axis on that line.
-
-    Args:
-        start_m: One end over time [m], shape (n, 3).
-        end_m: The other end [m], shape (n, 3).
-
-    Returns:
-        Length [m], shape (n,); centre [m], shape (n, 3); quaternion x y z w of the shortest rotation from the
-        vertical, shape (n, 4).
-    """
+    """Return length [m], centre [m] and quaternion x y z w of a solid whose z axis is the line between two points."""
     if end_m[0, 2] < start_m[0, 2]:  # point upwards: close to straight down, the shortest rotation has no definite axis
         start_m, end_m = end_m, start_m
     along = end_m - start_m
@@ -155,13 +138,7 @@ _USED: Final = tuple(f"{corner}_friction_utilisation" for corner in CORNERS)
 
 
 def send_tyre_forces(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) -> None:
-    """Send an arrow and a disc for each tyre, unless the recording lacks a channel that they need.
-
-    Args:
-        stream: Target of the data.
-        run: The run.
-        runs: All runs that are shown together; their arrows share one scale.
-    """
+    """Send an arrow and a disc for each tyre, unless the recording lacks a channel that they need."""
     if not run.has(*_USED, *CHANNELS):
         return
     origins, vectors = force_arrows(run.recording, force_scale([other.recording for other in runs]))
@@ -210,11 +187,6 @@ def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> 
     """Send bodies, their solids, and two level frames that move with the car.
 
     `NAME/car_frame` has the heading of the car, and `NAME/chase`, the frame of the camera, the direction of motion.
-
-    Args:
-        stream: Target of the data.
-        run: The run.
-        cutaway: Whether the body is transparent.
     """
     poses = run.recording.poses
     when = times(poses.time_s[run.poses])
@@ -251,13 +223,7 @@ def body_path(run: Run, body: str) -> str:
 
 
 def send_ghost(stream: rr.RecordingStream, run: Run, beside: Run) -> None:
-    """Send the body of a car as the view of another run shows it: transparent, and fainter the nearer the two cars are.
-
-    Args:
-        stream: Target of the data.
-        run: The run whose car is drawn.
-        beside: The run whose view shows the car.
-    """
+    """Send the body of a car for the view of another run: transparent, and fainter the nearer the two cars are."""
     poses = run.recording.poses
     time_s = poses.time_s[run.poses][::_GHOST_EVERY]
     alpha = np.rint(255.0 * _GHOST_OPACITY * share_seen(_apart(run, beside, time_s))).astype(np.uint32)

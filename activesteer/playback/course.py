@@ -125,13 +125,7 @@ def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
 
 
 def send_track(stream: rr.RecordingStream, run: Run, number: int) -> None:
-    """Send the track of a car and, on the map, its moving outline with steered wheels.
-
-    Args:
-        stream: Target of the data.
-        run: The run.
-        number: Index of the run; the line of each run lies a little above the line of the run before.
-    """
+    """Send the track of a car and, on the map, its moving outline with steered wheels."""
     track = _track(run)
     line = np.column_stack([track, np.full(len(track), 0.03 + 0.01 * number)])
     colour = bytes_of(run.colour)

@@ -34,12 +34,7 @@ _BELOW: Final = 12.0
 
 
 def legend(path: str, curves: Mapping[str, str]) -> rrb.Spatial2DView:
-    """Return the view of a legend.
-
-    Args:
-        path: Entity of the legend.
-        curves: Names and colours, `#rrggbb`.
-    """
+    """Return the view of a legend."""
     return rrb.Spatial2DView(
         origin=f"/{path}",
         name=f"Curves: {path.removeprefix(LEGEND)[1:]}",
@@ -54,13 +49,7 @@ def height(curves: Mapping[str, str]) -> float:
 
 
 def send_legend(stream: rr.RecordingStream, path: str, curves: Mapping[str, str]) -> None:
-    """Send a legend.
-
-    Args:
-        stream: Target of the data.
-        path: Entity of the legend.
-        curves: Names and colours, `#rrggbb`.
-    """
+    """Send a legend."""
     points = rr.Points2D(
         [(middle, (row + 0.5) * _ROW - _BELOW) for row, middle in _places(curves)],
         labels=list(curves),
@@ -203,13 +192,7 @@ _ABOVE: Final = rrb.EyeControls3D(position=(-1.3, 0.0, 6.5), look_target=(-1.3, 
 
 
 def blueprint(runs: Sequence[Run], *, compare: bool, page: int = 0) -> rrb.Blueprint:
-    """Return the layout of the viewer.
-
-    Args:
-        runs: The runs. If there are several, the first page shows all of them.
-        compare: Whether to leave out the pages of single runs.
-        page: The page of plots that is shown first.
-    """
+    """Return the layout of the viewer."""
     if len(runs) == 1:
         content = _page(runs[0], runs, page)
     elif compare:

@@ -36,13 +36,7 @@ def links(run: Run) -> tuple[Panel, ...]:
 
 
 def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
-    """Send the signals of every plot.
-
-    Args:
-        stream: Target of the data.
-        run: The run.
-        alone: Whether this is the only run. The lines of several runs have the colours of their runs.
-    """
+    """Send the signals of every plot."""
     when = times(run.recording.time_s)
     for plot in (*OF_CAR, *panels_in(WHEELS), *links(run)):
         own_colours = alone or plot not in OF_CAR
@@ -88,13 +82,7 @@ def pages(run: Run) -> dict[str, tuple[Panel, ...]]:
 
 
 def curves(plots: Sequence[Panel], run: Run, *, alone: bool) -> dict[str, str]:
-    """Return the names and colours of the lines of a run.
-
-    Args:
-        plots: The plots.
-        run: The run.
-        alone: Whether this is the only run; see `send_plots`.
-    """
+    """Return the names and colours of the lines of a run."""
     found = {}
     for plot in plots:
         own = alone or plot not in OF_CAR
@@ -115,13 +103,7 @@ def views(plots: Sequence[Panel], runs: Sequence[Run]) -> list[rrb.TimeSeriesVie
 
 
 def _range(plot: Panel, runs: Sequence[Run], beside: int) -> tuple[float, float]:
-    """Return the range of an axis, chosen from a few so that different runs mostly share it.
-
-    Args:
-        plot: The plot.
-        runs: The runs.
-        beside: Number of plots on the page.
-    """
+    """Return the range of an axis, chosen from a few so that different runs mostly share it."""
     values = [
         run.channel(line.channel) * plot.quantity.factor
         for run in runs
@@ -138,12 +120,6 @@ def axis_range(low: float, high: float, least: float, most: float) -> tuple[floa
     """Return a range that contains zero and in which the viewer draws at least three tick labels.
 
     The viewer labels multiples of one power of ten if they are at least 22 points apart.
-
-    Args:
-        low: Smallest value, at most 0.
-        high: Largest value, at least 0.
-        least: Smallest height of the range.
-        most: Largest height at which the labels are that far apart, in units of that power; at least 2.1.
     """
     if high - low < least:
         low, high = min(low, -0.5 * least), max(high, 0.5 * least)

@@ -20,11 +20,7 @@ TIMELINE: Final = "time"
 
 
 def times(time_s: NDArray[np.float64]) -> list[rr.TimeColumn]:
-    """Return the time index of columns.
-
-    Args:
-        time_s: Time of each row [s], shape (n,).
-    """
+    """Return the time index of columns."""
     return [rr.TimeColumn(TIMELINE, duration=np.rint(time_s * 1e9).astype("timedelta64[ns]"))]
 
 

@@ -42,14 +42,7 @@ def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
 
 
 def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, how: Showing) -> None:
-    """Send all data of the runs.
-
-    Args:
-        stream: Target of the data; choose its own target first.
-        runs: The runs.
-        layout: The layout; it replaces a layout that the viewer remembers.
-        how: Display options.
-    """
+    """Send all data of the runs."""
     stream.send_blueprint(layout, make_active=True, make_default=True)
     several = len(runs) > 1
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -76,12 +69,7 @@ def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint,
 
 
 def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
-    """Return a page in Markdown: scenario, results, metrics side by side, systems.
-
-    Args:
-        runs: The runs.
-        verdict: Results, line by line.
-    """
+    """Return a page in Markdown: scenario, results, metrics side by side, systems."""
     lines: list[str] = []
     for text in dict.fromkeys(_scenario(run.recording.metadata) for run in runs):
         lines += [f"**{text}**", ""]
@@ -234,11 +222,7 @@ def _run_viewer(
 
 
 def viewer_binary() -> Path:
-    """Return the viewer that rerun-sdk installs; the command `rerun` may be another version or not be on the path.
-
-    Raises:
-        PlaybackError: the viewer is missing.
-    """
+    """Return the viewer that rerun-sdk installs; the command `rerun` may be another version or not be on the path."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is not None and spec.origin is not None:
         binary = Path(spec.origin).with_name("rerun.exe" if os.name == "nt" else "rerun")

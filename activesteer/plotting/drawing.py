@@ -26,11 +26,7 @@ DOTS_PER_INCH: Final = 300
 
 
 def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
-    """Return an empty figure.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-    """
+    """Return an empty figure."""
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
     except ImportError as error:
@@ -76,11 +72,7 @@ _SCALE: Final = "viridis"
 
 
 def draw(picture: Picture) -> Figure:
-    """Draw a picture.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-    """
+    """Draw a picture."""
     count = len(picture.panels)
     columns = picture.columns or (2 if count == 4 else min(count, _BESIDE))
     rows = math.ceil(count / columns)
@@ -112,19 +104,7 @@ def draw(picture: Picture) -> Figure:
 def save_all(
     pictures: Mapping[str, Callable[[], Picture]], folder: str | os.PathLike[str], title: str = ""
 ) -> list[Path]:
-    """Draw pictures and write them as PNG files.
-
-    Args:
-        pictures: File name without its ending -> function that makes the picture.
-        folder: Folder for the files; it is created if it does not exist.
-        title: Beginning of every picture's title.
-
-    Returns:
-        The paths written, in the order given.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or a file cannot be written.
-    """
+    """Draw pictures and write them as PNG files."""
     directory = make_folder(folder, ParameterError)
     paths = []
     for name, make in pictures.items():

@@ -56,11 +56,7 @@ class Settings:
     """Whether the shells of the cars are transparent; the camera `wheel` always shows them so."""
 
     def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ParameterError: a setting is out of its range.
-        """
+        """Check the settings."""
         for kind, name, names in (("layout", self.layout, LAYOUTS), ("kind of gauges", self.gauges, GAUGES)):
             if name not in names:
                 raise ParameterError(f"there is no {kind} {name!r}; {nearest_names(name, names)}", value=name)
@@ -76,17 +72,7 @@ class Film:
     """Scenes and cameras for some recordings; use it in a `with` block."""
 
     def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
-        """Build the scenes.
-
-        Args:
-            recordings: Name -> recording. In an overlay, the camera follows the car of the first recording, and the
-                other cars are transparent.
-            settings: Camera, size, speed.
-
-        Raises:
-            ParameterError: there is no recording, or no such camera or wheel.
-            PlaybackError: a recording has no poses, or nothing can be drawn here.
-        """
+        """Build the scenes."""
         if not recordings:
             raise ParameterError("there is no recording to make a film of, at least one is needed")
         self.settings = settings
@@ -106,11 +92,7 @@ class Film:
         ]
 
     def __enter__(self) -> Self:
-        """Open the canvases.
-
-        Raises:
-            PlaybackError: nothing can be drawn here.
-        """
+        """Open the canvases."""
         for pane in self._panes:
             pane.open()
         return self
@@ -121,11 +103,7 @@ class Film:
             pane.close()
 
     def times(self, rate_hz: float) -> NDArray[np.float64]:
-        """Return the instants of the frames [s], from the first pose of any car to the last.
-
-        Args:
-            rate_hz: Frame rate [1/s].
-        """
+        """Return the instants of the frames [s], from the first pose of any car to the last."""
         start = min(track.start_s for track in self._tracks)
         end = max(track.end_s for track in self._tracks)
         step = self.settings.speed / rate_hz
@@ -133,11 +111,7 @@ class Film:
         return np.asarray(start + step * np.arange(count), np.float64)
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
-        """Return the frame of an instant, shape (height, width, 3).
-
-        Args:
-            time_s: The instant [s]; a car whose recording has ended keeps its last position.
-        """
+        """Return the frame of an instant, shape (height, width, 3)."""
         drawn = [pane.picture(time_s) for pane in self._panes]
         return drawn[0] if len(drawn) == 1 else np.hstack(drawn)
 

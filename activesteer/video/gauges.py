@@ -93,15 +93,7 @@ class Gauges:
         note: str = "",
         shown_with: Sequence[Dials] = (),
     ) -> None:
-        """Choose fonts and values.
-
-        Args:
-            dials: The runs, from top to bottom.
-            title: Title of the frame; if empty, the time is left out too.
-            size: Width and height of the frames [pixels].
-            note: Text behind the title, such as a slower speed.
-            shown_with: All runs of the film, if there are more than in `dials`; all panes then have the same gauges.
-        """
+        """Choose fonts and values."""
         self._dials = list(dials)
         self._title, self._note = title, note
         self._size = size
@@ -134,15 +126,7 @@ class Gauges:
         return self._columns[-1] * self._row * len(self._dials) + self._title_area()
 
     def draw(self, pixels: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
-        """Draw the gauges over a frame.
-
-        Args:
-            pixels: The frame, shape (height, width, 3); it is not changed.
-            time_s: The instant [s].
-
-        Returns:
-            The frame with gauges, of the same shape.
-        """
+        """Draw the gauges over a frame."""
         picture = Image.fromarray(np.ascontiguousarray(pixels))
         if self._title:
             self._headline(picture, f"{time_s:.2f} s")
@@ -253,12 +237,7 @@ class LargeSideslip:
     """Name and sideslip angle of each run, legible in a small picture."""
 
     def __init__(self, dials: Sequence[Dials], size: tuple[int, int]) -> None:
-        """Choose the fonts.
-
-        Args:
-            dials: The runs, from top to bottom.
-            size: Width and height of the frames [pixels].
-        """
+        """Choose the fonts."""
         self._dials, self._size = list(dials), size
         self._name, self._number = font(0.05 * size[1]), font(0.16 * size[1])
 
@@ -312,11 +291,7 @@ def used(recording: Recording, channel: str) -> bool:
 
 
 def text_scale(size: tuple[int, int]) -> float:
-    """Return the scale of texts relative to a frame of 640 x 480, at least so large that they can be read.
-
-    Args:
-        size: Width and height of the frames [pixels].
-    """
+    """Return the scale of texts relative to a frame of 640 x 480, at least so large that they can be read."""
     high = size[1] / 480.0
     return max(min(high, math.sqrt(size[0] / 640.0 * high)), LEGIBLE)
 

@@ -102,19 +102,7 @@ class RenderScene:
         drawn: DrawnSurface | None = None,
         edges: Edges | None = None,
     ) -> None:
-        """Build the scene.
-
-        Args:
-            cars: The cars.
-            course: Lanes, cones and path.
-            road: The road; a plain one by default.
-            size: Largest width and height of a frame [pixels].
-            drawn: Uneven surface of the road; None for a plane.
-            edges: Edges of a straight road without a course.
-
-        Raises:
-            PlaybackError: the recorded car, course or road cannot be built.
-        """
+        """Build the scene."""
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
             add_road(spec, road or Road(), drawn)
@@ -153,13 +141,7 @@ class RenderScene:
         return int(self.model.body_mocapid[self.model.body(body).id])
 
     def place(self, car: int, positions_m: Array, quaternions: Array) -> None:
-        """Place a car; call `update` to apply it.
-
-        Args:
-            car: Index of the car.
-            positions_m: Positions of its bodies [m], shape (bodies, 3).
-            quaternions: Their orientations, w x y z, shape (bodies, 4).
-        """
+        """Place a car; call `update` to apply it."""
         data, chassis = self.data, self._chassis[car]
         data.mocap_pos[self._mocap[car]] = positions_m
         data.mocap_quat[self._mocap[car]] = quaternions
@@ -168,12 +150,7 @@ class RenderScene:
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 
     def open_tail(self, car: int, share: float) -> None:
-        """Make the tail of a body transparent, so that the rear wheels are seen from behind.
-
-        Args:
-            car: Index of the car; without `tail_opens` nothing changes.
-            share: 0 for closed, 1 for open.
-        """
+        """Make the tail of a body transparent, so that the rear wheels are seen from behind."""
         open_rgba = np.array([*(3 * [_CUTAWAY_SHADE]), _TAIL_OPACITY])
         self.model.geom_rgba[self._tails[car]] = self._tail_rgba[car] * (1.0 - share * (1.0 - open_rgba))
 

@@ -52,13 +52,7 @@ _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 
 
 def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None) -> None:
-    """Add the surface; lower friction makes it bluer.
-
-    Args:
-        spec: The model.
-        road: The road, of which the friction `mu` is used.
-        drawn: Its uneven surface, drawn to scale above a plane that lies lower.
-    """
+    """Add the surface; lower friction makes it bluer."""
     colour = np.array(_colour(road.mu))
     spec.add_texture(
         name=_TEXTURE,
@@ -108,12 +102,7 @@ def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray
 
 
 def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
-    """Add the patches of other friction; later ones hide earlier ones.
-
-    Args:
-        spec: The model.
-        road: The road.
-    """
+    """Add the patches of other friction; later ones hide earlier ones."""
     for piece in road.pieces(-_FAR_M, _FAR_M, -_FAR_M, _FAR_M)[:_MAX_PIECES]:
         right, left = piece.corners_m[[0, 1]], piece.corners_m[[3, 2]]
         width, middle = np.linalg.norm(left.mean(axis=0) - right.mean(axis=0)), 0.5 * (left + right)
@@ -126,12 +115,7 @@ def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
 
 
 def add_course(spec: mujoco.MjSpec, course: Course) -> None:
-    """Add lanes, cones and the dashed path.
-
-    Args:
-        spec: The model.
-        course: The course.
-    """
+    """Add lanes, cones and the dashed path."""
     half = 0.5 * _LINE_M
     for _, start, end, right, left in course.lanes[:_MAX_LANES]:
         for side in (right, left):
@@ -164,11 +148,7 @@ class Edges(NamedTuple):
 
 
 def edges_beside(paths: Sequence[Array]) -> Edges | None:
-    """Return edges that all cars stay between; None if a car turns too far for a straight road.
-
-    Args:
-        paths: World x and y of each car, then any other columns [m], each of shape (k, 2 or more).
-    """
+    """Return edges that all cars stay between; None if a car turns too far for a straight road."""
     points = np.concatenate([path[:, :2] for path in paths])
     half = max(_LEAST_HALF_WIDTH_M, float(np.abs(points[:, 1]).max()) + _BESIDE_CAR_M)
     if half > _MOST_HALF_WIDTH_M:
@@ -177,12 +157,7 @@ def edges_beside(paths: Sequence[Array]) -> Edges | None:
 
 
 def add_edges(spec: mujoco.MjSpec, edges: Edges) -> None:
-    """Add the edges of a straight road, a mark every 10 m and a post every 50 m.
-
-    Args:
-        spec: The model.
-        edges: The edges.
-    """
+    """Add the edges of a straight road, a mark every 10 m and a post every 50 m."""
     half = 0.5 * _LINE_M
     for side in (-1.0, 1.0):
         y = side * edges.half_width_m

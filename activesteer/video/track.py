@@ -51,15 +51,7 @@ class Track:
     """
 
     def __init__(self, recording: Recording, name: str) -> None:
-        """Read the poses that can be drawn; a run that diverged ends with poses that cannot.
-
-        Args:
-            recording: The run.
-            name: Name of the run in error messages.
-
-        Raises:
-            PlaybackError: the recording has no poses of a car.
-        """
+        """Read the poses that can be drawn; a run that diverged ends with poses that cannot."""
         poses = recording.poses
         self.bodies = poses.names
         whole = poses.usable()
@@ -77,14 +69,7 @@ class Track:
         self._direction_rad = direction_of_motion(self._time_s, middle_m, self._heading_rad)
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
-        """Return the poses at an instant: the first pose before the recording, the last pose after it.
-
-        Args:
-            time_s: The instant [s].
-
-        Returns:
-            Positions [m], shape (bodies, 3); orientations, w x y z, shape (bodies, 4).
-        """
+        """Return positions [m] and orientations w x y z of the bodies at a time; the recording's end poses outside it."""
         last = len(self._time_s) - 1
         after = min(max(int(np.searchsorted(self._time_s, time_s, side="right")), min(1, last)), last)
         before = max(after - 1, 0)
@@ -120,11 +105,7 @@ class Track:
         return self._time_s, self._middles_m
 
     def wheel_place(self, corner: str) -> Array:
-        """Return the initial centre of a wheel relative to the chassis, in axes along its heading [m], shape (3,).
-
-        Raises:
-            PlaybackError: the car has no such wheel.
-        """
+        """Return the initial centre of a wheel relative to the chassis, in axes along its heading [m], shape (3,)."""
         body = f"{corner}_wheel"
         if body not in self.bodies:
             raise PlaybackError(
@@ -147,16 +128,7 @@ class Traces:
     def __init__(
         self, recording: Recording, track: Track, size: Footprint, colour: str, place: int = 0, *, uneven: bool = False
     ) -> None:
-        """Divide the traces into pieces.
-
-        Args:
-            recording: The run.
-            track: Poses of its car.
-            size: Size of the car.
-            colour: Colour of its system, `#rrggbb`.
-            place: Place of the car among the cars of the frame; the trace of a later car lies below.
-            uneven: Whether the road is uneven; the traces then lie at the height of the chassis.
-        """
+        """Divide the traces into pieces."""
         times, places = track.path()
         heights = places[:, 2] + _UNEVEN_Z_M if uneven else np.zeros(len(times))
         self._path = _pieces(
@@ -176,12 +148,7 @@ class Traces:
             self._skids.append((0.8 * width_m, _pieces(recording.time_s, np.column_stack([x_m, y_m, z_m]), slides)))
 
     def add(self, scene: mujoco.MjvScene, time_s: float) -> None:
-        """Add the traces up to an instant to a scene.
-
-        Args:
-            scene: The scene.
-            time_s: The instant [s].
-        """
+        """Add the traces up to an instant to a scene."""
         for width_m, (times, pieces), rgba in (
             (_WIDTH_M, self._path, self._rgba),
             *((width_m, made, _SKID_RGBA) for width_m, made in self._skids),
@@ -192,16 +159,7 @@ class Traces:
 
 
 def _pieces(times: Array, places: Array, drawn: np.ndarray) -> tuple[Array, Array]:
-    """Divide a line into pieces.
-
-    Args:
-        times: Instants [s], shape (k,).
-        places: Points [m], shape (k, 3).
-        drawn: Points at which the line is drawn, shape (k,).
-
-    Returns:
-        Times at the ends of the pieces [s], shape (n,), and their two ends [m], shape (n, 2, 3).
-    """
+    """Return the times at the ends of the pieces of a line [s], shape (n,), and both ends [m], shape (n, 2, 3)."""
     drawn = drawn & np.isfinite(places).all(axis=1)
     places = np.nan_to_num(places)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places[:, :2], axis=0).T))])
@@ -231,15 +189,7 @@ class Markings:
     def __init__(
         self, recording: Recording, track: Track, size: Footprint, colour: str, shown_with: Sequence[Recording]
     ) -> None:
-        """Prepare the markings.
-
-        Args:
-            recording: The run.
-            track: Poses of its car.
-            size: The size of the car.
-            colour: The colour of its system, `#rrggbb`.
-            shown_with: All runs of the frame; they share their scales.
-        """
+        """Prepare the markings."""
         self._track, self._rgb = track, shares_of(colour)
         self._tips = wheel_angles.tips_beside(size)
         self._factors = wheel_angles.factors(shown_with)
@@ -286,16 +236,7 @@ def add_geom(
     frame: Array,
     rgba: tuple[float, ...],
 ) -> mujoco.MjvGeom:
-    """Add a solid to a scene that is being drawn.
-
-    Args:
-        scene: The scene.
-        kind: Kind of the solid.
-        size: Its half sizes [m], shape (3,).
-        at: Its centre [m], shape (3,).
-        frame: Its axes as columns, shape (3, 3).
-        rgba: Its colour and opacity, 0 to 1.
-    """
+    """Add a solid to a scene that is being drawn."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, size, at, frame.ravel(), np.array(rgba, np.float32))
     scene.ngeom += 1
