@@ -117,7 +117,7 @@ def _recover(recording: Recording, options: argparse.Namespace) -> int:
 
 
 def _driver(recorded: Any) -> str:
-    """Name and parameters of the driver; recordings of earlier versions hold the name only."""
+    """Name and parameters of the driver. Recordings of earlier versions hold the name only."""
     if not isinstance(recorded, dict):
         return str(recorded)
     numbers = recorded.get("parameters", recorded)

@@ -144,7 +144,7 @@ class Runs:
         return ready
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
-        """Return the recording of a run; None if a newer choice has come."""
+        """Return the recording of a run, or None if a newer choice has come."""
         if stale():
             return None
         simulation = Simulation(scenario, controller)

@@ -110,7 +110,7 @@ def examine(
 
 
 _WIDE, _THIN = 3.6, 1.0
-"""Widths of the first and of the second curve of a controller [pt]; the two sides of a car may coincide."""
+"""Widths of the first and of the second curve of a controller [pt]. The two sides of a car may coincide."""
 _PALE: Final = 0.55
 """Share of white in the colour of the wide curve."""
 
@@ -142,7 +142,7 @@ def examination_page(result: Examination) -> Page:
 
 
 def _together(findings: Mapping[str, Findings]) -> list[Picture]:
-    """Return the pictures of several controllers laid over each other; empty for a single one.
+    """Return the pictures of several controllers laid over each other, or empty for a single one.
 
     A controller has one colour. The first curve of each panel, the turn to the left, is wide and pale, the second thin.
     """

@@ -100,7 +100,7 @@ def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> 
 
 
 def _metric_row(entry: KcMetric, *, banded: bool) -> list[Text]:
-    """Return the cells of a metric; those about bands only if the car has any."""
+    """Return the cells of a metric. Those about bands only if the car has any."""
     value = [
         entry.axle,
         Markup('<span title="{}">{}</span>').format(entry.definition, entry.name.replace("_", " ")),
