@@ -188,7 +188,7 @@ def added_lines(recording: Channels) -> list[Line]:
 
 
 def link_panels(channels: Iterable[str]) -> tuple[Panel, ...]:
-    """Return a panel for each corner with the forces of its links and springs, from channels like `fl_spring_force_N`."""
+    """Return a panel of link and spring forces for each corner, from channels such as `fl_spring_force_N`."""
     named = {corner: [name[3:] for name in channels if name.startswith(f"{corner}_")] for corner in CORNERS}
     # A part that all corners have, such as a spring, has the same colour in all of them.
     everywhere = [name for name in named[CORNERS[0]] if all(name in names for names in named.values())]

@@ -57,7 +57,7 @@ def angles_at(recording: Recording, time_s: Array | float) -> Array:
 
 
 def wedges(angle_rad: Array, factor: Sequence[int]) -> Array:
-    """Return wedges from straight ahead to the enlarged headings [m], tips at the origin, shape (..., 4, SLICES + 2, 2)."""
+    """Return wedges from straight ahead to the enlarged headings [m], tips at 0, shape (..., 4, SLICES + 2, 2)."""
     shown = np.nan_to_num(np.asarray(angle_rad, np.float64) * factor)
     along = shown[..., None] * np.linspace(0.0, 1.0, SLICES + 1)
     arc = RADIUS_M * np.stack([np.cos(along), np.sin(along)], axis=-1)
