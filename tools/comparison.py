@@ -22,7 +22,7 @@ from activesteer import simulate
 from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.analysis.general import METRICS as ENERGIES
 from activesteer.analysis.harm import MEASURES
-from activesteer.analysis.report.significance import Change, significance
+from activesteer.analysis.report.tables import Change, significance
 from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, Runs
 from activesteer.config import Source
 from activesteer.controllers import controller_spec

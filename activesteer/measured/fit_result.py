@@ -18,7 +18,7 @@ from activesteer.conventions import RUN_COLOURS, Array
 from activesteer.errors import StudyError
 from activesteer.files import json_text, make_folder, write_text
 from activesteer.pages import Page, Section, Table, render_page
-from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.units import parameter_title, quantity_of
 
 LEVEL: Final = 0.95
@@ -367,7 +367,7 @@ def _page(found: Fit, name: str) -> Page:
         Section("Remaining differences", tables=[Table("", columns, [each.words() for each in found.compared])])
     )
     for recording, compared in groupby(found.compared, lambda each: each.recording):
-        sections.append(Section(recording, pictures=[as_svg(draw(picture(list(compared))))]))
+        sections.append(Section(recording, pictures=[picture(list(compared))]))
     sections.append(Section("Assumptions", points=rests_on(found)))
     return Page(f"activesteer fit: {name}", f"Parameters from recordings: {name}", lead, sections)
 

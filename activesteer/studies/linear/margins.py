@@ -48,7 +48,7 @@ from activesteer.controllers.linear_form import (
 )
 from activesteer.conventions import GRAVITY_MPS2, Array
 from activesteer.pages import Page, Section, Table, write_page
-from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
 from activesteer.signals import Measurement
@@ -367,7 +367,7 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
         sorted(found, key=lambda each: (each.controller, each.loop)), lambda each: (each.controller, each.loop)
     ):
         loops = list(rows)
-        pictures = [as_svg(draw(_picture(loops)))] if loops[0].curves else []
+        pictures = [_picture(loops)] if loops[0].curves else []
         sections.append(Section(f"{controller}, opened at {loop}", pictures=pictures, tables=[_table(loops)]))
     title = f"Stability margins: {vehicle}"
     lead = [_LEAD] if any(each.curves for each in found) else []
