@@ -192,7 +192,7 @@ def results(group: Group) -> list[Result]:
     found = []
     for place, run in enumerate(group.runs):
         metrics = run.recording.metrics
-        well = tuple(kept(metrics)) or (("keeps the car",) if any(lost) and not lost[place] else ())
+        well = tuple(kept(metrics)) or (("stays under control",) if any(lost) and not lost[place] else ())
         figures = [_figure(name, metrics, first if place else None) for _, name in chosen]
         if not (_is_judged(group.runs[0]) and _is_judged(run)):
             figures = [figure._replace(change=Change.OTHER) for figure in figures]
