@@ -17,7 +17,8 @@ whose limit exceeds the driver's demand is OFF. A front wheel that a controller 
 At low speed the tyre builds up force slowly (relaxation length over speed), so that a wheel swings on it, and neither
 its deceleration nor a small slip tell of locking. There HOLD keeps the mean friction torque of the cycles before, and
 only a large slip releases the wheel. Beyond the peak of its friction a wheel would lock at a held pressure, so each
-wheel first rolls at less, in RECOVER, over the distance in which its tyre follows its slip. At standstill, rising pressures hand the car over to the driver.
+wheel first rolls at less, in RECOVER, over the distance in which its tyre follows its slip.
+At standstill, rising pressures hand the car over to the driver.
 
 Source of the cycle by wheel deceleration: Bosch, Automotive Handbook, chapter on ABS; Pasillas-Lepine (2006), Hybrid
 modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Fractions, thresholds and rates
