@@ -79,7 +79,7 @@ class Child:
         return self._received(length, end_s)
 
     def _problem(self, reason: BaseException, doing: str, limit_s: float) -> str | None:
-        """Return in words why there is no answer; None for an exception that is not the child's."""
+        """Return in words why there is no answer, or None for an exception that is not the child's."""
         if not isinstance(reason, EOFError | OSError):
             return None
         late = isinstance(reason, TimeoutError)
@@ -101,7 +101,7 @@ class Child:
 
 
 def _left_s(end_s: float) -> float:
-    """Return the time until a deadline; with less than nothing, a socket would not wait, and with nothing for ever."""
+    """Return the time until a deadline. With less than nothing, a socket would not wait, and with nothing for ever."""
     if (left_s := end_s - time.monotonic()) <= 0.0:
         raise TimeoutError
     return left_s

@@ -12,12 +12,12 @@ from typing import Any, Final
 MAX_SHOWN: Final = 200
 """Characters of a value that an error message repeats."""
 _MAX_MESSAGE: Final = 1000
-"""Characters of the longest error message; the middle of a longer one is left out."""
+"""Characters of the longest error message. The middle of a longer one is left out."""
 _GAP: Final = " ... "
 
 
 class ActiveSteerError(Exception):
-    """Base of every error that activesteer raises on purpose; its message is one line, made from its attributes.
+    """Base of every error that activesteer raises on purpose. Its message is one line, made from its attributes.
 
     Attributes:
         problem: The problem and its remedy.
@@ -43,7 +43,7 @@ class ActiveSteerError(Exception):
         allowed: Any = None,
         overridden: bool = False,
     ) -> None:
-        """Make the message; see the attributes."""
+        """Make the message (see the attributes)."""
         where = [f"{file}, line {line}" if line else file] if file and not overridden else []
         if key:
             where.append(f"override {key}" if overridden else key)
@@ -77,7 +77,7 @@ class DriverError(ActiveSteerError):
 
 
 class SimulationDiverged(ActiveSteerError):  # noqa: N818 - an event of the physics, named as one
-    """The state became non-finite, or the engine raised a warning; the recording so far is kept."""
+    """The state became non-finite, or the engine raised a warning. The recording so far is kept."""
 
 
 class RecordingError(ActiveSteerError):

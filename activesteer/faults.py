@@ -63,7 +63,7 @@ def _sensors() -> dict[str, Sensor]:
 
 
 MOTOR: Final = "motor_"
-"""Beginning of the parts that are electric motors; their places follow."""
+"""Beginning of the parts that are electric motors. Their places follow."""
 ACTUATORS: Final = {
     "rear": Actuator(("rl_steer", "rr_steer")),
     "rear_left": Actuator(("rl_steer",)),
@@ -183,7 +183,7 @@ class Fault:
 
     @property
     def size(self) -> float:
-        """Size in the unit of the part; 0 if the kind has none."""
+        """Size in the unit of the part, or 0 if the kind has none."""
         return next((value for name in _SIZES if (value := getattr(self, name)) is not None), 0.0)
 
     @property
@@ -230,7 +230,7 @@ _WHEN: Final = "@START[-END]"
 
 
 def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
-    """Read a fault into the table that a manoeuvre file has; the table is checked there."""
+    """Read a fault into the table that a manoeuvre file has. The table is checked there."""
     found = _FAULT.fullmatch(text.strip())
     if found is None or (found["start"] is None) is (start_s is None):
         if start_s is None:

@@ -1,4 +1,4 @@
-"""Limits of files from outside: size, count, depth and numbers; docs/limits.md says what they guarantee.
+"""Limits of files from outside: size, count, depth and numbers. The page `docs/limits.md` says what they guarantee.
 
 Every reader checks with these limits and functions before it uses what a file holds, so that a small file can fill
 neither memory nor time.
@@ -17,9 +17,9 @@ overflow."""
 
 # Text files and folders of them.
 MAX_TEXT_BYTES: Final = 2_000_000
-"""Default limit of a text file; files of the package have about 20 kB."""
+"""Default limit of a text file. Files of the package have about 20 kB."""
 MAX_CSV_BYTES: Final = 10_000_000
-"""Limit of a CSV; an hour of samples every 10 ms has 8 MB."""
+"""Limit of a CSV. An hour of samples every 10 ms has 8 MB."""
 MAX_TOML_DEPTH: Final = 32
 MAX_TOML_LETTERS: Final = 1000
 """Longest text of a TOML file."""
@@ -45,40 +45,40 @@ MAX_MEASURED_BYTES: Final = 2**30
 MAX_READER_BYTES: Final = 2**32
 """Memory of the child: a file of the largest size, and its numbers in several copies."""
 MAX_READER_S: Final = 120.0
-"""Time for opening a file and for reading a column; a column of the largest length takes some seconds."""
+"""Time for opening a file and for reading a column. A column of the largest length takes some seconds."""
 
 # Recordings.
 MAX_ROWS: Final = 20_000_000
 """Largest number of rows: five and a half hours at 1 ms, 160 MB in memory per channel."""
 MAX_CHANNELS: Final = 10_000
-"""Largest number of channels; a car has about 150."""
+"""Largest number of channels. A car has about 150."""
 MAX_FILE_BYTES: Final = 2**35
 """Largest size of a file; 20 million rows have about 15 GB. A sparse file of any size could take forever to read."""
 MAX_CHUNK_BYTES: Final = 2**26
-"""Largest size of a chunk, compressed or not; one second of a car is 1 MB."""
+"""Largest size of a chunk, compressed or not. One second of a car is 1 MB."""
 MAX_EXPANSION: Final = 200
 """Largest expansion of a chunk by decompression. The writer leaves a chunk uncompressed if it would exceed this ratio.
 Driving gives 2 to 4, standing still about 50."""
 MAX_OTHER_BYTES: Final = 2**28
-"""Largest size of all attachments, schemas and metadata together; models with meshes have about 50 MB."""
+"""Largest size of all attachments, schemas and metadata together. Models with meshes have about 50 MB."""
 MAX_OTHER_RECORDS: Final = 20_000
 """Largest number of attachments, schemas, topics and metadata records together."""
 MAX_FOREIGN_MESSAGES: Final = 100_000
 """Largest number of messages in topics of other tools in a chunk."""
 MAX_BODIES: Final = 1000
-"""Largest number of bodies with poses; a car has about 30."""
+"""Largest number of bodies with poses. A car has about 30."""
 MAX_PARTS: Final = 100_000
-"""Largest number of parts of a scene; a car has about 60."""
+"""Largest number of parts of a scene. A car has about 60."""
 MAX_EVENTS: Final = 10_000
 MAX_EVENT_LETTERS: Final = 2000
 MAX_DESCRIPTION_LETTERS: Final = 1000
 """Longest description of a channel."""
 MAX_NAME_LETTERS: Final = 5000
-"""Longest name of an entry or a controller; a controller name contains a path of up to 4096 letters."""
+"""Longest name of an entry or a controller. A controller name contains a path of up to 4096 letters."""
 MAX_METADATA_LETTERS: Final = 100_000
 MAX_METADATA_DEPTH: Final = 16
 MAX_METADATA_ENTRIES: Final = 20_000
-"""Largest number of named values in all tables of the metadata; a run has about 150."""
+"""Largest number of named values in all tables of the metadata. A run has about 150."""
 MAX_METADATA_ELEMENTS: Final = 5_000_000
 """Largest number of values in all lists of the metadata: a path with a point per centimetre for 20 km."""
 MAX_LIST_ELEMENTS: Final = 1_000_000
@@ -104,13 +104,13 @@ def check_number(value: float, error: type[ActiveSteerError], *, text: Any = Non
 
 
 def too_large(values: Any, *, infinite: bool = False) -> Any:
-    """Return which values are above `MAX_NUMBER`; nan is a missing value, infinity may be that of a diverged run."""
+    """Return which values are above `MAX_NUMBER`. Nan is a missing value, infinity may be that of a diverged run."""
     size = abs(values)
     return (size > MAX_NUMBER) & (size < math.inf) if infinite else size > MAX_NUMBER
 
 
 def check_numbers(values: Any, error: type[ActiveSteerError], *, infinite: bool = False, **place: Any) -> None:
-    """Refuse values above `MAX_NUMBER`; see `too_large`."""
+    """Refuse values above `MAX_NUMBER` (see `too_large`)."""
     wrong = too_large(values, infinite=infinite)
     if wrong.any():
         check_number(float(values[wrong].flat[0]), error, **place)

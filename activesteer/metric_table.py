@@ -48,7 +48,7 @@ CONES_MISSED: Final = "cones_missed"
 LANE_OVERSTEP: Final = "lane_overstep_m"
 STAYS_IN_LANES: Final = "stays_in_lanes"
 SIDESLIP_PEAKS: Final = ("sideslip_peak_abs_rad", "sideslip_peak_rad")
-"""Metrics of the largest sideslip angle; a manoeuvre has one of them."""
+"""Metrics of the largest sideslip angle. A manoeuvre has one of them."""
 
 
 class Better(StrEnum):
@@ -96,7 +96,7 @@ class Metric(NamedTuple):
 
     @property
     def unit_name(self) -> str:
-        """Name of the unit; empty for a pure number."""
+        """Name of the unit, or empty for a pure number."""
         return self.unit.name.removesuffix("-")
 
     @property
@@ -110,7 +110,7 @@ class Metric(NamedTuple):
         return self.form is not Form.NUMBER
 
     def text(self, value: float) -> str:
-        """Return a value [SI] as tables show it; `-` where the value is not defined (nan)."""
+        """Return a value [SI] as tables show it. `-` where the value is not defined (nan)."""
         if math.isnan(value):
             return "-"
         if self.form is Form.YES_OR_NO:
@@ -119,7 +119,7 @@ class Metric(NamedTuple):
         return text.lstrip("-") if float(text) == 0.0 else text
 
     def cost(self, value: float) -> float:
-        """Return what shall be small [SI]; the value itself where the metric has no preferred direction."""
+        """Return what shall be small [SI]. The value itself where the metric has no preferred direction."""
         if self.better is Better.SMALLER:
             return abs(value)
         return -value if self.better is Better.HIGHER else value

@@ -48,13 +48,13 @@ class NativeBlock:
 
     @property
     def is_watched(self) -> bool:
-        """True if somebody has replaced the method `step`, for example to watch it; compiled code then stays away."""
+        """True if somebody has replaced the method `step`, for example to watch it. Compiled code then stays away."""
         kind: Any = type(self)
         return "step" in vars(self) or kind.step is not kind._written_step
 
 
 def table(numbers: Table) -> Table:
-    """Return a block's numbers; compiled code makes an array of the record of their memory (`native_memory`)."""
+    """Return a block's numbers. Compiled code makes an array of the record of their memory (`native_memory`)."""
     return numbers
 
 
@@ -97,7 +97,7 @@ def values(block: NativeBlock) -> tuple[Any, ...]:
 
 
 def take(block: NativeBlock, record: tuple[Any, ...]) -> None:
-    """Give a block the attributes of its record, as a tuple; see `values`."""
+    """Give a block the attributes of its record, as a tuple (see `values`)."""
     for (name, hint), value in zip(_members(type(block)).items(), record, strict=True):
         if hint in _NUMBERS:
             setattr(block, name, hint(value))

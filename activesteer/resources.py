@@ -81,12 +81,12 @@ def list_controller_variants() -> list[str]:
 
 
 def find_driver_file(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a driver by its name or path; see `find_maneuver`."""
+    """Return the file of a driver by its name or path (see `find_maneuver`)."""
     return _find(name_or_path, models_dir() / "drivers", "driver", DriverError)
 
 
 def find_controller_variant(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a controller variant by its name or path; see `find_maneuver`."""
+    """Return the file of a controller variant by its name or path (see `find_maneuver`)."""
     return _find(name_or_path, models_dir() / "controllers", "controller", ControllerError)
 
 
@@ -143,7 +143,7 @@ def check_own(file: Path) -> None:
 
 
 def find_study(name_or_path: str | os.PathLike[str]) -> Path:
-    """Return the file of a study by its name or path; see `find_maneuver`."""
+    """Return the file of a study by its name or path (see `find_maneuver`)."""
     return _find(name_or_path, studies_dir(), "study", StudyError)
 
 

@@ -105,7 +105,7 @@ def numbers_of(message: type[tuple[Any, ...]]) -> tuple[Number, ...]:
 
 @functools.cache
 def widths_of(message: type[tuple[Any, ...]]) -> tuple[int, ...]:
-    """Return how many numbers each field of a message holds; see `numbers_of`."""
+    """Return how many numbers each field of a message holds (see `numbers_of`)."""
     fields = [number.field for number in numbers_of(message)]
     return tuple(fields.count(field) for field in get_type_hints(message))
 
@@ -126,7 +126,7 @@ def nested_fields(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
 
 
 def numbers_in(message: tuple[Any, ...]) -> list[float]:
-    """Return the numbers of a message one after the other; see `numbers_of`."""
+    """Return the numbers of a message one after the other (see `numbers_of`)."""
     row: list[float] = []
     for width, value in zip(widths_of(type(message)), message, strict=True):
         if width == 1:
@@ -142,7 +142,7 @@ def _types_of(message: type[tuple[Any, ...]]) -> tuple[Any, ...]:
 
 
 def message_of(kind: type[_Message], row: Iterable[float]) -> _Message:
-    """Return a message from its numbers; fields without numbers are None."""
+    """Return a message from its numbers. Fields without numbers are None."""
     numbers, fields = iter(row), []
     for width, hint in zip(widths_of(kind), _types_of(kind), strict=True):
         if width == 1:
@@ -153,7 +153,7 @@ def message_of(kind: type[_Message], row: Iterable[float]) -> _Message:
 
 
 def arrays_of(kind: type[_Message], rows: Any) -> _Message:
-    """Return a message whose fields are arrays, from rows of its numbers; a field without numbers is None.
+    """Return a message whose fields are arrays, from rows of its numbers. A field without numbers is None.
 
     Args:
         kind: Class of the message.
@@ -270,7 +270,7 @@ class Measurement(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Position and motion of the car over the ground, as the driver sees and feels them; no controller gets it.
+    """Position and motion of the car over the ground, as the driver sees and feels them. No controller gets it.
 
     Attributes:
         x_m: Position of the centre of gravity, world x [m].

@@ -120,7 +120,7 @@ EDGE_UNITS: Final = {
 
 
 def find_unit(name: str, *, any_case: bool = False) -> Unit | None:
-    """Return a unit by one of its names; None if there is none."""
+    """Return a unit by one of its names, or None if there is none."""
     return _IN_LOWER_CASE.get(name.lower()) if any_case else _UNITS.get(name)
 
 
@@ -141,7 +141,7 @@ def split_ending(name: str) -> tuple[str, Unit]:
 
 
 def unit_of(name: str) -> str:
-    """Return the name of the unit at the end of a name; empty for a pure number."""
+    """Return the name of the unit at the end of a name, or empty for a pure number."""
     return split_ending(name)[1].name
 
 

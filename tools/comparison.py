@@ -22,7 +22,7 @@ from activesteer import simulate
 from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.analysis.general import METRICS as ENERGIES
 from activesteer.analysis.harm import MEASURES
-from activesteer.analysis.report.significance import Change, significance
+from activesteer.analysis.report.tables import Change, significance
 from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, Runs
 from activesteer.config import Source
 from activesteer.controllers import controller_spec
@@ -42,13 +42,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HARMED_PROPORTION: Final = 0.01
-"""Largest proportion of runs of a population that a controller harms; see `analysis.harm`."""
+"""Largest proportion of runs of a population that a controller harms (see `analysis.harm`)."""
 TRACK_HARM_M: Final = 0.10
 """Largest growth of a lane overstep or path error by a controller in any run [m]."""
 
 
 class Target(NamedTuple):
-    """Verdict on a target of a controller; the text holds the target and the result."""
+    """Verdict on a target of a controller. The text holds the target and the result."""
 
     controller: str
     text: str
@@ -140,7 +140,7 @@ SHOWN: Final[dict[str, tuple[str, ...]]] = {
     ),
     "mu_jump": (*_ALONG_PATH, "track_deviation_max_m"),
 }
-"""Scenario -> metrics that are printed and drawn; the JSON has all metrics."""
+"""Scenario -> metrics that are printed and drawn. The JSON has all metrics."""
 SENSORS: Final = {"sensors.preset": "production", "sensors.seed": 1}
 """Sensors of all controllers."""
 ENTRY_SEEDS: Final = (1, 2, 3)
@@ -160,7 +160,7 @@ _COLUMN: Final = 7
 
 
 class Row(NamedTuple):
-    """One value of the table by its recorded metric [SI]; nan if the run does not define it."""
+    """One value of the table by its recorded metric [SI], or nan if the run does not define it."""
 
     scenario: str
     controller: str
@@ -268,7 +268,7 @@ def compare(
 
 
 def _entry_speed(vehicle: FileOrTable, controller: str, seed: int) -> float:
-    """Return the highest speed at which a car stays in the severe lane change, by bisection [m/s]; nan for none."""
+    """Return the highest speed at which a car stays in the severe lane change, by bisection [m/s], or nan for none."""
     changes = SENSORS | ENTRY_LINE | {"sensors.seed": seed}
     course = resolve(_LANE_CHANGE, vehicle, changes, ENTRY_DRIVER, [controller]).maneuver.course
     assert course is not None
@@ -344,7 +344,7 @@ def comparison_text(found: Population) -> str:
 
 
 def shown_growth(name: str, growth: float) -> str:
-    """Return the growth of a measure in its unit; `lost` where only the car without control gets so far."""
+    """Return the growth of a measure in its unit. `lost` where only the car without control gets so far."""
     measure = MEASURES[name]
     return f"{growth * measure.unit.factor:+.2f} {measure.unit.name}".rstrip() if math.isfinite(growth) else "undefined"
 
@@ -368,7 +368,7 @@ def _line(effect: SystemEffect) -> str:
 _RANGE: Final = 3.0
 """Ratio at which the colours end in both directions."""
 _WORSE, _NEUTRAL, _BETTER = "#e08a3c", "#f4f4f4", "#5b9fd0"
-"""Ends and middle of the colours; they are told apart without seeing red or green, and black can be read on them."""
+"""Ends and middle of the colours. They are told apart without seeing red or green, and black can be read on them."""
 _COLOURS: Final = (_WORSE, _NEUTRAL, _BETTER)
 _PALEST: Final = 0.2
 """Least depth of the colour of a better or worse value, so that it is seen to be one [-]."""
@@ -407,7 +407,7 @@ def comparison_figure(made: Comparison) -> Figure:
 
 
 def _shade(metric: str, value: float, first: float) -> float:
-    """Return how much better a value is than the first controller's, 1 at a factor of `_RANGE`; worse is below 0."""
+    """Return how much better a value is than the first controller's, 1 at a factor of `_RANGE`. Worse is below 0."""
     change = significance(metric, value, first)
     if change not in (Change.BETTER, Change.WORSE):
         return 0.0 if math.isfinite(value) else math.nan

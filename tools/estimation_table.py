@@ -45,7 +45,7 @@ COLUMNS: Final = ("samples", "friction_rms", "friction_max", "inside", "inside_a
 
 
 class Accuracy(NamedTuple):
-    """Errors of one run; nan without samples.
+    """Errors of one run, or nan without samples.
 
     Attributes:
         samples: Share of the samples that are loaded.
@@ -112,7 +112,7 @@ def _lasts(holds: NDArray[np.bool_], samples: int) -> NDArray[np.bool_]:
 
 
 def observed(vehicle: str, course: str, sensors: str, seed: int) -> Accuracy | None:
-    """Drive a course with the observer; None if the car or its estimator cannot."""
+    """Drive a course with the observer, or None if the car or its estimator cannot."""
     maneuver, changes = COURSES[course]
     noise = {} if sensors == "ideal" else {"sensors.seed": seed}
     try:

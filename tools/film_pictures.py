@@ -61,7 +61,7 @@ SCENES: Final = {
     "steady_state": Scene("slowly_increasing_steer", ("none", "ars"), 34.0, 38.0),
     "uneven_roads": Scene("kerb_strike", ("none",), 0.6, 2.6, "wheel", "full"),
 }
-"""Animations by their page; that on transient manoeuvres shows the one of README."""
+"""Animations by their page. That on transient manoeuvres shows the one of README."""
 
 
 def draw_films(names: Sequence[str] = ()) -> None:

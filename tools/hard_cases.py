@@ -81,7 +81,7 @@ COURSES: Final[dict[str, Course]] = {
         "split_mu_braking", None, {"road.mu_left": 0.7, "road.mu_right": 0.15, "duration_s": 14.0}, "typical", _STOP
     ),
 }
-"""Other cases; without a vehicle they drive that of the command line."""
+"""Other cases. Without a vehicle they drive that of the command line."""
 
 
 def sine_with_dwell(
@@ -99,7 +99,7 @@ def sine_with_dwell(
 
 
 def passes(row: Mapping[str, float]) -> bool:
-    """Return whether a sine with dwell keeps the limits; the displacement counts at all amplitudes."""
+    """Return whether a sine with dwell keeps the limits. The displacement counts at all amplitudes."""
     ratio_1000ms, ratio_1750ms, displacement_m = LIMITS
     return (
         abs(row["ratio_1000ms"]) <= ratio_1000ms

@@ -18,7 +18,7 @@ from activesteer.resources import models_dir
 
 NAME: Final = "bmw_m8"
 RATIO: Final = 14.3
-"""Steering ratio of the maker [-]; the tables of the Tesla have 15.48."""
+"""Steering ratio of the maker [-]. The tables of the Tesla have 15.48."""
 TESLA_RATIO: Final = 15.48
 TYRES: Final = {"front": ("275/35 ZR 20", 0.275), "rear": ("285/35 ZR 20", 0.285)}
 """Axle -> size and width [m]; aspect ratio 0.35, rim 20 in."""

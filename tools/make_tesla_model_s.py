@@ -38,7 +38,7 @@ MOTOR: Final = {
     "speed_radps": [0.0, 1900.0], "torque_Nm": [330.0, 330.0], "max_power_W": 150e3, "gear_ratio": 9.7,
     "efficiency": 0.9, "idle_loss_W": 300.0, "lag_s": 0.05, "rotor_inertia_kgm2": 0.0425,
 }  # fmt: skip
-"""The motor of each axle of a 85D, as a guess: 330 N m and half of the power of the car; its gear is the maker's, its
+"""The motor of each axle of a 85D, as a guess: 330 N m and half of the power of the car. Its gear is the maker's, its
 efficiency, loss, lag and inertia are assumptions."""
 WHEEL_KG: Final = 23.57
 """Of each wheel: `Iwf` and `Iwr` are those of a disc of 47.15 kg with the radius `r_stat0`, and that is what the
@@ -103,7 +103,7 @@ def tell_controllers(file: Path, name: str, command: str) -> None:
 
 
 def write_tyre(given: dict[str, Any], file: Path) -> None:
-    """Write the tyre as PAC2002; its radius is half of DIAMETER, as UNLOADED_RADIUS (0.314 m) is another tyre's."""
+    """Write the tyre as PAC2002. Its radius is half of DIAMETER, as UNLOADED_RADIUS (0.314 m) is another tyre's."""
     dimension = {
         "UNLOADED_RADIUS": 0.5 * given["DIAMETER"], "WIDTH": given["WIDTH"], "ASPECT_RATIO": given["ASPECT_RATIO"],
         "RIM_RADIUS": 0.5 * 0.0254 * given["RIM"], "RIM_WIDTH": given["RIM_WIDTH"],

@@ -38,7 +38,7 @@ REASONS: Final = ROOT / "tools" / "mutants.md"
 LEAST_PER_ROOM: Final = 15
 CACHES: Final = PLACE / "caches"
 TIME_LIMIT_S: Final = 400
-"""Longest time of the tests of a mutant; beyond it the mutant is caught [s]."""
+"""Longest time of the tests of a mutant. Beyond it the mutant is caught [s]."""
 
 
 class Room(NamedTuple):
@@ -121,7 +121,7 @@ OPERATORS: Final = (
     *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ZeroIterationForLoop"),
     *("ExceptionReplacer", "NumberReplacer"),
 )
-"""Operators of cosmic-ray that make plausible mistakes; any test would catch `<<` in place of `*`."""
+"""Operators of cosmic-ray that make plausible mistakes. Any test would catch `<<` in place of `*`."""
 _NO_CODE: Final = {"decorator", "raise_stmt", "fstring", "import_from", "import_name"}
 
 

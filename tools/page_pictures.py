@@ -29,7 +29,7 @@ SIZE: Final = (1000, 760)
 """Width and height of the browser's window [px]."""
 COLOURS: Final = 128
 FROM: Final = {"measured_lane_change": "Fitted"}
-"""Picture -> heading at its top; by default it shows the top of the page."""
+"""Picture -> heading at its top. By default it shows the top of the page."""
 
 
 def write_pages(folder: Path) -> dict[str, Path]:

@@ -22,10 +22,10 @@ import numpy as np
 from PIL import Image
 
 from activesteer import ActuatorCommand, Simulation, study
-from activesteer.analysis.figures import BY_KIND, style, time_histories, time_panels
-from activesteer.analysis.figures.style import SPEED, STEERING_WHEEL
+from activesteer.analysis.figures import BY_KIND, over_time, style
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.analysis.linear_plots import driver_loops_figure
+from activesteer.drawing.panels import PANELS, Line, Panel, panel_of
 from activesteer.plotting import Heat, Picture, draw, new_figure
 from activesteer.resources import list_maneuvers, models_dir
 from activesteer.scenario import resolve
@@ -36,7 +36,7 @@ from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
-from activesteer.units import DisplayUnit, Quantity, quantity_of
+from activesteer.units import DisplayUnit, quantity_of
 from tools.comparison import COMPARED, compare, comparison_figure, comparison_population_figure
 from tools.population_results import read_population
 
@@ -46,36 +46,41 @@ if TYPE_CHECKING:
 DOCS: Final = Path(__file__).resolve().parents[1] / "docs"
 DOTS_PER_INCH: Final = 100
 COLUMN_DOTS_PER_INCH: Final = 150
-"""Of a picture that is as narrow as a column; it comes out narrower than the others, with larger text."""
+"""Of a picture that is as narrow as a column. It comes out narrower than the others, with larger text."""
 COLOURS: Final = 64
 """A plot has few colours and their shades: a palette makes the file a third as large."""
 SYSTEMS: Final = ("none", "ars", "afs")
 CORNER_WORDS: Final = {"fl": "front left", "rl": "rear left"}
 
 
-def at_wheel(channel: str) -> Quantity:
-    """A corner's quantity with the corner in its name."""
+def at_wheel(channel: str) -> Panel:
+    """A panel of a corner with the corner in its name."""
     found = quantity_of(channel)
-    return found._replace(short=f"{found.short}\n{CORNER_WORDS[channel[:2]]}")
+    named = found._replace(short=f"{found.short}\n{CORNER_WORDS[channel[:2]]}")
+    return panel_of(channel)._replace(quantity=named)
 
 
 LOADS: Final = (at_wheel("fl_tyre_fz_N"), at_wheel("rl_tyre_fz_N"))
-DISTANCE: Final = quantity_of("path_distance_m")._replace(channel="x_m", short="distance", unit=DisplayUnit("mm", 1e3))
-RIDE: Final = (quantity_of("pitch_rad"), LOADS[0])
-PANELS: Final[Mapping[str, Sequence[Quantity]]] = {
-    "straight_line": (SPEED, at_wheel("fl_drive_torque_Nm"), *LOADS),
+DISTANCE: Final = Panel(
+    "Distance",
+    quantity_of("y_m")._replace(channel="x_m", short="distance", unit=DisplayUnit("mm", 1e3)),
+    (Line("x_m"),),
+)
+RIDE: Final = (panel_of("pitch_rad"), LOADS[0])
+PANELS_OF: Final[Mapping[str, Sequence[Panel]]] = {
+    "straight_line": (PANELS["speed"], at_wheel("fl_drive_torque_Nm"), *LOADS),
     "standstill": (DISTANCE, *LOADS),
     "hill_hold": (DISTANCE, at_wheel("fl_brake_torque_Nm"), *LOADS),
-    "drive_off_and_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
-    "start_stop": (SPEED, quantity_of("ax_mps2"), quantity_of("pitch_rad"), *LOADS),
+    "drive_off_and_stop": (PANELS["speed"], panel_of("ax_mps2"), panel_of("pitch_rad"), *LOADS),
+    "start_stop": (PANELS["speed"], panel_of("ax_mps2"), panel_of("pitch_rad"), *LOADS),
     **dict.fromkeys(("rough_road", "rough_road_50", "rough_road_120", "cleat", "kerb_strike"), RIDE),
-    "rough_braking": (SPEED, at_wheel("fl_brake_pressure_Pa"), LOADS[0]),
-    **dict.fromkeys(("rough_lane_change", "banked_curve"), (quantity_of("yaw_rate_radps"), LOADS[0])),
+    "rough_braking": (PANELS["speed"], at_wheel("fl_brake_pressure_Pa"), LOADS[0]),
+    **dict.fromkeys(("rough_lane_change", "banked_curve"), (panel_of("yaw_rate_radps"), LOADS[0])),
     "straight_braking": (
-        SPEED, quantity_of("ax_mps2"), at_wheel("fl_brake_pressure_Pa"), at_wheel("rl_brake_pressure_Pa"),
+        PANELS["speed"], panel_of("ax_mps2"), at_wheel("fl_brake_pressure_Pa"), at_wheel("rl_brake_pressure_Pa"),
     ),
     "parking": (
-        STEERING_WHEEL, at_wheel("fl_steer_rad"), at_wheel("fl_tyre_mz_Nm"), at_wheel("fl_tie_rod_force_N"),
+        PANELS["steering_wheel"], at_wheel("fl_steer_rad"), at_wheel("fl_tyre_mz_Nm"), at_wheel("fl_tie_rod_force_N"),
     ),
 }  # fmt: skip
 """What shows a manoeuvre better than the general picture: where the car goes straight or stands, that is rounding."""
@@ -114,13 +119,13 @@ def draw_pictures(names: Sequence[str]) -> None:
 def _manoeuvre(name: str) -> Figure:
     scenario = with_amplitude_found(resolve(name))
     kind = scenario.maneuver.kind
-    # In those of PANELS no system has anything to do.
-    runs = {system: run_scenario(scenario, system) for system in (("none",) if name in PANELS else SYSTEMS)}
+    # In those of PANELS_OF no system has anything to do.
+    runs = {system: run_scenario(scenario, system) for system in (("none",) if name in PANELS_OF else SYSTEMS)}
     if kind in {"sine_sweep", "random_steer"}:
         return _frequency_responses(runs)
-    if name not in PANELS:
+    if name not in PANELS_OF:
         return _draw(kind, runs)
-    figure = time_panels.time_figure(runs, PANELS[name])
+    figure = over_time.time_figure(runs, PANELS_OF[name])
     for axis in figure.get_axes():
         low, high = axis.get_ylim()
         if high - low < MIN_SPAN:
@@ -343,7 +348,7 @@ def _envelope(name: str) -> Figure:
 
 
 def _draw(kind: str, runs: Mapping[str, Any]) -> Figure:
-    return BY_KIND.get(kind, time_histories.general)(runs)
+    return BY_KIND.get(kind, over_time.time_figure)(runs)
 
 
 def _save(figure: Figure, path: Path) -> None:

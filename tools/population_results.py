@@ -144,7 +144,7 @@ class SystemEffect:
     worst_track_m: float = math.nan
 
     def median_change(self, metrics: Sequence[str]) -> float:
-        """Return the median change of the first metric that the scenario has; nan if it has none of them."""
+        """Return the median change of the first metric that the scenario has, or nan if it has none of them."""
         medians = {change.metric: change.median for change in self.changes}
         return next((medians[name] for name in metrics if name in medians), math.nan)
 
@@ -198,7 +198,7 @@ class Population:
     worst: tuple[WorstRun, ...] = ()
 
     def of(self, claim: str) -> ClaimProportion | None:
-        """Return the proportion of a claim; None for an unknown claim."""
+        """Return the proportion of a claim, or None for an unknown claim."""
         return next((proportion for proportion in self.claims if proportion.id == claim), None)
 
     @property
@@ -272,7 +272,7 @@ class Population:
 
 
 def read_population(name: str) -> Population | None:
-    """Return the results that the package stores of a study, `population` or `comparison`; None if it stores none."""
+    """Return the stored results of a study, `population` or `comparison`, or None if there are none."""
     table = stored_table(name)
     return None if table is None else Population.from_json(table)
 
@@ -280,7 +280,7 @@ def read_population(name: str) -> Population | None:
 def population_study(
     samples: int | None = None, seed: int | None = None, vehicle: FileOrTable | None = None
 ) -> StudyFile:
-    """Return the study of the paper's claims; values that are not given are those of its file."""
+    """Return the study of the paper's claims. Values that are not given are those of its file."""
     return _study(STUDY, samples, seed, vehicle)
 
 
@@ -335,7 +335,7 @@ def population(
 
 
 def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()) -> Population:
-    """Count the results of a population's runs as far as it is; a comparison has no nominal claims."""
+    """Count the results of a population's runs as far as it is. A comparison has no nominal claims."""
     rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
     names = [label_of(controller) for controller in planned.controllers]
     without = [row for row in rows if row["controller"] == NONE]
@@ -419,7 +419,7 @@ def _count(held: Iterable[bool]) -> Proportion:
 
 
 def _has_lowest_peak(runs: Mapping[tuple[str, int], Row], system: str, sample: int) -> bool:
-    """Return whether the peak sideslip angle is below that of every reference; a run without a peak has the largest."""
+    """Return whether the peak sideslip angle is below that of every reference. A run without a peak has the largest."""
 
     def peak(controller: str) -> float:
         row = runs.get((controller, sample), {})

@@ -110,7 +110,7 @@ relative to the same sample without control: median, and the range of 90 % of th
 
 
 def driven(options: argparse.Namespace, controllers: Sequence[str] | None, name: str) -> tuple[Population, Path]:
-    """Drive a population or what is missing of it; return its results and the folder of its runs."""
+    """Drive a population or what is missing of it. Return its results and the folder of its runs."""
     output = options.output or Path("build", name)
     with RunCounter("population", quiet=False) as counter:
         found = population(options.samples, controllers, output=output, jobs=options.jobs, progress=counter)

@@ -8,8 +8,10 @@ The exit status is 1 if a comparison is outside its tolerance. `docs/validation.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -18,10 +20,10 @@ from activesteer.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.files import write_json
 from activesteer.pages import write_page
-from tests.reference.chrono.comparison import to_json
+from tests.reference.chrono.comparison import Comparison, to_json
 from tests.reference.chrono.programme import validate, write_runs
 from tests.reference.chrono.study import TITLES, responses
-from tests.reference.chrono.validation_page import comparison_table, study_table, validation_page
+from tests.reference.chrono.validation_page import study_table, validation_page
 
 
 def main() -> int:
@@ -58,12 +60,24 @@ def _validate(options: argparse.Namespace) -> int:
         rows = {key: [row._asdict() for row in found] for key, found in tables.items()}
         print(json.dumps(to_json(result.comparisons) | rows, indent=2))
         return 1 if result.outside else 0
-    print("\n".join(comparison_table(result.comparisons).lines()))
+    print("\n".join(_lines(result.comparisons)))
     kept = result.judged - len(result.outside)
     print(f"{kept} of {result.judged} comparisons within tolerance (! outside, ~ no tolerance)")
     for title, rows in titled.items():
         print("\n".join((title, *study_table(rows).lines())))
     return 1 if result.outside else 0
+
+
+def _lines(rows: Sequence[Comparison]) -> Iterator[str]:
+    """Yield the comparisons in 80 columns, grouped by their runs."""
+    for run, group in itertools.groupby(rows, lambda row: row.run):
+        yield run
+        for row in group:
+            _, quantity, ours, reference, error, tolerance = row.words()
+            mark = {None: "~", True: " ", False: "!"}[row.inside]
+            percent = " %" if error.endswith("%") else "  "
+            numbers = f"{ours.split()[0]:>9}  {reference:12.12} {error.split()[0]:>10}{percent}  {tolerance}"
+            yield f"{mark} {quantity:31.31} {numbers}"
 
 
 if __name__ == "__main__":

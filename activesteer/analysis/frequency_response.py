@@ -26,7 +26,7 @@ from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 
 INPUT: Final = "steering_wheel_demand_rad"
-"""The driver's demand; the steering wheel follows it within a millisecond."""
+"""The driver's demand. The steering wheel follows it within a millisecond."""
 OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 """Channels whose response is evaluated."""
 HALF_BAND_LINES: Final = 2
@@ -169,7 +169,7 @@ def frequency_response_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _falls_to(x: NDArray[np.float64], y: NDArray[np.float64], level: float) -> float:
-    """Return the first abscissa at which y falls to a level, interpolated; nan if it never does."""
+    """Return the first abscissa at which y falls to a level, interpolated, or nan if it never does."""
     below = np.flatnonzero((y[1:] <= level) & (y[:-1] > level))
     if below.size == 0:
         return math.nan

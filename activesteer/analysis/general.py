@@ -56,7 +56,7 @@ def general_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def measured_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the metrics whose channels were measured; a car on a proving ground has no sensors of tyre forces."""
+    """Return the metrics whose channels were measured. A car on a proving ground has no sensors of tyre forces."""
     values: dict[str, float] = {}
     for name, unit in SIGNALS:
         with suppress(RecordingError):
@@ -81,7 +81,7 @@ METRICS: Final = ("battery_energy_J", "steering_energy_J", "brake_energy_J")
 
 
 def energy_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the energies of a run; nothing for a car without motors."""
+    """Return the energies of a run, or nothing for a car without motors."""
     vehicle = recording.metadata.get("vehicle")
     if not isinstance(vehicle, Mapping) or not vehicle.get("motors"):
         return {}
@@ -165,7 +165,7 @@ def seat_acceleration_mps2(recording: RecordingLike) -> float:
 
 
 def weighted(acceleration_mps2: Array, step_s: float) -> Array:
-    """Return a vertical acceleration filtered by W_k; its mean is removed first."""
+    """Return a vertical acceleration filtered by W_k. Its mean is removed first."""
     spectrum = np.fft.rfft(acceleration_mps2 - np.mean(acceleration_mps2))
     gain = weighting(np.asarray(np.fft.rfftfreq(len(acceleration_mps2), step_s), np.float64))
     return np.fft.irfft(spectrum * gain, len(acceleration_mps2))

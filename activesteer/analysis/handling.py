@@ -64,7 +64,7 @@ class CarGeometry(NamedTuple):
 
 
 class Handling(NamedTuple):
-    """Steady-state handling in one test. Gradients are over lateral acceleration; nan if the test does not define them.
+    """Steady-state handling in one test. Gradients are over lateral acceleration, or nan if not defined.
 
     Attributes:
         understeer_gradient_radpmps2: EG, at the road wheel [rad/(m/s2)].

@@ -26,7 +26,7 @@ from activesteer.metric_table import (
 from activesteer.units import DisplayUnit, display_unit
 
 Metrics = Mapping[str, float | None]
-"""Metrics of a run; a value that is not defined is None or nan."""
+"""Metrics of a run. A value that is not defined is None or nan."""
 
 LOST_SIDESLIP_RAD: Final = math.radians(20.0)
 """Largest sideslip angle of a car that is not lost [rad]."""
@@ -56,7 +56,7 @@ def is_lost(metrics: Metrics) -> bool:
 
 
 def is_controlled(metrics: Metrics) -> bool:
-    """Return whether nothing tells that the car was lost; a manoeuvre may have no metric that could."""
+    """Return whether nothing tells that the car was lost. A manoeuvre may have no metric that could."""
     tells = any(name in metrics for name in (*SIDESLIP_PEAKS, "heading_end_rad"))
     return not ((tells and has_spun(metrics)) or _leaves_course(metrics))
 
@@ -82,7 +82,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
 
 
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
-    """Describe the requirements that a run with these metrics met; empty if the manoeuvre has none."""
+    """Describe the requirements that a run with these metrics met, or empty if the manoeuvre has none."""
     if metrics.get(STAYS_IN_LANES) == 1.0:
         yield "stays in the lanes"
     if metrics.get(CONES_MISSED) == 0.0 and not metrics.get(CONES_HIT):
@@ -243,5 +243,5 @@ def severity(change: Mapping[str, float]) -> float:
 
 
 def track_harm_m(change: Mapping[str, float]) -> float:
-    """Return the growth of lane overstep or path error [m]; nan if the manoeuvre has neither."""
+    """Return the growth of lane overstep or path error [m], or nan if the manoeuvre has neither."""
     return max((change[name] for name in TRACK if name in change), default=math.nan)

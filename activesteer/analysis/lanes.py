@@ -61,7 +61,7 @@ def cone_distances(recording: RecordingLike, course: Course, car: Footprint) -> 
 
 
 def _distances(recording: RecordingLike, points_m: Array, car: Footprint) -> Array:
-    """Return the smallest distance of each point from the body over the run [m], below 0 inside; points are (n, 2)."""
+    """Return the smallest distance of each point from the body over the run [m], below 0 inside. Points are (n, 2)."""
     front_x, front_y, cos, sin = _pose(recording)
     middle_m = 0.5 * (car.front_m + car.rear_m)
     half_length_m = car.front_m - middle_m
@@ -117,7 +117,7 @@ def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
 
 
 def first_at(recording: RecordingLike, x_m: float) -> int | None:
-    """Return the index of the first sample at which the front axle centre has reached an x; None if it never does."""
+    """Return the first sample at which the front axle centre has reached an x, or None if it never has."""
     reached = np.flatnonzero(front_axle(recording)[0] >= x_m)
     return int(reached[0]) if reached.size else None
 
@@ -165,7 +165,7 @@ def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -
 
 
 def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
-    """Return distance along a path and distance to its left [m] of a car that follows it; the path may cross itself."""
+    """Return distance along a path and distance to its left [m] of a car that follows it. The path may cross itself."""
     along, beside = np.empty(len(x_m)), np.empty(len(x_m))
     at = 0
     for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):
@@ -191,7 +191,7 @@ def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
 
 
 def largest_difference(first: RecordingLike, second: RecordingLike, from_x_m: float, to_x_m: float) -> float:
-    """Return the largest lateral distance between two tracks at the same x [m]; nan if one does not cover the range."""
+    """Return the largest lateral distance of two tracks at the same x [m], or nan if one does not cover the range."""
     x = np.linspace(from_x_m, to_x_m, max(2, math.ceil((to_x_m - from_x_m) / 0.1) + 1))
     return float(np.abs(track_over_x(first, x) - track_over_x(second, x)).max())
 
@@ -200,7 +200,7 @@ BEFORE_M: Final = 20.0
 AFTER_M: Final = 50.0
 """Length of the road before the first gate and after the last gate [m]."""
 BESIDE_M: Final = 2.0
-"""Width of the road beside the course [m]; a car further off is outside the picture."""
+"""Width of the road beside the course [m]. A car further off is outside the picture."""
 
 
 class CourseView(NamedTuple):

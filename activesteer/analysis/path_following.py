@@ -204,7 +204,7 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
 
 
 def _lap(recording: RecordingLike, course: Course) -> dict[str, float]:
-    """Return the time to the end of a path, and the largest overstep of its edges; nan for a path without its end."""
+    """Return the time to the end of a path and the largest overstep of its edges, or nan for an unfinished path."""
     every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
     x, y, time_s = (np.asarray(values)[::every] for values in (*lanes.front_axle(recording), recording.time_s))
     along, beside = lanes.places_along(x, y, course.path)

@@ -61,7 +61,7 @@ class EvaluatedRun(NamedTuple):
 
 
 Runs = Mapping[EvaluatedRun, Mapping[str, float | None]]
-"""Place of a run -> its metrics; a metric that the run does not define is None or nan."""
+"""Place of a run -> its metrics. A metric that the run does not define is None or nan."""
 
 
 class Names(NamedTuple):
@@ -95,7 +95,7 @@ class Expression:
     wanted = "a sum of metrics such as yaw_rate_overshoot(ars) is needed"
 
     def __init__(self, text: str, names: Names, source: Source, where: tuple[str, ...]) -> None:
-        """Read an expression; errors name its place in the source."""
+        """Read an expression. Errors name its place in the source."""
         self.text, self._names = text, names
         self.metrics: dict[tuple[str, EvaluatedRun], None] = {}
         self.comparisons: list[tuple[_Number, str, _Number]] = []
@@ -111,7 +111,7 @@ class Expression:
             raise self._fail("there is no metric of a run, such as lane_overstep_m(none),")
 
     def __call__(self, runs: Runs) -> float:
-        """Return the value; nan if it is not defined."""
+        """Return the value, or nan if it is not defined."""
         return self._value(runs)
 
     def undefined(self, runs: Runs) -> set[str]:
@@ -175,7 +175,7 @@ class Expression:
 
 
 class Requirement(Expression):
-    """A comparison of such numbers, or several; its value is the margin, which is negative if it is violated."""
+    """A comparison of such numbers, or several. Its value is the margin, which is negative if it is violated."""
 
     wanted = "a comparison such as stopping_distance_m(none) <= 45 is needed"
 
@@ -195,7 +195,7 @@ class Requirement(Expression):
         return lambda runs: _all([margin(runs) for margin in margins])
 
     def _comparison(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> _Number:
-        """Return the margin; the limit is the side without a metric, or else the right one."""
+        """Return the margin. The limit is the side without a metric, or else the right one."""
         one, other = self._number(left), self._number(right)
         self.comparisons.append((one, _SIGNS[type(sign)], other))
         less, more = (one, other) if isinstance(sign, (ast.Lt, ast.LtE)) else (other, one)
@@ -223,19 +223,19 @@ def _value_of(name: str, run: EvaluatedRun) -> _Number:
 
 
 def _ratio(one: float, other: float) -> float:
-    """Return the quotient; infinite for a division of another number by 0."""
+    """Return the quotient, or infinite for a division of another number by 0."""
     if other:
         return one / other
     return math.copysign(math.inf, one) if one else math.nan
 
 
 def least(values: Sequence[float]) -> float:
-    """Return the smallest value; nan if one is not defined."""
+    """Return the smallest value, or nan if one is not defined."""
     return math.nan if any(map(math.isnan, values)) else min(values)
 
 
 def _all(margins: Sequence[float]) -> float:
-    """Return the smallest margin; nan if one is not defined and no other is negative."""
+    """Return the smallest margin, or nan if one is not defined and no other is negative."""
     known = [margin for margin in margins if not math.isnan(margin)]
     return min(known) if len(known) == len(margins) or min(known, default=0.0) < 0.0 else math.nan
 

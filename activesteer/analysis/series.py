@@ -36,7 +36,7 @@ PEAK_MARGIN: Final = 0.005
 
 
 class StepResponse(NamedTuple):
-    """Response of a signal to a step. Times count from the step; undefined values are nan.
+    """Response of a signal to a step. Times count from the step. Undefined values are nan.
 
     Attributes:
         steady_state: Value at the end.
@@ -104,13 +104,13 @@ def largest_rate(values: Array, timestep_s: float) -> float:
 
 
 def rate_rms(values: Array, timestep_s: float) -> float:
-    """Return the root mean square of the rate of change over `RATE_SPAN_S`; see `largest_rate`."""
+    """Return the root mean square of the rate of change over `RATE_SPAN_S` (see `largest_rate`)."""
     span = max(1, round(RATE_SPAN_S / timestep_s))
     return rms(values[span:] - values[:-span]) / (span * timestep_s)
 
 
 def rms(values: Array) -> float:
-    """Return the root mean square, in the unit of the values; nan for no values."""
+    """Return the root mean square, in the unit of the values, or nan for no values."""
     return float(np.sqrt(np.mean(np.square(values, dtype=np.float64)))) if len(values) else math.nan
 
 
@@ -241,7 +241,7 @@ FAST_RADPS: Final = math.radians(75.0)
 FAST_FOR_S: Final = 0.2
 """Least duration of this rate [s]."""
 THRESHOLD_RAD: Final = math.radians(5.0)
-"""Steering wheel angle whose first passing is the beginning of steer [rad]; the range ends before it."""
+"""Steering wheel angle whose first passing is the beginning of steer [rad]. The range ends before it."""
 RANGE_S: Final = 1.0
 """Length of the range [s]."""
 _AVERAGED_S: Final = 0.1
@@ -264,7 +264,7 @@ def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
 
 
 def offset(values: Array, samples: slice) -> float:
-    """Return the mean of a signal over some samples; 0 for no samples.
+    """Return the mean of a signal over some samples, or 0 for no samples.
 
     The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
     """
@@ -317,6 +317,6 @@ def crossings(x: Array, y: Array, *, rising: bool) -> Array:
 
 
 def slope_at_zero(x: Array, y: Array, within: float) -> float:
-    """Return the slope of the line through the points near abscissa zero; nan for fewer than three points."""
+    """Return the slope of the line through the points near abscissa zero, or nan for fewer than three points."""
     near = np.abs(x) <= within
     return float(np.polynomial.Polynomial.fit(x[near], y[near], 1).convert().coef[1]) if near.sum() > 2 else math.nan

@@ -39,13 +39,13 @@ STEERING_CUT_OFF_Hz: Final = 10.0
 MOTION_CUT_OFF_Hz: Final = 6.0
 """Cut-off frequency for yaw rate and lateral acceleration [Hz]."""
 LONGEST_CREEP_S: Final = 0.1
-"""Longest time from the threshold to the centre [s]; a slower wheel creeps, and its line is extrapolated."""
+"""Longest time from the threshold to the centre [s]. A slower wheel creeps, and its line is extrapolated."""
 PEAK_PROMINENCE: Final = 0.02
 """Least prominence of a peak of the yaw rate, as a fraction of the largest one."""
 INSTANTS_S: Final = (1.0, 1.75)
 """Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
 DISPLACEMENT_TIME_S: Final = 1.07
-"""Time after the beginning of steer at which the lateral displacement is taken [s]; FMVSS 126 requires 1.83 m from a
+"""Time after the beginning of steer at which the lateral displacement is taken [s]. FMVSS 126 requires 1.83 m from a
 car up to 3500 kg, from 5 A on."""
 RATIO_LIMITS: Final = (0.35, 0.20)
 """Largest allowed ratios at `INSTANTS_S`."""
@@ -196,7 +196,7 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
 
 
 def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, float]:
-    """Return time and value of the first prominent maximum after a time; of the largest value if there is none."""
+    """Return time and value of the first prominent maximum after a time, or of the largest value if there is none."""
     from scipy.signal import find_peaks  # noqa: PLC0415 - takes half a second to import
 
     after = np.flatnonzero(time_s >= begin_s)
@@ -237,5 +237,5 @@ def integrated_displacement(time_s: NDArray[np.floating], ay_mps2: NDArray[np.fl
 
 
 def _at(time_s: Array, values: NDArray[np.floating], instant_s: float) -> float:
-    """Return the value at a time, interpolated; nan after the end of the run."""
+    """Return the value at a time, interpolated, or nan after the end of the run."""
     return float(np.interp(instant_s, time_s, values)) if instant_s <= time_s[-1] else math.nan

@@ -13,7 +13,7 @@ from activesteer.road.course import Course, Footprint, course_of, footprint_of
 
 
 class RecordingLike(Protocol):
-    """A recorded run; `activesteer.recording.Recording` is one."""
+    """A recorded run. `activesteer.recording.Recording` is one."""
 
     @property
     def time_s(self) -> NDArray[np.float64]:

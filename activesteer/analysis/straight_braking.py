@@ -16,7 +16,7 @@ STANDSTILL_MPS: Final = 0.1
 FROM_FRACTION, TO_FRACTION = 0.8, 0.1
 """Fractions of the initial speed for the mean fully developed deceleration (UN R13-H): 80 and 10 of 100 km/h."""
 SLIPS_FROM_MPS: Final = 15.0 / 3.6
-"""Speed above which no wheel shall lock [m/s]; UN R13-H, annex 6 has the same speed."""
+"""Speed above which no wheel shall lock [m/s]. UN R13-H, annex 6 has the same speed."""
 
 KEY_METRICS: Final = (
     "stopping_distance_m", "mean_deceleration_mps2", "braking_efficiency", "wheel_slip_max",

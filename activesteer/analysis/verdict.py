@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from activesteer.analysis.harm import kept, losses
-from activesteer.analysis.report.groups import groups_of
-from activesteer.analysis.report.judgement import judge
+from activesteer.analysis.report.groups import groups_of, judge
 from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.recording import Recording
 

@@ -34,7 +34,7 @@ command: Final = Group("drive")
 _WIDTH: Final = 25
 """Width of the column of names."""
 _OTHER_FILES: Final = frozenset((".mp4", ".gif", ".rrd", ".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf"))
-"""Endings of files of other commands; such a name for a folder is a mistake."""
+"""Endings of files of other commands. Such a name for a folder is a mistake."""
 
 
 @command("list", "list manoeuvres, controllers, drivers, cars, studies, standards", JSON)
@@ -72,11 +72,11 @@ def _titles(names: Iterable[str], find: Callable[[str], Path]) -> dict[str, str]
 
 
 class _Failures(dict[str, str]):
-    """Label of a controller -> message of its error; the other controllers drive all the same."""
+    """Label of a controller -> message of its error. The other controllers drive all the same."""
 
     @contextmanager
     def caught(self, label: str, *, alone: bool) -> Iterator[None]:
-        """Report an error of a controller; the error of a controller that drives alone ends the command."""
+        """Report an error of a controller. The error of a controller that drives alone ends the command."""
         try:
             yield
         except ActiveSteerError as error:
@@ -236,9 +236,9 @@ def _chosen(metrics: Mapping[str, float], names: Sequence[str]) -> dict[str, flo
 def _paint(
     metrics: Mapping[str, Mapping[str, float]], run: str, name: str, value: float, first: float, text: str
 ) -> str:
-    """Return a value in green if it is better than in the first run, in red if it is worse; plain if a run is lost."""
+    """Return a value in green if it is better than in the first run, in red if it is worse. Plain if a run is lost."""
     from activesteer.analysis.harm import is_controlled
-    from activesteer.analysis.report.significance import Change, significance
+    from activesteer.analysis.report.tables import Change, significance
 
     if not (is_controlled(metrics[run]) and is_controlled(next(iter(metrics.values())))):
         return text

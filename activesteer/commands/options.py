@@ -54,7 +54,7 @@ Part = Option | OneOf | Sequence[Option]
 
 
 class Group:
-    """Commands that `--help` lists together; call it with a declaration to decorate the function of a command."""
+    """Commands that `--help` lists together. Call it with a declaration to decorate the function of a command."""
 
     def __init__(self, title: str) -> None:
         self.title = title
@@ -117,7 +117,7 @@ class CommandLine:
         self.names = [name for group in groups for name, *_ in group.commands]
 
     def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
-        """Parse a command line; end the program with a correction if the command line is wrong."""
+        """Parse a command line. End the program with a correction if the command line is wrong."""
         words = list(sys.argv[1:] if arguments is None else arguments)
         command = next((word for word in words if not word.startswith("-")), None)
         if command in SUCCESSORS:
@@ -149,7 +149,7 @@ def _hint(parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -
 
 
 def option(names: str, metavar: str | tuple[Any, ...], help: str, default: Any = None, **words: Any) -> Option:
-    """Declare an argument with a value; its help ends with the default if there is one."""
+    """Declare an argument with a value. Its help ends with the default if there is one."""
     if words.pop("many", False):
         words["action"] = "append"
     words["metavar" if isinstance(metavar, str) else "choices"] = metavar
@@ -187,7 +187,7 @@ RECORDINGS: Final = option("files", "FILE.mcap", f"{_RECORDING}; several are com
 
 
 def driver(default: str = "") -> Option:
-    """Return `--driver`; with a default in words, `options.driver` is None without the option."""
+    """Return `--driver`. With a default in words, `options.driver` is None without the option."""
     words = "novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu"
     if default:
         return option("--driver", "DRIVER", f"{words} (default: {default})")
@@ -195,7 +195,7 @@ def driver(default: str = "") -> Option:
 
 
 def controllers(default: str = "none") -> Option:
-    """Return `-c`; `options.controller` is a list, or None for the default, which is given in words."""
+    """Return `-c`. `options.controller` is a list, or None for the default, which is given in words."""
     words = (
         "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
     )
@@ -203,12 +203,12 @@ def controllers(default: str = "none") -> Option:
 
 
 def output(metavar: str, help: str, default: str | None = None) -> Option:
-    """Return `-o`; the help says what is written there, and what happens without the option if it has no default."""
+    """Return `-o`. The help says what is written there, and what happens without the option if it has no default."""
     return option("-o --output", metavar, help, None if default is None else Path(default), type=Path)
 
 
 def cutaway(when: str = "") -> Option:
-    """Return `--cutaway`; `when` says with which option it has an effect."""
+    """Return `--cutaway`. `when` says with which option it has an effect."""
     return flag("--cutaway", f"{when}show the suspension through the body")
 
 

@@ -117,7 +117,7 @@ def _recover(recording: Recording, options: argparse.Namespace) -> int:
 
 
 def _driver(recorded: Any) -> str:
-    """Name and parameters of the driver; recordings of earlier versions hold the name only."""
+    """Name and parameters of the driver. Recordings of earlier versions hold the name only."""
     if not isinstance(recorded, dict):
         return str(recorded)
     numbers = recorded.get("parameters", recorded)
@@ -302,7 +302,6 @@ def _size(text: str) -> tuple[int, int]:
     description="Draw a recording without a window, and write an MP4 or a GIF.",
 )  # fmt: skip
 def _video(options: argparse.Namespace) -> int:
-    from activesteer.analysis.verdict import verdict
     from activesteer.recording import Recording
     from activesteer.recording.recording import run_names
     from activesteer.video import Settings, make_film
@@ -331,7 +330,7 @@ def _video(options: argparse.Namespace) -> int:
     named = dict(zip(run_names(files, recordings), recordings, strict=True))
     started = time.monotonic()
     with ProgressBar(f"{output}", quiet=False) as progress:
-        made = make_film(named, output, settings, progress, verdict(named))
+        made = make_film(named, output, settings, progress)
     took = time.monotonic() - started
     print(
         f"{output}: {made.pictures} pictures, {made.pictures / made.rate_hz:.1f} s at {made.rate_hz:g} a second, "

@@ -94,7 +94,7 @@ class StopSignals:
         self.end(in_order=False)
 
     def end(self, *, in_order: bool = True) -> int:
-        """Print which files are saved; end the process if it belongs to the program."""
+        """Print which files are saved. End the process if it belongs to the program."""
         number = self.number or signal.SIGINT
         with self._ending:  # never released by the first caller; a second one waits for the end
             if in_order and self._watching:
@@ -151,7 +151,7 @@ def _files(output: Path | None) -> Iterator[Path]:
 
 
 def _part(path: Path, *, in_order: bool) -> str:
-    """Return in words how much of a run a recording holds; an empty text for a complete one and for other files."""
+    """Return in words how much of a run a recording holds, or an empty text for a complete one and for other files."""
     if path.suffix != ".mcap":
         return ""
     with path.open("rb") as file:

@@ -234,7 +234,7 @@ def _values(trial: Trial, indent: str = "  ") -> Iterator[str]:
 
 
 def _draw(found: list[Tuning], folder: Path) -> list[Path]:
-    """Draw each search; nothing without matplotlib."""
+    """Draw each search, or nothing without matplotlib."""
     from activesteer.errors import ParameterError
     from activesteer.studies.engine.report import draw_tuning
 

@@ -30,26 +30,26 @@ _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 
 def table_lines(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> Iterator[str]:
-    """Yield the lines of a table of rows, a column for each key with its head; numbers have three digits."""
+    """Yield the lines of a table of rows, a column for each key with its head. Numbers have three digits."""
     cells = [[row[key] if isinstance(row[key], str) else f"{row[key]:.3g}" for key in columns] for row in rows]
     return text_table([list(columns.values()), *cells], text=0, repeat=2, least=10, gap=1)
 
 
 def wrapped(text: str) -> Iterator[str]:
-    """Yield lines of 80 columns; the continuation of a longer line is indented four columns further than the line."""
+    """Yield lines of 80 columns. The continuation of a longer line is indented four columns further than the line."""
     for line in text.splitlines():
         yield coloured("\n".join(wrapped_line(line)))
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:
-    """Print a value as JSON; in one line for another program that reads it while this program goes on."""
+    """Print a value as JSON. In one line for another program that reads it while this program goes on."""
     text = json_text(value)
     text = " ".join(line.strip() for line in text.splitlines()) if one_line else text
     print(text, file=_for_json[-1] if _for_json else None, flush=one_line)
 
 
 def tell(options: argparse.Namespace, values: Any, lines: Iterable[str], figures: Iterable[Path] | None = None) -> None:
-    """Print values with `--json`, else lines; if figures can be drawn, the values have their paths as `figures`."""
+    """Print values with `--json`, else lines. If figures can be drawn, the values have their paths as `figures`."""
     if options.json:
         print_json(values if figures is None else values | {"figures": [str(path) for path in figures]})
         return
@@ -72,7 +72,7 @@ _for_json: Final[list[TextIO]] = []
 
 @contextmanager
 def stdout_for_json() -> Iterator[None]:
-    """Reserve standard output for `print_json`; all other output, such as a user's `print`, goes to standard error."""
+    """Reserve standard output for `print_json`. All other output, such as a user's `print`, goes to standard error."""
     stream = sys.stdout
     own = stream if stream is sys.__stdout__ else None
     if own is not None:  # native code and other processes write to it, too
@@ -123,7 +123,7 @@ def print_notes(notes: Iterable[str]) -> None:
 
 
 def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = None) -> None:
-    """Print a head and a text in lines of 80 columns; further lines are indented.
+    """Print a head and a text in lines of 80 columns. Further lines are indented.
 
     The text may come from any file: control characters are printed as escape sequences.
     """

@@ -37,7 +37,7 @@ SETTINGS: Final = {"paper": "paper's setting", "literature": "driver from litera
 
 
 def _setting(name: str) -> str:
-    """Return the name of a setting; its former name is rejected."""
+    """Return the name of a setting. Its former name is rejected."""
     if name == "human":
         raise argparse.ArgumentTypeError("the setting 'human' is now 'literature'")
     return name

@@ -14,7 +14,7 @@ from activesteer.units import EDGE_UNITS
 
 
 def spellings(name: str) -> list[str]:
-    """Return the keys that fill a field: its name, and the name in a display unit; `class` fills `class_`."""
+    """Return the keys that fill a field: its name, and the name in a display unit. `class` fills `class_`."""
     name = name.removesuffix("_")
     edges = [name[: -len(si)] + edge for edge, (si, _) in EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]
@@ -45,7 +45,7 @@ def fields_of(cls: type) -> dict[str, dataclasses.Field[Any]]:
 
 
 def dataclass_in(hint: Any) -> type | None:
-    """Return the dataclass of a table that a field holds, possibly an optional one; None for other fields."""
+    """Return the dataclass of a table that a field holds, possibly an optional one, or None for other fields."""
     for candidate in (hint, *typing.get_args(hint)):
         if isinstance(candidate, type) and dataclasses.is_dataclass(candidate):
             return candidate if typing.get_origin(hint) not in (dict, tuple) else None
@@ -104,7 +104,7 @@ def key_hint(cls: type, key: str) -> str | None:
 
 
 def no_such_key(cls: type, source: Source, path: Sequence[str]) -> ActiveSteerError:
-    """Return the error for a key that a class does not have; see `Source.fail`."""
+    """Return the error for a key that a class does not have (see `Source.fail`)."""
     names = [spelling for name in fields_of(cls) for spelling in spellings(name)]
     help_ = key_hint(cls, path[-1]) or nearest_names(path[-1], names)
     return source.fail(path, f"there is no such key; {help_}", allowed=names)
@@ -169,7 +169,7 @@ def _merged_list(
 
 
 def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: Iterable[Sequence[str]]) -> None:
-    """Refuse keys that other keys make ineffective; see `OVERRULED`."""
+    """Refuse keys that other keys make ineffective (see `OVERRULED`)."""
     for path in given:
         owner, within = cls, table
         for key in path[:-1]:

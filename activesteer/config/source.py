@@ -63,7 +63,7 @@ class Source:
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
     def _line_of(self, path: Sequence[str]) -> int | None:
-        """Return the line of a key in the text; tomllib does not keep it."""
+        """Return the line of a key in the text. Tomllib does not keep it."""
         wanted = ".".join(path)
         table = ""
         elements: dict[str, int] = {}
@@ -95,7 +95,7 @@ def _numbered(name: str, elements: Mapping[str, int]) -> str:
 
 
 _DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{limits.MAX_TOML_DEPTH}}}""")
-"""Dotted key with too many parts; the time of tomllib grows with the square of their number."""
+"""Dotted key with too many parts. The time of tomllib grows with the square of their number."""
 
 
 def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tuple[dict[str, Any], Source]:
@@ -118,7 +118,7 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value written as in TOML; any other text is returned as it is."""
+    """Return a value written as in TOML. Any other text is returned as it is."""
     try:
         table = _parsed(f"value = {text}")
     except tomllib.TOMLDecodeError:
@@ -129,7 +129,7 @@ def parse_value(text: str) -> Any:
 
 
 def toml_value(value: Any) -> str:
-    """Return a value as TOML; texts, numbers and lists of JSON are valid TOML."""
+    """Return a value as TOML. Texts, numbers and lists of JSON are valid TOML."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{json.dumps(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):

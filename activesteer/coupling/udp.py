@@ -1,4 +1,4 @@
-"""Commands from another process by UDP, and the state of the car back to it; see docs/coupling.md for the messages."""
+"""Commands from another process by UDP, and the state of the car back to it (see docs/coupling.md for the messages)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from activesteer.errors import ManeuverError, ParameterError
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 
 COMMAND: Final = struct.Struct("<4sIII12d")
-"""Magic `ASC1`, sequence number, flags, 0; then steering wheel, drive torque, brake pedal, parking brake, gear, rear
+"""Magic `ASC1`, sequence number, flags, 0. Then steering wheel, drive torque, brake pedal, parking brake, gear, rear
 angle, superposition, four brake torques, and change of the drive torque."""
 STATE: Final = struct.Struct("<4sIII24d")
 """Magic `ASS1`, sequence number of the command in use, flags, step; then `Measurement` and `Motion`, number by number,
@@ -59,7 +59,7 @@ class UdpPort(NamedTuple):
 
 
 Commands = tuple[DriverCommand | None, ActuatorCommand | None]
-"""Commands in use; None where the run's own block decides."""
+"""Commands in use, or None where the run's own block decides."""
 _NOTHING: Final[Commands] = (None, None)
 
 

@@ -68,11 +68,7 @@ class Panel(NamedTuple):
 
 
 def without_tail(panel: Panel, size: Footprint) -> tuple[Panel, Panel]:
-    """Divide a panel of a body: the low part around and behind the rear wheels hides them from a camera behind the car.
-
-    Returns:
-        The panel without its tail, and the tail; either can be empty.
-    """
+    """Return a panel of a body without its tail, which hides the rear wheels from behind, and the tail."""
     corners = np.concatenate([panel.vertices_m, panel.normals], axis=1)[panel.faces]
     ahead, behind = _cut(corners, 0, -size.wheelbase_m + _TAIL_M[0])
     above, tail = _cut(behind, 2, _TAIL_M[1])
@@ -108,15 +104,7 @@ def _cut(triangles: Array, axis: int, at_m: float) -> tuple[Array, Array]:
 
 
 def dressed(parts: Sequence[ScenePart], size: Footprint | None) -> tuple[tuple[ScenePart, ...], tuple[Panel, ...]]:
-    """Return a car with a body and wheels.
-
-    Args:
-        parts: Parts of its model.
-        size: Its size; None leaves the car as it is.
-
-    Returns:
-        The parts of the model that are still drawn, and the panels.
-    """
+    """Return a car with a body and wheels."""
     if size is None:
         return tuple(parts), ()
     solids = [part for part in parts if isinstance(part, Primitive)]

@@ -44,12 +44,6 @@ def share_seen(apart_m: Array | float) -> Array:
     """Return the fraction of a ghost's opacity: it fades between 1 m and 0.2 m from the car and vanishes below.
 
     Two surfaces in one place would show through each other in patches.
-
-    Args:
-        apart_m: Distance between the chassis of ghost and car [m].
-
-    Returns:
-        Fraction, 0 to 1.
     """
     return np.clip((apart_m - _HIDDEN_M) / (_SEEN_M - _HIDDEN_M), 0.0, 1.0)
 
@@ -62,16 +56,7 @@ motion, which therefore stays visible."""
 
 
 def direction_of_motion(time_s: Array, places_m: Array, heading_rad: Array) -> Array:
-    """Return the averaged direction of motion over the ground.
-
-    Args:
-        time_s: Instants [s], shape (k,).
-        places_m: World x and y of the midpoint of the axles [m], shape (k, 2).
-        heading_rad: Heading of the car [rad], shape (k,), for the time before it first moves.
-
-    Returns:
-        Continuous direction [rad], left positive, shape (k,).
-    """
+    """Return the averaged, continuous direction of motion over the ground [rad], left positive, shape (k,)."""
     if len(time_s) < 2:
         return np.unwrap(heading_rad)
     velocity = np.asarray(np.gradient(places_m, time_s, axis=0))

@@ -38,15 +38,7 @@ def force_scale(recordings: Sequence[Recording]) -> float:
 
 
 def force_arrows(recording: Recording, scale_NpM: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return origins and vectors of the arrows in the world.
-
-    Args:
-        recording: A run with `CHANNELS`.
-        scale_NpM: Force per length of an arrow [N/m]; see `force_scale`.
-
-    Returns:
-        Origins and vectors [m], each of shape (rows, 4, 3).
-    """
+    """Return origins and vectors of the arrows in the world [m], each of shape (rows, 4, 3)."""
     origins = np.empty((len(recording), len(CORNERS), 3), np.float32)
     vectors = np.zeros_like(origins)
     origins[:, :, 2] = _ABOVE_ROAD_M

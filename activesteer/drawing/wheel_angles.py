@@ -46,15 +46,7 @@ def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
 
 
 def angles_at(recording: Recording, time_s: Array | float) -> Array:
-    """Return the steer angles of the wheels at instants, interpolated between the rows of a recording.
-
-    Args:
-        recording: The run.
-        time_s: The instants [s], of any shape.
-
-    Returns:
-        Angles [rad], left positive, shape (..., 4); nan for a wheel without a recorded angle.
-    """
+    """Return the steer angles of the wheels at sample times [rad], shape (..., 4), interpolated between the rows."""
     return np.stack(
         [
             np.interp(time_s, recording.time_s, recording[name]) if name in recording else np.full_like(time_s, np.nan)
@@ -65,15 +57,7 @@ def angles_at(recording: Recording, time_s: Array | float) -> Array:
 
 
 def wedges(angle_rad: Array, factor: Sequence[int]) -> Array:
-    """Return wedges from straight ahead to the headings of the wheels, with their tips at the origin.
-
-    Args:
-        angle_rad: Steer angles [rad], left positive, shape (..., 4).
-        factor: Factor of each wheel; see `factors`.
-
-    Returns:
-        Points [m], shape (..., 4, SLICES + 2, 2): the tip, then the arc from straight ahead on.
-    """
+    """Return wedges from straight ahead to the enlarged headings [m], tips at 0, shape (..., 4, SLICES + 2, 2)."""
     shown = np.nan_to_num(np.asarray(angle_rad, np.float64) * factor)
     along = shown[..., None] * np.linspace(0.0, 1.0, SLICES + 1)
     arc = RADIUS_M * np.stack([np.cos(along), np.sin(along)], axis=-1)
@@ -107,13 +91,7 @@ class Plan(NamedTuple):
 
 
 def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
-    """Return the plan view of a car with enlarged angles of its wheels.
-
-    Args:
-        size: Its size.
-        angle_rad: Steer angles [rad], left positive, shape (..., 4).
-        factor: Factor of each wheel; see `factors`.
-    """
+    """Return the plan view of a car with enlarged angles of its wheels."""
     front, rear, half = size.front_m, size.rear_m, 0.5 * size.width_m
     body = np.array(
         [
@@ -130,11 +108,7 @@ def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
 
 
 def words(angle_rad: float) -> str:
-    """Write the true angle of a wedge and its side; empty for an unknown angle and for one that is as good as zero.
-
-    Args:
-        angle_rad: Steer angle [rad], left positive.
-    """
+    """Write the true angle of a wedge and its side; empty for an unknown angle and for one that is as good as zero."""
     if not abs(angle_rad) >= _NOTHING_RAD:
         return ""
     side = " left" if angle_rad > 0.0 else " right"

@@ -17,7 +17,7 @@ from activesteer.resources import list_drivers
 from activesteer.signals import DriverCommand, WheelTorques, new_message
 
 _MAX_ANGLE_RAD: Final = 50.0
-"""Largest angle of a command; a larger one is taken for a mistake, such as degrees [rad]."""
+"""Largest angle of a command. A larger one is taken for a mistake, such as degrees [rad]."""
 _FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 _GEARS: Final = (-1, 0, 1)
 _MAX_TORQUE_NM: Final = 1e6
@@ -29,7 +29,7 @@ class _DriverKind(Kind):
     """Drivers, whose command is completed by the angle at the road wheel."""
 
     def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
-        """Return a command with the angle at the road wheel; see the base class."""
+        """Return a command with the angle at the road wheel (see the base class)."""
         torques, front = command.wheel_torques, command.front_steer_demand_rad
         if torques is not None and not _are_torques(torques):
             needed = "an activesteer.signals.WheelTorques of finite numbers is needed"
@@ -69,7 +69,7 @@ DRIVER: Final = _DriverKind(
 
 
 def driver_spec(given: Any) -> Plugin:
-    """Find a driver; see `activesteer.plugins.find`.
+    """Find a driver (see `activesteer.plugins.find`).
 
     Args:
         given: A name from `list_drivers`, a driver file or its table; or a user's own code:

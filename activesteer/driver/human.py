@@ -68,7 +68,7 @@ class HumanDriver(NativeBlock):
         return self._path.gains_at(rounded).size
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """Return the command; see `Driver`."""
+        """Return the command (see `Driver`)."""
         if setpoint.path is not None:
             return self._path.step(setpoint, measurement, motion)
         if setpoint.curvature_demand_1pm is not None:
@@ -89,7 +89,7 @@ SETPOINT: Final = np.dtype(
         ],
     )
 )
-"""A `Setpoint` for compiled code; `torques_Nm` holds the drive torques and the brake torques of the wheels."""
+"""A `Setpoint` for compiled code. `torques_Nm` holds the drive torques and the brake torques of the wheels."""
 LINE: Final = np.dtype(
     (np.record, [("spacing_m", np.float64), ("x_m", ARRAY), ("y_m", ARRAY), ("headings_rad", np.float64, (2,))])
 )
@@ -108,7 +108,7 @@ _MOTION_SPEED: Final = Motion._fields.index("speed_mps")
 
 
 class SetpointTable(NamedTuple):
-    """Setpoints of successive steps for compiled code; the last one holds on.
+    """Setpoints of successive steps for compiled code. The last one holds on.
 
     Attributes:
         rows: Records of `SETPOINT`.
@@ -133,7 +133,7 @@ def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | N
 
 
 def setpoint_row(setpoint: Setpoint, rack_per_steering_wheel_m: float | None) -> tuple[Any, ...]:
-    """Return a setpoint as its record takes it; see `tabulate`."""
+    """Return a setpoint as its record takes it (see `tabulate`)."""
     turn, speed, pedal, holds, curvature, rack, wheels, path, parking = setpoint
     kind = ANGLE
     if path is not None:

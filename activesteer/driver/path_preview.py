@@ -31,7 +31,7 @@ from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
 LateralModel = Callable[[float], tuple[Array, Array]]
 """Function from speed [m/s] to system matrix (2, 2) and input matrix (2, k). The states are yaw rate [rad/s] and
-sideslip angle [rad]; the first input is the front steer angle [rad]."""
+sideslip angle [rad]. The first input is the front steer angle [rad]."""
 
 PREVIEW_INTERVAL_S: Final = 0.01
 """Time between two looks at the road [s]; short compared with delay and lag."""
@@ -154,7 +154,7 @@ class PathPreviewDriver(NativeBlock):
 
 @shared
 def looks(speed_mps: float) -> bool:
-    """Return whether a driver looks ahead at a speed [m/s]; otherwise he holds the steering wheel."""
+    """Return whether a driver looks ahead at a speed [m/s]. Otherwise he holds the steering wheel."""
     return speed_mps >= _MIN_SPEED_MPS
 
 

@@ -12,10 +12,10 @@ from activesteer.errors import ParameterError
 from activesteer.resources import DEFAULT_DRIVER
 
 MAX_MESSAGE_BYTES: Final = 20_000
-"""Largest message of the page; its choices have some hundred bytes."""
+"""Largest message of the page. Its choices have some hundred bytes."""
 MAX_CONTROLLERS: Final = 4
 MAX_WAITING: Final = 100
-"""Largest number of messages that wait; the newest choice and the newest hands replace older ones."""
+"""Largest number of messages that wait. The newest choice and the newest hands replace older ones."""
 _MAX_NUMBERS: Final = 300
 
 _Name = Annotated[str, Meta(min_length=1, max_length=200)]
@@ -31,7 +31,7 @@ class Choice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_
     vehicle: _Name = "compact"
     """Car."""
     driver: _Name = DEFAULT_DRIVER
-    """Driver; a drive by hand needs none."""
+    """Driver. A drive by hand needs none."""
     controllers: Annotated[tuple[_Name, ...], Meta(min_length=1, max_length=MAX_CONTROLLERS)] = ("none",)
     """Controllers."""
 
@@ -59,10 +59,10 @@ class Start(Choice, frozen=True, tag="start"):
 
 
 class Act(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="act"):
-    """Hands and feet, controller, or the speed to hold during a drive; what is unset stays as it is."""
+    """Hands and feet, controller, or the speed to hold during a drive. What is unset stays as it is."""
 
     steer: Annotated[float, Meta(ge=-1.0, le=1.0)] | UnsetType = UNSET
-    """Position of the steering, -1 full right to 1 full left; throttle, brake and direct count with it."""
+    """Position of the steering, -1 full right to 1 full left. Throttle, brake and direct count with it."""
     throttle: _Pedal = 0.0
     """Throttle pedal."""
     brake: _Pedal = 0.0
@@ -104,7 +104,7 @@ def read(text: str | bytes) -> Message:
 
 
 def add(waiting: deque[Message], message: Message) -> bool:
-    """Append a message to a queue, where it replaces an older one of the same meaning; return False if it is full.
+    """Append a message to a queue, where it replaces an older one of the same meaning. Return False if it is full.
 
     Beginning and end of a drive are always taken: they make older hands useless.
     """

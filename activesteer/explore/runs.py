@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
-from activesteer.analysis.report.results import KEY_FIGURES
 from activesteer.analysis.report.run_page import write_report
+from activesteer.analysis.report.tables import KEY_FIGURES
 from activesteer.controllers import controller_spec
 from activesteer.conventions import run_looks
+from activesteer.drawing.panels import EXPLORE
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.car_shape import poses_of, shape_of
 from activesteer.explore.choice import Folder, check_numbers
@@ -96,7 +97,7 @@ class Runs:
                 return
             self._kept[name] = controller.label, recording
             step_s, poses = poses_of(recording)
-            shown = plots(groups_of({f"{name}.mcap": recording})[0])
+            shown = plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE)
             yield Reply({**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}, (poses,))
         yield Reply({"kind": "finished", **self._commands(choice, overrides)})
 
@@ -143,7 +144,7 @@ class Runs:
         return ready
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
-        """Return the recording of a run; None if a newer choice has come."""
+        """Return the recording of a run, or None if a newer choice has come."""
         if stale():
             return None
         simulation = Simulation(scenario, controller)

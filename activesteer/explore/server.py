@@ -153,7 +153,7 @@ class ExploreServer:
         return HTMLResponse(self._report)
 
     async def _talk(self, page: WebSocket) -> None:
-        """Pass messages of the page to the worker; a second page takes the place of the first."""
+        """Pass messages of the page to the worker. A second page takes the place of the first."""
         if page.headers.get("origin") not in (f"http://{self._host}", f"http://localhost:{self.port}"):
             await page.close(1008)
             return
@@ -181,7 +181,7 @@ class ExploreServer:
                 self._hand_on(End())
 
     def _hand_on(self, message: Message) -> bool:
-        """Put a message for the worker into the queue; return False if it is full."""
+        """Put a message for the worker into the queue. Return False if it is full."""
         taken = add(self._waiting, message)
         self._came.set()
         return taken

@@ -94,7 +94,7 @@ def _label(key: str) -> tuple[str, str]:
 
 
 def _gain(key: str, declared: Declared) -> Slider | None:
-    """Return the slider of a gain, from zero to some multiples of its value; None if it is no number."""
+    """Return the slider of a gain, from zero to some multiples of its value, or None if it is no number."""
     if not _is_number(declared.default):
         return None
     tables, _, name = key.rpartition(".")

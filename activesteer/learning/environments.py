@@ -80,7 +80,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start an episode at the start of the manoeuvre; see `gymnasium.Env.reset`."""
+        """Start an episode at the start of the manoeuvre (see `gymnasium.Env.reset`)."""
         super().reset(seed=seed)
         (observation,) = self.episodes.reset([0], [self.np_random])
         self._close_picture()
@@ -90,7 +90,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return observation, {"car": int(self.episodes.active[0])}
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Drive until the next decision; see `gymnasium.Env.step`."""
+        """Drive until the next decision (see `gymnasium.Env.step`)."""
         found = self.episodes.step([action])
         self._given.append(np.array(action, dtype=np.float64))
         info = {
@@ -232,7 +232,7 @@ class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.fl
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start all episodes, or those of `options["reset_mask"]`; see `gymnasium.vector.VectorEnv.reset`."""
+        """Start all episodes, or those of `options["reset_mask"]` (see `gymnasium.vector.VectorEnv.reset`)."""
         seeds = [seed + number for number in range(self.num_envs)] if isinstance(seed, int) else seed
         mask = np.ones(self.num_envs, dtype=bool)
         if options is not None and "reset_mask" in options:
@@ -256,7 +256,7 @@ class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.fl
     def step(
         self, actions: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Drive all cars until the next decision; see `gymnasium.vector.VectorEnv.step`."""
+        """Drive all cars until the next decision (see `gymnasium.vector.VectorEnv.step`)."""
         over = self._over.copy()
         if over.any() and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ParameterError(f"episodes {np.flatnonzero(over).tolist()} are over; reset them", key="reset_mask")

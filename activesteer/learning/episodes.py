@@ -1,4 +1,4 @@
-"""Episodes of some cars at once: actions in; observations, rewards and ends out. The core of all environments."""
+"""Episodes of some cars at once: actions in. Observations, rewards and ends out. The core of all environments."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ class Episodes:
         self._started = np.zeros(n, dtype=bool)
 
     def reset(self, episodes: Sequence[int], generators: Sequence[np.random.Generator]) -> NDArray[np.float32]:
-        """Start some episodes anew, each with a car that its generator draws; return the observations of all.
+        """Start some episodes anew, each with a car that its generator draws. Return the observations of all.
 
         Args:
             episodes: Numbers of the episodes.

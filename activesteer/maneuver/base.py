@@ -89,11 +89,11 @@ class Maneuver(ABC):
 
     @property
     def course(self) -> Course | None:
-        """Path, lanes and cones; None if the manoeuvre sets the steering wheel angle instead."""
+        """Path, lanes and cones, or None if the manoeuvre sets the steering wheel angle instead."""
         return None
 
     def sequence(self) -> Any:
-        """Return what follows the car through the phases of one run; None if setpoints depend on time alone."""
+        """Return what follows the car through the phases of one run, or None if setpoints depend on time alone."""
         return None
 
     @property
@@ -103,7 +103,7 @@ class Maneuver(ABC):
 
     @property
     def search(self) -> Search | None:
-        """Search that must be driven before the manoeuvre can be run; None if all values are known."""
+        """Search that must be driven before the manoeuvre can be run, or None if all values are known."""
         return None
 
     def settling_setpoint(self) -> Setpoint:
@@ -133,7 +133,7 @@ class Search:
 
 
 def within(value: float, most: float) -> float:
-    """Return a value limited to 0 and `most`; in a setpoint `min` and `max` would take most of the time."""
+    """Return a value limited to 0 and `most`. In a setpoint `min` and `max` would take most of the time."""
     return 0.0 if value < 0.0 else most if value > most else value
 
 

@@ -78,11 +78,11 @@ class BrakeInTurn(Maneuver):
         return None if search is None else dataclasses.replace(search, accept=self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> BrakeInTurn:
-        """Return the manoeuvre with a steering wheel angle [rad]; the lateral acceleration stays on record."""
+        """Return the manoeuvre with a steering wheel angle [rad]. The lateral acceleration stays on record."""
         return dataclasses.replace(self, turn=dataclasses.replace(self.turn, steering_wheel_rad=steering_wheel_rad))
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Ramp of the steering wheel, then ramp of the brake; see the base class."""
+        """Ramp of the steering wheel, then ramp of the brake (see the base class)."""
         turn, brake = self.turn, self.brake
         amplitude = turn.steering_wheel_rad or 0.0
         turned = within((time_s - turn.start_s) * turn.rate_radps, abs(amplitude))
@@ -104,7 +104,7 @@ class StraightBraking(Maneuver):
     brake: BrakeInput
     """The brake."""
     hold_line: bool = True
-    """Whether the driver keeps the car on a straight line; otherwise the steering wheel is held straight."""
+    """Whether the driver keeps the car on a straight line. Otherwise the steering wheel is held straight."""
 
     def __post_init__(self) -> None:
         """Check that the car drives forwards and brakes within the run."""
@@ -126,7 +126,7 @@ class StraightBraking(Maneuver):
 
     @property
     def course(self) -> Course | None:
-        """The straight line that the driver keeps; None if the steering wheel is held."""
+        """The straight line that the driver keeps, or None if the steering wheel is held."""
         return self._course if self.hold_line else None
 
     @cached_property
@@ -134,7 +134,7 @@ class StraightBraking(Maneuver):
         return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0]))
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Speed, then the ramp of the brake; see the base class."""
+        """Speed, then the ramp of the brake (see the base class)."""
         brake, (before, after) = self.brake, self._ends
         if time_s < brake.start_s:
             return before

@@ -26,7 +26,7 @@ from activesteer.road.path import Path
 from activesteer.signals import Setpoint
 
 _WINDOW_M: Final = 5.0
-"""Distance to either side of the last place in which the car is looked for [m]; so a path may cross itself."""
+"""Distance to either side of the last place in which the car is looked for [m]. So a path may cross itself."""
 _COAST_MPS2: Final = 0.7
 """Deceleration that drag and engine give without the brake [m/s2]."""
 _PEDAL_PER_MPS2: Final = 1.0 / 13.0
@@ -54,7 +54,7 @@ class PathSpeed:
         self._acceleration_mps2 = speed_mps * np.gradient(speed_mps, path.s_m)
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the present place of the car; see `PhaseSequence.setpoint`."""
+        """Return the setpoint for the present place of the car (see `PhaseSequence.setpoint`)."""
         speed_mps, x_m, y_m = seen[3:6]
         self._along_m = self._search.nearest(x_m, y_m, self._along_m, _WINDOW_M)
         wanted_mps = float(np.interp(self._along_m, self._s_m, self._speed_mps))
@@ -73,7 +73,7 @@ class PathSpeed:
 
 @dataclass(frozen=True)
 class PathTable:
-    """Points in the order of travel; the car starts at (0, 0), heading along x."""
+    """Points in the order of travel. The car starts at (0, 0), heading along x."""
 
     csv: str | None = None
     """CSV file with the columns x_m and y_m, and speed_mps (or speed_kmh) and width_m if wanted: a path, or a name in
@@ -109,7 +109,7 @@ class FollowPath(AlongCourse):
     def filled_from_csv(
         cls, table: Mapping[str, Any], folder: FilePath | None, source: Source
     ) -> tuple[dict[str, Any], dict[str, bytes]]:
-        """Fill in the points of the CSV; see the base class."""
+        """Fill in the points of the CSV (see the base class)."""
         points = table.get("path")
         if not isinstance(points, Mapping) or not isinstance(points.get("csv"), str):
             return dict(table), {}
@@ -141,7 +141,7 @@ class FollowPath(AlongCourse):
         return np.interp(path.s_m, at * (path.length_m / at[-1]), values)
 
     def sequence(self) -> PathSpeed | None:
-        """Return what follows the speeds along the path; None if it has none."""
+        """Return what follows the speeds along the path, or None if it has none."""
         path = self.course.path
         speeds_mps = self._along(path, self.path.speed_mps)
         return None if speeds_mps is None else PathSpeed(self, path, speeds_mps)
@@ -186,7 +186,7 @@ class ConstantRadius(Maneuver):
             )
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Curvature and speed; see the base class."""
+        """Curvature and speed (see the base class)."""
         circle = self.circle
         fraction = within(time_s / circle.entry_s, 1.0)
         # Half a wave of a cosine: the curvature has no kink at the beginning and the end of the rise.

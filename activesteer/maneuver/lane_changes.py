@@ -179,9 +179,9 @@ def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
 _DEGREE: Final = 5
 """Without active bounds the path of least jerk is a quintic polynomial."""
 _KNOT_SPACING_M: Final = 2.0
-"""Distance of the knots [m]; halving it changes the paths of ISO 3888 by less than 1 cm."""
+"""Distance of the knots [m]. Halving it changes the paths of ISO 3888 by less than 1 cm."""
 _INCOMPATIBLE: Final = 1e-9
-"""Residual of the dual below which bounds contradict each other; usual values are above 1e-4."""
+"""Residual of the dual below which bounds contradict each other. Usual values are above 1e-4."""
 
 
 class Bound(NamedTuple):
@@ -256,7 +256,7 @@ class _Spline:
 
 
 def _bounded(a: Array, b: Array, g: Array, low: Array, high: Array) -> Array:
-    """Return the z that minimises |A z - b| for low <= G z <= high; A has full column rank (LSI, LDP)."""
+    """Return the z that minimises |A z - b| for low <= G z <= high. A has full column rank (LSI, LDP)."""
     from scipy.linalg import solve_triangular  # noqa: PLC0415 - slow to import
     from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
 

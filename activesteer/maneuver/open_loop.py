@@ -96,7 +96,7 @@ class ParkingBrakeTable:
 
 @dataclass(frozen=True)
 class WheelTorqueTable:
-    """Torques of each wheel over time; a missing column is zero."""
+    """Torques of each wheel over time. A missing column is zero."""
 
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
@@ -109,7 +109,7 @@ class WheelTorqueTable:
     rr_drive_Nm: tuple[float, ...] | None = None
     """Rear right."""
     fl_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
-    """Brake torque, front left, against the rotation [N m]; the limits of the car's brakes apply."""
+    """Brake torque, front left, against the rotation [N m]. The limits of the car's brakes apply."""
     fr_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
     """Front right."""
     rl_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
@@ -118,7 +118,7 @@ class WheelTorqueTable:
     """Rear right."""
 
     def columns(self, what: str) -> tuple[tuple[float, ...], ...] | None:
-        """Return the torques of the four wheels, `drive` or `brake`; None if no wheel has any."""
+        """Return the torques of the four wheels, `drive` or `brake`, or None if no wheel has any."""
         given = [getattr(self, f"{corner}_{what}_Nm") for corner in CORNERS]
         if all(column is None for column in given):
             return None
@@ -136,7 +136,7 @@ _CSVS: Final = (
 def with_tables(
     table: Mapping[str, Any], folder: Path | None, source: Source
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Fill the values of its CSV files into an open-loop table; see `Maneuver.filled_from_csv`."""
+    """Fill the values of its CSV files into an open-loop table (see `Maneuver.filled_from_csv`)."""
     filled, files = dict(table), {}
     for key, name, columns in _CSVS:
         if not isinstance(filled.get(key), str):
@@ -192,19 +192,19 @@ class OpenLoop(Maneuver):
     drive_csv: str | None = None
     """CSV file with the column time_s and any of the columns fl_drive_Nm ... rr_brake_Nm."""
     drive: DriveMode = "hold_speed"
-    """`hold_speed` or `coast`; with wheel torques it holds only before the recording starts."""
+    """`hold_speed` or `coast`. With wheel torques it holds only before the recording starts."""
     sensor_ahead_m: float = 0.0
     """Position of the sensors of a repeated measurement, ahead of the centre of gravity [m]: `fit`, `compare` and
     `validate` use the motion there."""
     hold_last: bool = False
-    """Whether steering or wheel torques that end before `duration_s` keep their last value; a single value always
+    """Whether steering or wheel torques that end before `duration_s` keep their last value. A single value always
     does."""
 
     @classmethod
     def filled_from_csv(
         cls, table: Mapping[str, Any], folder: Path | None, source: Source
     ) -> tuple[dict[str, Any], dict[str, bytes]]:
-        """Fill in the tables of the CSV files; see the base class."""
+        """Fill in the tables of the CSV files (see the base class)."""
         return with_tables(table, folder, source)
 
     def __post_init__(self) -> None:
@@ -241,7 +241,7 @@ class OpenLoop(Maneuver):
             raise ManeuverError(problem, key=f"{key}.time_s", value=times_s[-1])
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Values of the tables; see the base class."""
+        """Values of the tables (see the base class)."""
         steering = self.steering
         value = steering.factor * _interpolate(time_s - steering.delay_s, steering.time_s, steering.values)
         angle, rack = (value, None) if self.steering.rack_m is None else (0.0, value)
@@ -273,7 +273,7 @@ class OpenLoop(Maneuver):
 
 
 def _interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:
-    """Interpolate linearly, constant outside; with plain floats because this runs every step."""
+    """Interpolate linearly, constant outside. With plain floats because this runs every step."""
     index = bisect_right(xs, x)
     if index == 0:
         return ys[0]

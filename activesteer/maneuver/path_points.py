@@ -13,16 +13,16 @@ from activesteer.maneuver.tables import read_columns
 COLUMNS: Final = ("x_m", "y_m")
 """Columns that a CSV must have."""
 OPTIONAL: Final = ("speed_mps", "width_m")
-"""Columns that a CSV may have; others are ignored."""
+"""Columns that a CSV may have. Others are ignored."""
 
 MIN_POINTS: Final = 4
 _MAX_GAP_M: Final = 20.0
-"""Largest distance of two points; a larger one counts as a jump [m]."""
+"""Largest distance of two points. A larger one counts as a jump [m]."""
 _MIN_GAP_M: Final = 1e-3
 _MAX_TURN_RAD: Final = math.radians(90.0)
-"""Largest turn at a point; a larger one counts as going back [rad]."""
+"""Largest turn at a point. A larger one counts as going back [rad]."""
 _MIN_RADIUS_M: Final = 6.0
-"""Smallest radius; a tighter bend counts as a kink. A car of the compact class turns on 5.2 m [m]."""
+"""Smallest radius. A tighter bend counts as a kink. A car of the compact class turns on 5.2 m [m]."""
 _MAX_START_M: Final = 1.0
 """Largest distance of the first point from the car [m]."""
 _MAX_START_RAD: Final = math.radians(15.0)

@@ -58,7 +58,7 @@ class Until:
     yaw_rate_within_radps: float | None = None
     """Yaw rate within plus and minus a value [rad/s]."""
     roll_rate_above_radps: float | None = None
-    """Roll rate above a value [rad/s]; a turn to the left rolls the car with a positive rate."""
+    """Roll rate above a value [rad/s]. A turn to the left rolls the car with a positive rate."""
     roll_rate_below_radps: float | None = None
     """Roll rate below a value [rad/s]."""
     roll_rate_within_radps: float | None = None
@@ -105,7 +105,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Phase:
-    """One phase; what it leaves out stays as it is."""
+    """One phase. What it leaves out stays as it is."""
 
     name: str
     """Name, for the events in the recording."""
@@ -150,7 +150,7 @@ class Phase:
 
 @dataclass(frozen=True, kw_only=True)
 class Phases(Maneuver):
-    """Phases in a row; the last one lasts to the end of the run."""
+    """Phases in a row. The last one lasts to the end of the run."""
 
     phases: tuple[Phase, ...]
     """The phases."""
@@ -186,7 +186,7 @@ class Phases(Maneuver):
         return PhaseSequence(self)
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Setpoint of phases that end by their times and inputs alone; a run uses `sequence`."""
+        """Setpoint of phases that end by their times and inputs alone. A run uses `sequence`."""
         sequence, never = self.sequence(), (math.nan,) * len(Seen._fields)
         while True:
             setpoint = sequence.setpoint(time_s, never)
@@ -256,7 +256,7 @@ class PhaseSequence:
         return self.maneuver.phases[self._number % len(self.maneuver.phases)]
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the driver; go on to the next phase if this one has ended.
+        """Return the setpoint for the driver. Go on to the next phase if this one has ended.
 
         Args:
             time_s: Time since the start of the recording [s].

@@ -30,14 +30,14 @@ class StepInput:
     start_s: Annotated[float, Range(0.0)] = 0.5
     """Time at which the steering wheel begins to turn [s]."""
     rate_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(400.0)
-    """Steering wheel rate [rad/s]; ISO 7401 requires at least 200 deg/s."""
+    """Steering wheel rate [rad/s]. ISO 7401 requires at least 200 deg/s."""
     steering_wheel_rad: Annotated[float, Range(-15.0, 15.0)] | None = None
     """Amplitude, left positive [rad]. Default: found by a search."""
     lateral_acceleration_mps2: Annotated[float, Range(-12.0, 12.0)] | None = None
     """Steady-state lateral acceleration of the car without control that the search reaches, left positive [m/s2]."""
 
     def __post_init__(self) -> None:
-        """Check that amplitude or lateral acceleration is given; with both, a search has found the amplitude."""
+        """Check that amplitude or lateral acceleration is given. With both, a search has found the amplitude."""
         if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
             raise ManeuverError(
                 "steering_wheel_deg (the amplitude) or lateral_acceleration_g (which the car without control reaches) "
@@ -63,7 +63,7 @@ class StepSteer(Maneuver):
             )
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle of the ramp; see the base class."""
+        """Steering wheel angle of the ramp (see the base class)."""
         step, (before, after) = self.steer, self._ends
         turned = (time_s - step.start_s) * step.rate_radps
         if turned <= 0.0:
@@ -88,7 +88,7 @@ class StepSteer(Maneuver):
         return SteadyTurn(probe, wanted, self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> StepSteer:
-        """Return the step with an amplitude [rad]; the lateral acceleration stays on record."""
+        """Return the step with an amplitude [rad]. The lateral acceleration stays on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
 
@@ -104,7 +104,7 @@ Frequency = Annotated[float, Range(0.01, 50.0)]
 
 @dataclass(frozen=True)
 class Sweep:
-    """The sweep at the steering wheel; its frequency rises by the same factor every second."""
+    """The sweep at the steering wheel. Its frequency rises by the same factor every second."""
 
     start_s: Annotated[float, Range(0.0)] = 0.5
     """Time at which the sweep begins [s]."""
@@ -148,7 +148,7 @@ class SineSweep(Maneuver):
             )
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle of the sweep; see the base class."""
+        """Steering wheel angle of the sweep (see the base class)."""
         sweep = self.sweep
         t = time_s - sweep.start_s
         angle = 0.0
@@ -194,7 +194,7 @@ class SlowlyIncreasingSteer(Maneuver):
             raise ManeuverError("rate_degps and end_deg must not be 0: the steering wheel would not turn", key="steer")
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle of the ramp; see the base class."""
+        """Steering wheel angle of the ramp (see the base class)."""
         ramp = self.steer
         turned = within((time_s - ramp.start_s) * abs(ramp.rate_radps), ramp.end_rad)
         return self.at_speed(math.copysign(turned, ramp.rate_radps))
@@ -220,7 +220,7 @@ class RandomSignal:
     """The steering wheel angle: normally distributed, with the same power at all frequencies of a band."""
 
     rms_rad: Annotated[float, Range(0.0, 5.0)] = math.radians(8.0)
-    """Root mean square [rad]; peaks are three to four times as large."""
+    """Root mean square [rad]. Peaks are three to four times as large."""
     lowest_Hz: Frequency = 0.1
     """Lower end of the band [Hz]."""
     highest_Hz: Frequency = 5.0
@@ -267,7 +267,7 @@ class RandomSteer(Maneuver):
         return angles.tolist()
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle; see the base class."""
+        """Steering wheel angle (see the base class)."""
         place = max(time_s, 0.0) / _STEP_S
         index = min(int(place), len(self._angles_rad) - 2)
         before, after = self._angles_rad[index], self._angles_rad[index + 1]
@@ -326,7 +326,7 @@ class DwellInput:
 
 @dataclass(frozen=True, kw_only=True)
 class SineWithDwell(Maneuver):
-    """A sine with dwell; the drive holds the speed until the sine begins."""
+    """A sine with dwell. The drive holds the speed until the sine begins."""
 
     steer: DwellInput
     """The sine."""
@@ -356,11 +356,11 @@ class SineWithDwell(Maneuver):
         return reference_angle_search(self, lambda angle: self.with_amplitude(factor * angle))
 
     def with_amplitude(self, steering_wheel_rad: float) -> SineWithDwell:
-        """Return the manoeuvre with an amplitude [rad]; the factor stays on record."""
+        """Return the manoeuvre with an amplitude [rad]. The factor stays on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle of the sine; see the base class."""
+        """Steering wheel angle of the sine (see the base class)."""
         steer, (before, after) = self.steer, self._ends
         t = time_s - steer.start_s
         if t < 0.0:

@@ -14,7 +14,7 @@ from activesteer.road.crg import packed, referenced
 
 
 def find_csv(name: str, folder: Path | None, source: Source, key: Sequence[str]) -> Path:
-    """Find the CSV that a key of a manoeuvre names, in the folder of its file; None for a table that has no file."""
+    """Find the CSV that a key of a manoeuvre names, in the folder of its file, or None for a table that has no file."""
     beside = () if folder is None else (folder / name,)
     for candidate in (*beside, user_path(name, source.error)):
         if name.isprintable() and is_file(candidate):
@@ -29,7 +29,7 @@ def find_csv(name: str, folder: Path | None, source: Source, key: Sequence[str])
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
 ) -> tuple[dict[str, list[float]], list[int]]:
-    """Read required and optional columns of a CSV whose first line names them; other columns are ignored.
+    """Read required and optional columns of a CSV whose first line names them. Other columns are ignored.
 
     A column may be in degrees or km/h, as in a TOML file: `steering_wheel_deg` fills `steering_wheel_rad`.
     """
@@ -80,7 +80,7 @@ def read_columns(
 def with_road_files(
     table: Mapping[str, Any], folder: Path | None, source: Source
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Fill the contents of the road's files into the table of a manoeuvre; see `Maneuver.filled_from_csv`.
+    """Fill the contents of the road's files into the table of a manoeuvre (see `Maneuver.filled_from_csv`).
 
     The files to be kept with the recording are the CSV files; the table itself holds the OpenCRG file.
     """

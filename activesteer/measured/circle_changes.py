@@ -21,7 +21,7 @@ _RADIUS_M: Final = 0.335
 
 @dataclass(frozen=True)
 class ChangeTable:
-    """A change; the keys that are given act in this order."""
+    """A change. The keys that are given act in this order."""
 
     without: tuple[str, ...] = ()
     """Effects to remove."""
@@ -41,7 +41,7 @@ class ChangeTable:
     steer: Annotated[float, Range(1e-3)] = 1.0
     """Factor on the steer angle of the rack."""
     steer_at_lock: Annotated[float, Range(1e-3)] | None = None
-    """The factor at the lock; it changes in proportion to the rack travel."""
+    """The factor at the lock. It changes in proportion to the rack travel."""
     lock_m: Annotated[float, Range(1e-3)] = 0.06
     """Rack travel at the lock [m]."""
     compliance: Literal["", "no_toe_by_force", "least_toe_by_moment", "no_camber", "reversed_toe"] = ""
@@ -128,7 +128,7 @@ def _least_toe_by_moment(compliance: Array) -> None:
 
 
 def _no_camber(compliance: Array) -> None:
-    """Reduce the camber compliance to a thousandth; toe over a side force at the road is unchanged."""
+    """Reduce the camber compliance to a thousandth. Toe over a side force at the road is unchanged."""
     own, over_roll = compliance[_CAMBER, _CAMBER], compliance[_TOE, _CAMBER]
     compliance[_CAMBER, :] = compliance[:, _CAMBER] = 0.0
     compliance[_CAMBER, _CAMBER] = 1e-3 * own

@@ -94,7 +94,7 @@ def _text(data: bytes) -> str:
 
 
 def _clock_s(texts: list[str | None]) -> Array | None:
-    """Return times of day [s], increasing over midnight; None if a text is no time of day."""
+    """Return times of day [s], increasing over midnight, or None if a text is no time of day."""
     found = [_CLOCK.fullmatch((text or "").strip()) for text in texts]
     if not all(found):
         return None
@@ -174,7 +174,7 @@ def read_columns(path: Path) -> list[Column]:
 
 
 def _numbered(columns: list[Column]) -> list[Column]:
-    """Append a number to the second and further columns of a name; files such as MDF may repeat names."""
+    """Append a number to the second and further columns of a name. Files such as MDF may repeat names."""
     seen: dict[str, int] = {}
     found = []
     for column in columns:

@@ -25,7 +25,7 @@ INPUTS: Final = ("steering_wheel_rad", "rack_m")
 """Channels that align the clocks if both runs have them: the response of another car may lag, its input may not."""
 RESPONSES: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 _STEP_S: Final = 0.01
-"""Step of the search [s]; the result is found between its instants."""
+"""Step of the search [s]. The result is found between its instants."""
 _NEARLY: Final = 0.01
 """Among shifts this close to the best correlation, such as all periods of a sine, the shortest one is taken."""
 

@@ -18,13 +18,13 @@ from activesteer.conventions import RUN_COLOURS, Array
 from activesteer.errors import StudyError
 from activesteer.files import json_text, make_folder, write_text
 from activesteer.pages import Page, Section, Table, render_page
-from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.units import parameter_title, quantity_of
 
 LEVEL: Final = 0.95
 """Probability that an interval contains the true value."""
 _WINDOW: Final = 5.0
-"""The autocorrelation is summed over this multiple of the resulting time (Sokal, 1997); beyond, it is noise."""
+"""The autocorrelation is summed over this multiple of the resulting time (Sokal, 1997). Beyond, it is noise."""
 _SAME: Final = 2e-3
 """Parameters are the same to the recordings if a combination of them changes all differences by at most this fraction
 of their single effects. Their correlation is then 0.999996, which differences of runs cannot distinguish from 1."""
@@ -52,7 +52,7 @@ class Intervals(NamedTuple):
 
 
 def autocorrelation_time(values: Array) -> float:
-    """Return the number of neighbouring samples that are worth one independent sample; 1 for white noise.
+    """Return the number of neighbouring samples that are worth one independent sample, or 1 for white noise.
 
     The time is one plus twice the sum of the autocorrelations, as far as these exceed their own noise. The mean is not
     subtracted: an offset is no noise.
@@ -114,7 +114,7 @@ def without_effect(slopes: Sequence[Array]) -> list[int]:
 
 
 def told_apart(slopes: Sequence[Array]) -> list[int]:
-    """Return parameters of which a combination has no effect; empty if all can be separated."""
+    """Return parameters of which a combination has no effect, or empty if all can be separated."""
     _, sizes, combinations = np.linalg.svd(np.concatenate(slopes) / _effects(slopes), full_matrices=False)
     if sizes[-1] > _SAME:
         return []
@@ -330,7 +330,7 @@ def notes_of(found: Fit) -> tuple[str, ...]:
 
 
 def write_fit(found: Fit, name: str, folder: Path) -> list[Path]:
-    """Write `fit.json`, `overrides.toml` and `fit.html`, and return their paths; existing files are replaced."""
+    """Write `fit.json`, `overrides.toml` and `fit.html`, and return their paths. Existing files are replaced."""
     make_folder(folder, StudyError)
     texts = {
         "fit.json": json_text(found.to_json()) + "\n",
@@ -367,7 +367,7 @@ def _page(found: Fit, name: str) -> Page:
         Section("Remaining differences", tables=[Table("", columns, [each.words() for each in found.compared])])
     )
     for recording, compared in groupby(found.compared, lambda each: each.recording):
-        sections.append(Section(recording, pictures=[as_svg(draw(picture(list(compared))))]))
+        sections.append(Section(recording, pictures=[picture(list(compared))]))
     sections.append(Section("Assumptions", points=rests_on(found)))
     return Page(f"activesteer fit: {name}", f"Parameters from recordings: {name}", lead, sections)
 

@@ -42,7 +42,7 @@ class FitTable:
     start: dict[str, float] = field(default_factory=dict)
     """Factor -> start of the search; by default the value of the files, or the middle of the range."""
     from_s: float | None = None
-    """Start of the compared part of the recordings [s]; inputs are driven from the first row."""
+    """Start of the compared part of the recordings [s]. Inputs are driven from the first row."""
     until_s: float | None = None
     """End of the compared part [s]."""
     windows: dict[str, tuple[float, ...]] = field(default_factory=dict)
@@ -160,7 +160,7 @@ AT_END: Final = 1e-3
 """A parameter this close to an end of its range is at that end."""
 
 Answer = list[Array] | str
-"""Differences of every channel of every recording for a set of parameters; or the reason why it cannot be driven."""
+"""Differences of every channel of every recording for a set of parameters. Or the reason why it cannot be driven."""
 
 
 class Found(NamedTuple):
@@ -192,7 +192,7 @@ def search(
     rounds: dict[bytes, tuple[list[Array], list[Array]] | None] = {}
 
     def tried(place: Array) -> tuple[list[Array], list[Array]] | None:
-        """Return differences and derivatives; None if the parameters cannot be driven."""
+        """Return differences and derivatives, or None if the parameters cannot be driven."""
         name = place.tobytes()
         if name not in rounds:
             rounds[name] = _tried(answers, place, first=not rounds)
@@ -412,7 +412,7 @@ class _Problem:
 def drive(
     settings: Settings, recording: int, overrides: dict[str, Any], time_s: Array, channels: tuple[str, ...]
 ) -> dict[str, Array] | str:
-    """Drive once; return channels at the times of a recording, or the reason of a failure."""
+    """Drive once. Return channels at the times of a recording, or the reason of a failure."""
     try:
         scenario = scenario_of(settings, recording, 0, overrides)
         run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)

@@ -237,7 +237,7 @@ class _Case:
         scheduler: str | None,
         overrides: Mapping[str, Any] | None = None,
     ) -> Fit | None:
-        """Find factors in the fit windows; None without factors."""
+        """Find factors in the fit windows, or None without factors."""
         if not keys:
             return None
         used = [run for run in self._file.table.runs if run.fit_s]

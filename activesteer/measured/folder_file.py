@@ -43,17 +43,17 @@ class RunTable:
     map: str = ""
     """Map file of `activesteer import`."""
     fit_s: Window = ()
-    """Window for fitting; by default the run is not used for fitting."""
+    """Window for fitting. By default the run is not used for fitting."""
     check_s: Window = ()
-    """Window for checking; by default the run is not used for checking."""
+    """Window for checking. By default the run is not used for checking."""
 
 
 @dataclass(frozen=True)
 class QuantityTable:
-    """A compared channel; the numbers have the unit of its key."""
+    """A compared channel. The numbers have the unit of its key."""
 
     noise: Annotated[float, Range(1e-12)] | None = None
-    """Standard deviation of its noise, its weight in fits; by default the channel is not used in fits."""
+    """Standard deviation of its noise, its weight in fits. By default the channel is not used in fits."""
     offset: Annotated[float, Range(0.0)] | None = None
     """Constant part of the tolerance; by default that of `activesteer compare`."""
     gain: Annotated[float, Range(0.0)] | None = None
@@ -69,7 +69,7 @@ class PredictTable:
     factors: tuple[str, ...] = ()
     """Factors that the data must give before anything can be predicted, such as an unknown scale."""
     channels: tuple[str, ...] = ()
-    """Channels that determine them; by default all that have a noise."""
+    """Channels that determine them. By default all that have a noise."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class MeasuredTable:
     title: str = ""
     """Title of the page."""
     filter: Literal["iso15037", "fmvss126", "none"] = "iso15037"
-    """Filter of both sides; see `activesteer compare`."""
+    """Filter of both sides (see `activesteer compare`)."""
     noise_allowance: bool = True
     """Whether to widen the corridors by the estimated noise of the measurement."""
     overrides: dict[str, Any] = field(default_factory=dict)
@@ -252,7 +252,7 @@ def _with_runs(file: MeasuredFile) -> MeasuredFile:
 
 
 def _with_circle(file: MeasuredFile, circle: CircleTable) -> MeasuredFile:
-    """Check circle, effects, steps, decisions and intervals; an interval of a key becomes changes."""
+    """Check circle, effects, steps, decisions and intervals. An interval of a key becomes changes."""
     table, source = file.table, file.source
     if set(file.tolerances) != {STEERING}:
         raise source.fail(("quantities",), "a circle compares steering_wheel_deg alone", list(table.quantities))

@@ -64,11 +64,11 @@ class MeasurementMap:
     """Map file."""
 
     channels: dict[str, ChannelMap] = field(default_factory=dict)
-    """Channel -> its source; by default, columns are recognised by their names."""
+    """Channel -> its source. By default, columns are recognised by their names."""
     axes: Literal["iso8855", "sae_j670"] = "iso8855"
     """Axes of the file: SAE J670 has y to the right and z down."""
     time: str = ""
-    """Name of the time column; recognised by its name by default, as in further files without this column."""
+    """Name of the time column. Recognised by its name by default, as in further files without this column."""
     time_unit: str = ""
     """Unit of the time; by default that of the file, or s."""
     shift_s: dict[str, float] = field(default_factory=dict)
@@ -88,7 +88,7 @@ class MeasurementMap:
 
 
 def read_map(path: Path | None) -> MeasurementMap:
-    """Read a map; return an empty map without a file."""
+    """Read a map. Return an empty map without a file."""
     if path is None:
         return MeasurementMap()
     table, source = read_toml(path, RecordingError)
@@ -196,7 +196,7 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
 
 
 def _words(source: _Source) -> str:
-    """Return column and unit; many names contain the unit."""
+    """Return column and unit. Many names contain the unit."""
     name, unit = source.column.name, source.known.unit or "-"
     return name if split_unit(name)[1] == unit else f"{name} [{unit}]"
 
@@ -292,7 +292,7 @@ def _shared_times(files: _Files, chosen: MeasurementMap, sources: Mapping[str, _
 
 
 def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, named: bool) -> Array:
-    """Return the times of a file [s]; of several files, `time` of the map may name the column of some."""
+    """Return the times of a file [s]. Of several files, `time` of the map may name the column of some."""
     if chosen.time and named:
         column = find(columns, chosen.time, path)
     else:
@@ -359,7 +359,7 @@ def _plausible(values: Array, column: str, path: Path) -> Array:
 
 
 def _bridge_s(chosen: MeasurementMap, signal: Samples) -> float:
-    """Return the longest allowed gap; a slow signal has long steps between its samples."""
+    """Return the longest allowed gap. A slow signal has long steps between its samples."""
     return max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal.time_s))))
 
 

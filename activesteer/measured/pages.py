@@ -16,7 +16,7 @@ from activesteer.measured.fit_result import Fit, correlation_table, parameter_ta
 from activesteer.measured.folder import Band, MeasuredValidation, Part
 from activesteer.measured.folder_file import STEERING
 from activesteer.pages import Page, Section, Table, Text, failed, passed
-from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.units import quantity_of, typeset
 
 _EDGE: Final = "#9bbbd4"
@@ -31,7 +31,7 @@ def comparison_page(found: Comparison, measured: list[str], simulated: str) -> P
     columns = ["quantity", "rms of the residual", "tolerance", "share inside", ""]
     outside = frozenset(number for number, each in enumerate(found.quantities) if not each.inside)
     table = Table("", columns, [words(each) for each in found.quantities], outside)
-    pictures = [as_svg(draw(picture(each, found.standard, len(measured)))) for each in found.quantities]
+    pictures = [picture(each, found.standard, len(measured)) for each in found.quantities]
     heading = "Measured and simulated: " + (passed("inside") if found.inside else failed("outside"))
     sections = [Section(tables=[table]), Section(pictures=pictures), Section("Assumptions", points=assumptions(found))]
     return Page(f"activesteer compare: {simulated}", heading, lead, sections)
@@ -131,7 +131,7 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
             tables.append(parameter_table(found))
             if len(found.parameters) > 1:
                 tables.append(correlation_table(found))
-        pictures = [as_svg(draw(_picture(result, one))) for one in shown if one.part == "check"]
+        pictures = [_picture(result, one) for one in shown if one.part == "check"]
         notes, points = ([], []) if found is None else ([f"! {note}" for note in found.notes], rests_on(found))
         sections.append(Section(name.capitalize(), [_free(found), *notes], pictures, tables, points))
     if result.bands:
@@ -206,7 +206,7 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
          f"{result.nominal_deg:.1f}"),
         ("predicted, with assumed effects", f"{result.assumed_deg:.1f}", "nominal"),
     ]  # fmt: skip
-    sections = [Section("", (), [as_svg(draw(_distributions(result)))], [_table(["steering wheel", "deg", ""], rows)])]
+    sections = [Section("", (), [_distributions(result)], [_table(["steering wheel", "deg", ""], rows)])]
     if result.ends:
         text = (
             f"From {result.low_deg:.1f} to {result.high_deg:.1f} deg, {result.high_deg - result.low_deg:.1f} deg wide: "
@@ -221,7 +221,7 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
         steps = [(name, origin, f"{angle:.1f}") for name, origin, angle in result.steps]
         sections.append(
             Section(
-                "From geometry to the second prediction", (), [as_svg(draw(_waterfall(result)))],
+                "From geometry to the second prediction", (), [_waterfall(result)],
                 [_table(["with", "origin", "deg"], steps)],
             )
         )  # fmt: skip

@@ -91,7 +91,7 @@ _EXPORTERS: Final[tuple[tuple[str, dict[str, Known]], ...]] = (
 
 
 def written_unit(unit: str) -> Unit | None:
-    """Return a unit as a file writes it; None if it is unknown."""
+    """Return a unit as a file writes it, or None if it is unknown."""
     return find_unit(unit.strip().strip("[]()").strip().replace("**", "^"), any_case=True)
 
 
@@ -102,7 +102,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def before_bracket(name: str) -> str:
-    """Return the part of a column's name before a bracket at its end; empty if there is none."""
+    """Return the part of a column's name before a bracket at its end, or empty if there is none."""
     found = re.fullmatch(r"(.*?)\s*[\[(][^\])]*[\])]\s*", name)
     return found[1] if found else ""
 
@@ -250,7 +250,7 @@ def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:
 
 
 def _alike(one: Array, other: Array) -> float:
-    """Return the cosine between two signals; 0 if one of them is zero."""
+    """Return the cosine between two signals, or 0 if one of them is zero."""
     size = math.sqrt(float(one @ one) * float(other @ other))
     return float(one @ other) / size if size > 0.0 else 0.0
 
@@ -268,7 +268,7 @@ class Samples(NamedTuple):
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
-    """Return the finite samples in the order of their times; the last of several at one instant is kept."""
+    """Return the finite samples in the order of their times. The last of several at one instant is kept."""
     if time_s.shape != values.shape or time_s.ndim != 1:
         raise RecordingError(
             f"{name} has {values.shape} values at {time_s.shape} times; one value a time is needed", file=file
@@ -368,7 +368,7 @@ def at_sensor(run: Recording) -> Recording:
 
 
 def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) -> Poses | None:
-    """Return poses of a car in its design position, moved along the path, for replay; None without a path."""
+    """Return poses of a car in its design position, moved along the path, for replay, or None without a path."""
     if not {"x_m", "y_m", "yaw_rad"} <= set(channels):
         return None
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import

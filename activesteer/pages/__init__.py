@@ -12,14 +12,15 @@ from markupsafe import Markup
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from activesteer.errors import ParameterError
 from activesteer.files import make_folder, write_text
-from activesteer.pages.model import Page, Section, Table, Text, failed, passed
+from activesteer.pages.model import Page, Section, Table, Text, failed, passed, picture_values
 from activesteer.units import parameter_title, typeset
 from activesteer.version import __version__
 
 
 def render_page(page: Page) -> str:
     """Return a page as HTML."""
-    return render("document.html", page=page)
+    charts = [picture_values(picture) for section in page.sections for picture in section.pictures]
+    return render("document.html", page=page, charts=charts)
 
 
 def write_page(page: Page, path: Path) -> Path:

@@ -3,19 +3,178 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 import rerun as rr
+from numpy.typing import ArrayLike, NDArray
 
-from activesteer.conventions import Array, yaw_of
+from activesteer.conventions import CORNERS, Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed
 from activesteer.drawing.cars import bytes_of, direction_of_motion, share_seen
-from activesteer.playback.geometry import about_vertical, xyzw
-from activesteer.playback.runs import Run
-from activesteer.playback.timeline import times
-from activesteer.recording import Primitive, ScenePart
+from activesteer.drawing.tyre_forces import CHANNELS, force_arrows, force_scale
+from activesteer.playback.runs import Run, times
+from activesteer.recording import Link, Primitive, ScenePart
 from activesteer.road.course import Footprint, footprint_of
+
+
+def rotated(quaternions: Array, point: ArrayLike) -> Array:
+    """Rotate one point of a body by the orientations of that body."""
+    vector = np.asarray(point, np.float64)
+    w, axis = quaternions[:, :1], quaternions[:, 1:]
+    cross = 2.0 * np.cross(axis, vector)
+    return vector + w * cross + np.cross(axis, cross)
+
+
+def about_vertical(angle_rad: Array) -> Array:
+    """Return quaternions x y z w of rotations about the vertical, shape (n, 4)."""
+    zero = np.zeros_like(angle_rad)
+    return np.stack([zero, zero, np.sin(0.5 * angle_rad), np.cos(0.5 * angle_rad)], axis=-1)
+
+
+def xyzw(quaternions: ArrayLike) -> Array:
+    """Reorder quaternions w x y z to the viewer's order x y z w, shape (..., 4)."""
+    return np.asarray(quaternions, np.float64)[..., [1, 2, 3, 0]]
+
+
+def between(start_m: Array, end_m: Array) -> tuple[Array, Array, Array]:
+    """Return length [m], centre [m] and quaternion x y z w of a solid whose z axis is the line between two points."""
+    if end_m[0, 2] < start_m[0, 2]:  # point upwards: close to straight down, the shortest rotation has no definite axis
+        start_m, end_m = end_m, start_m
+    along = end_m - start_m
+    length = np.linalg.norm(along, axis=1)
+    x, y, z = (along / np.maximum(length, 1e-9)[:, None]).T
+    turn = np.stack([-y, x, np.zeros_like(x), 1.0 + z], axis=1)
+    turn[turn[:, 3] < 1e-9] = (1.0, 0.0, 0.0, 0.0)
+    return length, 0.5 * (start_m + end_m), turn / np.linalg.norm(turn, axis=1, keepdims=True)
+
+
+_COILS: Final = 6
+_POINTS_PER_COIL: Final = 16
+_WIRE_RADIUS_M: Final = 0.007
+
+
+def send_links(stream: rr.RecordingStream, run: Run) -> None:
+    """Send every link of the scene whose bodies have poses: rods as cylinders, springs as coils.
+
+    Recordings made before links were recorded show none.
+    """
+    names = run.recording.poses.names
+    links = [
+        part for part in run.recording.scene if isinstance(part, Link) and all(body in names for body, _ in part.points)
+    ]
+    springs = [link for link in links if link.kind == "spring"]
+    _send_rods(stream, run, [link for link in links if link.kind != "spring"])
+    for spring in springs:
+        _send_spring(stream, run, spring)
+
+
+def link_ends(run: Run, link: Link) -> list[NDArray[np.float64]]:
+    """Return the world position of each point of a link [m], each of shape (number of shown poses, 3)."""
+    poses = run.recording.poses
+    ends = []
+    for body, point in link.points:
+        index = poses.names.index(body)
+        turned = rotated(poses.quaternions[run.poses, index], point)
+        ends.append(poses.positions_m[run.poses, index] + turned)
+    return ends
+
+
+def _send_rods(stream: rr.RecordingStream, run: Run, links: list[Link]) -> None:
+    """Send all springs in one entity, because there are many and each changes at every pose."""
+    parts = []
+    radii: list[float] = []
+    colours: list[list[int]] = []
+    for link in links:
+        ends = link_ends(run, link)
+        for start_m, end_m in pairwise(ends):
+            parts.append(between(start_m, end_m))
+            radii.append(link.radius_m)
+            colours.append([round(255 * value) for value in link.rgba])
+    if not parts:
+        return
+    lengths, centres, turns = (np.stack(values, axis=1).astype(np.float32) for values in zip(*parts, strict=True))
+    path = f"{run.scene}/links"
+    stream.log(path, rr.Cylinders3D.from_fields(radii=radii, colors=colours, fill_mode="solid"), static=True)
+    columns = rr.Cylinders3D.columns(
+        lengths=lengths.reshape(-1), centers=centres.reshape(-1, 3), quaternions=turns.reshape(-1, 4)
+    )
+    when = times(run.recording.poses.time_s[run.poses])
+    stream.send_columns(path, when, columns.partition(lengths=[len(parts)] * len(run.poses)))
+
+
+def _send_spring(stream: rr.RecordingStream, run: Run, spring: Link) -> None:
+    ends = link_ends(run, spring)
+    length, centre, turn = between(ends[0], ends[-1])
+    path = f"{run.scene}/springs/{spring.name}"
+    colour = [round(255 * value) for value in spring.rgba[:3]]
+    coil = rr.LineStrips3D([_coil(spring.radius_m)], radii=_WIRE_RADIUS_M, colors=[colour])
+    stream.log(path, coil, static=True)
+    scale = np.ones((len(length), 3), np.float32)
+    scale[:, 2] = length
+    columns = rr.Transform3D.columns(
+        translation=centre.astype(np.float32), quaternion=turn.astype(np.float32), scale=scale
+    )
+    stream.send_columns(path, times(run.recording.poses.time_s[run.poses]), columns)
+
+
+def _coil(radius_m: float) -> NDArray[np.float64]:
+    """Return a helix about z of length one, with its middle at the origin."""
+    turn = np.linspace(0.0, 2.0 * np.pi * _COILS, _COILS * _POINTS_PER_COIL + 1)
+    height = np.linspace(-0.5, 0.5, len(turn))
+    return np.stack([radius_m * np.cos(turn), radius_m * np.sin(turn), height], axis=1)
+
+
+_ARROW_RADIUS_M: Final = 0.045
+_ARROW_COLOUR: Final = (255, 45, 150)
+_DISC_RADIUS_M: Final = 0.3
+
+_USE: Final = (0.0, 0.6, 0.9, 1.1)
+_USE_COLOURS: Final = ((0, 158, 115), (240, 228, 66), (230, 120, 0), (220, 20, 20))
+"""Colours at these utilisations: green, yellow, orange, red."""
+
+_USED: Final = tuple(f"{corner}_friction_utilisation" for corner in CORNERS)
+
+
+def send_tyre_forces(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) -> None:
+    """Send an arrow and a disc for each tyre, unless the recording lacks a channel that they need."""
+    if not run.has(*_USED, *CHANNELS):
+        return
+    origins, vectors = force_arrows(run.recording, force_scale([other.recording for other in runs]))
+    colours = use_colours(np.stack([run.channel(name) for name in _USED], axis=1))
+    # A run that diverged ends with values that cannot be drawn.
+    good = np.isfinite(origins).all(axis=(1, 2)) & np.isfinite(vectors).all(axis=(1, 2))
+    when, four = times(run.recording.time_s[good]), [len(CORNERS)] * int(good.sum())
+    painted = colours[good].reshape(-1)
+    arrows = f"{run.scene}/tyres/force"
+    stream.log(arrows, rr.Arrows3D.from_fields(radii=[_ARROW_RADIUS_M], colors=[_ARROW_COLOUR]), static=True)
+    stream.send_columns(
+        arrows,
+        when,
+        rr.Arrows3D.columns(origins=origins[good].reshape(-1, 3), vectors=vectors[good].reshape(-1, 3)).partition(
+            lengths=four
+        ),
+    )
+    discs = f"{run.scene}/tyres/friction_utilisation"
+    size = rr.Cylinders3D.from_fields(radii=[_DISC_RADIUS_M], lengths=[0.02], fill_mode="solid")
+    stream.log(discs, size, static=True)
+    flat = origins[good] * np.array((1.0, 1.0, 0.0), np.float32)
+    stream.send_columns(
+        discs, when, rr.Cylinders3D.columns(centers=flat.reshape(-1, 3), colors=painted).partition(lengths=four)
+    )
+
+
+def use_colours(friction_utilisation: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """Return colours 0xrrggbbff for fractions of the available friction."""
+    red, green, blue = (
+        np.interp(np.nan_to_num(friction_utilisation, nan=0.0), _USE, [colour[part] for colour in _USE_COLOURS])
+        .round()
+        .astype(np.uint32)
+        for part in range(3)
+    )
+    return ((red << 24) | (green << 16) | (blue << 8) | 255).astype(np.uint32)
+
 
 _GHOST_OPACITY: Final = 0.4
 _GHOST_EVERY: Final = 5
@@ -28,11 +187,6 @@ def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> 
     """Send bodies, their solids, and two level frames that move with the car.
 
     `NAME/car_frame` has the heading of the car, and `NAME/chase`, the frame of the camera, the direction of motion.
-
-    Args:
-        stream: Target of the data.
-        run: The run.
-        cutaway: Whether the body is transparent.
     """
     poses = run.recording.poses
     when = times(poses.time_s[run.poses])
@@ -69,13 +223,7 @@ def body_path(run: Run, body: str) -> str:
 
 
 def send_ghost(stream: rr.RecordingStream, run: Run, beside: Run) -> None:
-    """Send the body of a car as the view of another run shows it: transparent, and fainter the nearer the two cars are.
-
-    Args:
-        stream: Target of the data.
-        run: The run whose car is drawn.
-        beside: The run whose view shows the car.
-    """
+    """Send the body of a car for the view of another run: transparent, and fainter the nearer the two cars are."""
     poses = run.recording.poses
     time_s = poses.time_s[run.poses][::_GHOST_EVERY]
     alpha = np.rint(255.0 * _GHOST_OPACITY * share_seen(_apart(run, beside, time_s))).astype(np.uint32)

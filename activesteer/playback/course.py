@@ -11,9 +11,8 @@ import rerun as rr
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.bodywork import CHASSIS
 from activesteer.drawing.cars import bytes_of, height_colours
-from activesteer.playback.geometry import rotated
-from activesteer.playback.runs import Run
-from activesteer.playback.timeline import times
+from activesteer.playback.car import rotated
+from activesteer.playback.runs import Run, times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
 from activesteer.road.recorded import LIMIT_M
@@ -126,13 +125,7 @@ def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
 
 
 def send_track(stream: rr.RecordingStream, run: Run, number: int) -> None:
-    """Send the track of a car and, on the map, its moving outline with steered wheels.
-
-    Args:
-        stream: Target of the data.
-        run: The run.
-        number: Index of the run; the line of each run lies a little above the line of the run before.
-    """
+    """Send the track of a car and, on the map, its moving outline with steered wheels."""
     track = _track(run)
     line = np.column_stack([track, np.full(len(track), 0.03 + 0.01 * number)])
     colour = bytes_of(run.colour)

@@ -2,19 +2,182 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
 
+import numpy as np
+import rerun as rr
 import rerun.blueprint as rrb
 
 from activesteer.drawing.bodywork import CHASSIS
-from activesteer.playback import events, plots
+from activesteer.drawing.cars import bytes_of
+from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Panel, panels_in
+from activesteer.playback import plots
 from activesteer.playback.car import body_path, ghost_path
 from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
-from activesteer.playback.legend import LEGEND, LEGEND_OF_RUNS, height, legend
-from activesteer.playback.runs import Run
-from activesteer.playback.timeline import TIMELINE
+from activesteer.playback.runs import TIMELINE, Run, times
 from activesteer.playback.wheel_angles import plan_view, wedges_path
+from activesteer.recording.contents import events_of
+from activesteer.units import display_unit
+
+LEGEND: Final = "legend"
+"""Parent entity of the legends."""
+LEGEND_OF_RUNS: Final = f"{LEGEND}/runs"
+"""Entity of the legend of the runs, which have the same colours in all plots."""
+_WIDTH: Final = 500.0
+"""Width of a legend, for a window of 1280 x 800 [screen points]."""
+_ROW: Final = 26.0
+_LETTER: Final = 6.6
+_GAP: Final = 26.0
+_BELOW: Final = 12.0
+"""Distance from a marker to the middle of its text."""
+
+
+def legend(path: str, curves: Mapping[str, str]) -> rrb.Spatial2DView:
+    """Return the view of a legend."""
+    return rrb.Spatial2DView(
+        origin=f"/{path}",
+        name=f"Curves: {path.removeprefix(LEGEND)[1:]}",
+        titlebar=False,
+        visual_bounds=rrb.VisualBounds2D(x_range=(0.0, _WIDTH), y_range=(0.0, height(curves))),
+    )
+
+
+def height(curves: Mapping[str, str]) -> float:
+    """Return the height of the legend of some curves."""
+    return _ROW * (1 + max((row for row, _ in _places(curves)), default=0))
+
+
+def send_legend(stream: rr.RecordingStream, path: str, curves: Mapping[str, str]) -> None:
+    """Send a legend."""
+    points = rr.Points2D(
+        [(middle, (row + 0.5) * _ROW - _BELOW) for row, middle in _places(curves)],
+        labels=list(curves),
+        show_labels=True,
+        colors=[bytes_of(colour) for colour in curves.values()],
+        radii=0.0,
+    )
+    stream.log(path, points, static=True)
+
+
+def _places(curves: Mapping[str, str]) -> list[tuple[int, float]]:
+    """Return the row and the middle of each name."""
+    places, row, at = [], 0, 0.0
+    for name in curves:
+        wide = _LETTER * len(name) + _GAP
+        if at > 0.0 and at + wide > _WIDTH:
+            row, at = row + 1, 0.0
+        places.append((row, at + 0.5 * wide))
+        at += wide
+    return places
+
+
+_LIMIT: Final = "_saturated"
+_SHORTEST_S: Final = 0.05
+"""Shorter interruptions of a saturation are ignored [s]."""
+
+
+class Event(NamedTuple):
+    """Begin or end of a fault or a saturation, or a recorded event.
+
+    Attributes:
+        time_s: Time of the event [s].
+        text: Description.
+        level: Level of the viewer's log.
+    """
+
+    time_s: float
+    text: str
+    level: rr.TextLogLevel
+
+
+def events(run: Run) -> list[Event]:
+    """Return the faults of the manoeuvre, the recorded events and the saturations, sorted by time."""
+    found = [*_faults(run), *_recorded(run), *_limits(run)]
+    return sorted(found, key=lambda event: event.time_s)
+
+
+def _recorded(run: Run) -> list[Event]:
+    levels = {"fail": ("FAULT ", rr.TextLogLevel.ERROR)}
+    found = []
+    for event in events_of(run.recording.metadata):
+        start, level = levels.get(event.kind, (f"{event.kind}: ", rr.TextLogLevel.INFO))
+        found.append(Event(event.time_s, start + event.what, level))
+    return found
+
+
+def _faults(run: Run) -> list[Event]:
+    maneuver = run.recording.metadata.get("maneuver")
+    faults = maneuver.get("fault") if isinstance(maneuver, Mapping) else None
+    last_s = float(run.recording.time_s[-1])
+    found = []
+    for fault in faults if isinstance(faults, list | tuple) else ():
+        if not isinstance(fault, Mapping):
+            continue
+        name = f"{fault.get('part', '?')}: {fault.get('kind', '?')}{_size(fault)}"
+        ends = (("start_s", f"FAULT {name}", rr.TextLogLevel.ERROR), ("end_s", f"{name} is over", rr.TextLogLevel.INFO))
+        for key, text, level in ends:
+            time_s = fault.get(key)
+            if isinstance(time_s, int | float) and time_s <= last_s:
+                found.append(Event(float(time_s), text, level))
+    return found
+
+
+def _size(fault: Mapping[str, Any]) -> str:
+    """Return the size of a fault in display units."""
+    said = ""
+    for key, value in fault.items():
+        if key == "side":
+            said += f" {value}"
+        elif (key == "delay_s" or key.startswith("size_")) and isinstance(value, int | float):
+            unit, factor = display_unit(key)
+            said += f" {factor * value:.4g} {unit}"
+    return said
+
+
+def _limits(run: Run) -> list[Event]:
+    found = []
+    time_s = run.recording.time_s
+    for channel in run.recording.channels:
+        if not channel.name.endswith(_LIMIT):
+            continue
+        begins, ends = _spans(run.channel(channel.name) > 0.5, time_s)
+        what = channel.name.removesuffix(_LIMIT).replace("_", " ")
+        found += [Event(float(when), f"{what} at its limit", rr.TextLogLevel.WARN) for when in begins]
+        found += [Event(float(when), f"{what} no longer at its limit", rr.TextLogLevel.INFO) for when in ends]
+    return found
+
+
+def _spans(active: np.ndarray, time_s: np.ndarray) -> tuple[list[float], list[float]]:
+    """Return the times at which a flag rises and falls, with short gaps closed."""
+    edges = np.diff(np.concatenate(([False], active)).astype(np.int8))
+    begins, ends = list(time_s[edges > 0]), list(time_s[edges < 0])
+    kept_begins, kept_ends = begins[:1], []
+    for end, begin in zip(ends, begins[1:], strict=False):
+        if begin - end >= _SHORTEST_S:
+            kept_ends.append(end)
+            kept_begins.append(begin)
+    return kept_begins, kept_ends + ends[len(begins) - 1 :] if begins else []
+
+
+def send_events(stream: rr.RecordingStream, run: Run) -> None:
+    """Send the warnings of a run, if it has any."""
+    found = events(run)
+    if found:
+        when = times(np.array([event.time_s for event in found]))
+        texts, levels = [event.text for event in found], [event.level for event in found]
+        stream.send_columns(_warnings_path(run), when, rr.TextLog.columns(text=texts, level=levels))
+
+
+def warnings_view(runs: Sequence[Run]) -> list[rrb.TextLogView]:
+    """Return the view of the warnings of these runs, or None if there are none."""
+    paths = [f"/{_warnings_path(run)}" for run in runs if events(run)]
+    return [rrb.TextLogView(origin="/", contents=paths, name="Warnings")] if paths else []
+
+
+def _warnings_path(run: Run) -> str:
+    return f"{run.name}/warnings"
+
 
 SUMMARY: Final = "summary"
 """Entity of the summary text."""
@@ -29,13 +192,7 @@ _ABOVE: Final = rrb.EyeControls3D(position=(-1.3, 0.0, 6.5), look_target=(-1.3, 
 
 
 def blueprint(runs: Sequence[Run], *, compare: bool, page: int = 0) -> rrb.Blueprint:
-    """Return the layout of the viewer.
-
-    Args:
-        runs: The runs. If there are several, the first page shows all of them.
-        compare: Whether to leave out the pages of single runs.
-        page: The page of plots that is shown first.
-    """
+    """Return the layout of the viewer."""
     if len(runs) == 1:
         content = _page(runs[0], runs, page)
     elif compare:
@@ -70,7 +227,7 @@ def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
     )
 
 
-def _tab(name: str, shown: Sequence[plots.Plot], run: Run, *, alone: bool) -> rrb.Vertical:
+def _tab(name: str, shown: Sequence[Panel], run: Run, *, alone: bool) -> rrb.Vertical:
     views, curves = plots.views(shown, [run]), plots.curves(shown, run, alone=alone)
     names = legend(f"{LEGEND}/{run.name}/{name}", curves)
     high = height(curves)
@@ -81,7 +238,7 @@ def _tab(name: str, shown: Sequence[plots.Plot], run: Run, *, alone: bool) -> rr
 
 def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
     """Return the page of all runs: a view for each car, with the others as ghosts, and overlaid plots."""
-    loads, use = plots.WHEELS[:2]
+    loads, use = panels_in(WHEELS)[:2]
     return rrb.Horizontal(
         rrb.Vertical(
             rrb.Horizontal(*(_chase(run, runs) for run in runs)),
@@ -92,9 +249,7 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
         rrb.Vertical(
             legend(LEGEND_OF_RUNS, {run.label: run.colour for run in runs}),
             rrb.Tabs(
-                rrb.Vertical(*plots.views(plots.MOTION, runs), name="Motion"),
-                rrb.Vertical(*plots.views(plots.DRIVING, runs), name="Driving"),
-                rrb.Vertical(*plots.views(plots.BODY, runs), name="Body"),
+                *(rrb.Vertical(*plots.views(panels_in(name), runs), name=name) for name in (MOTION, DRIVING, BODY)),
                 rrb.Vertical(*plots.views_by_corner(loads, runs), name="Wheel loads"),
                 rrb.Vertical(*plots.views_by_corner(use, runs), name="Friction utilisation"),
                 active_tab=page,
@@ -148,5 +303,5 @@ def _map(runs: Sequence[Run]) -> rrb.Spatial2DView:
 def _words(runs: Sequence[Run]) -> rrb.Tabs | rrb.TextDocumentView:
     """Return the view of the summary, with the warnings behind it if there are any."""
     summary = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")
-    warnings = events.view(runs)
+    warnings = warnings_view(runs)
     return rrb.Tabs(summary, *warnings, active_tab=0) if warnings else summary

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import cycle
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import rerun as rr
@@ -13,15 +12,11 @@ import rerun.blueprint as rrb
 
 from activesteer.conventions import CORNERS
 from activesteer.drawing.cars import bytes_of
-from activesteer.playback.runs import Run
-from activesteer.playback.timeline import times
-from activesteer.units import quantity_of
+from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Line, Panel, link_panels, panels_in
+from activesteer.playback.runs import Run, times
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
 """Number of plots on a page -> number of tick labels that fit on one axis in a window of 1280 x 800."""
-_CORNER_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7")
-_LINK_COLOURS: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#d55e00", "#a6a6a6")
-_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 
 
 _MARGIN: Final = 1.02
@@ -30,136 +25,20 @@ _EDGE: Final = 1.06
 """Room beyond the largest value relative to it, least part of an axis on either side of zero, and room at the edge."""
 
 
-class Series(NamedTuple):
-    """A line of a plot.
-
-    Attributes:
-        channel: Channel of the recording.
-        name: Name in the legend, if a plot has several lines of a run.
-        colour: Colour of the line if a single run is plotted; empty for the colour of the run.
-        width: Width of the line.
-    """
-
-    channel: str
-    name: str = ""
-    colour: str = ""
-    width: float = 1.5
+OF_CAR: Final = tuple(panel for page in (MOTION, DRIVING, BODY) for panel in panels_in(page))
+"""Panels of the car as a whole: the lines of several runs have the colours of their runs."""
 
 
-class Plot(NamedTuple):
-    """A plot over time.
-
-    Attributes:
-        title: Quantity, with its unit in brackets.
-        series: The lines.
-        entity: Name of the entity that holds all lines, which makes the file smaller. If empty, every line is an entity
-            of its own and may appear in several plots.
-    """
-
-    title: str
-    series: tuple[Series, ...]
-    entity: str = ""
-
-
-def _of_car(channel: str) -> Plot:
-    return Plot(quantity_of(channel).title, (Series(channel),))
-
-
-MOTION: Final = (
-    Plot(
-        quantity_of("yaw_rate_radps")._replace(label="yaw rate, desired one thin").title,
-        (
-            Series("yaw_rate_radps"),
-            Series("yaw_rate_desired_radps", "desired", "#b39b00", 0.8),
-            Series("measured_yaw_rate_radps", "measured", "#a6a6a6", 0.8),
-        ),
-    ),
-    Plot(
-        quantity_of("sideslip_rad").title,
-        (Series("sideslip_rad"), Series("estimated_sideslip_rad", "estimated", "#a6a6a6", 0.8)),
-    ),
-    Plot(
-        quantity_of("rear_steer_rad")._replace(label="added steer angles, rear thick, front thin").title,
-        (
-            Series("rear_steer_rad", "rear wheels", "#d55e00", 2.0),
-            Series("superposition_rad", "front superposition", "#0072b2", 1.0),
-        ),
-    ),
-)
-"""Plots of the car as a whole."""
-DRIVING: Final = (_of_car("steering_wheel_rad"), _of_car("speed_mps"))
-"""Plots of the driver's inputs."""
-BODY: Final = (
-    Plot(
-        quantity_of("ay_mps2").title,
-        (Series("ay_mps2"), Series("measured_ay_mps2", "measured", "#a6a6a6", 0.8)),
-    ),
-    _of_car("roll_rad"),
-    _of_car("ax_mps2"),
-)
-"""Plots of the accelerations and the attitude of the body."""
-OF_CAR: Final = (*MOTION, *DRIVING, *BODY)
-
-_DEMAND_OF: Final = {
-    "yaw_rate_desired_radps": "yaw_rate_desired_radps",
-    "rear_steer_rad": "rear_steer_demand_rad",
-    "superposition_rad": "superposition_demand_rad",
-    **{f"{corner}_brake_pressure_Pa": f"{corner}_brake_pressure_Pa" for corner in CORNERS},
-}
-"""Channel -> the demand without which it is not plotted: compliance moves a hinge even if nothing is demanded."""
-
-
-def _of_wheels(channel: str, entity: str = "") -> Plot:
-    lines = zip(CORNERS, _CORNER_COLOURS, strict=True)
-    series = tuple(Series(f"{corner}_{channel}", _WORDS[corner], colour) for corner, colour in lines)
-    return Plot(quantity_of(channel).title, series, entity)
-
-
-WHEELS: Final = (
-    _of_wheels("tyre_fz_N"),
-    _of_wheels("friction_utilisation"),
-    _of_wheels("tyre_fy_N", "tyre_fy_N"),
-    _of_wheels("tyre_fx_N", "tyre_fx_N"),
-    _of_wheels("brake_pressure_Pa", "brake_pressure_Pa"),
-)
-"""Plots of the four wheels."""
-
-
-def links(run: Run) -> tuple[Plot, ...]:
-    """Return plots of the axial forces of links and springs, one for each corner, from the recorded channels."""
-    named = {
-        corner: [
-            channel.name[3:]
-            for channel in run.recording.channels
-            if channel.name.startswith(f"{corner}_") and channel.name.endswith("_force_N") and channel.group == "links"
-        ]
-        for corner in CORNERS
-    }
-    # A part that all corners have, such as a spring, has the same colour in all of them.
-    everywhere = [name for name in named[CORNERS[0]] if all(name in names for names in named.values())]
-    plots = []
-    for corner, names in named.items():
-        order = [*everywhere, *(name for name in names if name not in everywhere)]
-        series = (
-            Series(f"{corner}_{name}", name.removesuffix("_force_N").replace("_", " "), colour)
-            for name, colour in zip(order, cycle(_LINK_COLOURS), strict=False)
-        )
-        if names:
-            title = f"Link forces {_WORDS[corner]}, tension positive [N]"
-            plots.append(Plot(title, tuple(series), f"{corner}_link_forces_N"))
-    return tuple(plots)
+def links(run: Run) -> tuple[Panel, ...]:
+    """Return the panels of the axial forces of links and springs, one for each corner."""
+    channels = (channel.name for channel in run.recording.channels if channel.group == "links")
+    return link_panels([name for name in channels if name.endswith("_force_N")])
 
 
 def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
-    """Send the signals of every plot.
-
-    Args:
-        stream: Target of the data.
-        run: The run.
-        alone: Whether this is the only run. The lines of several runs have the colours of their runs.
-    """
+    """Send the signals of every plot."""
     when = times(run.recording.time_s)
-    for plot in (*OF_CAR, *WHEELS, *links(run)):
+    for plot in (*OF_CAR, *panels_in(WHEELS), *links(run)):
         own_colours = alone or plot not in OF_CAR
         for path, lines in _entities(run, plot):
             style = rr.SeriesLines(
@@ -168,52 +47,42 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
                 widths=[line.width for line in lines],
             )
             stream.log(path, style, static=True)
-            values = np.stack([run.channel(line.channel) * _factor(line.channel) for line in lines], axis=1)
+            values = np.stack([run.channel(line.channel) * plot.quantity.factor for line in lines], axis=1)
             columns = rr.Scalars.columns(scalars=values.reshape(-1))
             stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.recording)))
 
 
-def _factor(channel: str) -> float:
-    """Return the factor from SI to the unit of the plot; forces of links are plotted in N."""
-    return 1.0 if channel.endswith("_force_N") else quantity_of(channel).factor
-
-
-def _name(run: Run, line: Series, *, alone: bool) -> str:
+def _name(run: Run, line: Line, *, alone: bool) -> str:
     if not line.name:
         return run.label
     return line.name if alone else f"{run.label}, {line.name}"
 
 
-def _paint(run: Run, line: Series, *, alone: bool) -> str:
+def _paint(run: Run, line: Line, *, alone: bool) -> str:
     return line.colour if line.colour and alone else run.colour
 
 
-def _entities(run: Run, plot: Plot) -> list[tuple[str, list[Series]]]:
+def _entities(run: Run, plot: Panel) -> list[tuple[str, list[Line]]]:
     """Return the entities of a plot and the lines in each, for the channels that a run has."""
-    lines = [line for line in plot.series if run.has(line.channel) and _is_demanded(run, line.channel)]
-    if plot.entity:
-        return [(f"{run.name}/plots/{plot.entity}", lines)] if lines else []
+    lines = [line for line in plot.lines_in(MOTION) if run.has(line.channel) and line.of(run.recording) is not None]
+    if plot.joined:
+        return [(f"{run.name}/plots/{_entity(plot)}", lines)] if lines else []
     return [(f"{run.name}/plots/{line.channel}", [line]) for line in lines]
 
 
-def _is_demanded(run: Run, channel: str) -> bool:
-    demand = _DEMAND_OF.get(channel)
-    return demand is None or not run.has(demand) or bool(np.any(run.recording[demand]))
+def _entity(plot: Panel) -> str:
+    """Return the name of the entity that holds all lines of a plot."""
+    channel = plot.lines[0].channel
+    return f"{channel[:2]}_link_forces_N" if channel.endswith("_force_N") else channel[3:]
 
 
-def pages(run: Run) -> dict[str, tuple[Plot, ...]]:
+def pages(run: Run) -> dict[str, tuple[Panel, ...]]:
     """Return the plots of a run by page name."""
-    return {"Motion": MOTION, "Driving": DRIVING, "Body": BODY, "Wheels": WHEELS, "Links": links(run)}
+    return {page: panels_in(page) for page in (MOTION, DRIVING, BODY, WHEELS)} | {"Links": links(run)}
 
 
-def curves(plots: Sequence[Plot], run: Run, *, alone: bool) -> dict[str, str]:
-    """Return the names and colours of the lines of a run.
-
-    Args:
-        plots: The plots.
-        run: The run.
-        alone: Whether this is the only run; see `send_plots`.
-    """
+def curves(plots: Sequence[Panel], run: Run, *, alone: bool) -> dict[str, str]:
+    """Return the names and colours of the lines of a run."""
     found = {}
     for plot in plots:
         own = alone or plot not in OF_CAR
@@ -222,47 +91,35 @@ def curves(plots: Sequence[Plot], run: Run, *, alone: bool) -> dict[str, str]:
     return found
 
 
-def views(plots: Sequence[Plot], runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
+def views(plots: Sequence[Panel], runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
     """Return a view for each plot that has data, with the lines of all these runs."""
     shown = []
     found = [(plot, [entity for run in runs for entity in _entities(run, plot)]) for plot in plots]
     filled = [(plot, entities) for plot, entities in found if entities]
     for plot, entities in filled:
         limits = _range(plot, runs, len(filled))
-        shown.append(_view(plot.title, [f"/{path}" for path, _ in entities], limits))
+        shown.append(_view(plot.title_with_unit, [f"/{path}" for path, _ in entities], limits))
     return shown
 
 
-def _range(plot: Plot, runs: Sequence[Run], beside: int) -> tuple[float, float]:
-    """Return the range of an axis, chosen from a few so that different runs mostly share it.
-
-    Args:
-        plot: The plot.
-        runs: The runs.
-        beside: Number of plots on the page.
-    """
+def _range(plot: Panel, runs: Sequence[Run], beside: int) -> tuple[float, float]:
+    """Return the range of an axis, chosen from a few so that different runs mostly share it."""
     values = [
-        run.channel(line.channel) * _factor(line.channel)
+        run.channel(line.channel) * plot.quantity.factor
         for run in runs
-        for line in plot.series
+        for line in plot.lines_in(MOTION)
         if run.has(line.channel)
     ]
     finite = [found[np.isfinite(found)] for found in values]
     low = min((float(found.min(initial=0.0)) for found in finite), default=0.0)
     high = max((float(found.max(initial=0.0)) for found in finite), default=0.0)
-    return axis_range(low, high, _least_span(plot.series[0].channel), _MOST_NUMBERS.get(beside, 4.3))
+    return axis_range(low, high, plot.quantity.min_span, _MOST_NUMBERS.get(beside, 4.3))
 
 
 def axis_range(low: float, high: float, least: float, most: float) -> tuple[float, float]:
     """Return a range that contains zero and in which the viewer draws at least three tick labels.
 
     The viewer labels multiples of one power of ten if they are at least 22 points apart.
-
-    Args:
-        low: Smallest value, at most 0.
-        high: Largest value, at least 0.
-        least: Smallest height of the range.
-        most: Largest height at which the labels are that far apart, in units of that power; at least 2.1.
     """
     if high - low < least:
         low, high = min(low, -0.5 * least), max(high, 0.5 * least)
@@ -285,21 +142,17 @@ def axis_range(low: float, high: float, least: float, most: float) -> tuple[floa
         power *= 10.0
 
 
-def _least_span(channel: str) -> float:
-    return 100.0 if channel.endswith("_force_N") else quantity_of(channel).min_span
-
-
-def views_by_corner(plot: Plot, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
+def views_by_corner(plot: Panel, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
     """Return a view for each wheel of a wheel plot; each run's lines have the colour of the run."""
     shown = []
-    for line in plot.series:
+    for line in plot.lines:
         present = [run for run in runs if run.has(line.channel)]
         styles = {
             f"/{run.name}/plots/{line.channel}": rr.SeriesLines(names=[run.label], colors=[bytes_of(run.colour)])
             for run in present
         }
         if styles:
-            head, _, unit = plot.title.rpartition(" [")
+            head, _, unit = plot.title_with_unit.rpartition(" [")
             shown.append(_view(f"{head}, {line.name} [{unit}", list(styles), _range(plot, runs, len(CORNERS)), styles))
     return shown
 

@@ -7,12 +7,36 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
+import rerun as rr
 from numpy.typing import NDArray
 
 from activesteer.conventions import run_looks
 from activesteer.drawing.bodywork import CHASSIS
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
+
+TIMELINE: Final = "time"
+"""Name of the timeline in the viewer."""
+
+
+def times(time_s: NDArray[np.float64]) -> list[rr.TimeColumn]:
+    """Return the time index of columns."""
+    return [rr.TimeColumn(TIMELINE, duration=np.rint(time_s * 1e9).astype("timedelta64[ns]"))]
+
+
+class Showing(NamedTuple):
+    """Display options of a playback.
+
+    Attributes:
+        compare: Whether to leave out the pages of single runs.
+        cutaway: Whether bodies are transparent.
+        verdict: Results, a line for each run and each claim, at the top of the summary.
+    """
+
+    compare: bool = False
+    cutaway: bool = False
+    verdict: tuple[str, ...] = ()
+
 
 PLOT_RATE_HZ: Final = 100.0
 """Largest number of samples of a signal shown per second; a screen cannot show more."""

@@ -9,16 +9,108 @@ import socket
 import subprocess
 import tempfile
 import urllib.parse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+import rerun as rr
+import rerun.blueprint as rrb
 
 from activesteer.errors import PlaybackError
 from activesteer.files import atomic_write, shown_path
-from activesteer.playback.layout import blueprint
-from activesteer.playback.runs import Run
-from activesteer.playback.showing import Showing
-from activesteer.playback.stream import fill, new_stream
+from activesteer.metric_table import recorded_metric
+from activesteer.playback.car import send_car, send_ghost, send_links, send_tyre_forces
+from activesteer.playback.course import send_course, send_road, send_track
+from activesteer.playback.layout import LEGEND, LEGEND_OF_RUNS, SUMMARY, blueprint, send_events, send_legend
+from activesteer.playback.plots import curves, pages, send_plots
+from activesteer.playback.runs import Run, Showing
+from activesteer.playback.wheel_angles import send_wheel_angles
+
+
+def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
+    """Return a stream that has no target yet.
+
+    The viewer keeps one layout for each application id while it is open. Another manoeuvre or other runs need another
+    layout, so they have another id.
+    """
+    maneuver = runs[0].recording.metadata.get("maneuver", {})
+    words = ["activesteer", str(maneuver.get("name", "")), *(run.name for run in runs), "compared" if compare else ""]
+    # An application id may contain letters, digits, spaces, - and _ only.
+    stream = rr.RecordingStream(re.sub(r"[^A-Za-z0-9_-]+", " ", " ".join(words)).strip())
+    stream.send_recording_name(str(maneuver.get("title") or "activesteer"))
+    return stream
+
+
+def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, how: Showing) -> None:
+    """Send all data of the runs."""
+    stream.send_blueprint(layout, make_active=True, make_default=True)
+    several = len(runs) > 1
+    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    send_road(stream, runs)
+    send_course(stream, runs)
+    for run in runs:
+        send_car(stream, run, cutaway=how.cutaway)
+        send_links(stream, run)
+        send_tyre_forces(stream, run, runs)
+        send_wheel_angles(stream, run, runs)
+        send_track(stream, run, runs.index(run))
+        for other in runs:
+            if other is not run:
+                send_ghost(stream, run, other)
+        send_plots(stream, run, alone=not several)
+        for page, shown in pages(run).items():
+            send_legend(stream, f"{LEGEND}/{run.name}/{page}", curves(shown, run, alone=not several))
+        send_events(stream, run)
+    if several:
+        send_legend(stream, LEGEND_OF_RUNS, {run.label: run.colour for run in runs})
+    text = rr.TextDocument(summary(runs, how.verdict), media_type=rr.MediaType.MARKDOWN)
+    stream.log(SUMMARY, text, static=True)
+    stream.flush()
+
+
+def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
+    """Return a page in Markdown: scenario, results, metrics side by side, systems."""
+    lines: list[str] = []
+    for text in dict.fromkeys(_scenario(run.recording.metadata) for run in runs):
+        lines += [f"**{text}**", ""]
+    if verdict:
+        lines += [*(f"- {_emphasised(line)}" for line in verdict), ""]
+    names = list(dict.fromkeys(name for run in runs for name in run.recording.metrics))
+    if names:
+        lines += [f"| metric | {' | '.join(run.short for run in runs)} |", "|---" * (1 + len(runs)) + "|"]
+    for name in names:
+        metric = recorded_metric(name)
+        found = [run.recording.metrics.get(name) for run in runs]
+        values = ("" if value is None else metric.text(value) for value in found)
+        lines.append(f"| {metric.label}{metric.unit_name and f' [{metric.unit_name}]'} | {' | '.join(values)} |")
+    lines.append("")
+    for run in runs:
+        metadata = run.recording.metadata
+        versions = metadata.get("versions", {})
+        text = f"- **{run.label}**: controller {metadata.get('controller', '?')}, "
+        text += f"vehicle {_named(metadata, 'vehicle', 'name')}, activesteer {versions.get('activesteer', '?')}"
+        if metadata.get("overrides"):
+            text += ", " + ", ".join(f"{key} = {value}" for key, value in metadata["overrides"].items())
+        if not metadata.get("complete", True):
+            text += f". **Incomplete**: {metadata.get('error', 'the run did not end properly')}"
+        lines.append(text)
+    return "\n".join(lines) + "\n"
+
+
+def _emphasised(line: str) -> str:
+    """Set the subject of a verdict in bold type."""
+    about, colon, words = line.partition(":")
+    return f"**{about}{colon}**{words}" if colon else line
+
+
+def _scenario(metadata: Mapping[str, Any]) -> str:
+    return _named(metadata, "maneuver", "title") or _named(metadata, "maneuver", "name") or "a run"
+
+
+def _named(metadata: Mapping[str, Any], table: str, key: str) -> str:
+    entry = metadata.get(table, {})
+    return str(entry.get(key, "")) if isinstance(entry, Mapping) else ""
+
 
 _ELSEWHERE: Final = "--web shows it in a browser, --save out.rrd writes a file for a viewer elsewhere"
 _HOST: Final = "127.0.0.1"
@@ -130,11 +222,7 @@ def _run_viewer(
 
 
 def viewer_binary() -> Path:
-    """Return the viewer that rerun-sdk installs; the command `rerun` may be another version or not be on the path.
-
-    Raises:
-        PlaybackError: the viewer is missing.
-    """
+    """Return the viewer that rerun-sdk installs; the command `rerun` may be another version or not be on the path."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is not None and spec.origin is not None:
         binary = Path(spec.origin).with_name("rerun.exe" if os.name == "nt" else "rerun")

@@ -23,8 +23,7 @@ from activesteer.drawing.wheel_angles import (
     wheel_centres,
     words,
 )  # fmt: skip
-from activesteer.playback.runs import Run
-from activesteer.playback.timeline import times
+from activesteer.playback.runs import Run, times
 from activesteer.road.course import Footprint, footprint_of
 
 PLAN: Final = "plan"
@@ -40,13 +39,7 @@ _RAYS: Final = range(1, SLICES + 2, 2)
 
 
 def send_wheel_angles(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) -> None:
-    """Send the wedges and the plan of a run, unless the recording has no wheel angles.
-
-    Args:
-        stream: Target of the data.
-        run: The run.
-        runs: All runs that are shown together; they share one scale.
-    """
+    """Send the wedges and the plan of a run, unless the recording has no wheel angles."""
     if not run.has(*CHANNELS):
         return
     recording, size = run.recording, footprint_of(run.recording.metadata) or Footprint()
@@ -66,11 +59,7 @@ def wedges_path(run: Run) -> str:
 
 
 def plan_view(runs: Sequence[Run]) -> rrb.Spatial2DView:
-    """Return the view of the plans of these runs.
-
-    Args:
-        runs: The runs, from left to right.
-    """
+    """Return the view of the plans of these runs."""
     found = [footprint_of(run.recording.metadata) or Footprint() for run in runs]
     front = max(size.front_m for size in found) + 1.9
     rear = min(size.rear_m for size in found) - 1.2

@@ -1,7 +1,6 @@
 """Plots: one model of a curve, a panel and a picture, drawn by matplotlib without a screen."""
 
-from activesteer.plotting.drawing import draw, save_all
-from activesteer.plotting.files import as_svg, new_figure, plain_axis, save
+from activesteer.plotting.drawing import draw, new_figure, plain_axis, save, save_all
 from activesteer.plotting.model import Area, Curve, Heat, Panel, Picture
 
 __all__ = [
@@ -10,7 +9,6 @@ __all__ = [
     "Heat",
     "Panel",
     "Picture",
-    "as_svg",
     "draw",
     "new_figure",
     "plain_axis",

@@ -11,15 +11,53 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from activesteer.conventions import RUN_COLOURS, Array
-from activesteer.errors import ParameterError
-from activesteer.files import make_folder
-from activesteer.plotting.files import new_figure, plain_axis, save
+from activesteer.errors import ActiveSteerError, ParameterError, not_installed
+from activesteer.files import atomic_write, make_folder, shown_path
 from activesteer.plotting.model import Heat, Panel, Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
+
+
+DOTS_PER_INCH: Final = 300
+"""Resolution of pictures that are saved as pixels: journals ask for it."""
+
+
+def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
+    """Return an empty figure."""
+    try:
+        from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
+    except ImportError as error:
+        raise not_installed(ParameterError, "a plot", "matplotlib", "plot") from error
+    # A Figure of its own instead of pyplot: no backend is chosen and no global state changes for the caller.
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    if title:
+        figure.suptitle(title, fontsize="medium")
+    return figure
+
+
+def plain_axis(axis: Axes) -> None:
+    """Draw a grid, and remove the frame above and on the right."""
+    axis.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:
+    """Write a figure and return its path. The first file fixes the layout, which other formats keep.
+
+    Raises:
+        ActiveSteerError: the file cannot be written; of class `error`.
+    """
+    with atomic_write(path, error) as part:
+        try:
+            figure.savefig(part, dpi=DOTS_PER_INCH)
+        except ValueError as reason:  # an ending that is no format of matplotlib's
+            raise error(f"cannot write {shown_path(path)}: {reason}", value=path) from reason
+    figure.set_layout_engine("none")
+    return path
+
 
 _BESIDE: Final = 3
 """Most panels beside each other."""
@@ -34,11 +72,7 @@ _SCALE: Final = "viridis"
 
 
 def draw(picture: Picture) -> Figure:
-    """Draw a picture.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-    """
+    """Draw a picture."""
     count = len(picture.panels)
     columns = picture.columns or (2 if count == 4 else min(count, _BESIDE))
     rows = math.ceil(count / columns)
@@ -70,19 +104,7 @@ def draw(picture: Picture) -> Figure:
 def save_all(
     pictures: Mapping[str, Callable[[], Picture]], folder: str | os.PathLike[str], title: str = ""
 ) -> list[Path]:
-    """Draw pictures and write them as PNG files.
-
-    Args:
-        pictures: File name without its ending -> function that makes the picture.
-        folder: Folder for the files; it is created if it does not exist.
-        title: Beginning of every picture's title.
-
-    Returns:
-        The paths written, in the order given.
-
-    Raises:
-        ParameterError: matplotlib is not installed, or a file cannot be written.
-    """
+    """Draw pictures and write them as PNG files."""
     directory = make_folder(folder, ParameterError)
     paths = []
     for name, make in pictures.items():

@@ -112,7 +112,7 @@ class _Neighbours:
 
     @classmethod
     def find_spec(cls, name: str, path: Sequence[str] | None = None, _target: object = None) -> ModuleSpec | None:
-        """Find a module; the folder of the file loaded last comes first."""
+        """Find a module. The folder of the file loaded last comes first."""
         top = name.partition(".")[0]
         folder = next((folder for folder, names in reversed(cls.folders.items()) if top in names), None)
         spec = None if folder is None else PathFinder.find_spec(name, [folder] if path is None else path)
@@ -123,7 +123,7 @@ class _Neighbours:
     @classmethod
     @contextmanager
     def first(cls, folder: Path, files: Iterable[str]) -> Iterator[None]:
-        """Load modules anew, and those of a folder first; afterwards they are found if there is no other."""
+        """Load modules anew, and those of a folder first. Afterwards they are found if there is no other."""
         names = frozenset(Path(file).parts[0].removesuffix(".py") for file in files)
         loaded = [name for name in sys.modules if name.partition(".")[0] in names]
         others = {name: sys.modules[name] for name in loaded if not is_user_module(name)}
@@ -164,7 +164,7 @@ def _with_neighbours(path: Path, error: type[ActiveSteerError]) -> dict[str, byt
 
 
 def _imported_from(folder: Path, source: bytes) -> list[Path]:
-    """Modules, and files of packages, in a folder that a source imports; none if the source is not Python."""
+    """Modules, and files of packages, in a folder that a source imports, or none if the source is not Python."""
     try:
         nodes = list(ast.walk(ast.parse(source)))
     except (SyntaxError, ValueError, RecursionError):
@@ -202,7 +202,7 @@ def _formats() -> dict[str, EntryPoint]:
 
 
 def format_of(given: Any) -> EntryPoint | None:
-    """Return the format of a block that is given as a file, with `?name=value` for parameters; None for others."""
+    """Return the format of a block that is given as a file, with `?name=value` for parameters, or None for others."""
     if not isinstance(given, (str, os.PathLike)):
         return None
     name, dot, ending = os.fspath(given).partition("?")[0].lower().rpartition(".")

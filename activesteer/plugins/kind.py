@@ -19,7 +19,7 @@ from activesteer.config import Range
 from activesteer.errors import ActiveSteerError, nearest_names, shown
 
 _USUAL: Final = frozenset({float, bool, np.float64})
-"""Types of nearly all numbers in a command; numbers of other types take the slow check."""
+"""Types of nearly all numbers in a command. Numbers of other types take the slow check."""
 _LIMITED: Final = _USUAL | {int}
 """Types of nearly all numbers with a range, which keeps a whole number within the range of float64."""
 _LIBRARIES: Final = tuple({sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")})
@@ -91,7 +91,7 @@ class Kind:
             raise self.fail(name, f"{said} {shown(command)}; {in_one_line(reason)}", command) from reason
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> Any:
-        """Check and complete the fields other than plain numbers; see `checked`."""
+        """Check and complete the fields other than plain numbers (see `checked`)."""
         return command
 
     def _is_usual(self, command: Any) -> bool:
@@ -149,7 +149,7 @@ def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
 
 
 def _words(error: BaseException) -> str:
-    """Return class and text of an error; the text is made by foreign code, which may fail, too."""
+    """Return class and text of an error. The text is made by foreign code, which may fail, too."""
     name = type(error).__name__
     try:
         return f"{name}: {error}".removesuffix(": ")

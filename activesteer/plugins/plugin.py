@@ -188,7 +188,7 @@ class Plugin:
 
     @functools.cached_property
     def declared(self) -> dict[str, Declared]:
-        """Parameters of a user's block: name -> declaration; an object has none, because it is made already.
+        """Parameters of a user's block: name -> declaration. An object has none, because it is made already.
 
         Raises:
             ActiveSteerError: of the kind's type: the declaration is wrong.
@@ -222,7 +222,7 @@ class Plugin:
         return found
 
     def value_of(self, parameter: str, own: Mapping[str, Mapping[str, Any]]) -> Any:
-        """Return the value of a declared parameter in the unit of its name; see `parameters_with`.
+        """Return the value of a declared parameter in the unit of its name (see `parameters_with`).
 
         Raises:
             ParameterError: there is no such parameter.

@@ -89,7 +89,7 @@ _SHOWN: Final = 100
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
 
 Check = Callable[[Any, str], object]
-"""Check of a value with its key; raises `RecordingError`."""
+"""Check of a value with its key. Raises `RecordingError`."""
 
 
 def _name(value: Any, key: str) -> None:
@@ -268,7 +268,7 @@ FORMAT_RECORD = "activesteer.format"
 
 
 LIBRARY = "activesteer "
-"""Name of the writing program in the header of a file; the version follows."""
+"""Name of the writing program in the header of a file. The version follows."""
 
 
 def is_recording_start(data: bytes) -> bool:

@@ -64,7 +64,7 @@ _READ: Final = {
     Opcode.METADATA: Metadata,
     Opcode.ATTACHMENT: Attachment,
 }
-"""Records that are kept; chunks are read later, and all others repeat information."""
+"""Records that are kept. Chunks are read later, and all others repeat information."""
 _REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
 """Records that cannot stand here: none, the footer, and a message outside a chunk."""
 
@@ -137,7 +137,7 @@ class Records:
 
 
 def opened(path: Path) -> int:
-    """Open a regular file and return its descriptor; a device or pipe may never end."""
+    """Open a regular file and return its descriptor. A device or pipe may never end."""
     with reading(path, RecordingError):
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
@@ -299,7 +299,7 @@ class _Rows:
         self._last_ns = [-1, -1]
 
     def add(self, place: Place, data: bytes, decoder: BlockDecoder) -> Block:
-        """Check a chunk and keep its contents; `place` has no rows yet."""
+        """Check a chunk and keep its contents. `place` has no rows yet."""
         block = decoder.decode(data)
         for kind, time_ns in enumerate((block.row_ns, block.pose_ns)):
             if not len(time_ns):

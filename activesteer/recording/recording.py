@@ -160,19 +160,19 @@ class Recording:
                 writer.write(block.row_ns / 1e9, values, block.pose_ns / 1e9, block.positions_m, block.quaternions)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """A pandas data frame; see `activesteer.recording.export.to_dataframe`."""
+        """A pandas data frame (see `activesteer.recording.export.to_dataframe`)."""
         return export.to_dataframe(self)
 
     def to_csv(self, path: str | Path) -> Path:
-        """Write a CSV file; see `activesteer.recording.export.to_csv`."""
+        """Write a CSV file (see `activesteer.recording.export.to_csv`)."""
         return export.to_csv(self, path)
 
     def to_parquet(self, path: str | Path) -> Path:
-        """Write a Parquet file; see `activesteer.recording.export.to_parquet`."""
+        """Write a Parquet file (see `activesteer.recording.export.to_parquet`)."""
         return export.to_parquet(self, path)
 
     def to_mat(self, path: str | Path) -> Path:
-        """Write a MATLAB file; see `activesteer.recording.export.to_mat`."""
+        """Write a MATLAB file (see `activesteer.recording.export.to_mat`)."""
         return export.to_mat(self, path)
 
     @property
@@ -207,7 +207,7 @@ class Recording:
         )  # fmt: skip
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """Return a channel over time, shape (n,), read-only; raise `RecordingError` if there is none."""
+        """Return a channel over time, shape (n,), read-only. Raise `RecordingError` if there is none."""
         column = self._channels.index(name)
         if isinstance(self._values, FileRows):
             return _frozen(self._values.channel(column))

@@ -98,7 +98,7 @@ def read_bytes(descriptor: int, start: int, length: int) -> bytes:
 
 
 def messages_of(content: bytes) -> tuple[bytes, int]:
-    """Decompress a chunk; return its messages and their checksum. The declared size is an upper limit."""
+    """Decompress a chunk. Return its messages and their checksum. The declared size is an upper limit."""
     try:
         chunk = Chunk.read(ReadDataStream(BytesIO(content)))
         size, packed = chunk.uncompressed_size, len(chunk.data)
@@ -155,7 +155,7 @@ def poses_of(blocks: Iterable[Block], sets: int, body_names: tuple[str, ...]) ->
 
 
 class FileRows:
-    """Rows of an open file. The file may be replaced or deleted meanwhile; a changed file raises an error."""
+    """Rows of an open file. The file may be replaced or deleted meanwhile. A changed file raises an error."""
 
     def __init__(
         self, descriptor: int, decoder: BlockDecoder, channels: Sequence[Channel], places: list[Place]

@@ -111,7 +111,7 @@ class FixedMessage:
         return self.raw(dtype)
 
     def raw(self, dtype: str) -> FixedMessage:
-        """Append an untagged number; extend the last run if the distance is the same."""
+        """Append an untagged number. Extend the last run if the distance is the same."""
         offset = len(self.template)
         if self.runs:
             last = self.runs[-1]
@@ -321,7 +321,7 @@ def _layout(message: DescriptorProto) -> FixedMessage:
 
 
 def state_layout(channels: Iterable[Channel]) -> FixedMessage:
-    """Return the layout of the message of a group; see `state_schema`."""
+    """Return the layout of the message of a group (see `state_schema`)."""
     layout = FixedMessage()
     for number, channel in enumerate(channels, start=1):
         layout.number(number, "<f4" if channel.single else "<f8")
@@ -349,7 +349,7 @@ def transforms_layout(body_names: Iterable[str]) -> FixedMessage:
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,254}")
 _GROUP = re.compile(r"[a-z][a-z0-9_]{0,254}")
 TIME = "time_s"
-"""Name of the time column in every export; no channel may have it."""
+"""Name of the time column in every export. No channel may have it."""
 
 
 class ChannelTable:
@@ -417,7 +417,7 @@ class ChannelTable:
         return columns
 
     def __getitem__(self, name: str) -> Channel:
-        """Return a channel by its name; raise `RecordingError` if there is none."""
+        """Return a channel by its name. Raise `RecordingError` if there is none."""
         return self._channels[self.index(name)]
 
     def __iter__(self) -> Iterator[Channel]:

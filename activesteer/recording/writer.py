@@ -58,7 +58,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Check that a recording can be written, without changing anything; only a recording may be replaced."""
+    """Check that a recording can be written, without changing anything. Only a recording may be replaced."""
     path = Path(path)
     if not path.parent.is_dir():
         raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
@@ -287,7 +287,7 @@ class McapWriter:
             raise self._failure(error) from error
 
     def flush(self) -> Path:
-        """Wait until all blocks are in the file; return its path.
+        """Wait until all blocks are in the file. Return its path.
 
         Raises:
             RecordingError: a block could not be written.
@@ -354,7 +354,7 @@ class McapWriter:
             error.add_note(f"The recording could not be ended properly either: {second}")
 
     def _await(self, maximum: int) -> None:
-        """Wait until at most `maximum` blocks are being written; raise an error of their writing."""
+        """Wait until at most `maximum` blocks are being written. Raise an error of their writing."""
         while len(self._pending) > maximum:
             end_ns, future = self._pending[0]
             try:

@@ -346,7 +346,7 @@ class TyreRig:
         return stacked([self.advance(Motion(*row)) for row in zip(*columns, strict=True)])
 
     def _spin(self, load_N: float, slip_ratio: float, speed_mps: float) -> float:
-        """Return the spin at a slip ratio; the rolling radius grows with the spin [rad/s]."""
+        """Return the spin at a slip ratio. The rolling radius grows with the spin [rad/s]."""
         tyre = self.formula.parameters.record
         spin = 0.0
         for _ in range(_MAX_STEPS):
@@ -365,7 +365,7 @@ class TyreRig:
         data.qvel[5] = motion.spin_radps
 
     def _residual(self, motion: Motion, unknown: Vector, load_N: float) -> Vector:
-        """Return missing load [N] and deflection rates along and across [m/s]; a steady wheel is not twisted."""
+        """Return missing load [N] and deflection rates along and across [m/s]. A steady wheel is not twisted."""
         self._impose(motion)
         self._data.act[:] = (unknown[1], unknown[2], 0.0)
         mujoco.mj_forward(self._model, self._data)

@@ -68,7 +68,7 @@ class Course:
 
     @property
     def first_gate_x_m(self) -> float:
-        """Start of the first lane, or the first cone if there are no lanes [m]; 0 without both."""
+        """Start of the first lane, or the first cone if there are no lanes [m], or 0 without both."""
         if self.lanes:
             return min(lane.start_x_m for lane in self.lanes)
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
@@ -95,7 +95,7 @@ class Course:
         return outward
 
     def to_table(self) -> dict[str, Any]:
-        """Return the course as plain tables, ready for JSON; a recording keeps it as `course`."""
+        """Return the course as plain tables, ready for JSON. A recording keeps it as `course`."""
         return {
             "path": {"x_m": self.path.x_m.tolist(), "y_m": self.path.y_m.tolist()},
             "lanes": [lane._asdict() for lane in self.lanes],
@@ -106,7 +106,7 @@ class Course:
 
     @classmethod
     def from_table(cls, table: object) -> Course:
-        """Build the course that `to_table` describes; differences between its points give heading and curvature."""
+        """Build the course that `to_table` describes. Differences between its points give heading and curvature."""
         course = table_of(table, "course")
         path = table_of(course.get("path"), "course.path")
         x_m, y_m = (numbers(path.get(key), f"course.path.{key}") for key in ("x_m", "y_m"))
@@ -128,7 +128,7 @@ class Course:
 
 
 def course_of(metadata: Mapping[str, Any]) -> Course | None:
-    """Return the course of a recorded run; None if its manoeuvre has no course."""
+    """Return the course of a recorded run, or None if its manoeuvre has no course."""
     table = metadata.get("course")
     return None if table is None else Course.from_table(table)
 
@@ -143,7 +143,7 @@ def _lane(table: object, key: str) -> Lane:
 
 
 FRONT_OVERHANG_M: Final = 0.85
-"""Distance from the front axle to the front end of the body [m]; usual for the class, since recordings do not hold it.
+"""Distance from the front axle to the front end of the body [m]. Usual for the class, since recordings do not hold it.
 """
 REAR_OVERHANG_M: Final = 0.75
 """Distance from the rear axle to the rear end of the body [m]; usual for the class."""
@@ -183,7 +183,7 @@ class Footprint(NamedTuple):
 
 
 def footprint_of(metadata: Mapping[str, Any]) -> Footprint | None:
-    """Return the dimensions of the car of a recorded run; None if they were not recorded."""
+    """Return the dimensions of the car of a recorded run, or None if they were not recorded."""
     table = metadata.get("car")
     return None if table is None else Footprint.from_table(table)
 
@@ -196,7 +196,7 @@ _HIGHEST_M: Final = 1000.0
 
 @dataclass(frozen=True)
 class ProfileTable:
-    """Heights over the distance; keys of the table [road.heights], which a CSV of `road.profile` fills.
+    """Heights over the distance. Keys of the table [road.heights], which a CSV of `road.profile` fills.
 
     The road runs smoothly through the points, without overshoot (monotone cubics), and linearly from track to track. It
     is even across outside the tracks.

@@ -65,7 +65,7 @@ class _Blocks(NamedTuple):
 
 
 def packed(files: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Return files as texts that a recording keeps; the first file is that of the road."""
+    """Return files as texts that a recording keeps. The first file is that of the road."""
     content = b"".join(f"{name}\0{len(text)}\0".encode() + text for name, text in files.items())
     text = base64.b64encode(zlib.compress(content, 9)).decode()
     return tuple(text[start : start + _PIECE] for start in range(0, len(text), _PIECE))
@@ -263,12 +263,12 @@ def _places(head: dict[str, float], names: list[str]) -> Array:
 
 
 def _channel(along: Mapping[str, Array], name: str, constant: float, rows: int) -> Array:
-    """Return slope or banking at each row; missing values are 0."""
+    """Return slope or banking at each row. Missing values are 0."""
     return np.nan_to_num(along[name]) if name in along else np.full(rows, constant)
 
 
 def _filled(heights: Array, mode: int, offset: float) -> Array:
-    """Fill missing heights at the sides; a hole between heights is an error."""
+    """Fill missing heights at the sides. A hole between heights is an error."""
     missing = np.isnan(heights)
     if not missing.any():
         return heights
@@ -287,7 +287,7 @@ def _filled(heights: Array, mode: int, offset: float) -> Array:
 
 
 def _evenly(places: Array, heights: Array) -> tuple[Array, float, float]:
-    """Return heights at even distances across, first distance and step [m]; exact where all places are multiples."""
+    """Return heights at even distances across, first distance and step [m]. Exact where all places are multiples."""
     step = float(np.diff(places).min())
     count = max(2, round((places[-1] - places[0]) / step) + 1)
     if heights.shape[0] * count > limits.MAX_CRG_POINTS:
@@ -299,7 +299,7 @@ def _evenly(places: Array, heights: Array) -> tuple[Array, float, float]:
 
 
 def _line(turn_rad: Array, step_m: float) -> Path | None:
-    """Return the reference line from the heading of each step against the first one; None if it is straight."""
+    """Return the reference line from the heading of each step against the first one, or None if it is straight."""
     if np.abs(turn_rad).max() < 1e-9:
         return None
     x, y = (np.concatenate([[0.0], np.cumsum(step_m * function(turn_rad))]) for function in (np.cos, np.sin))

@@ -84,7 +84,7 @@ def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
 
 
 def surface_in(metadata: Mapping[str, Any]) -> DrawnSurface | None:
-    """Return the surface of a recorded run; None if the road was plane, or the surface was not recorded."""
+    """Return the surface of a recorded run, or None if the road was plane, or the surface was not recorded."""
     if "surface" not in metadata:
         return None
     table = table_of(metadata["surface"], "surface")

@@ -42,7 +42,7 @@ class PathSearch:
 
 
 class PathSearches:
-    """Positions of many cars, each along its own path; see `PathSearch`."""
+    """Positions of many cars, each along its own path (see `PathSearch`)."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         """Prepare the arguments of the kernel."""
@@ -121,10 +121,10 @@ def _ahead(path, x, y, around, window, ahead, starts, xs, ys, ends):
 
 
 _BESIDE_M: Final = 20.0
-"""Width of the road beside the path that the grid covers [m]; places outside use the nearest cell."""
+"""Width of the road beside the path that the grid covers [m]. Places outside use the nearest cell."""
 _CELL_M: Final = 2.0
 _MAX_CELLS: Final = 65536
-"""Largest number of cells; on a larger area the cells are larger [-]."""
+"""Largest number of cells. On a larger area the cells are larger [-]."""
 _SAME_PASS: Final = 20
 """Points of the path further apart than this belong to different passes [-]."""
 _ON_EARLIER_M: Final = 1.0

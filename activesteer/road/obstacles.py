@@ -95,7 +95,7 @@ _LONG_M: Final = 1.5
 OBSTACLE: Final = numbers_type(
     "shape", "start_m", "length_m", "height_m", "right_m", "left_m", "edge_m", "skew", "waves"
 )  # fmt: skip
-"""An obstacle for the kernels; see `height_of`. `skew`: metres by which it begins earlier per metre to the left."""
+"""An obstacle for the kernels. See `height_of`. `skew`: metres by which it begins earlier per metre to the left."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Obstacle:
     start_m: Annotated[float, Range(FIRST_START_M)]
     """Distance from the start of the manoeuvre, along x or along the path [m]."""
     length_m: Annotated[float, Range(1e-3)] | None = None
-    """Length [m]; wavelength of a `sine_wave`; length over which a `cross_slope_ramp` turns. Default: without end, for
+    """Length [m]; wavelength of a `sine_wave`. Length over which a `cross_slope_ramp` turns. Default: without end, for
     a `kerb`."""
     height_m: Height | None = None
     """Height; depth of a `pothole`; amplitude of a `sine_wave` [m]."""
@@ -127,7 +127,7 @@ class Obstacle:
     slope: Annotated[float, Range(-0.5, 0.5)] | None = None
     """Cross slope that a `cross_slope_ramp` reaches, rise to the left over run [-]."""
     waves: Annotated[int, Range(0, 100_000)] = 0
-    """Number of waves of a `sine_wave`; 0 for no end."""
+    """Number of waves of a `sine_wave`, or 0 for no end."""
 
     def __post_init__(self) -> None:
         """Check that the obstacle has what its kind needs, and nothing without effect."""
@@ -157,7 +157,7 @@ class Obstacle:
 
     @property
     def borders(self) -> tuple[float, float]:
-        """Right and left border [m]; infinite where there is none."""
+        """Right and left border [m], or infinite where there is none."""
         right, left = _SIDES[self.side]
         return (right if self.right_m is None else self.right_m), (left if self.left_m is None else self.left_m)
 
@@ -196,7 +196,7 @@ class Roughness:
     OVERRULED: ClassVar = {"class_": {"spectrum_m3": None}}
 
     class_: Literal["A", "B", "C", "D", "E"] = "C"
-    """Class of ISO 8608, of which the surface has the geometric mean; the key in a file is `class`."""
+    """Class of ISO 8608, of which the surface has the geometric mean. The key in a file is `class`."""
     seed: Annotated[int, Range(0, 2**31)] = 1
     """Number of the surface: the same seed gives the same surface."""
     spectrum_m3: Annotated[float, Range(1e-9, 1e-1)] | None = None
@@ -206,7 +206,7 @@ class Roughness:
     width_m: Annotated[float, Range(1.0, 20.0)] = 8.0
     """Width of the surface [m]."""
     least_1pm: Annotated[float, Range(1e-4, 1.0)] = 0.01
-    """Lowest spatial frequency [cycles/m]; longer waves are left out."""
+    """Lowest spatial frequency [cycles/m]. Longer waves are left out."""
     greatest_1pm: Annotated[float, Range(0.1, 10.0)] = 4.0
     """Highest spatial frequency [cycles/m]; the tyre swallows shorter waves."""
 

@@ -16,7 +16,7 @@ from activesteer.errors import ManeuverError
 SPACING_M: Final = 0.5
 """Distance between two points of a path [m]: a car at 100 km/h covers it in 18 ms."""
 MIN_CHORD_M: Final = 1e-6
-"""Smallest distance between two points in a row; below it they count as the same point [m]."""
+"""Smallest distance between two points in a row. Below it they count as the same point [m]."""
 _FINE: Final = 20
 """Points per spacing used to measure the length of the curve."""
 
@@ -76,7 +76,7 @@ class Path:
 
     @classmethod
     def between(cls, x_m: Array, y_m: Array) -> Path:
-        """Make a path of known points; differences between them give arc length, heading and curvature."""
+        """Make a path of known points. Differences between them give arc length, heading and curvature."""
         s = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(y_m)))])
         heading = np.unwrap(np.arctan2(np.gradient(y_m, s), np.gradient(x_m, s)))
         x_m, y_m = np.ascontiguousarray(x_m), np.ascontiguousarray(y_m)
@@ -95,6 +95,6 @@ class Path:
 
 
 def _first(wrong: Sequence[bool] | NDArray[np.bool_]) -> int:
-    """Return the number of the first wrong point, counted from 1; 0 if there is none."""
+    """Return the number of the first wrong point, counted from 1, or 0 if there is none."""
     found = np.flatnonzero(wrong)
     return int(found[0]) + 1 if found.size else 0

@@ -45,7 +45,7 @@ def number(value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M
 def numbers(
     value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M, count: int | None = None
 ) -> NDArray[np.float64]:
-    """Return the value [m] if it is a list of numbers from `low` to `high`, `count` of them if given; else raise."""
+    """Return the value [m] if it is a list of numbers from `low` to `high`, `count` of them if given. Else raise."""
     listed = sequence(value, key)
     if count is not None and len(listed) != count:
         raise fail(key, f"has {len(listed)} values, expected {count}")

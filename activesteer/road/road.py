@@ -39,7 +39,7 @@ _SLICE_M: Final = 2.0
 """Length of the pieces in which a patch along a path is drawn [m], at most `_MAX_SLICES` of them."""
 _MAX_SLICES: Final = 200
 _SHOWN_BESIDE_M: Final = 4.0
-"""Width to either side of the path in which its friction is drawn [m]; it counts further out too."""
+"""Width to either side of the path in which its friction is drawn [m]. It counts further out too."""
 
 
 @dataclass(frozen=True)
@@ -69,12 +69,12 @@ class RoadPatch:
 
 @dataclass(frozen=True)
 class BankingTable:
-    """Bank over the distance; keys of the table [road.banking]. It runs smoothly through its points."""
+    """Bank over the distance. Keys of the table [road.banking]. It runs smoothly through its points."""
 
     s_m: tuple[float, ...]
     """Distances along x or along the path [m], increasing."""
     bank_rad: tuple[float, ...]
-    """Bank at these places [rad]; positive if the left side is higher."""
+    """Bank at these places [rad]. Positive if the left side is higher."""
 
     def __post_init__(self) -> None:
         """Check the points."""
@@ -112,7 +112,7 @@ class Area(NamedTuple):
     slope_1pm: float = 0.0
 
     def clipped(self, start_m: float, end_m: float, right_m: float, left_m: float) -> Area | None:
-        """Return its part within a rectangle [m]; None if they do not overlap."""
+        """Return its part within a rectangle [m], or None if they do not overlap."""
         start, end = max(self.start_m, start_m), min(self.end_m, end_m)
         right, left = max(self.right_m, right_m), min(self.left_m, left_m)
         if not (start < end and right < left):
@@ -151,21 +151,21 @@ class Road:
     mu: Friction = 1.0
     """Friction relative to that in the tyre files [-]."""
     grade: Annotated[float, Range(-0.5, 0.5)] = 0.0
-    """Rise over run in the direction of travel [-]; positive is uphill."""
+    """Rise over run in the direction of travel [-]. Positive is uphill."""
     mu_left: Friction | None = None
     """Friction where y > 0 [-]; default `mu`."""
     mu_right: Friction | None = None
     """Friction where y <= 0 [-]; default `mu`."""
     patches: tuple[RoadPatch, ...] = ()
-    """Stretches with their own friction; where two overlap, the later one counts."""
+    """Stretches with their own friction. Where two overlap, the later one counts."""
     along: Literal["x", "path"] = "x"
     """What patches, sides, obstacles and surfaces follow: `x`, the world's x axis, or `path`, the path of the
     manoeuvre's course."""
 
     bank_rad: Annotated[float, Range(-0.5, 0.5)] = 0.0
-    """Bank of the whole road [rad]; positive if the left side is higher, as for a right-hand curve."""
+    """Bank of the whole road [rad]. Positive if the left side is higher, as for a right-hand curve."""
     obstacle: tuple[Obstacle, ...] = ()
-    """Bumps, cleats, kerbs, potholes, cross slopes and waves; their heights add up."""
+    """Bumps, cleats, kerbs, potholes, cross slopes and waves. Their heights add up."""
     profile: str | None = None
     """CSV file with the columns s_m and z_m, or s_m, left_z_m and right_z_m: a path, or a name in the manoeuvre's
     folder."""
@@ -184,7 +184,7 @@ class Road:
     """What a tyre feels of an uneven road, see `activesteer.vehicle.native_contact`. `auto`: `single_point` where all
     that is uneven is long and smooth, else `enveloping`."""
     start_m: Annotated[float, Range(3.0, 1000.0)] = 10.0
-    """Distance from which an uneven surface or `banking` counts in full [m]; from 2 m on it is blended in."""
+    """Distance from which an uneven surface or `banking` counts in full [m]. From 2 m on it is blended in."""
     outside: Literal["extend", "error"] = "extend"
     """Beyond the known surface: `extend` its edge, or end the run with an `error`."""
 
@@ -252,14 +252,14 @@ class Road:
         return LaidRoad(*values, path=course.path)
 
     def grid(self) -> Grid | None:
-        """Return the heights of the surface without obstacles and banking; None if there are none."""
+        """Return the heights of the surface without obstacles and banking, or None if there are none."""
         if self.crg_data:
             return unpacked(self.crg_data).grid._replace(s_m=self.start_m)
         grids = [part.grid() for part in (self.roughness, self.heights) if part is not None]
         return summed(*grids) if len(grids) > 1 else grids[0] if grids else None
 
     def cross_slopes(self) -> tuple[float, float, Array] | None:
-        """Return first distance, step [m] and cross slopes of `banking`; None without it."""
+        """Return first distance, step [m] and cross slopes of `banking`, or None without it."""
         return None if self.banking is None else self.banking.sampled()
 
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
@@ -279,7 +279,7 @@ class Road:
         return float(np.mean(~grid.knows(s, d) & (s >= self.start_m)))
 
     def areas(self) -> tuple[Area, ...]:
-        """Return the areas whose friction is not `mu`; where areas overlap, the later one counts."""
+        """Return the areas whose friction is not `mu`. Where areas overlap, the later one counts."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
         split = [Area(-math.inf, math.inf, *_SIDES[side], mu) for side, mu in sides if mu is not None]
         return (*split, *(Area(it.start_m, it.end_m, *_SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
@@ -296,7 +296,7 @@ class Road:
 
 
 def _sliced(index: int, area: Area, slices: int, place: Callable[[Array, Array], tuple[Array, Array]]) -> list[Piece]:
-    """Cut an area into slices; `place` turns its x and y into those of the world."""
+    """Cut an area into slices. `place` turns its x and y into those of the world."""
     stations = np.linspace(area.start_m, area.end_m, slices + 1)
     edges = [np.column_stack(place(stations, np.full(slices + 1, y))) for y in (area.right_m, area.left_m)]
     corners = np.stack([edges[0][:-1], edges[0][1:], edges[1][1:], edges[1][:-1]], axis=1)
@@ -319,7 +319,7 @@ class LaidRoad(Road):
     """The path of the course."""
 
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
-        """Return world x and y of places along and beside the path, straight beyond its end; see the base class."""
+        """Return world x and y of places along and beside the path, straight beyond its end (see the base class)."""
         path = self.path
         assert path is not None
         x, y, heading = (np.interp(s_m, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
@@ -328,7 +328,7 @@ class LaidRoad(Road):
         return x + beyond * cos - d_m * sin, y + beyond * sin + d_m * cos
 
     def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Return the places along and beside the nearest point of the path; see the base class."""
+        """Return the places along and beside the nearest point of the path (see the base class)."""
         from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
 
         path = self.path
@@ -339,7 +339,7 @@ class LaidRoad(Road):
         return path.s_m[near] + dx * cos + dy * sin, dy * cos - dx * sin
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return quadrangles along the path; the rectangle does not matter. See the base class."""
+        """Return quadrangles along the path. The rectangle does not matter. See the base class."""
         path, found = self.path, []
         assert path is not None
         for index, area in enumerate(self.areas()):
@@ -351,7 +351,7 @@ class LaidRoad(Road):
 
 
 def road_of(metadata: Mapping[str, Any]) -> Road:
-    """Return the road of a recorded run, laid along its course; a default road if it was not recorded."""
+    """Return the road of a recorded run, laid along its course. A default road if it was not recorded."""
     maneuver = table_of(metadata.get("maneuver", {}), "maneuver")
     table = table_of(maneuver.get("road", {}), "maneuver.road")
     road = build(Road, table, Source("the metadata of the recording", error=RecordingError), ("maneuver", "road"))

@@ -39,7 +39,7 @@ ends: 1 if leaving the grid is an error."""
 SINGLE_POINT, FOUR_POINT, ENVELOPING = 1.0, 2.0, 3.0
 
 COARSE_M: Final = 0.018
-"""Distance at which a tyre looks for an obstacle [m]; a cleat of 20 mm cannot hide between two places."""
+"""Distance at which a tyre looks for an obstacle [m]. A cleat of 20 mm cannot hide between two places."""
 NEAR_M: Final = 1.0
 """Distance within which an obstacle counts for a wheel [m]; a tyre reaches some 0.5 m."""
 
@@ -133,7 +133,7 @@ def _on_grid(first, per, count, at):
 
 @compiled
 def level_at(surface, numbers, obstacles, first, last, s, d):
-    """Return the height of the road at a place [m]; see `height_at`."""
+    """Return the height of the road at a place [m] (see `height_at`)."""
     z = 0.0
     rows, columns, count = int(surface.rows), int(surface.columns), int(surface.slopes)
     if s > surface.blend_m:
@@ -254,7 +254,7 @@ class Surface(NamedTuple):
 
 
 def surface_of(road: Road) -> Surface | None:
-    """Return the surface of a road; None if it is plane."""
+    """Return the surface of a road, or None if it is plane."""
     return _surface_of(road) if road.is_uneven else None
 
 

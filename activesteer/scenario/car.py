@@ -58,7 +58,7 @@ _COUNTS: Final = {
     ),
     "mesh": ("maxhullvert",),
 }
-"""Element -> attributes with amounts of memory or numbers of iterations; None for all attributes."""
+"""Element -> attributes with amounts of memory or numbers of iterations, or None for all attributes."""
 _COPYING: Final = ("replicate", "composite", "flexcomp")
 _COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
@@ -200,7 +200,7 @@ class VehicleConfig(VehicleParameters):
     single_track: SingleTrackParameters
     """Single-track model of the car, for controllers."""
     two_track: TwoTrackParameters | None = None
-    """Further properties for estimators; a car without this table has no estimator."""
+    """Further properties for estimators. A car without this table has no estimator."""
     controllers: ControllerParameters = field(default_factory=ControllerParameters)
     """Gains and limits."""
     KEY_HINTS: ClassVar = VehicleParameters.KEY_HINTS | {"driver": _DRIVER_HINT}
@@ -258,7 +258,7 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
 
 
 def car_with(vehicle: FileOrTable, overrides: list[Override]) -> CarSpec:
-    """Read a car with overrides of the vehicle file only; see `load_car`."""
+    """Read a car with overrides of the vehicle file only (see `load_car`)."""
     table, source, folder, files = read_table(vehicle, "vehicle", find_vehicle, ParameterError)
     known = table.get("single_track")
     table, source = applied(VehicleConfig, table, source, overrides)

@@ -95,15 +95,15 @@ def battery_power_W(battery: Battery) -> tuple[float, float]:
 
 
 _LARGEST_SLIP_ANGLE_RAD: Final = np.radians(20.0)
-"""Largest slip angle of the grid; beyond it the force stays constant [rad]."""
+"""Largest slip angle of the grid. Beyond it the force stays constant [rad]."""
 _LARGEST_LOAD: Final = 3.0
-"""Largest load of the grid over the static load; beyond it the force stays constant."""
+"""Largest load of the grid over the static load. Beyond it the force stays constant."""
 _SPEED_MPS: Final = 20.0
 """Speed at which the tyres are evaluated [m/s]."""
 
 
 def estimator_setup(car: CarSpec) -> EstimatorSetup | None:
-    """Return the properties that estimators may know; None if the vehicle file has no table [two_track]."""
+    """Return the properties that estimators may know, or None if the vehicle file has no table [two_track]."""
     config, body = car.config, car.config.single_track
     if config.two_track is None:
         return None

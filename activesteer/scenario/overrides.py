@@ -60,14 +60,14 @@ _BUILT_IN: Final = frozenset(field.name for field in fields(ControllerParameters
 
 
 def own_path(key: str) -> tuple[str, str] | None:
-    """Return the class and the parameter of a key of a user's controller; None for other keys."""
+    """Return the class and the parameter of a key of a user's controller, or None for other keys."""
     table, _, rest = key.removeprefix("vehicle.").partition(".")
     name, _, parameter = rest.partition(".")
     return (name, parameter) if table == "controllers" and name and name not in _BUILT_IN else None
 
 
 def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
-    """Return users' controllers by the names that they have in keys; the same class may drive with other parameters."""
+    """Return users' controllers by the names that they have in keys. The same class may drive with other parameters."""
     found: dict[str, list[Plugin]] = {}
     for plugin in map(controller_spec, controllers):
         if not plugin.is_builtin:

@@ -75,7 +75,7 @@ def _is_header(line: str, name: str | None = None) -> bool:
 
 
 _LONGEST: Final = 200_000
-"""Maximum of points of a table; a longer recording is thinned."""
+"""Maximum of points of a table. A longer recording is thinned."""
 _ON_GROUND: Final = 0.5
 """Minimum speed of a manoeuvre with a moving car [m/s]."""
 
@@ -86,7 +86,7 @@ def is_recording(maneuver: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def recorded_inputs(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the manoeuvre of a file; see `open_loop_of`. A damaged file is used up to the damage."""
+    """Return the manoeuvre of a file. See `open_loop_of`. A damaged file is used up to the damage."""
     file = user_path(path, RecordingError)
     return open_loop_of(Recording.open(file, recover=True), file.stem)
 

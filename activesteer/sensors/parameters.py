@@ -31,7 +31,7 @@ class Sensor:
     bandwidth_Hz: _Bandwidth | None = None
     """Corner frequency (-3 dB) of a first-order low-pass before sampling [Hz]."""
     sample_time_s: _SampleTime | None = None
-    """Time between two samples, in whole steps of the simulation; the output is held between [s]."""
+    """Time between two samples, in whole steps of the simulation. The output is held between [s]."""
     delay_s: _Delay | None = None
     """Delay from the sample to the output, in whole steps of the simulation [s]."""
 
@@ -41,7 +41,7 @@ class Sensor:
         return not any(getattr(self, field.name) for field in fields(self))
 
     def amount(self, word: str) -> float:
-        """Return the value of the key that begins with a word and ends in the unit; 0 if it is not given."""
+        """Return the value of the key that begins with a word and ends in the unit, or 0 if it is not given."""
         return next((getattr(self, field.name) for field in fields(self) if field.name.startswith(word)), None) or 0.0
 
 
@@ -63,7 +63,7 @@ class RateSensor(Sensor):
 
 @dataclass(frozen=True)
 class WheelSpeedSensor(RateSensor):
-    """A sensor of the rotational speed of a wheel; all four are alike.
+    """A sensor of the rotational speed of a wheel. All four are alike.
 
     With teeth, the sensor counts the edges of a pulse wheel that pass between two samples and measures their time. If
     no edge passes, the reading is at most the speed that the time since the last edge allows. The sign of rotation is
@@ -71,7 +71,7 @@ class WheelSpeedSensor(RateSensor):
     """
 
     teeth: Annotated[int, Range(0, 1000)] | None = None
-    """Edges per turn; 0 for a sensor without a pulse wheel."""
+    """Edges per turn, or 0 for a sensor without a pulse wheel."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class Sensors:
     preset: Literal["ideal", "production"] = "ideal"
     """Default of all keys."""
     seed: Annotated[int, Range(0, 2**32 - 1)] | None = None
-    """Seed of noise, bias and drift; default 0. It has no effect if no sensor has any of these."""
+    """Seed of noise, bias and drift. Default 0. It has no effect if no sensor has any of these."""
     yaw_rate: RateSensor = RateSensor()
     """Yaw rate."""
     ax: AccelerationSensor = AccelerationSensor()
@@ -158,7 +158,7 @@ class Sensors:
     """Pressure in each wheel brake."""
     speed_from_wheels: bool | None = None
     """Whether the speed is that of the wheels that are not driven (of all wheels if all are driven) times their rolling
-    radius; else it is the car's own."""
+    radius. Else it is the car's own."""
 
     def __post_init__(self) -> None:
         """Fill in the values of the preset."""

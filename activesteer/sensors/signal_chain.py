@@ -25,7 +25,7 @@ CHAIN: Final = np.dtype(
         ],
     )
 )
-"""Constants of a sensor: place of its memory, steps between samples, length of its delay line; fraction of the low-pass
+"""Constants of a sensor: place of its memory, steps between samples, length of its delay line. Fraction of the low-pass
 filter per step, rms of the noise, offset, rms of the drift per sample, quantisation step and limit (0 for none), teeth
 (0 for none), key of its random numbers."""
 
@@ -63,7 +63,7 @@ def normals(key, number):
 
 @inlined
 def _pass_teeth(chain, memory, speed_radps, timestep_s):
-    """Turn the pulse wheel by one step; see `WheelSpeedSensor`."""
+    """Turn the pulse wheel by one step (see `WheelSpeedSensor`)."""
     at = chain.memory
     turned = speed_radps * timestep_s * chain.teeth / (2.0 * math.pi)
     phase = memory[at + PHASE] + turned

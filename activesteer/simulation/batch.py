@@ -198,26 +198,26 @@ class Batch:
 
     @property
     def measurement(self) -> Any:
-        """Present signals of the sensors, a `Measurement`; each field has shape (n,), or (n, 4) for the wheels."""
+        """Present signals of the sensors, a `Measurement`. Each field has shape (n,), or (n, 4) for the wheels."""
         return arrays_of(Measurement, self.rows(Measurement))
 
     @property
     def motion(self) -> Any:
-        """Present positions and motions as the drivers see them, a `Motion`; each field has shape (n,)."""
+        """Present positions and motions as the drivers see them, a `Motion`. Each field has shape (n,)."""
         return arrays_of(Motion, self.rows(Motion))
 
     @property
     def driver_command(self) -> Any:
-        """Last commands of the drivers, a `DriverCommand`; each field has shape (n,)."""
+        """Last commands of the drivers, a `DriverCommand`. Each field has shape (n,)."""
         return arrays_of(DriverCommand, self.rows(DriverCommand))
 
     @property
     def actuator_command(self) -> Any:
-        """Last commands of the controllers, an `ActuatorCommand`; each field has shape (n,), for the wheels (n, 4)."""
+        """Last commands of the controllers, an `ActuatorCommand`. Each field has shape (n,), for the wheels (n, 4)."""
         return arrays_of(ActuatorCommand, self.rows(ActuatorCommand))
 
     def rows(self, kind: type[Any], cars: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """Return the numbers of present messages, a copy of shape (cars, numbers); see `signals.arrays_of`.
+        """Return the numbers of present messages, a copy of shape (cars, numbers) (see `signals.arrays_of`).
 
         Args:
             kind: `Measurement`, `Motion`, `DriverCommand` or `ActuatorCommand`.
@@ -292,7 +292,7 @@ class Batch:
             future.result()
 
     def set(self, key: str, value: Any, cars: ArrayLike | None = None) -> None:
-        """Change a key of some cars from the next step on; see `Simulation.set`.
+        """Change a key of some cars from the next step on (see `Simulation.set`).
 
         Args:
             key: Dotted key, as in `overrides`.
@@ -311,7 +311,7 @@ class Batch:
                     self.loops[car].change(key, values[car])
 
     def fail(self, fault: str | Fault, cars: ArrayLike | None = None) -> None:
-        """Set a fault in some cars, beside those that act already; see `Simulation.fail`.
+        """Set a fault in some cars, beside those that act already (see `Simulation.fail`).
 
         Args:
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.

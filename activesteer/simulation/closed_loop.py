@@ -1,4 +1,4 @@
-"""The closed loop of one car: its blocks, its state, and what changes on the way; `native_loop` drives it."""
+"""The closed loop of one car: its blocks, its state, and what changes on the way. `native_loop` drives it."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def driver(self) -> Any:
-        """The driver; a new one takes over from the next step on."""
+        """The driver. A new one takes over from the next step on."""
         self._store()
         return self.blocks[0]
 
@@ -178,7 +178,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def controller(self) -> Any:
-        """The controller; a new one takes over from the next step on, with the control unit of the former one."""
+        """The controller. A new one takes over from the next step on, with the control unit of the former one."""
         self._store()
         return self.blocks[1]
 
@@ -188,7 +188,7 @@ class ClosedLoop(Uncopyable):
         self.blocks = self.blocks[0], controller
 
     def replace_controller(self, controller: Any) -> None:
-        """Let another controller take over, with a control unit of its own; see `activesteer.plugins.find`.
+        """Let another controller take over, with a control unit of its own (see `activesteer.plugins.find`).
 
         Raises:
             ControllerError: there is no such controller, or it cannot be created.
@@ -268,7 +268,7 @@ class ClosedLoop(Uncopyable):
         self._store()
 
     def add_fault(self, fault: str | Fault) -> str:
-        """Set a fault, beside those that act already, and return it in words; see `Simulation.fail`."""
+        """Set a fault, beside those that act already, and return it in words (see `Simulation.fail`)."""
         now_s = self.step_count * self.vehicle.timestep_s
         if isinstance(fault, str):
             start_s = None if "@" in fault else now_s
@@ -322,7 +322,7 @@ class ClosedLoop(Uncopyable):
         return scenario
 
     def run(self, recorder: Recorder | None = None) -> None:
-        """Drive the manoeuvre to its end; see `advance`."""
+        """Drive the manoeuvre to its end (see `advance`)."""
         self.advance(self.steps - self.step_count, recorder)
 
     def advance(self, steps: int, recorder: Recorder | None = None, given: Given = _NOTHING_GIVEN) -> None:
@@ -343,7 +343,7 @@ class ClosedLoop(Uncopyable):
             self.drive(steps, recorder, given)
 
     def drive(self, steps: int, recorder: Recorder | None = None, given: Given = _NOTHING_GIVEN) -> None:
-        """Drive some steps inside `in_use`; see `advance`."""
+        """Drive some steps inside `in_use` (see `advance`)."""
         vehicle, cars, car = self.vehicle, self._cars, self._car
         driver_command, actuator_command = given
         if driver_command is not None:

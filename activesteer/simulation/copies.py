@@ -108,7 +108,7 @@ def _kept_parts(
 
 
 def _state(block: Any) -> dict[str, Any]:
-    """Return the attributes of a block; of one that is copied by its state, without views of it."""
+    """Return the attributes of a block. Of one that is copied by its state, without views of it."""
     if hasattr(block, "__setstate__"):
         return block.__getstate__()
     return {name: getattr(block, name) for name in _attributes(block)}
@@ -134,7 +134,7 @@ def same(one: Any, other: Any, seen: frozenset[tuple[int, int]] = frozenset()) -
 
 
 def _parts(value: Any) -> Mapping[Any, Any] | None:
-    """Return the parts of a container or an object; None for a value without parts."""
+    """Return the parts of a container or an object, or None for a value without parts."""
     if isinstance(value, dict):
         return value
     if isinstance(value, list | tuple | deque):

@@ -33,8 +33,8 @@ GIVEN, NATIVE, PYTHON = range(3)
 DRIVE, CONTROL, PASS_ON = range(3)
 """Stages of a step, each of which a car can stop before: the driver; the controller; its bus, and the car."""
 DONE, AT_CHANGE, TAPE_FULL, NEEDS_SETPOINTS, NEEDS_GAINS, NEEDS_DRIVER, NEEDS_CONTROLLER, INSANE = range(8)
-"""Why a car has stopped: all its steps are made; a fault begins or ends; the tape has no room; the next setpoints, the
-driver's gains at a new speed, the driver's or the controller's command are needed; a value is beyond all reason."""
+"""Why a car has stopped: all its steps are made. A fault begins or ends. The tape has no room. The next setpoints, the
+driver's gains at a new speed, the driver's or the controller's command are needed. A value is beyond all reason."""
 
 CAR: Final = np.dtype(
     (
@@ -93,7 +93,7 @@ def _begin(car, bindings):
 
 @inlined
 def _drive(car):
-    """Find the setpoint and let the driver act; return a status."""
+    """Find the setpoint and let the driver act. Return a status."""
     if car.driver_kind == GIVEN:
         return DONE
     if car.driver_kind == PYTHON:
@@ -121,7 +121,7 @@ def _drive(car):
 
 @inlined
 def _control(car):
-    """Let the controller decide if it is its turn; return a status."""
+    """Let the controller decide if it is its turn. Return a status."""
     if car.controller_kind == GIVEN or car.calls % car.every != 0:
         return DONE
     command = car.driver_command
@@ -156,7 +156,7 @@ def _pass_on(car):
 
 @inlined
 def _advance(car, bindings, step_address):
-    """Step the car, which records its row; return a status."""
+    """Step the car, which records its row. Return a status."""
     torques_set = car.torques_set != 0
     if torques_set:
         ctrl = f64_pointer(bindings.ctrl)

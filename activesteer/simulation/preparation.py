@@ -46,7 +46,7 @@ from activesteer.vehicle.statics import mass_properties
 from activesteer.version import __version__
 
 MAX_KEPT: Final = 1000
-"""Maximum of numbers in the process and in the folder; the oldest are deleted first."""
+"""Maximum of numbers in the process and in the folder. The oldest are deleted first."""
 _MAX_BYTES: Final = 200
 _SUFFIX: Final = ".amplitude"
 _in_process: dict[str, float] = {}
@@ -63,7 +63,7 @@ def folder() -> Path:
 
 
 def recall(key: str) -> float | None:
-    """Return a stored number, bit for bit; None if there is none."""
+    """Return a stored number, bit for bit, or None if there is none."""
     if _reads and key not in _in_process:
         with contextlib.suppress(ActiveSteerError, RuntimeError, ValueError):
             text = read_bytes(folder() / f"{key}{_SUFFIX}", ActiveSteerError, _MAX_BYTES).decode("ascii")
@@ -251,7 +251,7 @@ def _rows(recorder: Recorder, name: str) -> np.ndarray:
 
 
 Run = Callable[[Scenario], RecordingLike]
-"""Function that runs a scenario; an argument, because the runner itself calls this module."""
+"""Function that runs a scenario. An argument, because the runner itself calls this module."""
 
 CONSTANT_SPEED_TESTS: Final = {"80 km/h": 80.0, "100 km/h": 100.0}
 """Tests at constant speed that give the single-track model: name -> speed [km/h]."""

@@ -167,7 +167,7 @@ class Recorder(Uncopyable):
             raise self._complaint(first, values, poses)
 
     def result(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Poses]:
-        """Return times, values and poses of all rows in memory; see `flush`."""
+        """Return times, values and poses of all rows in memory (see `flush`)."""
         self.flush()
         first, last = self._first, self.rows
         self._kept.referred_rows = max(self._kept.referred_rows, last)
@@ -207,7 +207,7 @@ class Recorder(Uncopyable):
             raise ParameterError(f"is {shown(state)}; the rows of this run are needed", key="state", value=state)
 
     def restore_state(self, state: RecordedRows) -> None:
-        """Go back to the rows of a saved state; see `check_state`."""
+        """Go back to the rows of a saved state (see `check_state`)."""
         self.check_state(state)
         if state.kept is not self._kept or state.kept.referred_rows > state.rows:
             self._kept = state.kept.copied(state.rows, self._poses_before(state.rows))

@@ -59,7 +59,7 @@ class Link(Protocol):
         ...
 
     def commands(self) -> Given:
-        """Return the commands for the next step; None where the run's own block decides."""
+        """Return the commands for the next step, or None where the run's own block decides."""
         ...
 
     def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:
@@ -227,7 +227,7 @@ class Simulation:
     def step(
         self, driver_command: DriverCommand | None = None, actuator_command: ActuatorCommand | None = None
     ) -> Measurement:
-        """Drive one step; see `advance`."""
+        """Drive one step (see `advance`)."""
         return self.advance(1, driver_command, actuator_command)
 
     def advance(
@@ -308,7 +308,7 @@ class Simulation:
                 gc.enable()
 
     def set(self, key: str, value: Any) -> None:
-        """Change a key from the next step on; the recording keeps the change as an event.
+        """Change a key from the next step on. The recording keeps the change as an event.
 
         The frictions of the road, the speed and the inputs of the manoeuvre, and the parameters of controller and
         driver can change. Controller and driver keep their memory.
@@ -336,7 +336,7 @@ class Simulation:
             self._note("set", f"{key} = {json.dumps(value, default=str)}")
 
     def fail(self, fault: str | Fault) -> None:
-        """Set a fault, beside those that act already; the recording keeps it as an event.
+        """Set a fault, beside those that act already. The recording keeps it as an event.
 
         Args:
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.
@@ -377,7 +377,7 @@ class Simulation:
             raise ManeuverError(f"{problem}: {self._failure}") from self._failure
 
     def run(self) -> None:
-        """Drive the manoeuvre to its end; see `advance`."""
+        """Drive the manoeuvre to its end (see `advance`)."""
         self.advance(self.steps - self.loop.step_count)
 
     def save_state(self) -> SavedState:
@@ -527,7 +527,7 @@ class Simulation:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Note a failure, after which the states of the blocks do not match; the recorded rows are kept."""
+        """Note a failure, after which the states of the blocks do not match. The recorded rows are kept."""
         try:
             yield
         except BaseException as failure:

@@ -15,7 +15,7 @@ from activesteer.conventions import run_looks
 from activesteer.drawing.cars import bytes_of
 from activesteer.files import file_word
 from activesteer.pages import Page, Section, Table, Text, failed, passed
-from activesteer.plotting import Panel, Picture, as_svg, draw
+from activesteer.plotting import Panel, Picture
 from activesteer.scenario import FileOrTable, check_gains, check_parts, read_by, resolve
 from activesteer.standards.catalogue import standard_of
 from activesteer.standards.standard import Findings, NoResult, Standard
@@ -110,7 +110,7 @@ def examine(
 
 
 _WIDE, _THIN = 3.6, 1.0
-"""Widths of the first and of the second curve of a controller [pt]; the two sides of a car may coincide."""
+"""Widths of the first and of the second curve of a controller [pt]. The two sides of a car may coincide."""
 _PALE: Final = 0.55
 """Share of white in the colour of the wide curve."""
 
@@ -128,10 +128,10 @@ def examination_page(result: Examination) -> Page:
     sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])]
     together = _together(result.findings) if standard.overlaid else []
     if together:
-        sections.append(Section("All controllers", pictures=[as_svg(draw(picture)) for picture in together]))
+        sections.append(Section("All controllers", pictures=together))
     for name, found in result.findings.items():
         words = Markup("{}: {}.").format(_verdict(found), found.error or typeset(found.summary))
-        alone = [] if together else [as_svg(draw(picture)) for picture in found.pictures]
+        alone = [] if together else found.pictures
         sections.append(Section(name, [words], alone, found.tables))
     sections += [
         Section("Scope of this implementation", [standard.edition]),
@@ -142,7 +142,7 @@ def examination_page(result: Examination) -> Page:
 
 
 def _together(findings: Mapping[str, Findings]) -> list[Picture]:
-    """Return the pictures of several controllers laid over each other; empty for a single one.
+    """Return the pictures of several controllers laid over each other, or empty for a single one.
 
     A controller has one colour. The first curve of each panel, the turn to the left, is wide and pale, the second thin.
     """

@@ -38,7 +38,7 @@ YAW_RATE_RADPS: Final = math.radians(3.0)
 AY_MPS2: Final = 1.0
 """Largest change of the lateral acceleration [m/s2]."""
 LANE_M: Final = 3.5
-"""Width of the lane, in whose middle the car is [m]; its edge is the largest lateral offset after 1 s."""
+"""Width of the lane, in whose middle the car is [m]. Its edge is the largest lateral offset after 1 s."""
 _ENTRY_S: Final = 2.0
 _BEGIN_S: Final = _ENTRY_S + 2.5
 """Time at which the fault begins, in the steady circle [s]."""
@@ -184,7 +184,7 @@ class _FaultRuns:
 
 
 def _judged(runs: _FaultRuns, fault: Fault) -> dict[str, Any]:
-    """Return the values of a fault; nan for an incomplete run."""
+    """Return the values of a fault, or nan for an incomplete run."""
     try:
         fixed = runs.hands_fixed(fault)
         driven = runs.again(fault)
@@ -213,7 +213,7 @@ def _offset_m(runs: _FaultRuns, motion: _Signals) -> float:
 
 
 def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
-    """Return the time from the beginning of the fault until a limit is exceeded [s]; None if none is."""
+    """Return the time from the beginning of the fault until a limit is exceeded [s], or None if none is."""
     good = runs.in_order
     broken = np.abs(motion.yaw_rate_radps - good.yaw_rate_radps) > YAW_RATE_RADPS
     broken |= np.abs(motion.ay_mps2 - good.ay_mps2) > AY_MPS2

@@ -29,7 +29,7 @@ HEAVY_KG: Final = 3500.0
 RATIOS: Final = ("yaw_ratio_1s", "yaw_ratio_175s")
 _METRICS: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
 _BEGIN_S: Final = 1.5
-"""Beginning of the sine [s]; the signals are zeroed over the second before."""
+"""Beginning of the sine [s]. The signals are zeroed over the second before."""
 _SINE: Final = {"steer.start_s": _BEGIN_S, "duration_s": 5.6}
 _RAMP: Final = {"steer.end_deg": 120.0, "duration_s": 10.0, "road.mu": 0.9}
 
@@ -47,7 +47,7 @@ def amplitudes(a_deg: float) -> list[tuple[float, float]]:
 
 
 def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
-    """Describe the limits that a run breaks, with the required displacement [m]; empty if it keeps them."""
+    """Describe the limits that a run breaks, with the required displacement [m], or empty if it keeps them."""
     broken = [
         f"yaw rate {100.0 * row[name]:.0f} % {after_s:.2f} s after completion of steer ({100.0 * limit:.0f} % allowed)"
         for name, after_s, limit in zip(RATIOS, INSTANTS_S, RATIO_LIMITS, strict=True)

@@ -21,7 +21,7 @@ _BEGIN_S: Final = 0.5
 
 
 def after_one_second(run: StandardRun, begin_s: float) -> dict[str, float]:
-    """Return the motion of the car 1 s after the beginning of braking, left positive; nan if the run ends before."""
+    """Return the motion of the car 1 s after the beginning of braking, left positive, or nan if the run ends before."""
     then_s = begin_s + AFTER_S
     return {
         "yaw_rate_after_1000ms_radps": run.at("yaw_rate_radps", then_s),

@@ -14,11 +14,11 @@ from activesteer.standards.standard import SIDES, Findings, Standard, StandardRu
 DRIVER: Final = "expert"
 """The standard requires a skilled driver."""
 MARGINS_M: Final = (0.1, 0.15, 0.2)
-"""Margins of the lines at every speed [m]; the best one depends on car and speed."""
+"""Margins of the lines at every speed [m]. The best one depends on car and speed."""
 THROTTLE_OFF_M: Final = 2.0
 """Distance into the entry lane after which the throttle is released [m]."""
 COARSE_KMH: Final = (35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 70.0, 75.0, 80.0)
-"""Entry speeds of the coarse search [km/h]; the search does not go beyond the lowest and the highest."""
+"""Entry speeds of the coarse search [km/h]. The search does not go beyond the lowest and the highest."""
 FINE_KMH: Final = 1.0
 """Resolution of the search [km/h]."""
 _CHANNELS: Final = ("x_m", "y_m", "speed_mps", "steering_wheel_rad", "yaw_rate_radps", "sideslip_rad")
@@ -28,7 +28,7 @@ _BEYOND_M: Final = 10.0
 """Length of the drawn track after the last lane [m]."""
 
 Try = Callable[[str, Sequence[float]], list[bool]]
-"""Function of the name of a series and entry speeds [km/h]; it returns True for each clean speed."""
+"""Function of the name of a series and entry speeds [km/h]. It returns True for each clean speed."""
 
 
 def highest_clean(attempt: Try) -> float | None:

@@ -48,7 +48,7 @@ _RESPONSES: Final = {
 _NAMES: Final = {"yaw_rate_radps": "yaw rate", "ay_mps2": "lateral acceleration", "roll_rad": "roll angle"}
 _POINTS: Final = 60
 SEQUENCES: Final = 12
-"""Number of one-minute runs with random steering; the standard requires 12 minutes."""
+"""Number of one-minute runs with random steering. The standard requires 12 minutes."""
 RANDOM_SHARE: Final = 0.2
 """Root mean square of the random angle, as a fraction of the step's angle: the peaks stay below the step."""
 COHERENCE: Final = 0.95
@@ -122,7 +122,7 @@ def _examine(runner: TestRunner) -> Findings:
 
 
 def _sweep_responses(sweep: StandardRun) -> Responses:
-    """Return the frequency responses to the steering wheel angle; empty if the sweep failed."""
+    """Return the frequency responses to the steering wheel angle, or empty if the sweep failed."""
     frequencies = np.geomspace(LOWEST_Hz, HIGHEST_Hz, _POINTS)
     try:
         return {name: frequency_response(sweep, name, frequencies) for name in _RESPONSES}
@@ -131,7 +131,7 @@ def _sweep_responses(sweep: StandardRun) -> Responses:
 
 
 def _random_responses(runs: list[StandardRun]) -> dict[str, RandomResponse]:
-    """Return the responses from the finished runs with random steering; empty without one."""
+    """Return the responses from the finished runs with random steering, or empty without one."""
     driven = [run for run in runs if run.channels]
     if not driven:
         return {}
@@ -139,7 +139,7 @@ def _random_responses(runs: list[StandardRun]) -> dict[str, RandomResponse]:
 
 
 def weak_ranges(found: FrequencyResponse) -> str:
-    """Describe the frequency ranges with a coherence below `COHERENCE`; empty if there is none."""
+    """Describe the frequency ranges with a coherence below `COHERENCE`, or empty if there is none."""
     weak = np.concatenate([[False], found.coherence < COHERENCE, [False]])
     edges = np.flatnonzero(np.diff(weak.astype(int)))
     lines = found.frequency_Hz

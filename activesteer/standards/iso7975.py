@@ -29,7 +29,7 @@ _SHOWN: Final = (
 _CHANNELS: Final = ("yaw_rate_radps", "sideslip_rad", "speed_mps")
 _BEGIN_S: Final = 6.0
 _AFTER_S: Final = 2.2
-"""Duration after the beginning of braking [s]; it ends before the car stops, where sideslip is undefined."""
+"""Duration after the beginning of braking [s]. It ends before the car stops, where sideslip is undefined."""
 
 
 def _examine(runner: TestRunner) -> Findings:

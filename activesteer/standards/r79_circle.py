@@ -48,21 +48,21 @@ WITHIN_S: Final = 4.0
 SPEED_KMH: Final = 10.0
 """Speed of the spiral [km/h]."""
 RIM_RADIUS_M: Final = 0.185
-"""Nominal radius of the steering wheel [m]: an assumption (diameter 370 mm); vehicle files have none."""
+"""Nominal radius of the steering wheel [m]: an assumption (diameter 370 mm). Vehicle files have none."""
 FIGURES: Final = (
     "yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m",
     "steering_correction_rad", "fault_tolerant_time_s",
 )  # fmt: skip
 """Values of a fault: largest changes with hands fixed; offset across the path, left positive, with hands fixed and with
-the driver; largest change of the driver's steering wheel angle; tolerated time, None if no limit is exceeded."""
+the driver. Largest change of the driver's steering wheel angle. Tolerated time, None if no limit is exceeded."""
 _TURNED_S: Final = 3.0
-"""Time in which the steering wheel reaches the Ackermann angle of the radius [s]; the limit is a third longer."""
+"""Time in which the steering wheel reaches the Ackermann angle of the radius [s]. The limit is a third longer."""
 _BEGIN_S: Final = 0.5
 _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "speed_mps")
 
 
 class Reached(NamedTuple):
-    """Time from the beginning of steer to a radius, and greatest force at the rim until then; nan if not reached."""
+    """Time from the beginning of steer to a radius, and greatest force at the rim until then, or nan if not reached."""
 
     time_s: float
     effort_N: float

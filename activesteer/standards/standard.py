@@ -34,7 +34,7 @@ class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test
 
 @dataclass(frozen=True)
 class StandardRun:
-    """A finished run; the analysis reads it like a recording.
+    """A finished run. The analysis reads it like a recording.
 
     Attributes:
         case: Values in which it differs from the other runs of its series.
@@ -65,7 +65,7 @@ class StandardRun:
         return self.channels[channel]
 
     def at(self, channel: str, time_s: float) -> float:
-        """Return a channel at a time, interpolated; nan after the end of the run."""
+        """Return a channel at a time, interpolated, or nan after the end of the run."""
         values = self.channels.get(channel, np.empty(0))
         return float(np.interp(time_s, self.time_s, values)) if len(values) and time_s <= self.time_s[-1] else math.nan
 
@@ -75,7 +75,7 @@ class StandardRun:
         return {**self.case, **(dict(self.metrics) if not self.error else {"error": self.error})}
 
     def metric(self, name: str) -> float:
-        """Return a metric; nan if the run does not have it."""
+        """Return a metric, or nan if the run does not have it."""
         return self.metrics.get(name, math.nan)
 
     def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
@@ -87,7 +87,7 @@ class StandardRun:
 
 
 class TestRunner(Protocol):
-    """Interface of a test runner; `study_test_runner.StudyTestRunner` implements it."""
+    """Interface of a test runner. `study_test_runner.StudyTestRunner` implements it."""
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
         """Resolve the car and a manoeuvre."""
@@ -105,7 +105,7 @@ class TestRunner(Protocol):
         ...
 
     def fault_circles(self) -> list[dict[str, Any]]:
-        """Drive the faults of the controller's actuators and sensors; see `fault_circle.fault_circles`."""
+        """Drive the faults of the controller's actuators and sensors (see `fault_circle.fault_circles`)."""
         ...
 
 
@@ -132,12 +132,12 @@ class Findings:
 
     @property
     def error(self) -> str:
-        """Reason for a missing result; empty with a result."""
+        """Reason for a missing result, or empty with a result."""
         return self.values.get("error", "")
 
     @property
     def passed(self) -> bool | None:
-        """True if the car keeps the limits; None for a method without limits."""
+        """True if the car keeps the limits, or None for a method without limits."""
         return self.values.get("pass")
 
 
@@ -168,7 +168,7 @@ class Standard:
 
 
 _RATE_DEGPS: Final = 5.0
-"""Rate of the ramp [deg/s]; the car lags by some 0.1 s, which is half a degree."""
+"""Rate of the ramp [deg/s]. The car lags by some 0.1 s, which is half a degree."""
 _LONGEST_S: Final = 30.0
 
 
@@ -197,7 +197,7 @@ def steering_wheel_at(runner: TestRunner, speed_kmh: float, ay_mps2: float) -> f
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return a table of metrics with a column for each run; a run without a metric has an empty cell."""
+    """Return a table of metrics with a column for each run. A run without a metric has an empty cell."""
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [
         [shown.label, shown.unit.name, *(shown.text(metrics.get(shown.name, math.nan)) for metrics in runs.values())]
@@ -221,7 +221,7 @@ class OverTime(Protocol):
 
 
 def time_panels(runs: Mapping[str, OverTime], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
-    """Return channels of runs over time, a panel each; time counts from an instant, which is also given in words."""
+    """Return channels of runs over time, a panel each. Time counts from an instant, which is also given in words."""
     return [
         Panel(
             f"time from {begin} [s]",

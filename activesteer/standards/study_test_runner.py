@@ -73,7 +73,7 @@ class StudyTestRunner:
         return [_run(row, case) for row, case in zip(table.to_pylist(), cases, strict=True)]
 
     def fault_circles(self) -> list[dict[str, Any]]:
-        """See `TestRunner`; the runs are not kept."""
+        """See `TestRunner`. The runs are not kept."""
         return fault_circles(
             self.controller, self.vehicle, self.overrides, self.driver, self.workers,
             lambda done, total: self.progress("fault_circles", done, total),

@@ -46,7 +46,7 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 
 ROUNDS: Final = 5
-"""Rounds; the best one counts, because a disturbance only makes a machine slower."""
+"""Rounds. The best one counts, because a disturbance only makes a machine slower."""
 _CALLS: Final = 5000
 _CONTROLLER: Final = "ars"
 """The most expensive of the paper's controllers."""
@@ -235,7 +235,7 @@ def _with_file(scenario: Scenario, path: Path) -> float:
 
 
 def _blocks(scenario: Scenario) -> dict[str, float]:
-    """Measure each block of the loop on its own, in the order of the data; the vehicle writes the rows."""
+    """Measure each block of the loop on its own, in the order of the data. The vehicle writes the rows."""
     loop = ClosedLoop(scenario, _CONTROLLER)
     vehicle = loop.vehicle
     measurement, motion, setpoint = vehicle.measure(), vehicle.motion(), loop.maneuver.setpoint(0.6)
@@ -302,7 +302,7 @@ class DrivenStop:
 
 @compiled
 def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
-    """Step sensors and brakes as `native_step.step` does; return the number of steps with reduced pressure."""
+    """Step sensors and brakes as `native_step.step` does. Return the number of steps with reduced pressure."""
     asked_Nm, held = np.zeros(4), 0
     for row in rows:
         speeds = memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4]
@@ -348,7 +348,7 @@ _INTERVAL: Final = 10
 
 
 def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure batches of cars in the sine with dwell with ideal sensors; the best of some interleaved rounds counts."""
+    """Measure batches of cars in the sine with dwell with ideal sensors. The best of some interleaved rounds counts."""
     found: dict[str, float] = {}
     for size in SIZES:
         before, threads = _memory_MB(), os.cpu_count() or 1
@@ -388,7 +388,7 @@ def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
 
 
 def _memory_MB() -> float:
-    """Return the memory that this process holds [MB]; 0 where the system does not tell."""
+    """Return the memory that this process holds [MB], or 0 where the system does not tell."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
@@ -437,7 +437,7 @@ class BenchmarkRun(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """A key metric [SI] that differs from the baseline by more than its tolerance; None where a side has none."""
+    """A key metric [SI] that differs from the baseline by more than its tolerance, or None where a side has none."""
 
     maneuver: str
     controller: str
@@ -477,7 +477,7 @@ class Benchmark(NamedTuple):
         return found
 
     def search_told(self, maneuver: str) -> str:
-        """Return the time of the search for a manoeuvre's amplitude in words; empty where nothing is searched."""
+        """Return the time of the search for a manoeuvre's amplitude in words, or empty where nothing is searched."""
         search_s = self.search_s.get(maneuver)
         return "" if search_s is None else f"search of the steering amplitude {search_s:.2f} s"
 
@@ -533,7 +533,7 @@ def _flat(baseline: Baseline) -> dict[tuple[str, str, str], float]:
 
 
 def read_baseline(path: Path = BASELINE) -> Baseline:
-    """Return the stored baseline; null stands for nan."""
+    """Return the stored baseline. Null stands for nan."""
     try:
         stored = json.loads(read_text(path, RecordingError))
         for maneuver, controller, name in _flat(stored):

@@ -122,7 +122,7 @@ class Outcome(NamedTuple):
 def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
 ) -> Iterator[Outcome]:
-    """Make all runs and yield each as it ends; a search is made once for all controllers."""
+    """Make all runs and yield each as it ends. A search is made once for all controllers."""
     with workers_for(jobs) as workers:
         queue = TaskQueue(workers)
         for name, scenario in scenarios.items():
@@ -140,7 +140,7 @@ def drive(
 
 
 def _run(scenario: Scenario, system: str, path: Path) -> str:
-    """Make one run in a process of its own; return the problem."""
+    """Make one run in a process of its own. Return the problem."""
     try:
         run_scenario(scenario, system, path=path)
     except ActiveSteerError as error:
@@ -160,7 +160,7 @@ def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
 
 
 def write_page(results: Iterable[Reproduction], folder: Path) -> Path | None:
-    """Write a page with all runs, including those that ended early; return None if no run made a step."""
+    """Write a page with all runs, including those that ended early. Return None if no run made a step."""
     recordings: dict[str, Recording] = {}
     for result in results:
         for scenario, systems in result.paths.items():

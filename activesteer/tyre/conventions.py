@@ -19,7 +19,7 @@ _CHOICES: Final = {
     "rolling_radius": ("file", "third_of_deflection"),
     "trail_load": ("nominal", "scaled"),
 }
-"""Allowed words of a key; the first is the default, the second is 1 in the tyre's record."""
+"""Allowed words of a key. The first is the default, the second is 1 in the tyre's record."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class TyreConventions:
     """Speed added to the divisor of slip velocities [m/s], against division by zero; 0.1 m/s makes slips 0.45 % smaller
     at 80 km/h."""
     reference_friction: float = 1.0
-    """Friction of the road to which the file's peaks belong; the road's friction is divided by it [-]."""
+    """Friction of the road to which the file's peaks belong. The road's friction is divided by it [-]."""
 
     def __post_init__(self) -> None:
         """Check the values."""

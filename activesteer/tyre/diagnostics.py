@@ -14,7 +14,7 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 
 _BAR_PA: Final = 1e5
 FRICTION_RANGE: Final = (0.6, 1.6)
-"""Peak friction of road tyres on a test drum; between ice and a slick on a dry road the range is wider."""
+"""Peak friction of road tyres on a test drum. Between ice and a slick on a dry road the range is wider."""
 CORNERING_RANGE_PRAD: Final = (8.0, 25.0)
 """Cornering stiffness over load of passenger, light truck and sports car tyres at the nominal load [1/rad]."""
 SLIP_RANGE: Final = (8.0, 60.0)
@@ -44,7 +44,7 @@ _SECTIONS: Final = {
 
 
 def remarks(params: TyreParameters) -> list[tuple[str, str]]:
-    """Return the unusual properties of a tyre, each with its reason or consequence; empty for an ordinary tyre."""
+    """Return the unusual properties of a tyre, each with its reason or consequence, or empty for an ordinary tyre."""
     parts = (_missing, _scales, _frame, _ranges, _levels, _curvatures, _asymmetry)
     return [remark for part in parts for remark in part(params)]
 

@@ -87,7 +87,7 @@ def _over_load(params: TyreParameters, loads: np.ndarray) -> dict[str, list[floa
 
 
 def size(params: TyreParameters) -> str | None:
-    """Return the size in words, such as 205/55 R16; None if the file has no dimensions of its own."""
+    """Return the size in words, such as 205/55 R16, or None if the file has no dimensions of its own."""
     if not {"WIDTH", "RIM_RADIUS", "ASPECT_RATIO"} <= params.given.keys():
         return None
     rim = 2.0 * params["RIM_RADIUS"] / _INCH_M

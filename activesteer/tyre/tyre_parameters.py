@@ -43,7 +43,7 @@ _WORKED_OUT: Final = (
     "Q_RA_GIVEN",  # 1 where the file gives the contact length
     "Q_RB_GIVEN",  # 1 where the file gives the contact width
 )
-"""Fields that no file holds; `TyreParameters.record` sets them."""
+"""Fields that no file holds. `TyreParameters.record` sets them."""
 
 _FIELDS: Final = (*(coefficient.name for coefficient in COEFFICIENTS), *_WORKED_OUT, *TyreConventions().numbers())
 
@@ -57,7 +57,7 @@ def is_finite(tyre: np.record) -> bool:
 
 
 def culprit(tyre: np.record, names: Iterable[str]) -> str | None:
-    """Return the enormous coefficient whose default makes the tyre finite; the largest one if there are several."""
+    """Return the enormous coefficient whose default makes the tyre finite, or the largest of several."""
     enormous = (name for name in names if abs(tyre[name]) > _ENORMOUS)
     for name in sorted(enormous, key=lambda name: -abs(tyre[name])):
         tried = np.atleast_1d(tyre).copy()
@@ -138,7 +138,7 @@ _RANGES = (("PRESMIN", "PRESMAX"), ("FZMIN", "FZMAX"), ("KPUMIN", "KPUMAX"), ("A
 
 @dataclass(frozen=True)
 class TyreParameters(Mapping[str, float]):
-    """Coefficients of one tyre, in SI and radians; a read-only mapping from key to value, defaults included.
+    """Coefficients of one tyre, in SI and radians. A read-only mapping from key to value, defaults included.
 
     Attributes:
         given: Values in the file, by key in upper case, in SI.

@@ -18,7 +18,7 @@ from activesteer.vehicle.toe_links import SCREW, screw_records
 
 
 class ActuatorRecords:
-    """Views of the records of a compiled car; a change acts from the next step on."""
+    """Views of the records of a compiled car. A change acts from the next step on."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         """Find the block."""
@@ -67,7 +67,7 @@ class ActuatorRecords:
 
 
 class SteeringRates(NamedTuple):
-    """Rates at the road wheels [rad/s]; infinite without such an actuator.
+    """Rates at the road wheels [rad/s], or infinite without such an actuator.
 
     Attributes:
         rear: Rear steering.

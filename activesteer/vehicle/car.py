@@ -204,7 +204,7 @@ class Vehicle(Uncopyable):
         drop_metric(self.model, data)
 
     def step(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> tuple[Measurement, Motion]:
-        """Apply the commands and advance the engine by one step, which is recorded on the tape; see `record_on`.
+        """Apply the commands and advance the engine by one step, which is recorded on the tape (see `record_on`).
 
         Args:
             driver_command: Command of the driver.
@@ -244,7 +244,7 @@ class Vehicle(Uncopyable):
         return new_message(Measurement, measurement), new_message(Motion, motion)
 
     def record_on(self, tape: Tape | None) -> None:
-        """Record the following steps on a tape; None stops recording.
+        """Record the following steps on a tape. None stops recording.
 
         Raises:
             ParameterError: `tape` is something else.
@@ -255,7 +255,7 @@ class Vehicle(Uncopyable):
 
     @property
     def address(self) -> int:
-        """Address of the record by which compiled code steps this car; the car must outlive it."""
+        """Address of the record by which compiled code steps this car. The car must outlive it."""
         return self._address
 
     @property
@@ -285,12 +285,12 @@ class Vehicle(Uncopyable):
         native_step.replay(self._address, inputs)
 
     def follow_model(self) -> None:
-        """Take over changes of `model` that a plan of the step froze; see `ImplicitPlan.follow`."""
+        """Take over changes of `model` that a plan of the step froze (see `ImplicitPlan.follow`)."""
         self._implicit.follow()
 
     @property
     def rack_per_steering_wheel_m(self) -> float | None:
-        """Rack travel per steering wheel angle [m/rad], from the fixed tendon `steering_column`; None without one."""
+        """Rack travel per steering wheel angle [m/rad], from the tendon `steering_column`, or None without one."""
         arms = tendon_arms(self.model, "steering_column")
         if "rack" not in arms or "steering_wheel" not in arms:
             return None
@@ -372,7 +372,7 @@ class Vehicle(Uncopyable):
         self.channels.add_estimate()
 
     def note_estimate(self, estimate: Estimate) -> None:
-        """Record an estimate from the next step on, if estimates are recorded; see `record_estimate`."""
+        """Record an estimate from the next step on, if estimates are recorded (see `record_estimate`)."""
         if self._estimate_memory is not None:
             write_estimate(self._estimate_memory, 0, *estimate)
 
@@ -441,7 +441,7 @@ class Vehicle(Uncopyable):
                     raise ParameterError(f"belongs to another car: {name} has another size", key="model")
 
     def change_road(self, road: Road) -> None:
-        """Drive on with other frictions; the road has as many areas as before."""
+        """Drive on with other frictions. The road has as many areas as before."""
         fb.section_of(self.model, "wheels")["mu"] = road.mu
         areas = fb.section_of(self.model, "areas")
         assert len(areas) == len(road.areas())
@@ -449,7 +449,7 @@ class Vehicle(Uncopyable):
             record[...] = np.array(area, fb.AREA)
 
     def limit_hands(self, torque_Nm: float | None) -> None:
-        """Limit the torque of the hands on the steering wheel [N m]; None for no limit."""
+        """Limit the torque of the hands on the steering wheel [N m], or None for no limit."""
         hands, felt = self._hands, 1.0 - self.parameters.steering.assist_fraction
         self.model.actuator_forcelimited[hands] = torque_Nm is not None
         maximum = 0.0 if torque_Nm is None else torque_Nm / felt
@@ -468,7 +468,7 @@ class Vehicle(Uncopyable):
                 self.sensors.reset(self.truth()[0])
 
     def act_in_every_step(self, faults: NDArray[Any] | None) -> None:
-        """Let these records of `faults.FAULT` act in every step; None for no faults."""
+        """Let these records of `faults.FAULT` act in every step, or None for no faults."""
         acting = None if faults is None or not faults.size else faults
         self._faults, self._bindings["n_faults"] = acting, 0 if acting is None else acting.size
         self._bindings["faults"] = 0 if acting is None else acting.ctypes.data

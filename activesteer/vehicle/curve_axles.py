@@ -73,12 +73,12 @@ class AxleCurves:
     """Directions a of additional hardening springs, none or two, five numbers each. A wheel displacement e lengthens
     such a spring by t = a . e, and the spring pushes back with a (s t2 + t3), as a soft bushing along a does."""
     hardening_square: tuple[float, ...] = (0.0, 0.0)
-    """Coefficient s of both; it makes them softer to one side than to the other."""
+    """Coefficient s of both. It makes them softer to one side than to the other."""
     damping_ratio: Annotated[float, Range(0.0, 0.5)] = 0.2
-    """Damping ratio of each mode of the wheel on the elastic part; rubber and joints of the compact have 0.1 to 0.35.
+    """Damping ratio of each mode of the wheel on the elastic part. Rubber and joints of the compact have 0.1 to 0.35.
     """
     rack_m: tuple[float, ...] = ()
-    """Travel of the rack, positive steers left, increasing; empty if the rack does not steer the axle [m]."""
+    """Travel of the rack, positive steers left, increasing, or empty if the rack does not steer the axle [m]."""
     rack_steer_rad: tuple[float, ...] = ()
     """Steer angle of the left wheel from straight ahead, positive to the left [rad]."""
     rack_camber_rad: tuple[float, ...] = ()
@@ -183,7 +183,7 @@ HOLDING_TENDON: Final = "_guide"
 """Suffix of the tendons that hold such a wheel: CORNER_NUMBER_guide."""
 _HELD: Final = 0.05
 """Square of natural frequency times step above which a tendon of the engine holds a mode: 36 Hz at 1 ms. Each tendon
-costs time; below it the explicit native forces are stable and as accurate."""
+costs time. Below it the explicit native forces are stable and as accurate."""
 _INTERVALS: Final = 32
 
 
@@ -227,7 +227,7 @@ def curve_axle_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDAr
 
 
 def _joints_of_model(model: mujoco.MjModel, corner: str) -> tuple[int, int]:
-    """Return the addresses of a corner's first coordinate and velocity; the others follow."""
+    """Return the addresses of a corner's first coordinate and velocity. The others follow."""
     joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_{name}") for name in JOINTS]
     qpos, dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     if (np.diff(qpos) != 1).any() or (np.diff(dofs) != 1).any():
@@ -411,7 +411,7 @@ def _row(matrix, start, e0, e1, e2, e3, e4):
 
 @inlined
 def _hardened(record, spring, e0, e1, e2, e3, e4):
-    """Return the force of a hardening spring over its direction a; see `AxleCurves.hardening`."""
+    """Return the force of a hardening spring over its direction a (see `AxleCurves.hardening`)."""
     t = _row(record.hardening, 5 * spring, e0, e1, e2, e3, e4)
     return t * t * (record.square[spring] + t)
 

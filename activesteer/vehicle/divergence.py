@@ -18,7 +18,7 @@ from activesteer.vehicle.step_bindings import CARRIED_OUT, COMMANDS, engine_arra
 
 @contextlib.contextmanager
 def engine_warnings_held() -> Iterator[None]:
-    """Leave the engine's warnings to `Vehicle.check`; by default it writes them to a file in the user's folder.
+    """Leave the engine's warnings to `Vehicle.check`. By default it writes them to a file in the user's folder.
 
     A handler that another part of the program has installed stays in force.
     """

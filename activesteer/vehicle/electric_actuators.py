@@ -27,14 +27,14 @@ STOP_BEYOND: Final = 1.03
 
 @dataclass(frozen=True)
 class ElectricActuator:
-    """A motor behind a gear; defaults come from the preset."""
+    """A motor behind a gear. Defaults come from the preset."""
 
     gear: Annotated[float, Range(0.1, 200.0)] | None = None
     """Turns of the motor per turn of the driven part."""
     friction_torque_Nm: Annotated[float, Range(0.0, 10.0)] | None = None
     """Dry friction at the motor without load: bearings, seals, brush [N m]."""
     load_friction: Annotated[float, Range(0.0, 20.0)] | None = None
-    """Friction over the load's torque at the motor. For a thread: tan(friction angle) / tan(lead angle); at 1 and more
+    """Friction over the load's torque at the motor. For a thread: tan(friction angle) / tan(lead angle). At 1 and more
     it is self-locking."""
     rotor_inertia_kgm2: Annotated[float, Range(1e-7, 1e-2)] | None = None
     """Inertia of everything that turns with the motor [kg m2]."""
@@ -116,7 +116,7 @@ class RearActuator(ElectricActuator):
     arrangement: Literal["per_side", "central"] | None = None
     """One actuator at each side, or one in the middle that moves both toe links."""
     limit_rad: Annotated[float, Range(math.radians(0.5), math.radians(15.0))] | None = None
-    """Largest wheel angle to either side as a demand; the end stops lie 3 % beyond [rad]."""
+    """Largest wheel angle to either side as a demand. The end stops lie 3 % beyond [rad]."""
     lead_m: Annotated[float, Range(1e-4, 0.05)] | None = None
     """Travel per turn of the screw [m]."""
     screw_stiffness_Npm: Annotated[float, Range(1e5, 1e10)] | None = None

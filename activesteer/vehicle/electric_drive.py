@@ -28,12 +28,12 @@ class Motor:
     """A motor with inverter and gear, on one wheel or, through a differential, on both wheels of an axle."""
 
     speed_radps: tuple[float, ...]
-    """Speeds of the torque-speed map at the motor's shaft, from 0, increasing [rad/s]; above the last one there is no
+    """Speeds of the torque-speed map at the motor's shaft, from 0, increasing [rad/s]. Above the last one there is no
     torque."""
     torque_Nm: tuple[float, ...]
     """Largest torques at these speeds, at the shaft [N m]; linear in between."""
     max_power_W: _Positive | None = None
-    """Largest power at the shaft [W]; default no limit beyond the map."""
+    """Largest power at the shaft [W]. Default no limit beyond the map."""
     gear_ratio: Annotated[float, Range(0.01, 100.0)] = 1.0
     """Turns of the motor per turn of the wheel [-]; 1 is a motor in the hub."""
     efficiency: Annotated[float, Range(0.1, 1.0)] = 0.9
@@ -46,7 +46,7 @@ class Motor:
     lag_s: Annotated[float, Range(0.001, 2.0)] = 0.02
     """Time constant of the torque relative to its demand [s]."""
     rate_Nmps: _Positive | None = None
-    """Largest rate of the torque at the shaft [N m/s]; default no limit."""
+    """Largest rate of the torque at the shaft [N m/s]. Default no limit."""
     rotor_inertia_kgm2: _NotNegative = 0.0
     """Inertia of everything that turns with the motor [kg m2]; the two wheels of an axle carry half of it each."""
     differential: Literal["open", "splitting"] = "open"
@@ -100,7 +100,7 @@ class Motor:
 
 @dataclass(frozen=True)
 class Motors:
-    """Electric motors by their places; an axle has one motor, or one on each wheel. Default none."""
+    """Electric motors by their places. An axle has one motor, or one on each wheel. Default none."""
 
     front: Motor | None = None
     """Motor of the front axle, with a differential."""
@@ -172,9 +172,9 @@ class Battery:
     """The battery of the motors: limits of its power at the terminals."""
 
     discharge_power_W: _Positive | None = None
-    """Largest power that it gives [W]; default no limit."""
+    """Largest power that it gives [W]. Default no limit."""
     charge_power_W: _NotNegative | None = None
-    """Largest power that it takes from regeneration [W]; default no limit."""
+    """Largest power that it takes from regeneration [W]. Default no limit."""
     auxiliary_power_W: _NotNegative = 0.0
     """Power of all consumers beside the motors [W]."""
 
@@ -184,8 +184,8 @@ MOTOR: Final = numbers_type(
     "split_Nm", "scale", "offset", "stuck", ("speed_radps", MAX_MAP_POINTS), ("torque_Nm", MAX_MAP_POINTS),
 )  # fmt: skip
 """A motor. Torques are those at its wheels together, except for its map (shaft). `left` and `right` are its wheels, the
-same one for the motor of a wheel; `follow` is the fraction of the difference between torque and demand that closes in
-one step, `step_Nm` the largest change in one step; a fault sets `scale`, `offset` and `stuck`."""
+same one for the motor of a wheel. `follow` is the fraction of the difference between torque and demand that closes in
+one step, `step_Nm` the largest change in one step. A fault sets `scale`, `offset` and `stuck`."""
 HEALTHY: Final = {"scale": 1.0, "offset": 0.0, "stuck": 0.0}
 """Fields of a motor without a fault."""
 

@@ -76,7 +76,7 @@ def _words(address: int, size_bytes: int) -> NDArray[np.uint64]:
 
 
 def _find(address: int, wanted: int, limit_bytes: int, what: str) -> int:
-    """Return the byte offset of the only word that equals `wanted`; the forward scan stops at the first match."""
+    """Return the byte offset of the only word that equals `wanted`. The forward scan stops at the first match."""
     words = _words(address, limit_bytes)
     block = 256
     for start in range(0, len(words), block):
@@ -104,7 +104,7 @@ def _measure(model: mujoco.MjModel, data: mujoco.MjData, numbers: int) -> Engine
 
 @functools.cache
 def engine_layout() -> EngineLayout:
-    """Return the offsets, measured once per process; see `measure_engine_layout`."""
+    """Return the offsets, measured once per process (see `measure_engine_layout`)."""
     return measure_engine_layout()
 
 
@@ -150,7 +150,7 @@ def sensor_columns(model: mujoco.MjModel, name: str) -> slice:
 
 
 def tendon_arms(model: mujoco.MjModel, name: str) -> dict[str, float]:
-    """Return, for each joint of a fixed tendon, the change of length per coordinate; empty if there is no such tendon.
+    """Return the change of length per coordinate for each joint of a fixed tendon, or empty without the tendon.
 
     The units are those of the joints: m/rad for a hinge, 1 for a slide.
     """

@@ -127,7 +127,7 @@ class _Acting:
 
     @property
     def state(self) -> int:
-        """What compiled code does with the fault now; see `set_fault`."""
+        """What compiled code does with the fault now (see `set_fault`)."""
         return int(self._own["state"])
 
     def bind(self, record: Any) -> None:
@@ -147,7 +147,7 @@ class _Acting:
         """Restore the part as built."""
 
     def recover(self) -> None:
-        """Do what the part needs when the fault ends; a motor returns to its demand with its lag and rate."""
+        """Do what the part needs when the fault ends. A motor returns to its demand with its lag and rate."""
 
 
 class _DemandFault(_Acting):
@@ -220,7 +220,7 @@ class _ActuatorFault(_DemandFault):
         self._set(native.WORKS)
 
     def recover(self) -> None:
-        """Start a servo that was free at its present angle; it returns to its demand with its own lag and rate."""
+        """Start a servo that was free at its present angle. It returns to its demand with its own lag and rate."""
         if self._kind == native.FLOATS and not self._part["seized"][0]:
             self._data.act[self._part["act"][0]] = self._data.qpos[self._part["qpos"][0]]
 

@@ -25,7 +25,7 @@ from activesteer.vehicle.native_contact import CAM
 
 BLOCK_NAME: Final = "activesteer"
 MARKER: Final = 20121121.0
-"""Last number of the block; the date of the conference of the paper that this project starts from."""
+"""Last number of the block. The date of the conference of the paper that this project starts from."""
 TRAILER_SIZE: Final = 2
 MAX_CHAIN: Final = 32
 """Largest number of degrees of freedom between the world and a wheel."""
@@ -37,7 +37,7 @@ WHEEL: Final = numbers_type(
     "body", "root", "act_x", "act_y", "act_z", "mu", "pressure_Pa", "low_speed_mps", "low_speed_damping_Nspm",
     "spin_dof", "drive_fraction", "chain_length", ("chain", MAX_CHAIN),
 )  # fmt: skip
-"""A wheel, with the degrees of freedom between the world and it; its tyre has the same place in its section."""
+"""A wheel, with the degrees of freedom between the world and it. Its tyre has the same place in its section."""
 
 DAMPER: Final = numbers_type(
     "tendon", "row", "length", "points", ("chain", MAX_CHAIN), ("velocity_mps", MAX_CURVE_POINTS),
@@ -50,30 +50,30 @@ ACTUATOR: Final = numbers_type(
     "kind", "act", "low", "high", "scale", "offset", "lag_s", "rate_limit", "userdata", "stiffness", "drive_fraction",
     "dof", "tendon", "vibration", "wound_limit", "record", "motor",
 )  # fmt: skip
-"""An actuator, in the model's order: its `KIND`, and the fields of that kind. `low` and `high` bound its command;
-`scale` and `offset` change the command, see `IN_ORDER`; the callback writes the rate of a tyre's state to `userdata`; a
-brake or friction acts on `dof` or `tendon`, the other one is negative; `record` is the place among `links` or
-`screws`; `motor` is 1 for the drive of a wheel that has a motor."""
+"""An actuator, in the model's order: its `KIND`, and the fields of that kind. `low` and `high` bound its command.
+`scale` and `offset` change the command, see `IN_ORDER`. The callback writes the rate of a tyre's state to `userdata`. A
+brake or friction acts on `dof` or `tendon`, the other one is negative. `record` is the place among `links` or
+`screws`. `motor` is 1 for the drive of a wheel that has a motor."""
 KIND_NONE, KIND_SLIP, KIND_SERVO, KIND_BRAKE, KIND_FRICTION, KIND_DRIVE = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
-"""Kinds of actuators; `KIND_NONE` has no dynamics of ours."""
+"""Kinds of actuators. `KIND_NONE` has no dynamics of ours."""
 KIND_LINK, KIND_SCREW, KIND_MOTOR = 6.0, 7.0, 8.0
 IN_ORDER: Final = {"scale": 1.0, "offset": -0.0}
-"""Values for an actuator without a fault; adding -0.0 changes nothing, not even the sign of a zero."""
+"""Values for an actuator without a fault. Adding -0.0 changes nothing, not even the sign of a zero."""
 
 AREA: Final = numbers_type("start_m", "end_m", "right_m", "left_m", "mu", "slope_1pm")
 """An area of the road with its own friction (`activesteer.road.road.Area`): a rectangle in world axes, or along the
-path where there is one; where areas overlap, the later one counts. Areas count while the header's `areas_felt` is 1,
+path where there is one. Where areas overlap, the later one counts. Areas count while the header's `areas_felt` is 1,
 which `Vehicle.rebase` sets, since the road has no origin before."""
 
 PATH_GRID: Final = numbers_type("x0_m", "y0_m", "cell_m", "columns", "rows", "spacing_m")
-"""Head of the grid of the path that the friction follows (`PathGrid`); points and cells have sections of their own."""
+"""Head of the grid of the path that the friction follows (`PathGrid`). Points and cells have sections of their own."""
 
 LINK: Final = numbers_type(
     "tendon", "rest_m", "stiffness_Npm", "backlash_m", "act", "screw_act", "sign", "userdata",
     ("angle", POWERS),
 )  # fmt: skip
 """A toe link with a screw in it (`toe_links`), with the coefficients of angle over travel. `act` is its change of
-length, `screw_act` the position of its screw; the callback writes its angle to `userdata` for its sensor."""
+length, `screw_act` the position of its screw. The callback writes its angle to `userdata` for its sensor."""
 
 SCREW: Final = numbers_type(
     "act", "motor_act", "command", "lead_mprad", "inertia_kgm2", "position_gain_1ps", "speed_gain_1ps",
@@ -84,7 +84,7 @@ SCREW: Final = numbers_type(
 """A screw and its motor, with the places of its links and the coefficients of travel over angle. The superposition's
 motor
 has such a record too: its travel is an angle [rad], and its link is the steering column. The callback writes torque and
-limit flag to `userdata` for its sensor; `command` is the actuator whose command it follows."""
+limit flag to `userdata` for its sensor. `command` is the actuator whose command it follows."""
 
 CURVE_AXLE_WHEEL: Final = numbers_type(
     "qpos", "dof", "side", "rack", "rack_dof", "travel_table", "rack_table", ("stiffness", 25), ("damping", 25),
@@ -96,7 +96,7 @@ stiffness and damping, row by row, and the part of them in the engine's tendons;
 curves in the design position."""
 
 CURVE_TABLE: Final = numbers_type("start_m", "per_m", "intervals", "count")
-"""Head of a table of curves; the curves follow as cubics on even intervals."""
+"""Head of a table of curves. The curves follow as cubics on even intervals."""
 
 _SECTIONS: Final[Mapping[str, Any]] = {
     "wheels": WHEEL, "tyres": TYRE_RECORD, "dampers": DAMPER, "actuators": ACTUATOR, "areas": AREA,
@@ -146,7 +146,7 @@ def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> 
 
 
 def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
-    """Return one record, shape (1,), 0 where nothing is given; a row may be shorter than its field."""
+    """Return one record, shape (1,), 0 where nothing is given. A row may be shorter than its field."""
     record = np.zeros(1, record_type)
     for name, value in values.items():
         if record[name].ndim > 1:
@@ -175,7 +175,7 @@ def with_trailer(block: NDArray[np.float64], start: int) -> NDArray[np.float64]:
 
 
 def header_of(model: mujoco.MjModel) -> NDArray[Any]:
-    """Return the header of one of our models, shape (1,): a view; a change acts from the next step on."""
+    """Return the header of one of our models, shape (1,): a view. A change acts from the next step on."""
     return _view(model, 0, HEADER, 1)
 
 

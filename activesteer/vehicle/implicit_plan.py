@@ -153,7 +153,7 @@ _HANDED_OVER: Final[dict[str, Callable[[mujoco.MjModel], Any]]] = {
 
 
 def handed_over(model: mujoco.MjModel) -> list[str]:
-    """Return the features of a model for which the engine's own step is needed; empty if the direct solution steps."""
+    """Return the features of a model that need the engine's own step, or empty if the direct solution steps."""
     found = [name for name, has in _HANDED_OVER.items() if has(model)]
     return found if mujoco.get_mjcb_control() is None else [*found, "mjcb_control"]
 
@@ -205,7 +205,7 @@ _WORDS: Final = (
 )  # fmt: skip
 IMPLICIT_PLAN: Final = numbers_type("timestep_s", words=_WORDS)
 """direct: 1 if the direct solution covers everything in the model, 0 if the engine's own step is needed.
-sensed_body, first_dof, n_dofs: The only body whose acceleration is sensed, and its degrees of freedom; 0 if the engine
+sensed_body, first_dof, n_dofs: The only body whose acceleration is sensed, and its degrees of freedom. 0 if the engine
 must find the accelerations of all bodies, and the forces between them.
 inertia_warning: Address of the engine's warning for an indefinite matrix: last information, count (int32)."""
 

@@ -123,7 +123,7 @@ class LocalState:
         data.act[self._activations] += difference[count + model.nv :]
 
     def _turn_home(self) -> None:
-        """Put the car at the origin of the road with heading 0 and unturned wheels; its motion stays."""
+        """Put the car at the origin of the road with heading 0 and unturned wheels. Its motion stays."""
         data = self.vehicle.data
         # The heading of the chassis' x axis (ISO 8855) does not change with a rotation about that axis.
         turn_chassis_back(data, 0.5 * float(yaw_of(data.qpos[3:7])))
@@ -159,7 +159,7 @@ _PARTS: Final = (
     ("superposition gear", r"(d_)?superposition"),
     ("steering wheel", r"(d_)?steering_wheel"),
 )
-"""Parts of a car and their states (see `LocalState`); each other state is its own part."""
+"""Parts of a car and their states (see `LocalState`). Each other state is its own part."""
 
 _BODY_PARTS: Final = ("bounce", "roll", "pitch")
 """Motions of the body that have one mode each."""
@@ -193,7 +193,7 @@ class Mode:
 
     @property
     def damping_ratio(self) -> float:
-        """Damping ratio [-]; 1 for a mode that decays without oscillation."""
+        """Damping ratio [-], or 1 for a mode that decays without oscillation."""
         return -self.eigenvalue_1ps.real / abs(self.eigenvalue_1ps)
 
     def to_json(self) -> dict[str, Any]:

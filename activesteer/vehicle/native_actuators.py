@@ -49,7 +49,7 @@ from activesteer.vehicle.electric_drive import BATTERY, BATTERY_STATE, MOTOR, MO
 from activesteer.vehicle.parameters import CLUTCH_OPEN, drive_limits
 
 _CONTACT_S: Final = 3e-4
-"""Time in which a screwed link settles in its play; at 0, the linearised car would lack this mode [s]."""
+"""Time in which a screwed link settles in its play. At 0, the linearised car would lack this mode [s]."""
 _links_at: Final = records_at(fb.LINK)
 _screws_at: Final = records_at(fb.SCREW)
 
@@ -286,7 +286,7 @@ def _mechanical_power(motor, state, qvel, spins):
 
 @inlined
 def _use_battery(motors, states, battery, given, qvel, spins):
-    """Scale torques down where the battery is at a limit; write the powers of motors and battery."""
+    """Scale torques down where the battery is at a limit. Write the powers of motors and battery."""
     total_W, driving_W, absorbing_W = battery.auxiliary_W, 0.0, 0.0
     for index in range(len(motors)):
         motor, state = motors[index], states[index]

@@ -51,7 +51,7 @@ CAM_POINTS: Final = 65
 _CAM_STEP_M: Final = 0.006
 """Distance of the tabulated points of a cam [m]: 64 of them reach 0.38 m, beyond any step that a tyre survives."""
 _FINE_M: Final = 0.0004
-"""Distance of the last places at which a cam looks for an obstacle; a step of 25 mm then changes its height by at most
+"""Distance of the last places at which a cam looks for an obstacle. A step of 25 mm then changes its height by at most
 0.1 mm [m]."""
 _GRID_M: Final = 0.002
 """The same for a grid, whose slopes are a tenth of a step's [m]."""
@@ -178,7 +178,7 @@ def contact_plane(
 
 @compiled
 def plane_axes(forward, sideways, heading_x, heading_y):
-    """Return normal and two axes of a plane, nine components in world axes; the first axis lies above world x."""
+    """Return normal and two axes of a plane, nine components in world axes. The first axis lies above world x."""
     slope_x = forward * heading_x - sideways * heading_y
     slope_y = forward * heading_y + sideways * heading_x
     nz = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)

@@ -15,12 +15,12 @@ from activesteer.shared_laws import shared
 from activesteer.vehicle import force_block as fb
 
 IDLE, LISTENS, ACTS = range(3)
-"""States of a fault: nothing to do; it keeps what it will need; it acts."""
+"""States of a fault: nothing to do. It keeps what it will need. It acts."""
 DEMAND, STUCK, DELAYED, OFFSET, RUNAWAY, REVERSED, DROPOUT = range(7)
 """Kinds: a demand that comes late, and the faults of a sensor."""
 FAULT: Final = numbers_type("amount", words=("state", "kind", "place", "offset", "memory", "capacity"))
-"""A fault. `place` is the address of the demand, or the place of the reading among the outputs of the sensors; `offset`
-the address that a late demand is written to; `memory` the address of the count of kept numbers, the place of the next
+"""A fault. `place` is the address of the demand, or the place of the reading among the outputs of the sensors. `offset`
+the address that a late demand is written to. `memory` the address of the count of kept numbers, the place of the next
 one, and the numbers, of which there is room for `capacity`."""
 _pointer: Final = pointer_to(from_dtype(FAULT))
 
@@ -89,13 +89,13 @@ def misread(address, count, outputs):
 
 
 WORKS, STICKS, RUNS_LEFT, RUNS_RIGHT, FLOATS, REVERSES, DROPS_OUT = range(7)
-"""Kinds of an actuator's fault, as an exported car takes them; one that works can have an offset."""
+"""Kinds of an actuator's fault, as an exported car takes them. One that works can have an offset."""
 PART: Final = numbers_type(
     "ratio", "free_m", words=("variable", "actuator", "record", "has_torque", "act", "qpos", "seized", "backlash")
 )
 """An actuator that can fail: place of its input in an exported car, places in the engine of the actuator, of its
-activation and of its joint, and places in the force block of its record, of the flag of a seized screw and of its play;
-0 without a screw. `ratio`: its angle over that of the road wheel; `free_m`: play of a nut off its thread."""
+activation and of its joint, and places in the force block of its record, of the flag of a seized screw and of its play,
+or 0 without a screw. `ratio`: its angle over that of the road wheel; `free_m`: play of a nut off its thread."""
 N_HEALTH: Final = 5 + mujoco.mjNGAIN + mujoco.mjNBIAS
 """Numbers of an actuator that faults change."""
 _SCALE, _OFFSET, _RATE, _LOW, _HIGH = (

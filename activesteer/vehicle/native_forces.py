@@ -364,7 +364,7 @@ def _no_clock():
 
 _installed: list[Any] = []
 _installing: Final = threading.Lock()
-"""The callbacks as the engine sees them; kept for the life of the process, since the engine holds bare pointers."""
+"""The callbacks as the engine sees them. Kept for the life of the process, since the engine holds bare pointers."""
 
 
 def install_native_forces() -> None:
@@ -397,7 +397,7 @@ def _install() -> None:
 
 
 def remove_native_forces() -> None:
-    """Remove our callbacks from this process, for example to measure the bare engine; those of others stay."""
+    """Remove our callbacks from this process, for example to measure the bare engine. Those of others stay."""
     if any(mujoco.get_mjcb_passive() is ours for ours in _installed):
         mujoco.set_mjcb_passive(None)
     if any(mujoco.get_mjcb_act_dyn() is ours for ours in _installed):

@@ -1,4 +1,4 @@
-"""A step of the engine with the accelerations found directly; see `implicit_plan`.
+"""A step of the engine with the accelerations found directly (see `implicit_plan`).
 
 Everything but the solution is the engine's: its own functions for positions, mass matrix, tendons, forces, sensors and
 integration are called one by one. The engine's own step does it all while a joint touches its limit, while a force acts
@@ -187,7 +187,7 @@ def _solve(plan):
 
 @inlined
 def _accelerate(plan):
-    """Find the accelerations that the sensors feel, gravity included; the engine does not compute them again."""
+    """Find the accelerations that the sensors feel, gravity included. The engine does not compute them again."""
     if plan.sensed_body == 0:
         _engine(plan.mj_rnePostConstraint, plan)
         return

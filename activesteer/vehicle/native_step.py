@@ -41,7 +41,7 @@ from activesteer.vehicle.step_bindings import (
 )
 
 FASTEST_MPS: Final = 200.0
-"""No car of this package drives faster; a run with a higher speed, or a speed that is NaN, has diverged [m/s]."""
+"""No car of this package drives faster. A run with a higher speed, or a speed that is NaN, has diverged [m/s]."""
 
 _N_WHEELS: Final = len(CORNERS)
 _ENGINE_ARRAYS: Final = len(ENGINE_ARRAYS)
@@ -182,7 +182,7 @@ def engage(bindings_address, gear):
 
 @inlined
 def _set_inputs(bindings, commands_address, torques_set):
-    """Write the inputs of all actuators of the engine; see `carry_out`."""
+    """Write the inputs of all actuators of the engine (see `carry_out`)."""
     commands = carray(_command_pointer(commands_address), (1,))[0]
     gear = float(CLUTCH_OPEN) if torques_set else commands.gear
     if gear != f64_pointer(bindings.gear)[0]:
@@ -260,7 +260,7 @@ def carry_out(bindings_address, driver_command, actuator_command, torques_set):
 
 @compiled_call(_SENSED, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND, types.boolean)
 def step(bindings_address, driver_command, actuator_command, torques_set):
-    """Make one step, called from Python; see `carry_out`."""
+    """Make one step, called from Python (see `carry_out`)."""
     return carry_out(bindings_address, driver_command, actuator_command, torques_set)
 
 

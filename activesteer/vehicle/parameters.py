@@ -112,7 +112,7 @@ VIBRATION_AT_MPS: Final = 80.0 / 3.6
 
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction, independent of speed: elastic until it slips; see `native_actuators`."""
+    """Dry friction, independent of speed: elastic until it slips (see `native_actuators`)."""
 
     front_damper_N: NotNegative = 0.0
     """Seal, piston and rod guide of a front damper or strut, along it [N]."""
@@ -123,20 +123,20 @@ class Friction:
     damper_stiffness_Npm: Annotated[float, Range(1.0, 1e6)] = 1e5
     """Force over travel before a damper slips [N/m]: a seal's lip deflects by some tenths of a millimetre."""
     vibration_mps: Annotated[float, Range(0.0, 1.0)] = 0.0
-    """RMS of the damper speed that a road's roughness causes at 80 km/h [m/s]; it grows with the root of the speed."""
+    """RMS of the damper speed that a road's roughness causes at 80 km/h [m/s]. It grows with the root of the speed."""
     rack_stiffness_Npm: Annotated[float, Range(1.0, 1e7)] = 2e6
     """The same for the rack [N/m]."""
 
 
 @dataclass(frozen=True)
 class Powertrain:
-    """Engine, gearbox and differentials: torque at the driven wheels and its distribution; see `drive_limits`.
+    """Engine, gearbox and differentials: torque at the driven wheels and its distribution (see `drive_limits`).
 
     On axles with motors the torques and the power are the limits of the driver's demand, which motors carry out.
     """
 
     front_fraction: Fraction
-    """Fraction of the drive torque at the front axle; each axle's part is split evenly [-]."""
+    """Fraction of the drive torque at the front axle. Each axle's part is split evenly [-]."""
     max_torque_Nm: Positive
     """Highest drive torque at all wheels together, in first gear [N m]."""
     max_power_W: Positive
@@ -172,7 +172,7 @@ class Steering:
 
 @dataclass(frozen=True)
 class Aerodynamics:
-    """Drag; lift is left out."""
+    """Drag. Lift is left out."""
 
     drag_area_m2: NotNegative
     """Drag coefficient times frontal area [m2]."""
@@ -184,7 +184,7 @@ class Aerodynamics:
 
 @dataclass(frozen=True)
 class Load:
-    """Load of the car in addition to its model: masses at points of the chassis; see `loading`."""
+    """Load of the car in addition to its model: masses at points of the chassis (see `loading`)."""
 
     KEY_HINTS: ClassVar = _MASS_HINTS
 
@@ -197,7 +197,7 @@ class Load:
     roof_height_m: Annotated[float, Range(0.5, 4.0)] = 1.6
     """Height of its centre of gravity above the road [m]."""
     fuel_kg: Annotated[float, Range(-100.0, 200.0)] = 0.0
-    """Fuel in addition to that in the model [kg]; negative is less."""
+    """Fuel in addition to that in the model [kg]. Negative is less."""
     fuel_position_m: Position | None = None
     """Position of the tank, vehicle axes [m]; default 0.4 m ahead of the rear axle, 0.35 m high."""
     cg_height_change_m: Annotated[float, Range(-0.3, 0.3)] = 0.0
@@ -215,7 +215,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Factors:
-    """Factors on the car as modelled, default 1; see `loading`."""
+    """Factors on the car as modelled, default 1 (see `loading`)."""
 
     KEY_HINTS: ClassVar = dict.fromkeys(("mass_kg", "payload_kg"), _MASS_HINT)
 
@@ -226,7 +226,7 @@ class Factors:
     """Factor on the yaw inertia of the empty car, as if masses were moved along the chassis, so that its pitch inertia
     changes by the same amount."""
     spring_rate: Annotated[float, Range(0.2, 5.0)] = 1.0
-    """Factor on the rates of the springs; their forces in the design position stay, and so does the ride height."""
+    """Factor on the rates of the springs. Their forces in the design position stay, and so does the ride height."""
     anti_roll_bar: Annotated[float, Range(0.0, 10.0)] = 1.0
     """Factor on the stiffnesses of the anti-roll bars."""
     damper: Annotated[float, Range(0.0, 10.0)] = 1.0
@@ -248,10 +248,10 @@ class Factors:
     tyre_vertical_stiffness: Annotated[float, Range(0.2, 3.0)] = 1.0
     """Factor on the tyres' LCZ."""
     servo_lag: Annotated[float, Range(0.1, 5.0)] = 1.0
-    """Factor on the lag of the model's servos of rear wheels and superposition; a screw and a motor have none."""
+    """Factor on the lag of the model's servos of rear wheels and superposition. A screw and a motor have none."""
 
     def on_tyres(self, front: TyreParameters, rear: TyreParameters) -> tuple[TyreParameters, TyreParameters]:
-        """Return the tyres of both axles with their scale factors multiplied; unchanged if all factors are 1."""
+        """Return the tyres of both axles with their scale factors multiplied. Unchanged if all factors are 1."""
         axles = (
             (self.front_cornering_stiffness, self.front_tyre_friction),
             (self.rear_cornering_stiffness, self.rear_tyre_friction),
@@ -311,7 +311,7 @@ class VehicleParameters:
     motors: Motors = Motors()
     """Electric motors; default none."""
     battery: Battery = Battery()
-    """Battery of the motors; default without limits."""
+    """Battery of the motors. Default without limits."""
     factors: Factors = Factors()
     """Factors; default 1."""
 

@@ -21,7 +21,7 @@ _LARGEST_STEP: Final = 0.02
 _ROUNDING_N: Final = 1e-4
 """Residual force below which a step without improvement ends the search [N, N m]."""
 _TOLERANCE_N: Final = 1e-7
-"""Residual force at which the search ends [N, N m]; weight is 1.4e4."""
+"""Residual force at which the search ends [N, N m]. Weight is 1.4e4."""
 
 
 def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.intp]) -> None:
@@ -128,7 +128,7 @@ YAW_DOF: Final = 5
 
 
 def turn_chassis_back(data: mujoco.MjData, half_rad: float) -> None:
-    """Turn orientation and velocity of the chassis about the world's z axis; its position stays."""
+    """Turn orientation and velocity of the chassis about the world's z axis. Its position stays."""
     turned = np.empty(4)
     mujoco.mju_mulQuat(turned, np.array([math.cos(half_rad), 0.0, 0.0, -math.sin(half_rad)]), data.qpos[3:7])
     data.qpos[3:7] = turned

@@ -198,7 +198,7 @@ COMMAND_ROW: Final = np.dtype([(name, np.float64) for name in COMMANDS])
 COMMAND_CHANNELS: Final = command_channels(_NUMBERS)
 """Channel -> its place in a row."""
 CARRIED_OUT: Final = tuple(name for name, number in _NUMBERS.items() if number.recorded is None or number.recorded.acts)
-"""Names of the numbers that the car acts on; the others are for the recording only."""
+"""Names of the numbers that the car acts on. The others are for the recording only."""
 BRAKES: Final = COMMANDS.index("fl_brake_torque_demand_Nm")
 """Place of the brake torque of the first wheel in a row."""
 TORQUES: Final = COMMANDS.index("fl_wheel_torque_demand_Nm")
@@ -212,7 +212,7 @@ ESTIMATE_CHANNELS: Final = tuple(
 )
 """Channels of the fields of an `Estimate`, in their order."""
 write_estimate: Final = struct.Struct(f"{len(Estimate._fields)}d").pack_into
-"""`write_estimate(row, 0, *estimate)` writes a row into the memory of an array; the arguments must be numbers."""
+"""`write_estimate(row, 0, *estimate)` writes a row into the memory of an array. The arguments must be numbers."""
 _SIZE_DRIVER: Final = 8 * len(numbers_of(DriverCommand))
 """Bytes of a row that hold the driver's command."""
 
@@ -254,7 +254,7 @@ def write_command(kind: type[Any], address: int, command: Any) -> None:
 
 @compiled_call(types.void, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND)
 def write_commands_at(address, driver_command, actuator_command):
-    """Write a row, called from Python; see `write_commands`."""
+    """Write a row, called from Python (see `write_commands`)."""
     write_commands(address, driver_command, actuator_command)
 
 
@@ -292,7 +292,7 @@ class RecordedArrays:
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> RawRows:
-        """Return one row as a step fills it, for the present instant and the present inputs; change nothing."""
+        """Return one row as a step fills it, for the present instant and the present inputs. Change nothing."""
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)

@@ -32,7 +32,7 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.electric_actuators import MOTOR, STOP_BEYOND, RearActuator, known
 
 DEGREE: Final = 5
-"""Degree of the polynomials; they have no constant term."""
+"""Degree of the polynomials. They have no constant term."""
 _POINTS: Final = 15
 _DIFFERENCE: Final = 1e-7
 _ITERATIONS: Final = 30
@@ -144,7 +144,7 @@ class _Corner:
         return missing
 
     def angles(self, travels_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the steer angles at several lengths [rad]; each search starts from the previous solution."""
+        """Return the steer angles at several lengths [rad]. Each search starts from the previous solution."""
         middle = len(travels_m) // 2
         outwards = [self._along(travels_m[middle:]), self._along(travels_m[middle::-1])]
         return np.concatenate([outwards[1][:0:-1], outwards[0]])

@@ -162,7 +162,7 @@ MULTILINK: Final = AxleKind(
 )
 
 CURVES: Final = AxleKind("curves", ("front", "rear"), (), ("wheel_centre",), {"travel": ()}, "travel")
-"""Measurements of a K&C rig guide the wheel instead of links; springs and dampers act along its travel."""
+"""Measurements of a K&C rig guide the wheel instead of links. Springs and dampers act along its travel."""
 
 KINDS: Final = (MCPHERSON, DOUBLE_WISHBONE, DOUBLE_WISHBONE_REAR, FIVE_LINK, MULTILINK, CURVES)
 DEFAULTS: Final = {"front": "mcpherson", "rear": "five_link"}

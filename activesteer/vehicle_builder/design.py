@@ -96,7 +96,7 @@ class Axle:
     spring: Mount
     damper: Mount
     top_mount: TopMount | None
-    """Elasticity of the top mount; None if it is rigid."""
+    """Elasticity of the top mount, or None if it is rigid."""
     anti_roll_bar_Npm: float
     measured: MeasuredAxle | None
     """Measurements that an axle of curves has to match."""

@@ -26,11 +26,11 @@ _USUAL: Final = np.diag([2.2e-6, 1.0e-7, 1.8e-6, 6.0e-5, 8.0e-5])
 """Compliance of a wheel at its centre [m/N, rad/(N m)]: about the compact's, 2.2 mm/kN along and 0.1 mm/kN across the
 car, 0.03 deg of camber, 1 deg of wind-up and 0.5 deg of toe per 100 N m or 0.3 kN at the road."""
 _FLOOR: Final = np.diag([4e-9, 4e-9, 1e-7, 1e-7, 1e-7])
-"""Smallest compliance [m/N, rad/(N m)]; with a smaller value rounding would matter."""
+"""Smallest compliance [m/N, rad/(N m)]. With a smaller value rounding would matter."""
 _WHEEL: Final = np.diag([35.0, 35.0, 0.9, 0.26, 0.4])
 """Inertia of a wheel with hub and knuckle [kg, kg m2]."""
 _FASTEST: Final = (2.0 * np.pi * 320.0) ** 2
-"""Square of the highest natural frequency of a wheel [1/s2]; higher ones show nothing at a step of 1 ms, and cost
+"""Square of the highest natural frequency of a wheel [1/s2]. Higher ones show nothing at a step of 1 ms, and cost
 iterations."""
 _UNITS: Final = np.sqrt(np.outer(np.diag(_USUAL), np.diag(_USUAL)))
 _LOWER: Final = np.tril_indices(5)
@@ -147,7 +147,7 @@ def _start(forces: Array, wanted: Array, weight: Array) -> Array:
 
 
 def _wanted(load: Load) -> Array:
-    """Return the motion without the motion of the compliance in series; nan if not measured; shape (n, 5)."""
+    """Return the motion without the motion of the compliance in series, or nan if not measured; shape (n, 5)."""
     moved = [np.full(len(load.x), np.nan) if (row := load.moved[name]) is None else row for name in COORDINATES]
     return np.stack(moved, axis=1) - np.outer(load.x, load.direction) @ load.beside.T
 
@@ -388,7 +388,7 @@ def _anti_roll_bar(tests: dict[str, Samples], travel: Array, parallel: Array | N
 
 
 def _rack_lift(tests: dict[str, Samples]) -> float:
-    """Return the rack lift from the change of wheel load in steering; 0 if not measured."""
+    """Return the rack lift from the change of wheel load in steering, or 0 if not measured."""
     steered, opposite = tests.get("steering"), tests.get("opposite_travel")
     if steered is None or opposite is None:
         return 0.0

@@ -64,7 +64,7 @@ class Samples:
     file: str
 
     def moved(self, name: str) -> Array | None:
-        """Return a channel less its value at x = 0, which need not be a sample; None if not measured."""
+        """Return a channel less its value at x = 0, which need not be a sample, or None if not measured."""
         if name not in self.channels:
             return None
         return self.channels[name] - smoothed(self.x, self.channels[name], np.zeros(1))

@@ -29,7 +29,7 @@ _SHELL = (
 
 
 def mjcf_files(car: CarDesign, trimmed: Trimmed) -> dict[str, str]:
-    """Return the files of the model as name to text; the keyframe is empty."""
+    """Return the files of the model as name to text. The keyframe is empty."""
     return {
         f"{car.name}.xml": _main(car, trimmed),
         "front_axle.xml": axle_file(car, car.front, trimmed),

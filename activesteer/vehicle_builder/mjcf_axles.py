@@ -177,7 +177,7 @@ def _carrier(car: CarDesign, axle: Axle, trimmed: TrimmedAxle, side: float) -> l
 
 
 def _in_design(axle: Axle, point: Array) -> Array:
-    """Return a point of the knuckle at zero joints; in the standing car curves turn it by the static angles."""
+    """Return a point of the knuckle at zero joints. In the standing car curves turn it by the static angles."""
     if axle.measured is None:
         return point
     curves = axle.measured.curves
@@ -233,7 +233,7 @@ def link_classes(car: CarDesign) -> str:
 
 
 def _class_of(axle: Axle, link: str) -> str:
-    """Return the class of a link; front and rear may have links of the same name."""
+    """Return the class of a link. Front and rear may have links of the same name."""
     return f"{axle.name}_{link}"
 
 

@@ -39,7 +39,7 @@ class LinkTable:
     stiffness_Npm: Positive | None = None
     """Rod and both bushings in series [N/m]."""
     bushings_Npm: tuple[float, ...] | None = None
-    """Radial stiffness of inner and outer bushing [N/m]; the rod between them counts as rigid."""
+    """Radial stiffness of inner and outer bushing [N/m]. The rod between them counts as rigid."""
     bushing: str | None = None
     """Class of the bushings: ball_joint, hard, medium, soft."""
     hardening_Npm3: NotNegative | None = None
@@ -99,7 +99,7 @@ class AxleTable:
     damper_force_N: tuple[float, ...] | None = None
     """Forces at these velocities, against the motion [N]."""
     damper_Nspm: Positive | None = None
-    """Or: mean damping around rest [N s/m]; the curve has the shape of the compact's."""
+    """Or: mean damping around rest [N s/m]. The curve has the shape of the compact's."""
     damping_ratio: Annotated[float, Range(0.01, 2.0)] | None = None
     """Or: damping ratio of the sprung mass of this axle on springs and tyres."""
     damper_friction_N: NotNegative | None = None
@@ -182,7 +182,7 @@ class SteeringTable:
 
 @dataclass(frozen=True)
 class RearSteeringTable:
-    """The hinge between rear knuckle and carrier; every car of the package has one, steered or not."""
+    """The hinge between rear knuckle and carrier. Every car of the package has one, steered or not."""
 
     axis_lower: Point | None = None
     """A point of the steering axis on the left side, in the table's units."""

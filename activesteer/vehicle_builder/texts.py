@@ -76,7 +76,7 @@ def vehicle_text(
 def _table(
     car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None
 ) -> dict[str, Any]:
-    """Return the vehicle file as a table; tables in the form of a vehicle file are copied with all keys."""
+    """Return the vehicle file as a table. Tables in the form of a vehicle file are copied with all keys."""
     compact, _ = read_toml(find_vehicle("compact"))
     lines = two_track_lines(two_track) if two_track is not None else {}
     limit_rad = 0.99 * car.rack_limit_m / trimmed.pinion_radius_m
@@ -113,7 +113,7 @@ def _table(
 
 
 def _curves(car: CarDesign, trimmed: Trimmed) -> dict[str, Any]:
-    """Return the tables [curves.front] and [curves.rear], angles in degrees; none if links guide both axles."""
+    """Return the tables [curves.front] and [curves.rear], angles in degrees, or none if links guide both axles."""
     guided = {axle.name: curves for axle in car.axles if (curves := trimmed.axle(axle.name).curves) is not None}
     tables = {name: in_degrees(to_table(curves, defaults=False)) for name, curves in guided.items()}
     return {"curves": tables} if tables else {}

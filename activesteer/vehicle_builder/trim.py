@@ -49,7 +49,7 @@ class TrimmedAxle:
     wheel_z_rad: float = 0.0
     """Third Euler angle of the wheel: minus toe-in, less the contribution of the loaded links."""
     mount_m: dict[str, float] = field(default_factory=dict)
-    """Spring length of the top mount in each direction; the standing car's load closes it [m]."""
+    """Spring length of the top mount in each direction. The standing car's load closes it [m]."""
     bump_stop_m: float = 0.035
     """Compression of the damper to its bump stop."""
     rebound_stop_m: float = 0.065
@@ -316,7 +316,7 @@ def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
 
 
 def _target_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
-    """Return the wheel rate of the table, given or from the ride frequency; None if it gives the spring rate."""
+    """Return the wheel rate of the table, given or from the ride frequency, or None if it gives the spring rate."""
     if axle.measured is not None and axle.measured.wheel_load_N is not None:
         return None
     if axle.table.wheel_rate_Npm is not None or axle.ride_frequency_Hz is None:

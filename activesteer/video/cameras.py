@@ -37,17 +37,7 @@ class View(NamedTuple):
 
 
 def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
-    """Return the camera of a name.
-
-    Args:
-        name: One of `CAMERAS`.
-        track: The car that the camera follows.
-        corner: The wheel that `wheel` looks at.
-
-    Raises:
-        ParameterError: there is no camera or no corner of this name.
-        PlaybackError: the recording has no such wheel.
-    """
+    """Return the camera of a name."""
     if name == "chase":
         return View(_chase(track), 1.0)
     if name == "top":

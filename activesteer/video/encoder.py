@@ -46,28 +46,14 @@ class Encoder(Protocol):
 
 
 def frame_rate(path: Path, wanted_hz: float) -> float:
-    """Return the nearest frame rate that a format can have: a GIF shows each frame for whole hundredths of a second.
-
-    Args:
-        path: The file.
-        wanted_hz: Requested frame rate [1/s].
-    """
+    """Return the nearest frame rate that a format can have: a GIF shows each frame for whole hundredths of a second."""
     if path.suffix.lower() != ".gif":
         return wanted_hz
     return _GIF_TICKS_HZ / max(2, round(_GIF_TICKS_HZ / wanted_hz))  # browsers show less than two hundredths as ten
 
 
 def check(path: Path, size: tuple[int, int]) -> None:
-    """Check the conditions for writing before anything is drawn.
-
-    Args:
-        path: The file.
-        size: Width and height of the frames [pixels].
-
-    Raises:
-        ParameterError: no format has this suffix or allows this size.
-        PlaybackError: there is no ffmpeg, or the folder does not exist.
-    """
+    """Check the conditions for writing before anything is drawn."""
     if path.suffix.lower() not in FORMATS:
         raise ParameterError(f"a video's name must end in {' or '.join(FORMATS)}", file=str(path), allowed=FORMATS)
     if min(size) < 16 or max(size) > _SIDE_LIMIT:
@@ -85,25 +71,14 @@ def check(path: Path, size: tuple[int, int]) -> None:
 
 
 def encoder(path: Path, size: tuple[int, int], rate_hz: float, samples: Iterable[Pixels]) -> Encoder:
-    """Return the writer for a file name.
-
-    Args:
-        path: The file; an existing one is replaced.
-        size: Width and height [pixels].
-        rate_hz: Frame rate [1/s].
-        samples: Frames from the whole film, from which a GIF takes its palette; called for a GIF only.
-    """
+    """Return the writer for a file name."""
     if path.suffix.lower() == ".gif":
         return _Gif(path, rate_hz, samples)
     return _Mp4(path, size, rate_hz)
 
 
 def ffmpeg() -> str:
-    """Return the ffmpeg program of the package imageio-ffmpeg, or else of the system.
-
-    Raises:
-        PlaybackError: neither is installed.
-    """
+    """Return the ffmpeg program of the package imageio-ffmpeg, or else of the system."""
     with suppress(ImportError, RuntimeError):
         return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     if found := shutil.which("ffmpeg"):

@@ -19,15 +19,11 @@ from activesteer.road.drawn import surface_in
 from activesteer.road.road import road_of
 from activesteer.video.cameras import CUTAWAY, view
 from activesteer.video.encoder import check, encoder, frame_rate
-from activesteer.video.end_card import end_card
 from activesteer.video.gauges import Dials, Gauges, LargeSideslip, used
-from activesteer.video.labels import Labels
-from activesteer.video.markings import Markings
 from activesteer.video.offscreen import Offscreen
 from activesteer.video.render_scene import Car, RenderScene
 from activesteer.video.road import edges_beside
-from activesteer.video.traces import Traces
-from activesteer.video.track import Track
+from activesteer.video.track import Markings, Traces, Track
 
 LAYOUTS: Final = ("overlay", "side-by-side")
 """Layouts of several cars: one view with all but the first car transparent, or a pane for each car."""
@@ -35,8 +31,6 @@ GAUGES: Final = ("full", "sideslip")
 """Kinds of gauges over the frames."""
 _TAIL_OPENS_RAD: Final = tuple(np.radians((0.3, 0.8)))
 """Rear steer angles from which the tail of a body lets the rear wheels be seen, and at which it is open [rad]."""
-END_S: Final = 3.0
-"""Duration of the end card [s]."""
 _SAMPLES: Final = 6
 
 
@@ -62,11 +56,7 @@ class Settings:
     """Whether the shells of the cars are transparent; the camera `wheel` always shows them so."""
 
     def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ParameterError: a setting is out of its range.
-        """
+        """Check the settings."""
         for kind, name, names in (("layout", self.layout, LAYOUTS), ("kind of gauges", self.gauges, GAUGES)):
             if name not in names:
                 raise ParameterError(f"there is no {kind} {name!r}; {nearest_names(name, names)}", value=name)
@@ -81,19 +71,8 @@ class Settings:
 class Film:
     """Scenes and cameras for some recordings; use it in a `with` block."""
 
-    def __init__(self, recordings: Mapping[str, Recording], settings: Settings, verdict: Sequence[str] = ()) -> None:
-        """Build the scenes.
-
-        Args:
-            recordings: Name -> recording. In an overlay, the camera follows the car of the first recording, and the
-                other cars are transparent.
-            settings: Camera, size, speed.
-            verdict: Lines of the end card; the first ones have the colours of the runs, one line per run.
-
-        Raises:
-            ParameterError: there is no recording, or no such camera or wheel.
-            PlaybackError: a recording has no poses, or nothing can be drawn here.
-        """
+    def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
+        """Build the scenes."""
         if not recordings:
             raise ParameterError("there is no recording to make a film of, at least one is needed")
         self.settings = settings
@@ -111,14 +90,9 @@ class Film:
             _Pane(group, actors, settings, (int(width), settings.size[1]), "" if number else title)
             for number, (group, width) in enumerate(zip(groups, np.diff(edges), strict=True))
         ]
-        self._end = end_card(title, verdict, [actor.colour for actor in actors], settings.size)
 
     def __enter__(self) -> Self:
-        """Open the canvases.
-
-        Raises:
-            PlaybackError: nothing can be drawn here.
-        """
+        """Open the canvases."""
         for pane in self._panes:
             pane.open()
         return self
@@ -129,11 +103,7 @@ class Film:
             pane.close()
 
     def times(self, rate_hz: float) -> NDArray[np.float64]:
-        """Return the instants of the frames [s], from the first pose of any car to the last.
-
-        Args:
-            rate_hz: Frame rate [1/s].
-        """
+        """Return the instants of the frames [s], from the first pose of any car to the last."""
         start = min(track.start_s for track in self._tracks)
         end = max(track.end_s for track in self._tracks)
         step = self.settings.speed / rate_hz
@@ -141,21 +111,9 @@ class Film:
         return np.asarray(start + step * np.arange(count), np.float64)
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
-        """Return the frame of an instant, shape (height, width, 3).
-
-        Args:
-            time_s: The instant [s]; a car whose recording has ended keeps its last position.
-        """
+        """Return the frame of an instant, shape (height, width, 3)."""
         drawn = [pane.picture(time_s) for pane in self._panes]
         return drawn[0] if len(drawn) == 1 else np.hstack(drawn)
-
-    def ending(self, time_s: float) -> NDArray[np.uint8]:
-        """Return the frame of an instant with the end card over it.
-
-        Args:
-            time_s: The instant [s].
-        """
-        return self._end(self.picture(time_s))
 
     def pictures(self, times_s: Sequence[float] | NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
         """Yield the frames of several instants."""
@@ -214,7 +172,6 @@ class _Pane:
         edges = None
         if course is None and drawn is None:
             edges = edges_beside([actor.track.path()[1] for actor in every])
-        self._distances = [] if edges is None else edges.labels()
         self._scene = RenderScene(cars, course, road_of(metadata), size, drawn, edges)
         notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
         notes += ["road heights to scale"] if drawn is not None else []
@@ -223,7 +180,6 @@ class _Pane:
             Traces(actor.recording, actor.track, footprint, actor.colour, number, uneven=drawn is not None)
             for number, actor in enumerate(actors)
         ]
-        self._labels = Labels(size)
         self._markings = None
         if self._view.marked and settings.gauges == "full":
             recordings = [actor.recording for actor in every]
@@ -258,11 +214,9 @@ class _Pane:
         scene = self._canvas.prepare(self._scene.data, self._camera)
         for traces in self._traces:
             traces.add(scene, time_s)
-        labels = list(self._distances)
         if self._markings is not None:
-            labels += self._markings.add(scene, time_s)
-        pixels = self._labels.draw(self._canvas.draw(), scene, labels)
-        return self._gauges.draw(pixels, time_s)
+            self._markings.add(scene, time_s)
+        return self._gauges.draw(self._canvas.draw(), time_s)
 
 
 class FilmInfo(NamedTuple):
@@ -277,7 +231,6 @@ def make_film(
     path: Path,
     settings: Settings | None = None,
     progress: Callable[[float], Any] | None = None,
-    verdict: Sequence[str] = (),
 ) -> FilmInfo:
     """Draw a film of recordings and write it to a file.
 
@@ -286,7 +239,6 @@ def make_film(
         path: The file, ending in .mp4 or .gif; an existing one is replaced when the new one is complete.
         settings: Camera, size, speed.
         progress: Called after each frame with the fraction that is done, 0 to 1.
-        verdict: See `Film`; the end card is shown for `END_S`.
 
     Raises:
         ParameterError: a setting or the file's ending is wrong.
@@ -296,7 +248,7 @@ def make_film(
     settings = settings or Settings()
     check(path, settings.size)
     rate = frame_rate(path, settings.rate_hz)
-    with Film(recordings, settings, verdict) as film:
+    with Film(recordings, settings) as film:
         times = film.times(rate)
         samples = film.pictures(times[:: max(1, len(times) // _SAMPLES)])
         with encoder(path, settings.size, rate, samples) as file:
@@ -304,8 +256,4 @@ def make_film(
                 file.write(pixels)
                 if progress is not None:
                     progress(number / len(times))
-            last = film.ending(float(times[-1]))
-            held = round(END_S * rate)
-            for _ in range(held):
-                file.write(last)
-    return FilmInfo(len(times) + held, rate)
+    return FilmInfo(len(times), rate)

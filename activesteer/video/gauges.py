@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.cars import bytes_of
+from activesteer.drawing.panels import FILM, PANELS, panels_in
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, footprint_of
 from activesteer.units import quantity_of
-from activesteer.video.lettering import GREY, LEGIBLE, PANEL, WHITE, Colour, font, text_scale, write
 
+Colour = tuple[int, int, int, int]
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+
+PANEL: Final = (16, 18, 22, 190)
+"""Background colour of texts."""
+WHITE: Final = (245, 246, 248, 255)
+GREY: Final = (176, 181, 189, 255)
+
+LEGIBLE: Final = 0.85
+"""Smallest scale at which texts can be read: letters of 8 pixels."""
 _YELLOW: Final = (255, 205, 70, 255)
 _BODY: Final = (70, 76, 86, 255)
 # The sizes below are pixels of a frame of 640 x 480; see `text_scale`.
@@ -45,11 +56,9 @@ MIN_SPEED_MPS: Final = 1.0
 _SIDE: Final = 3
 """Factor by which plans are drawn larger and then scaled down, because Pillow's lines have hard edges."""
 
-READINGS: Final = tuple(
-    quantity_of(channel) for channel in ("speed_mps", "sideslip_rad", "rear_steer_rad", "superposition_rad")
-)
+READINGS: Final = tuple(quantity_of(line.channel) for panel in panels_in(FILM) for line in panel.lines_in(FILM))
 """Values in a row; a narrow frame shows the first ones only."""
-_ADDED: Final = ("rear_steer_rad", "superposition_rad")
+_ADDED: Final = tuple(line.channel for line in PANELS["added"].lines)
 _WIDEST: Final = {"speed_mps": "188.8", "sideslip_rad": "-18.8"}
 
 
@@ -84,15 +93,7 @@ class Gauges:
         note: str = "",
         shown_with: Sequence[Dials] = (),
     ) -> None:
-        """Choose fonts and values.
-
-        Args:
-            dials: The runs, from top to bottom.
-            title: Title of the frame; if empty, the time is left out too.
-            size: Width and height of the frames [pixels].
-            note: Text behind the title, such as a slower speed.
-            shown_with: All runs of the film, if there are more than in `dials`; all panes then have the same gauges.
-        """
+        """Choose fonts and values."""
         self._dials = list(dials)
         self._title, self._note = title, note
         self._size = size
@@ -125,15 +126,7 @@ class Gauges:
         return self._columns[-1] * self._row * len(self._dials) + self._title_area()
 
     def draw(self, pixels: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
-        """Draw the gauges over a frame.
-
-        Args:
-            pixels: The frame, shape (height, width, 3); it is not changed.
-            time_s: The instant [s].
-
-        Returns:
-            The frame with gauges, of the same shape.
-        """
+        """Draw the gauges over a frame."""
         picture = Image.fromarray(np.ascontiguousarray(pixels))
         if self._title:
             self._headline(picture, f"{time_s:.2f} s")
@@ -244,12 +237,7 @@ class LargeSideslip:
     """Name and sideslip angle of each run, legible in a small picture."""
 
     def __init__(self, dials: Sequence[Dials], size: tuple[int, int]) -> None:
-        """Choose the fonts.
-
-        Args:
-            dials: The runs, from top to bottom.
-            size: Width and height of the frames [pixels].
-        """
+        """Choose the fonts."""
         self._dials, self._size = list(dials), size
         self._name, self._number = font(0.05 * size[1]), font(0.16 * size[1])
 
@@ -300,3 +288,22 @@ def used(recording: Recording, channel: str) -> bool:
         return False
     values = np.abs(recording[channel])
     return bool(np.max(values[np.isfinite(values)], initial=0.0) >= _MIN_ANGLE_RAD)
+
+
+def text_scale(size: tuple[int, int]) -> float:
+    """Return the scale of texts relative to a frame of 640 x 480, at least so large that they can be read."""
+    high = size[1] / 480.0
+    return max(min(high, math.sqrt(size[0] / 640.0 * high)), LEGIBLE)
+
+
+def write(
+    layer: Image.Image, place: tuple[float, float], text: str, colour: Colour, face: Font, anchor: str = "lm"
+) -> None:
+    """Draw a text with its anchor, as Pillow names it, at a place [pixels]."""
+    ImageDraw.Draw(layer).text(place, text, colour, face, anchor)
+
+
+@lru_cache(maxsize=100)
+def font(points: float) -> Font:
+    """Return the font of all texts over frames in a size [pixels]."""
+    return ImageFont.load_default(max(6.0, points))

@@ -37,9 +37,6 @@ def backend() -> str:
 
     Each backend is tried in a process of its own: a broken driver may end the process, and PyOpenGL cannot change its
     backend once it has loaded one.
-
-    Raises:
-        PlaybackError: no backend works; the message names the packages to install.
     """
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     # `glfw` draws to hidden windows of a display; a user who names it has a display.
@@ -97,15 +94,7 @@ class Offscreen:
     """An offscreen canvas."""
 
     def __init__(self, model: mujoco.MjModel, size: tuple[int, int]) -> None:
-        """Open the canvas.
-
-        Args:
-            model: Model to draw; its offscreen buffer must be at least as large as the frames.
-            size: Width and height [pixels].
-
-        Raises:
-            PlaybackError: nothing can be drawn here.
-        """
+        """Open the canvas."""
         self._name = backend()
         self._rect = mujoco.MjrRect(0, 0, *size)
         self._pixels = np.empty((size[1], size[0], 3), np.uint8)
@@ -130,22 +119,13 @@ class Offscreen:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def prepare(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> mujoco.MjvScene:
-        """Prepare the scene of the next frame, to which more geometry can be added.
-
-        Args:
-            data: State of the model.
-            camera: The camera.
-        """
+        """Prepare the scene of the next frame, to which more geometry can be added."""
         every = int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self._model, data, self._look, None, camera, every, self._scene)
         return self._scene
 
     def draw(self) -> NDArray[np.uint8]:
-        """Render the prepared scene.
-
-        Returns:
-            Red, green and blue of each pixel, top row first, shape (height, width, 3); the next frame overwrites it.
-        """
+        """Render the prepared scene, top row first, shape (height, width, 3); the next frame overwrites the pixels."""
         self._context.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._drawer)
         mujoco.mjr_readPixels(self._pixels, None, self._rect, self._drawer)

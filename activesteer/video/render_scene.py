@@ -21,7 +21,6 @@ from activesteer.road.course import Course, Footprint
 from activesteer.road.drawn import DrawnSurface
 from activesteer.road.road import Road
 from activesteer.video.road import Edges, add_areas, add_course, add_edges, add_road
-from activesteer.video.sky import SKY, add_sky
 
 _PAINT: Final = (0.23, 0.46, 0.72)
 """Colour of a car without a colour of its own."""
@@ -52,6 +51,9 @@ _BASE: Final = """
     <!-- Round parts are small; with the usual 28 x 16 faces each they would cost a third of a picture. -->
     <quality shadowsize="0" offsamples="4" numslices="20" numstacks="6" numquads="2"/>
   </visual>
+  <asset>
+    <texture type="skybox" builtin="gradient" rgb1="0.82 0.87 0.91" rgb2="0.36 0.52 0.72" width="64" height="384"/>
+  </asset>
   <statistic center="0 0 0.5" extent="4"/>
   <worldbody>
     <light name="sun" type="directional" pos="0 0 20" dir="0.35 0.25 -1" diffuse="0.62 0.6 0.56" specular="0.2 0.2 0.2"
@@ -100,19 +102,7 @@ class RenderScene:
         drawn: DrawnSurface | None = None,
         edges: Edges | None = None,
     ) -> None:
-        """Build the scene.
-
-        Args:
-            cars: The cars.
-            course: Lanes, cones and path.
-            road: The road; a plain one by default.
-            size: Largest width and height of a frame [pixels].
-            drawn: Uneven surface of the road; None for a plane.
-            edges: Edges of a straight road without a course.
-
-        Raises:
-            PlaybackError: the recorded car, course or road cannot be built.
-        """
+        """Build the scene."""
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
             add_road(spec, road or Road(), drawn)
@@ -123,7 +113,6 @@ class RenderScene:
                 add_edges(spec, edges)
             for number, car in enumerate(cars):
                 _add_car(spec, car, f"{number}/")
-            add_sky(spec)
             self.model = spec.compile()
         except (ValueError, KeyError, TypeError) as reason:
             raise PlaybackError(f"car, course or road of the recording cannot be drawn: {reason!r}") from reason
@@ -133,7 +122,6 @@ class RenderScene:
         ]
         self._chassis = [car.bodies.index(CHASSIS) for car in cars]
         self._shadow = [self._mocap_id(f"{number}/shadow") for number in range(len(cars))]
-        self._sky = self._mocap_id(SKY)
         self._opacity = self.model.geom_rgba[:, 3].copy(), self.model.tendon_rgba[:, 3].copy()
         self._tails = [
             [index for index in self._drawn(number)[0] if self.model.geom(index).name.endswith(_TAIL)]
@@ -153,13 +141,7 @@ class RenderScene:
         return int(self.model.body_mocapid[self.model.body(body).id])
 
     def place(self, car: int, positions_m: Array, quaternions: Array) -> None:
-        """Place a car; call `update` to apply it.
-
-        Args:
-            car: Index of the car.
-            positions_m: Positions of its bodies [m], shape (bodies, 3).
-            quaternions: Their orientations, w x y z, shape (bodies, 4).
-        """
+        """Place a car; call `update` to apply it."""
         data, chassis = self.data, self._chassis[car]
         data.mocap_pos[self._mocap[car]] = positions_m
         data.mocap_quat[self._mocap[car]] = quaternions
@@ -168,12 +150,7 @@ class RenderScene:
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 
     def open_tail(self, car: int, share: float) -> None:
-        """Make the tail of a body transparent, so that the rear wheels are seen from behind.
-
-        Args:
-            car: Index of the car; without `tail_opens` nothing changes.
-            share: 0 for closed, 1 for open.
-        """
+        """Make the tail of a body transparent, so that the rear wheels are seen from behind."""
         open_rgba = np.array([*(3 * [_CUTAWAY_SHADE]), _TAIL_OPACITY])
         self.model.geom_rgba[self._tails[car]] = self._tail_rgba[car] * (1.0 - share * (1.0 - open_rgba))
 
@@ -185,7 +162,6 @@ class RenderScene:
             share = share_seen(apart)
             self.model.geom_rgba[geoms, 3] = share * self._opacity[0][geoms]
             self.model.tendon_rgba[tendons, 3] = share * self._opacity[1][tendons]
-        self.data.mocap_pos[self._sky, :2] = chassis[0][:2]
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
@@ -217,8 +193,6 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
                 quat=part.quaternion,
                 # The round solid of a shell is the greenhouse.
                 rgba=_colour_of(part.rgba, car, shell=part.rgba[3] < SEE_THROUGH, glass=part.kind == "sphere"),
-                contype=0,
-                conaffinity=0,
             )
         elif all(body in bodies for body, _ in part.points):
             tendon = spec.add_tendon(name=f"{prefix}{part.name}", width=part.radius_m, rgba=_colour_of(part.rgba, car))
@@ -248,9 +222,7 @@ def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car,
     if panel.shell and car.shell_opacity < _SHADED_BELOW:
         rgb = tuple(_CUTAWAY_SHADE * value for value in rgb)
     opacity = (car.shell_opacity if panel.shell else 1.0) * (_GHOST_OPACITY if car.ghost else 1.0)
-    body.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity), contype=0, conaffinity=0
-    )
+    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity))
 
 
 def _colour_of(
@@ -290,8 +262,6 @@ def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], o
         size=(half_m[0] + _SHADOW_FADE_M, half_m[1] + _SHADOW_FADE_M, 1.0),
         material=name,
         rgba=(1.0, 1.0, 1.0, 0.99),
-        contype=0,
-        conaffinity=0,
     )
 
 

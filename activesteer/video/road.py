@@ -14,7 +14,6 @@ from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course
 from activesteer.road.drawn import DrawnSurface
 from activesteer.road.path import Path
 from activesteer.road.road import Road
-from activesteer.video.markings import Label
 
 _TEXTURE: Final = "road"
 _SURFACE: Final = "uneven_road"
@@ -48,20 +47,12 @@ _BESIDE_CAR_M, _BEYOND_M = 2.5, 60.0
 _MARKS_M, _POSTS_M, _POST_M, _POST_HEIGHT_M = 10.0, 50.0, 0.6, 0.9
 """Spacing of marks and of posts, distance of a post from its edge, and its height [m]."""
 _MAX_POSTS: Final = 200
-_READ_M: Final = 70.0
-"""Distance up to which the label of a post is written [m]."""
 _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 """Largest numbers of pieces of patches, lanes, cones and dashes drawn: a scene holds a limited number of solids."""
 
 
 def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None) -> None:
-    """Add the surface; lower friction makes it bluer.
-
-    Args:
-        spec: The model.
-        road: The road, of which the friction `mu` is used.
-        drawn: Its uneven surface, drawn to scale above a plane that lies lower.
-    """
+    """Add the surface; lower friction makes it bluer."""
     colour = np.array(_colour(road.mu))
     spec.add_texture(
         name=_TEXTURE,
@@ -83,8 +74,6 @@ def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None)
         size=(0.0, 0.0, 1.0),
         material=_TEXTURE,
         pos=(0.0, 0.0, 0.0 if drawn is None else drawn.plane_below_m),
-        contype=0,
-        conaffinity=0,
     )
     if drawn is not None:
         _add_surface(spec, *drawn.mesh(road))
@@ -105,9 +94,7 @@ def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray
         mesh.uservert, mesh.userface = corners[kept].ravel(), faces.ravel()
         mesh.usertexcoord = (0.5 / _SURFACE_TILE_M * corners[kept, :2]).ravel()
         mesh.userfacetexcoord = faces.ravel()
-        geom = spec.worldbody.add_geom(
-            name=mesh.name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, contype=0, conaffinity=0
-        )
+        geom = spec.worldbody.add_geom(name=mesh.name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name)
         if band == 0:
             geom.material = _SURFACE
         else:
@@ -115,12 +102,7 @@ def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray
 
 
 def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
-    """Add the patches of other friction; later ones hide earlier ones.
-
-    Args:
-        spec: The model.
-        road: The road.
-    """
+    """Add the patches of other friction; later ones hide earlier ones."""
     for piece in road.pieces(-_FAR_M, _FAR_M, -_FAR_M, _FAR_M)[:_MAX_PIECES]:
         right, left = piece.corners_m[[0, 1]], piece.corners_m[[3, 2]]
         width, middle = np.linalg.norm(left.mean(axis=0) - right.mean(axis=0)), 0.5 * (left + right)
@@ -133,12 +115,7 @@ def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
 
 
 def add_course(spec: mujoco.MjSpec, course: Course) -> None:
-    """Add lanes, cones and the dashed path.
-
-    Args:
-        spec: The model.
-        course: The course.
-    """
+    """Add lanes, cones and the dashed path."""
     half = 0.5 * _LINE_M
     for _, start, end, right, left in course.lanes[:_MAX_LANES]:
         for side in (right, left):
@@ -163,11 +140,6 @@ class Edges(NamedTuple):
     end_m: float
     half_width_m: float
 
-    def labels(self) -> list[Label]:
-        """Return the distances from the start of the run, written at the posts."""
-        places = ((x, np.array([x, self.half_width_m + _POST_M, _POST_HEIGHT_M + 0.25])) for x in self.posts_m())
-        return [Label(f"{x:.0f} m", place, place + np.array([0.0, 0.0, 1.0]), far_m=_READ_M) for x, place in places]
-
     def posts_m(self) -> Array:
         """Return world x of the posts [m]."""
         return (
@@ -176,11 +148,7 @@ class Edges(NamedTuple):
 
 
 def edges_beside(paths: Sequence[Array]) -> Edges | None:
-    """Return edges that all cars stay between; None if a car turns too far for a straight road.
-
-    Args:
-        paths: World x and y of each car, then any other columns [m], each of shape (k, 2 or more).
-    """
+    """Return edges that all cars stay between; None if a car turns too far for a straight road."""
     points = np.concatenate([path[:, :2] for path in paths])
     half = max(_LEAST_HALF_WIDTH_M, float(np.abs(points[:, 1]).max()) + _BESIDE_CAR_M)
     if half > _MOST_HALF_WIDTH_M:
@@ -189,12 +157,7 @@ def edges_beside(paths: Sequence[Array]) -> Edges | None:
 
 
 def add_edges(spec: mujoco.MjSpec, edges: Edges) -> None:
-    """Add the edges of a straight road, a mark every 10 m and a post every 50 m.
-
-    Args:
-        spec: The model.
-        edges: The edges.
-    """
+    """Add the edges of a straight road, a mark every 10 m and a post every 50 m."""
     half = 0.5 * _LINE_M
     for side in (-1.0, 1.0):
         y = side * edges.half_width_m
@@ -233,18 +196,9 @@ def _add_cones(spec: mujoco.MjSpec, cones: np.ndarray) -> None:
             size=(1.25 * CONE_RADIUS_M, 1.25 * CONE_RADIUS_M, 0.015),
             pos=(x, y, 0.015),
             rgba=_BASE,
-            contype=0,
-            conaffinity=0,
         )
         for mesh, height, colour in rings:
-            spec.worldbody.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_MESH,
-                meshname=mesh,
-                pos=(x, y, height),
-                rgba=colour,
-                contype=0,
-                conaffinity=0,
-            )
+            spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, pos=(x, y, height), rgba=colour)
 
 
 def _box(
@@ -255,11 +209,7 @@ def _box(
 
 
 def _beam(
-    spec: mujoco.MjSpec,
-    ends: tuple[float, float, float, float],
-    width: float,
-    height: float,
-    rgba: tuple[float, ...],
+    spec: mujoco.MjSpec, ends: tuple[float, float, float, float], width: float, height: float, rgba: tuple[float, ...]
 ) -> None:
     """Add a flat box from one place on the road to another."""
     x0, y0, x1, y1 = ends
@@ -270,8 +220,6 @@ def _beam(
         pos=(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0),
         quat=(np.cos(half), 0.0, 0.0, np.sin(half)),
         rgba=rgba,
-        contype=0,
-        conaffinity=0,
     )
 
 

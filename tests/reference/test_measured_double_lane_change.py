@@ -152,7 +152,7 @@ def test_the_example_finds_the_parameters_of_its_car_and_predicts_the_second_lan
     for one in result.fitted.parameters:
         assert abs(one.value - truth[one.key]) < 1.5 * one.half_width  # one noise, 95 % intervals
     page = render_page(measured_page(result))
-    assert page.count("<svg") == 4
+    assert page.count('<div class="plots"') == 4
     assert "The road is level and dry." in page
     assert {row["part"] for row in result.to_json()["quantities"]} == {"fit", "check"}
 

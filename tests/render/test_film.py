@@ -12,7 +12,6 @@ from PIL import Image
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
 from activesteer.video import Film, Settings, make_film
-from activesteer.video.film import END_S
 from activesteer.video.offscreen import backend
 from tests.unit.video.films import decode, need_ffmpeg
 
@@ -224,17 +223,17 @@ def test_file_is_as_long_as_the_drive(drives, folder, name):
         need_ffmpeg()
     shares: list[float] = []
     made = make_film({"ars": drives["ars"]}, folder / name, Settings(size=SIZE, rate_hz=10, speed=4.0), shares.append)
-    duration_s = drives["ars"].poses.time_s[-1] / 4.0 + END_S
+    duration_s = drives["ars"].poses.time_s[-1] / 4.0
     assert made.pictures / made.rate_hz == pytest.approx(duration_s, abs=0.15)
     assert shares[-1] == 1.0
-    assert len(shares) == made.pictures - round(END_S * made.rate_hz)
+    assert len(shares) == made.pictures
     if name.endswith(".gif"):
         with Image.open(folder / name) as gif:
             shown_ms = 0
             for number in range(gif.n_frames):  # type: ignore[attr-defined]
                 gif.seek(number)
                 shown_ms += gif.info["duration"]
-        assert shown_ms == made.pictures * 100  # the last picture is one, shown for long
+        assert shown_ms == made.pictures * 100
         return
     film = decode(folder / name)
     assert "10 fps" in film.about

@@ -10,10 +10,11 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, RUN_COLOURS_ON_DARK
+from activesteer.drawing.panels import WHEELS, panels_in
 from activesteer.playback import Showing, runs_of, save
 from activesteer.playback.layout import blueprint
-from activesteer.playback.plots import WHEELS, links
-from activesteer.playback.stream import fill
+from activesteer.playback.plots import links
+from activesteer.playback.viewer import fill
 from activesteer.playback.wheel_angles import plan_view
 from activesteer.recording import Recording
 from tests.render.headless import Headless, Picture, save_pictures
@@ -217,14 +218,14 @@ def test_plan_and_names_of_the_curves_show_every_run_in_its_colour_from_left_to_
 def test_the_plots_of_wheels_and_links_are_drawn(viewer: Headless, drives: Drives, folder: Path) -> None:
     """These views are on pages behind the first one."""
     runs = runs_of({"ars": drives["ars"]})
-    for page, plots in ((3, WHEELS), (4, links(runs[0]))):
+    for page, plots in ((3, panels_in(WHEELS)), (4, links(runs[0]))):
         file = folder / f"page {page}.rrd"
         stream = rr.RecordingStream(f"page {page}")
         stream.save(file)
         fill(stream, runs, blueprint(runs, compare=False, page=page), Showing())
         stream.disconnect()
         # Nobody brakes in these drives, and what is zero throughout has no plot.
-        titles = tuple(plot.title for plot in plots if not plot.title.startswith("Brake pressure"))
+        titles = tuple(plot.title_with_unit for plot in plots if not plot.title.startswith("Brake pressure"))
         assert len(titles) == 4
         for name, picture in _looked_at(viewer, file, titles, (AT_S,))[AT_S].items():
             assert picture.reports == []

@@ -67,7 +67,7 @@ def test_the_steering_wheel_angle_is_not_wrapped(runs: Runs) -> None:
 
 
 def test_the_figures_are_drawn_from_the_files(runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("activesteer.plotting.files.DOTS_PER_INCH", 100)
+    monkeypatch.setattr("activesteer.plotting.drawing.DOTS_PER_INCH", 100)
     figure = pytest.importorskip("matplotlib.figure").Figure
     savefig = figure.savefig
 

@@ -49,7 +49,7 @@ class Kind(StrEnum):
     """Subject of the statements about a manoeuvre."""
 
     SYSTEMS = "property of the systems"
-    """The steering wheel follows a table; car, road and system determine the result."""
+    """The steering wheel follows a table. Car, road and system determine the result."""
     DRIVER = "depends on the driver"
     """A driver closes the loop and influences the result too."""
 
@@ -148,7 +148,7 @@ class Scenario:
             raise RecordingError(f"a run has no metric {name.args[0]}: its manoeuvre is of another kind") from None
 
     def _evaluated(self, recording: RecordingLike, cut: bool) -> dict[str, float]:
-        """Return the metrics of a run; those that an incomplete run does not have are nan."""
+        """Return the metrics of a run. Those that an incomplete run does not have are nan."""
         if not cut:
             return dict(self.metrics(Evaluable(recording)))
         found: dict[str, float] = defaultdict(lambda: math.nan)
@@ -176,7 +176,7 @@ def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance:
 
 
 def _is_cut_short(recording: RecordingLike) -> bool:
-    """Return whether a run ended before its manoeuvre; the last row of a whole run lies one step before the end."""
+    """Return whether a run ended before its manoeuvre. The last row of a whole run lies one step before the end."""
     maneuver: Any = recording.metadata.get("maneuver")
     duration_s = maneuver.get("duration_s") if isinstance(maneuver, Mapping) else None
     time_s = recording.time_s
@@ -209,7 +209,7 @@ def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> 
 
 
 def straight_ahead(recording: RecordingLike) -> slice:
-    """Return the rows before the steering wheel is first turned; none if it is turned from the beginning."""
+    """Return the rows before the steering wheel is first turned, or none if it is turned from the beginning."""
     turned = np.abs(recording["steering_wheel_rad"]) > AHEAD_RAD
     return slice(0, int(np.argmax(turned)) if turned.any() else len(turned))
 
@@ -232,6 +232,6 @@ def _means(values: Array, timestep_s: float) -> Array:
 
 
 def mean_straight_ahead(recording: RecordingLike, channel: str) -> float:
-    """Return the mean of a channel straight ahead, in its unit; 0 if no part of the run is straight ahead."""
+    """Return the mean of a channel straight ahead, in its unit, or 0 if no part of the run is straight ahead."""
     ahead = recording[channel][straight_ahead(recording)]
     return float(np.mean(ahead)) if len(ahead) else 0.0

@@ -58,7 +58,7 @@ from activesteer.metric_table import (
 LEVEL: Final = 0.9
 """Fraction of the steady-state value of none at which the delays of the step steer are compared."""
 KEPT: Final = 0.8
-"""Least fraction of the steady-state yaw rate that a system must keep; with less, the car only turns less."""
+"""Least fraction of the steady-state yaw rate that a system must keep. With less, the car only turns less."""
 KEPT_SIDESLIP_RAD: Final = math.radians(12.0)
 """Largest sideslip angle at which the steering still turns the car on a dry road [rad]."""
 SLIPPERY_SIDESLIP_RAD: Final = math.radians(5.0)
@@ -99,7 +99,7 @@ PEAK: Final = "yaw_rate_peak_abs_radps"
 """Peak over the whole run, to either side: the peak of a car that swings back counts too."""
 STEADY: Final = "yaw_rate_steady_state_radps"
 COMMON_DELAYS: Final = {"yaw_rate_delay_s": ("yaw_rate", "radps"), "ay_delay_s": ("ay", "mps2")}
-"""Times at which signals reach a common level, 90 % of the steady-state value of none; name and unit of the signals."""
+"""Times at which signals reach a common level, 90 % of the steady-state value of none. Name and unit of the signals."""
 TURNED: Final = (("rear_steer", "rad"), ("superposition", "rad"), ("sideslip", "rad"))
 """Settled angles that count from straight ahead, where the offset of a sensor also turns wheels."""
 ADDED: Final = ("rear_steer_steady_state_rad", "superposition_steady_state_rad")

@@ -58,7 +58,7 @@ class Number:
     high: float | None = None
     """Upper end of the range."""
     maneuvers: tuple[str, ...] = ()
-    """Manoeuvres in which it acts; empty for all."""
+    """Manoeuvres in which it acts, or empty for all."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def read_setting(name: str) -> Setting:
 
 
 def setting_of(recording: RecordingLike) -> str:
-    """Return the name of the setting in which a run was made; empty if it has other overrides or is of the user."""
+    """Return the name of the setting in which a run was made, or empty if it has other overrides or is of the user."""
     maneuver, overrides = recording.metadata.get("maneuver"), recording.metadata.get("overrides") or {}
     name = maneuver.get("name") if isinstance(maneuver, Mapping) else None
     if name not in SCENARIOS or not isinstance(overrides, Mapping):
@@ -104,7 +104,7 @@ def setting_of(recording: RecordingLike) -> str:
 
 
 def claims_for(recording: RecordingLike) -> Scenario | None:
-    """Return the scenario that checks the paper's claims about the manoeuvre of a run; None if it has none.
+    """Return the scenario that checks the paper's claims about the manoeuvre of a run, or None if it has none.
 
     The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a user's step steer is a step
     steer. The paper has no claims about a manoeuvre with other settings, except those of `setting_of`; any car and any
@@ -180,7 +180,7 @@ class ClaimProportion:
 
     @property
     def words(self) -> str:
-        """The factor in words; empty without a factor."""
+        """The factor in words, or empty without a factor."""
         if self.depends_on == NO_FACTOR:
             return ""
         choices = {name: value for name, value in self.at.items() if name.startswith(f"{self.depends_on} = ")}
@@ -198,12 +198,12 @@ class Population(NamedTuple):
     claims: tuple[ClaimProportion, ...]
 
     def of(self, claim: str) -> ClaimProportion | None:
-        """Return the proportion of a claim; None for an unknown claim."""
+        """Return the proportion of a claim, or None for an unknown claim."""
         return next((proportion for proportion in self.claims if proportion.id == claim), None)
 
 
 def read_claims(table: Mapping[str, Any]) -> tuple[ClaimProportion, ...]:
-    """Return the proportions of a stored population; a damaged table raises `StudyError`."""
+    """Return the proportions of a stored population. A damaged table raises `StudyError`."""
     try:
         return tuple(
             ClaimProportion(**{key: claim[key] for key in claim if key != "verdict"}) for claim in table["claims"]
@@ -213,7 +213,7 @@ def read_claims(table: Mapping[str, Any]) -> tuple[ClaimProportion, ...]:
 
 
 def stored_table(name: str) -> dict[str, Any] | None:
-    """Return the results that the package stores of a study, such as `population`; None if it stores none."""
+    """Return the results that the package stores of a study, such as `population`, or None if it stores none."""
     path = studies_dir() / name / SUMMARY
     if not path.is_file():
         return None
@@ -223,7 +223,7 @@ def stored_table(name: str) -> dict[str, Any] | None:
 
 @functools.cache
 def stored_population(vehicle: str) -> Population | None:
-    """Return the population that belongs to the package; None if no population of this car is stored."""
+    """Return the population that belongs to the package, or None if no population of this car is stored."""
     table = stored_table("population")
     if table is None or table.get("vehicle") != vehicle:
         return None

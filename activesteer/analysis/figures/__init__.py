@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from activesteer.analysis.figures import theory, time_histories, tracks
-from activesteer.analysis.figures.step_steer import figure_2, figure_11
+from activesteer.analysis.figures import theory, tracks
+from activesteer.analysis.figures.over_time import figure_2, figure_11, time_figure
 from activesteer.analysis.source import RecordingLike
+from activesteer.drawing.panels import PANELS
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.files import make_folder
 from activesteer.plotting import save
@@ -25,30 +27,36 @@ if TYPE_CHECKING:
 Draw = Callable[[Mapping[str, RecordingLike]], "Figure"]
 """Function from recordings by system to a figure."""
 
+
+def _over_time(*panels: str, instants: bool = False) -> Draw:
+    """Return the function that draws panels over one time axis."""
+    return partial(time_figure, panels=[PANELS[name] for name in panels], instants=instants)
+
+
 FORMATS: Final = (".png", ".svg", ".pdf")
 
 BY_SCENARIO: Final[dict[str, dict[str, Draw]]] = {
     "step_steer": {"figure_11_step_steer": figure_11},
     "sine_with_dwell": {
-        "figure_12_sine_with_dwell_input": time_histories.figure_12,
-        "figure_13_sine_with_dwell": time_histories.figure_13,
+        "figure_12_sine_with_dwell_input": _over_time("steering_wheel", instants=True),
+        "figure_13_sine_with_dwell": _over_time("yaw_rate", "added", "lateral", "sideslip", instants=True),
     },
     "double_lane_change": {
         "figure_14_double_lane_change_course": tracks.course_figure,
         "figure_15_double_lane_change_tracks": tracks.track_figure,
-        "figure_16_double_lane_change_steering": time_histories.steering_and_yaw_rate,
-        "figure_17_double_lane_change_response": time_histories.lateral_response,
+        "figure_16_double_lane_change_steering": _over_time("steering_wheel", "yaw_rate"),
+        "figure_17_double_lane_change_response": _over_time("lateral", "added", "sideslip"),
     },
     "slalom": {
         "figure_18_slalom_course": tracks.course_figure,
         "figure_19_slalom_tracks": tracks.track_figure,
-        "figure_20_slalom_steering": time_histories.steering_and_yaw_rate,
-        "figure_21_slalom_response": time_histories.lateral_response,
+        "figure_20_slalom_steering": _over_time("steering_wheel", "yaw_rate"),
+        "figure_21_slalom_response": _over_time("lateral", "added", "sideslip"),
     },
     "double_lane_change_low_mu": {
         "figure_22_slippery_tracks": tracks.track_figure,
-        "figure_23_slippery_response": time_histories.figure_23,
-        "figure_24_slippery_sideslip": time_histories.figure_24,
+        "figure_23_slippery_response": _over_time("steering_wheel", "yaw_rate", "lateral", "added"),
+        "figure_24_slippery_sideslip": _over_time("sideslip"),
     },
 }
 """Scenario -> file name without its ending -> function that draws the figure."""
@@ -61,12 +69,12 @@ OF_ANY_RUN: Final = {
 
 BY_KIND: Final[dict[str, Draw]] = {
     "step_steer": figure_11,
-    "sine_with_dwell": time_histories.sine_with_dwell_figure,
+    "sine_with_dwell": _over_time("steering_wheel", "yaw_rate", "added", "lateral", "sideslip", instants=True),
     "lane_change": tracks.overview,
     "slalom": tracks.overview,
     "follow_path": tracks.overview,
 }
-"""Kind of manoeuvre -> function that draws it at a glance; other kinds are drawn by `time_histories.general`."""
+"""Kind of manoeuvre -> function that draws it at a glance; other kinds are drawn by `over_time.time_figure`."""
 
 
 def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str | os.PathLike[str]) -> list[Path]:
@@ -110,7 +118,7 @@ def figure_for(kind: str) -> Callable[[Mapping[str, RecordingLike], str | os.Pat
         raises `ParameterError` without matplotlib or a run, and `RecordingError` for a missing channel or a file that
         cannot be written.
     """
-    draw = BY_KIND.get(kind, time_histories.general)
+    draw = BY_KIND.get(kind, time_figure)
 
     def draw_and_save(recordings: Mapping[str, RecordingLike], path: str | os.PathLike[str]) -> Path:
         return save(draw(recordings), Path(path), RecordingError)

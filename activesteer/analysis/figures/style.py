@@ -17,9 +17,10 @@ from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RunLook, run_looks
+from activesteer.drawing.panels import FIGURE, PANELS, Panel, added_lines
 from activesteer.errors import ParameterError
 from activesteer.plotting import plain_axis
-from activesteer.units import Quantity, quantity_of
+from activesteer.units import Quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,18 +45,6 @@ PATCH_COLOUR: Final = "#c3d9ec"
 """Colour of a place with another friction."""
 MAX_POINTS: Final = 5000
 """Most samples of a curve: a picture cannot show more, and its file would be large."""
-
-
-YAW_RATE: Final = quantity_of("yaw_rate_radps")
-DESIRED: Final = quantity_of("yaw_rate_desired_radps")
-STEERING_WHEEL: Final = quantity_of("steering_wheel_rad")
-LATERAL: Final = quantity_of("ay_mps2")
-SIDESLIP: Final = quantity_of("sideslip_rad")
-ROLL: Final = quantity_of("roll_rad")
-SPEED: Final = quantity_of("speed_mps")
-ADDED: Final = quantity_of("rear_steer_rad")._replace(channel="", short="added angle")
-"""The angles that the systems add: not one channel, but the demanded ones of `ADDED_CHANNELS`."""
-ADDED_CHANNELS: Final = ("rear_steer_rad", "superposition_rad")
 
 
 class DrawnRun(NamedTuple):
@@ -94,19 +83,29 @@ def curves(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
 def draw(
     axis: Axes,
     curve: DrawnRun,
-    panel: Quantity,
+    shown: Quantity,
     label: str = "",
     width: float = LINE_PT,
     style: LineStyle | None = None,
 ) -> None:
     """Draw a channel of a run over time: without a label outside the legend, by default in the run's own style."""
-    draw_band(axis, curve, panel.channel, panel.factor)
-    values = thinned(curve.recording[panel.channel]) * panel.factor
+    draw_band(axis, curve, shown.channel, shown.factor)
+    values = thinned(curve.recording[shown.channel]) * shown.factor
     # A leading underscore keeps a line out of the legend.
     axis.plot(
         thinned(curve.recording.time_s), values, color=curve.look.colour, linewidth=width,
         linestyle=curve.linestyle if style is None else style, label=label or "_hidden",
     )  # fmt: skip
+
+
+def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width: float = LINE_PT) -> None:
+    """Draw the lines of a run; those after the first are dotted."""
+    lines = panel.lines_in(FIGURE)
+    # A panel of one line needs it; of several, a run has some.
+    shown = lines if len(lines) == 1 else [line for line in lines if line.of(curve.recording) is not None]
+    for place, line in enumerate(shown):
+        quantity = panel.quantity._replace(channel=line.channel)
+        draw(axis, curve, quantity, f"_{FRONT_LABEL}" if place else label, width, DOTTED if place else None)
 
 
 def draw_band(axis: Axes, curve: DrawnRun, channel: str, factor: float = 1.0) -> None:
@@ -125,26 +124,16 @@ def draw_band(axis: Axes, curve: DrawnRun, channel: str, factor: float = 1.0) ->
         )
 
 
-def added_channels(curve: DrawnRun) -> list[str]:
-    """Return the angles that a system adds; an angle that no controller demands is the give of a hinge."""
-    return [name for name in ADDED_CHANNELS if np.any(curve.recording[name.replace("_rad", "_demand_rad")])]
-
-
-def draw_added(axis: Axes, curve: DrawnRun, width: float = LINE_PT) -> None:
-    """Draw the angles that a system adds; if it adds two, the one in front is dotted."""
-    for place, channel in enumerate(added_channels(curve)):
-        label, dots = (f"_{FRONT_LABEL}", DOTTED) if place else ("", None)
-        draw(axis, curve, ADDED._replace(channel=channel), label=label, width=width, style=dots)
-
-
 def friction_label(low: float, high: float) -> str:
     """Return the label of places with another friction, which keeps them out of the legend of their own axis."""
     return f"_friction {low:.2g}" + (f" to {high:.2g}" if f"{low:.2g}" != f"{high:.2g}" else "")
 
 
-def present(panels: Sequence[Quantity], drawn: Sequence[DrawnRun]) -> list[Quantity]:
+def present(panels: Sequence[Panel], drawn: Sequence[DrawnRun]) -> list[Panel]:
     """Return the panels, without the added angles if no run has any."""
-    return [panel for panel in panels if panel is not ADDED or any(added_channels(curve) for curve in drawn)]
+    return [
+        panel for panel in panels if panel is not PANELS["added"] or any(added_lines(each.recording) for each in drawn)
+    ]
 
 
 def thinned(values: NDArray[np.floating]) -> NDArray[np.float64]:

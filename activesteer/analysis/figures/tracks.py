@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from activesteer.analysis import lanes
 from activesteer.analysis.bands import TRACK
-from activesteer.analysis.figures import style, time_panels
+from activesteer.analysis.figures import over_time, style
 from activesteer.analysis.figures.style import DrawnRun
 from activesteer.analysis.lanes import CourseView, view_of
 from activesteer.analysis.source import RecordingLike, read_course, read_footprint
+from activesteer.drawing.panels import PANELS
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure
 from activesteer.road.course import CONE_RADIUS_M, Course
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+PANELS_BELOW_TRACK: Final = ("steering_wheel", "yaw_rate", "added", "lateral", "sideslip")
 LANE_COLOUR: Final = "#f0e6c8"
 CONE_COLOUR: Final = "#e69f00"
 STRUCK_COLOUR: Final = "#b3261e"
@@ -64,16 +66,15 @@ def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Draw tracks, and below them the actions of driver, car and systems over time."""
     drawn = style.curves(recordings)
-    wanted = (style.STEERING_WHEEL, style.YAW_RATE, style.ADDED, style.LATERAL, style.SIDESLIP)
-    panels = style.present(wanted, drawn)
+    panels = style.present([PANELS[name] for name in PANELS_BELOW_TRACK], drawn)
     figure = new_figure(width_in=WIDTH_IN, height_in=3.2 + 1.15 * len(panels))
     grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[2.6, *(1.0 for _ in panels)])
     above = figure.add_subplot(grid[0])
     _draw_tracks(above, recordings)
     axes: list[Axes] = [figure.add_subplot(grid[1])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(2, 1 + len(panels))]
-    time_panels.fill_panels(axes, drawn, panels)
-    time_panels.shade_friction(axes, drawn)
+    over_time.fill_panels(axes, drawn, panels)
+    over_time.shade_friction(axes, drawn)
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     figure.align_ylabels(axes)

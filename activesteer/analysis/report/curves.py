@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -13,13 +13,13 @@ from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
 from activesteer.analysis.report.groups import Group, Run, entry
 from activesteer.analysis.source import read_course, read_footprint
-from activesteer.conventions import CORNERS, Array
+from activesteer.conventions import Array
 from activesteer.drawing import wheel_angles
+from activesteer.drawing.panels import PATH_DISTANCE, REPORT, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
 from activesteer.recording.contents import events_of
 from activesteer.road.course import CONE_RADIUS_M, Course
-from activesteer.units import ESTIMATED, MEASURED, Quantity, quantity_of
 
 RATE_HZ: Final = 200.0
 """Most samples of a signal per second; the car's own motion ends below 20 Hz."""
@@ -33,52 +33,17 @@ DIGITS: Final = 4
 """Digits after the first digit of a signal's range; more cannot be seen."""
 
 
-class TimePlot(NamedTuple):
-    """A plot over time.
-
-    Attributes:
-        title: Its title.
-        quantity: Quantity that gives its unit and the least height of its axis.
-        signals: Functions from a recording to a signal, SI. The first is the run's own line, the others are dotted. A
-            signal that the recording lacks raises `RecordingError`; a signal without meaning is None.
-        note: Meaning of a dotted line.
-    """
-
-    title: str
-    quantity: Quantity
-    signals: tuple[Callable[[Recording], Array | None], ...]
-    note: str = ""
-
-
-def _of(channel: str, *others: Callable[[Recording], Array | None], note: str = "") -> TimePlot:
-    shown = quantity_of(channel)
-    return TimePlot(shown.label.capitalize(), shown, (lambda recording: recording[channel], *others), note)
-
-
-def _desired(recording: Recording) -> Array | None:
-    values = recording["yaw_rate_desired_radps"]
-    return values if np.any(values) else None
-
-
-def _added(name: str) -> Callable[[Recording], Array | None]:
-    def values(recording: Recording) -> Array | None:
-        # An angle that no controller demands is the give of a hinge, not an added angle.
-        return recording[f"{name}_rad"] if np.any(recording[f"{name}_demand_rad"]) else None
-
-    return values
-
-
-def _beside_truth(word: str, channel: str) -> TimePlot:
-    """Return the plot of a measured or an estimated channel, with the true one if it was recorded."""
-
-    def truth(recording: Recording) -> Array | None:
-        return recording[channel] if f"{word}_{channel}" in recording else None
-
-    return _of(f"{word}_{channel}", truth, note="dotted: true")
-
-
-def _over_corners(channel: str, choose: np.ufunc) -> Callable[[Recording], Array]:
-    return lambda run: choose.reduce([run[f"{corner}_{channel}"] for corner in CORNERS])
+def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[Array]:
+    """Yield the lines of a run: its own, then those that are dotted."""
+    if panel.extreme is not None:
+        yield panel.extreme.reduce([recording[line.channel] for line in panel.lines])
+        return
+    for line in panel.lines_in(view):
+        # A run of an older version or of another program may lack the signal.
+        with suppress(RecordingError):
+            values = _from_path(recording) if line.channel == PATH_DISTANCE else line.of(recording)
+            if values is not None:
+                yield values
 
 
 def _from_path(recording: Recording) -> Array:
@@ -86,39 +51,18 @@ def _from_path(recording: Recording) -> Array:
     return path_distance(*front_axle(recording), path.x_m, path.y_m)
 
 
-_DISTANCE, _LOAD = quantity_of("path_distance_m"), quantity_of("tyre_fz_N")
-_USE = "friction_utilisation"
-
-PANELS: Final = (
-    _of("steering_wheel_rad"),
-    _of("yaw_rate_radps", _desired, note="dotted: desired by the controller"),
-    _of("sideslip_rad"),
-    _of("ay_mps2"),
-    TimePlot(
-        "Added angle at the wheels", quantity_of("rear_steer_rad"), (_added("rear_steer"), _added("superposition")),
-        "rear wheels, dotted: front superposition",
-    ),
-    TimePlot(_DISTANCE.label.capitalize(), _DISTANCE, (_from_path,)),
-    _of("roll_rad"),
-    _of("speed_mps"),
-    _beside_truth(ESTIMATED, "sideslip_rad"),
-    _beside_truth(ESTIMATED, "speed_mps"),
-    _beside_truth(MEASURED, "yaw_rate_radps"),
-    _beside_truth(MEASURED, "ay_mps2"),
-    TimePlot("Friction utilisation, highest of four wheels", quantity_of(_USE), (_over_corners(_USE, np.maximum),)),
-    TimePlot("Wheel load, lowest of four wheels", _LOAD, (_over_corners("tyre_fz_N", np.minimum),)),
-)  # fmt: skip
-"""Plots in pairs, as they stand beside each other."""
-
-
-def plots(group: Group) -> dict[str, Any]:
+def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
     """Return the plots of a group as JSON values.
+
+    Args:
+        group: The runs.
+        view: View whose panels are shown; see `drawing.panels`.
 
     Returns:
         Time step and number of samples, runs, plots, marks, and the track if positions were recorded.
     """
     grid = time_grid([run.recording.time_s for run in group.runs])
-    panels = [shown for panel in PANELS if (shown := _panel(panel, group.runs, grid))["series"]]
+    panels = [shown for panel in panels_in(view) if (shown := _panel(panel, view, group.runs, grid))["series"]]
     return {
         "name": group.name,
         "step_s": float(grid[1] - grid[0]) if len(grid) > 1 else 0.0,
@@ -149,21 +93,14 @@ def time_grid(times_s: Sequence[Array]) -> Array:
     return np.rint((start + np.arange(count) * (every * step)) * 1e9) / 1e9
 
 
-def _panel(panel: TimePlot, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
+def _panel(panel: Panel, view: str, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
     series = []
     for number, run in enumerate(runs):
-        alone = True
-        for signal in panel.signals:
-            try:
-                values = signal(run.recording)
-            except RecordingError:
-                # A run of an older version or of another program may lack the signal.
-                continue
-            if values is not None:
+        with suppress(RecordingError):
+            for place, values in enumerate(_signals(panel, view, run.recording)):
                 sampled = _reduced(run.recording.time_s, values * panel.quantity.factor, grid)
                 # The only signal of a run is its own line; further signals are dotted.
-                series.append({"run": number, "dotted": not alone, "values": _rounded(sampled)})
-                alone = False
+                series.append({"run": number, "dotted": place > 0, "values": _rounded(sampled)})
     note = panel.note if any(item["dotted"] for item in series) else ""
     shown = panel.quantity
     return {"title": panel.title, "unit": shown.unit.name, "note": note, "min_span": shown.min_span, "series": series}

@@ -7,12 +7,57 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.analysis.claims.scorecard import Scorecard, scorecard
 from activesteer.analysis.claims.statements import SCENARIOS
-from activesteer.analysis.claims.stored import PAPER, SETTINGS, setting_of
+from activesteer.analysis.claims.stored import LITERATURE, PAPER, SETTINGS, claims_for, setting_of
 from activesteer.conventions import RunLook, run_looks
-from activesteer.errors import ParameterError, RecordingError
+from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.recording.recording import run_names
+
+
+class Judgement(NamedTuple):
+    """The claims about a group of runs.
+
+    Attributes:
+        scorecard: Claims with their verdicts; empty if there are no claims, or if they cannot be judged.
+        obstacle: Why the claims cannot be judged; empty if they are, or if there are none.
+    """
+
+    scorecard: Scorecard
+    obstacle: str = ""
+
+
+def judge(group: Group) -> Judgement:
+    """Check the paper's claims about the runs of a group.
+
+    The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
+    """
+    nothing = scorecard([], known={})
+    recordings = group.by_name()
+    check = claims_for(group.runs[0].recording)
+    if check is None:
+        return Judgement(nothing)
+    missing = [system for system in SYSTEMS if system not in recordings]
+    if missing:
+        return Judgement(nothing, f"no run of {', '.join(missing)}, and the claims compare {', '.join(SYSTEMS)}")
+    systems = [recordings[system] for system in SYSTEMS]
+    for system, recording in zip(SYSTEMS, systems, strict=True):
+        if not recording.metadata.get("complete", True):
+            return Judgement(nothing, f"the run {system} is not complete")
+    if not (_same(systems, "maneuver") and _same(systems, "vehicle")):
+        return Judgement(nothing, "the three runs differ in manoeuvre or vehicle; see the parameters")
+    try:
+        claims, setting = check(recordings), setting_of(systems[0])
+        return Judgement(scorecard(claims, entry(systems[0], "vehicle", "name"), setting=setting or LITERATURE))
+    except ActiveSteerError as error:
+        return Judgement(nothing, str(error))
+
+
+def _same(recordings: list[Recording], table: str) -> bool:
+    return all(recording.metadata.get(table) == recordings[0].metadata.get(table) for recording in recordings)
+
 
 MAX_RUNS: Final = 60
 """Most runs of a report; with more runs, nobody can read the page and a browser is slow to open it."""

@@ -10,17 +10,20 @@ from typing import Final, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict, number_lines
 from activesteer.analysis.report.curves import plots
-from activesteer.analysis.report.groups import Group, entry, groups_of
-from activesteer.analysis.report.judgement import Judgement, judge
-from activesteer.analysis.report.parameter_table import Row, rows
-from activesteer.analysis.report.results import HEADLINE, Result, key_titles, results
-from activesteer.analysis.report.significance import Change
+from activesteer.analysis.report.groups import Group, Judgement, entry, groups_of, judge
 from activesteer.analysis.report.tables import (
+    HEADLINE,
+    Change,
     MetricRow,
+    Result,
+    Row,
     changed_parameters,
     file_rows,
+    key_titles,
     metric_rows,
     metric_titles,
+    results,
+    rows,
     verdict_counts,
 )
 from activesteer.analysis.tables import notes

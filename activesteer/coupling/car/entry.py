@@ -96,5 +96,5 @@ def derive(rows, places, design, gravity, forces, n_forces, limits, n_limits, nu
 
 @compiled_callback(types.void, *SET_FAULT)
 def fault(part, block, gain, bias, healthy, kind, offset, held):
-    """Write a fault of an actuator into the model; see `faults.set_fault`."""
+    """Write a fault of an actuator into the model (see `faults.set_fault`)."""
     set_fault(part, block, gain, bias, healthy, kind, offset, held)

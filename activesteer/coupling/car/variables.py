@@ -30,7 +30,7 @@ MOTION: Final = (
     *(f"{corner}_{name}" for name in ("steer_rad", "camber_rad", "travel_m") for corner in CORNERS),
     "front_steer_rad", "rear_steer_rad", "superposition_rad",
 )  # fmt: skip
-"""Channels that car.c computes, in its order; those with a sine may differ from a recording in the last digit."""
+"""Channels that car.c computes, in its order. Those with a sine may differ from a recording in the last digit."""
 
 PLACE_GROUPS: Final = (
     ("chassis_orientation",), ("cg_velocity",), ("cg_accelerometer",), ("cg_gyro",),
@@ -86,7 +86,7 @@ _MEANINGS: Final = {
 
 
 def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
-    """Return the inputs; those of the native step come first, in the order of `CARRIED_OUT`."""
+    """Return the inputs. Those of the native step come first, in the order of `CARRIED_OUT`."""
     driver, actuator = loop.commands
     starts = dict(zip(COMMANDS, (*numbers_in(driver), *numbers_in(actuator)), strict=True))
     numbers = {number.name: number for command in (driver, actuator) for number in numbers_of(type(command))}
@@ -122,7 +122,7 @@ FAULT_KINDS: Final = ("works", "stuck", "runaway to the left or to its strength"
 
 
 def faulty_parts(loop: ClosedLoop) -> list[str]:
-    """Return the steering actuators and brakes that can fail; see `faults.ACTUATORS`."""
+    """Return the steering actuators and brakes that can fail (see `faults.ACTUATORS`)."""
     rear = ("rear",) if loop.vehicle.parameters.rear_actuator.is_central else ("rear_left", "rear_right")
     return [*rear, "superposition", *(f"{corner}_brake" for corner in CORNERS)]
 

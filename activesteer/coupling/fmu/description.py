@@ -115,7 +115,7 @@ _FORMATS: Final = {
     "Real": "d", "Float64": "d", "Float32": "f", "Integer": "i", "Int8": "b", "UInt8": "B", "Int16": "h", "UInt16": "H",
     "Int32": "i", "UInt32": "I", "Int64": "q", "UInt64": "Q",
 }  # fmt: skip
-"""Numeric type of FMI -> format of `struct`; Boolean and Enumeration depend on the version."""
+"""Numeric type of FMI -> format of `struct`. Boolean and Enumeration depend on the version."""
 _HERTZ: Final = re.compile(r"k?Hz|rev.*|r/.*|rpm")
 
 
@@ -225,7 +225,7 @@ def describe_fmu(archive: Archive, kind: Kind) -> Description:
 
 
 def _variable(variable: Any, description: Any) -> Variable | None:
-    """Return a variable; None if it holds no numbers."""
+    """Return a variable, or None if it holds no numbers."""
     version2 = description.fmiMajorVersion == 2
     kind, form = variable.type, _FORMATS.get(variable.type)
     if kind == "Boolean":
@@ -246,7 +246,7 @@ def _variable(variable: Any, description: Any) -> Variable | None:
 
 
 def _number(text: Any, default: Any = None) -> Any:
-    """Return the number in an attribute; true is 1."""
+    """Return the number in an attribute. True is 1."""
     first = str(text).split()[0] if text is not None and str(text).split() else None
     try:
         return default if first is None else float({"true": "1", "false": "0"}.get(first, first))
@@ -277,7 +277,7 @@ def _library(archive: Archive, identifier: str, kind: Kind) -> str:
 
 
 def _declared_unit(name: str | None, base: Any) -> Unit | None:
-    """Return a unit as an FMU declares it, by its base unit as FMPy reads it; None if nobody knows the unit."""
+    """Return a unit as an FMU declares it, by its base unit as FMPy reads it, or None if nobody knows the unit."""
     if name is None or base is None:
         return find_unit(name) if name else None
     others = any(getattr(base, other) for other in ("A", "K", "mol", "cd"))

@@ -77,7 +77,7 @@ class Signals(NamedTuple):
     words: str
 
     def full(self, name: str) -> str | None:
-        """Return the name of a signal that is given with or without its unit; None if there is none."""
+        """Return the name of a signal that is given with or without its unit, or None if there is none."""
         known = (other for other in self.places if other == name or split_ending(other)[0] == name)
         return next(known, None)
 
@@ -234,7 +234,7 @@ class FmuBlock:
         self._unchecked = kind.completes or any(names[field] in kind.unchecked for field in fields)
 
     def step(self, *messages: Any) -> Any:
-        """Return the command of the FMU; see `Controller.step` and `Driver.step`."""
+        """Return the command of the FMU (see `Controller.step` and `Driver.step`)."""
         self._steps += 1
         if self._every > 1 and (self._steps - 1) % self._every:
             return self._held
@@ -389,7 +389,7 @@ _ISOLATE_RANGE: Final = (0.001, 3600.0)
 _MESSAGES: Final = {"controller": (DriverCommand, Measurement), "driver": (Setpoint, Measurement, Motion)}
 """Kind of block -> the messages that it gets."""
 _MAX_KEPT_BYTES: Final = 4_000_000
-"""Largest FMU that a recording keeps; of a larger one it keeps the description and the digest."""
+"""Largest FMU that a recording keeps. Of a larger one it keeps the description and the digest."""
 
 
 class Fmu:
@@ -528,7 +528,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
 
 def isolated(given: Any, limit_s: float | None) -> Any:
-    """Return an FMU in its own process; other blocks, and all without a limit, are returned unchanged."""
+    """Return an FMU in its own process. Other blocks, and all without a limit, are returned unchanged."""
     if limit_s is None or not is_fmu(given):
         return given
     text = os.fspath(given)

@@ -1,42 +1,6 @@
 // The plots of the report. Each group of runs has linked plots over one time axis, and a track that marks the same
-// instant. Data: the JSON in #data, from `curves.plots`.
-"use strict";
+// instant. Data: the JSON in #data, from `curves.plots`. Shared parts: `charts.js`.
 (() => {
-  const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-  // Colours of the stylesheet, light or dark; read again when the scheme changes.
-  const PAINTS = ["quiet", "grid", "lane", "cone", "struck", "path", ...Array.from({ length: 6 }, (_, i) => `run-${i}`)];
-  const paint = {};
-  const mix = () => { const style = getComputedStyle(document.documentElement); for (const name of PAINTS) paint[name] = style.getPropertyValue(`--${name}`).trim(); };
-  mix();
-  const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
-  // Least size of a cone [px], otherwise cones and cars have their true size; distance between drawn cars [px].
-  const LEAST_CONE = 2, CARS_APART = 110;
-  // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
-  const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 118, PRINTED_TRACK_HEIGHT = 190;
-
-  const SVG = "http://www.w3.org/2000/svg";
-  const element = (name, attributes = {}, ...children) => {
-    const made = document.createElement(name);
-    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-    made.append(...children);
-    return made;
-  };
-  // Axis labels with a real minus sign and without rounding errors.
-  const labels = (unit) => (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit));
-  const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
-  const shown = (number) => (number == null ? "–" : number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0).replace("-", "−"));
-
-  const dashed = (run, width) => run.dashes.map((length) => length * width);
-  // Later runs lie over earlier ones; thinner and dashed, they leave these visible.
-  const lineWidth = (run) => Math.max(1.5, 2.6 - 0.4 * run);
-
-  // Limits of a vertical axis, with some room, and no closer than `least`.
-  function padded(low, high, least) {
-    if (low == null) return [0, least];
-    const half = Math.max(0.55 * (high - low), least / 2), middle = (low + high) / 2;
-    return [middle - half, middle + half];
-  }
-
   class Group {
     constructor(data) {
       this.data = data;
@@ -73,13 +37,7 @@
     toolbar() {
       const bar = document.querySelector(`.toolbar[data-group="${this.data.anchor}"]`);
       this.data.runs.forEach((run, i) => {
-        const swatch = document.createElementNS(SVG, "svg");
-        swatch.setAttribute("class", "swatch");
-        swatch.setAttribute("viewBox", "0 0 28 6");
-        swatch.style.setProperty("--run", `var(--run-${run.place})`);
-        const line = swatch.appendChild(document.createElementNS(SVG, "path"));
-        line.setAttribute("d", "M0 3h28");
-        line.setAttribute("stroke-dasharray", dashed(run, 2).join(" "));
+        const swatch = swatchOf(`var(--run-${run.place})`, dashed(run, 2));
         const button = element("button", { type: "button", "aria-pressed": "true" }, swatch, run.label);
         button.addEventListener("click", () => {
           this.visible[i] = !this.visible[i];
@@ -203,6 +161,7 @@
     }
 
     fit(width = null) {
+      if (width != null) this.play(false);
       for (const plot of this.plots) {
         const room = width == null ? plot.root.parentElement.clientWidth : (width - PRINTED_GAP) / 2;
         if (room > 0 && room !== plot.width) plot.setSize({ width: room, height: width == null ? PLOT_HEIGHT : PRINTED_PLOT_HEIGHT });
@@ -393,51 +352,10 @@
     }
   }
 
-  // One finger reads values, two zoom in time, a double tap shows all; up and down the page still scrolls.
-  function touchable(u, zoom) {
-    const over = u.over, fingers = new Map();
-    let start = null, tapped = 0;
-    const at = (event) => event.clientX - over.getBoundingClientRect().left;
-    over.addEventListener("pointerdown", (event) => {
-      if (event.pointerType !== "touch") return;
-      fingers.set(event.pointerId, at(event));
-      if (fingers.size === 2) {
-        const [a, b] = [...fingers.values()].sort((p, q) => p - q);
-        start = { a: u.posToVal(a, "x"), b: u.posToVal(b, "x") };
-      } else if (fingers.size === 1) {
-        if (event.timeStamp - tapped < 300) zoom(null);
-        tapped = event.timeStamp;
-      }
-    });
-    over.addEventListener("pointermove", (event) => {
-      if (!fingers.has(event.pointerId)) return;
-      fingers.set(event.pointerId, at(event));
-      if (fingers.size === 1) u.setCursor({ left: at(event), top: event.clientY - over.getBoundingClientRect().top }, true, true);
-      if (fingers.size !== 2 || !start) return;
-      const [a, b] = [...fingers.values()].sort((p, q) => p - q);
-      if (b - a < 10) return;
-      const scale = (start.b - start.a) / (b - a), min = start.a - a * scale;
-      zoom({ min, max: min + over.clientWidth * scale });
-    });
-    for (const name of ["pointerup", "pointercancel"]) {
-      over.addEventListener(name, (event) => { fingers.delete(event.pointerId); if (fingers.size < 2) start = null; });
-    }
-  }
-
-  const groups = JSON.parse(document.getElementById("data").textContent).map((data) => new Group(data));
+  drawn.push(...DATA.map((data) => new Group(data)));
   // The contents mark the manoeuvre that is read.
   const seen = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) document.querySelector(`.jump a[href="#${target.id}"]`)?.setAttribute("aria-current", isIntersecting);
   }, { rootMargin: "-15% 0px -84% 0px" });
   for (const section of document.querySelectorAll(".group")) seen.observe(section);
-  const repaint = () => { mix(); for (const group of groups) group.repaint(); };
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
-  addEventListener("beforeprint", () => {
-    document.documentElement.classList.add("paper");
-    repaint();
-    for (const group of groups) group.play(false);
-    for (const details of document.querySelectorAll(".group > details")) details.open = true;
-    for (const group of groups) group.fit(PRINTED);
-  });
-  addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaint(); for (const group of groups) group.fit(); });
 })();

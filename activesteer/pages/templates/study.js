@@ -39,6 +39,8 @@ function range(values) {
   return [low - margin, high + margin];
 }
 
+// Width that a picture may have on this screen.
+const widthOf = () => Math.max(240, at("distribution").clientWidth || Infinity) - 2;
 const LETTER = 6.2, LINE = 14;
 const textWidth = (text) => LETTER * text.length;
 
@@ -58,11 +60,12 @@ function picture(parent, width, height, label) {
 }
 
 // A frame with axes; returns the svg and the scales. An axis is {label, range} or {label, levels}. Labels of any length fit.
-function frame(parent, least, height, x, y) {
+function frame(parent, wanted, height, x, y, most = widthOf()) {
+  const least = Math.min(wanted, most);
   const marks = (axis, count) => axis.levels ? axis.levels.map((level, i) => [i, String(level)]) : ticks(...axis.range, count).map((v) => [v, short(v)]);
   const right = 12, top = 10, beside = marks(y, 5);
   const named = wrapped(y.label, height - top - 42), widest = Math.max(0, ...beside.map(([, text]) => textWidth(text)));
-  const left = Math.max(62, LINE * named.length + 12 + widest), width = Math.max(least, left + least - 62);
+  const left = Math.max(62, LINE * named.length + 12 + widest), width = Math.min(Math.max(least, left + least - 62), most);
   const below = wrapped(x.label, width - 8), bottom = 28 + LINE * below.length;
   const svg = picture(parent, width, height, `${y.label} over ${x.label}`);
   const span = (axis) => (axis.levels ? [-0.5, axis.levels.length - 0.5] : axis.range);
@@ -181,7 +184,7 @@ function bars(parent, controller, found, metric, [bottom, top]) {
   const box = html(parent, "div");
   html(box, "div", data.controllers[controller]);
   const label = names[0] === "mu*" ? withUnit("mu*", metric.unit) : `${names.join(" (light), ")}${names.length > 1 ? " (dark)" : ""} [-]`;
-  const f = frame(box, Math.max(300, 90 + Math.max(130, ...labelled.map(textWidth)) * factors.length), 240, { label: "factor", levels: labelled }, { label, range: [bottom * 1.05, top * 1.05 || 1] });
+  const f = frame(box, Math.max(300, 90 + Math.max(130, ...labelled.map(textWidth)) * factors.length), 240, { label: "factor", levels: labelled }, { label, range: [bottom * 1.05, top * 1.05 || 1] }, Infinity);
   element(f.svg, "line", { x1: f.sx(-0.5), x2: f.sx(factors.length - 0.5), y1: f.sy(0), y2: f.sy(0), stroke: "#888" });
   for (const [factor, name, value, confidence, spread] of found) {
     const n = names.indexOf(name), width = 0.6 / names.length, x = factors.indexOf(factor) - 0.3 + n * width;
@@ -216,11 +219,12 @@ function parallel(parent, metric, rows) {
 }
 
 function tableOf(parent, header, lines) {
-  const table = html(parent, "table"), first = html(table, "tr");
+  const table = html(parent, "table"), first = html(html(table, "thead"), "tr"), body = html(table, "tbody");
+  table.className = "findings cards";
   header.forEach((text) => html(first, "th", text));
   for (const line of lines) {
-    const row = html(table, "tr");
-    line.forEach((cell) => (cell instanceof Node ? html(row, "td").appendChild(cell) : html(row, "td", cell)));
+    const row = html(body, "tr");
+    line.forEach((cell, i) => { const made = html(row, "td", cell instanceof Node ? "" : cell); made.setAttribute("data-title", header[i]); if (cell instanceof Node) made.appendChild(cell); });
   }
 }
 
@@ -309,4 +313,10 @@ if (data.metrics.length) {
   at("metric").value = "sideslip_peak_abs_rad";
   choose();
   draw();
+}
+
+// A phone that is turned has another width.
+if (data.metrics.length && typeof addEventListener === "function") {
+  let width = at("distribution").clientWidth;
+  addEventListener("resize", () => { if (at("distribution").clientWidth !== width) { width = at("distribution").clientWidth; draw(); } });
 }

@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from activesteer.conventions import Array
 from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
-from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, save_all
+from activesteer.plotting import Area, Curve, Panel, Picture, save_all
 from activesteer.plotting import draw as drawn
 from activesteer.rigs.kc.metrics import Axle, mean_steer_rad, ratio_curve, roll_angle_rad
 from activesteer.rigs.kc.programme import Sweep, rear_screw_travel_m
@@ -91,7 +91,7 @@ def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> 
     outside = frozenset(number for number, entry in enumerate(result.metrics) if entry.inside is False)
     metrics = Section("Metrics", tables=[Table("", columns, rows, outside)])
     sections = [
-        Section(picture.title[0].upper() + picture.title[1:], pictures=[as_svg(drawn(picture._replace(title="")))])
+        Section(picture.title[0].upper() + picture.title[1:], pictures=[picture._replace(title="")])
         for picture in pictures
     ]
     sections.insert(1 if result.targeted else 0, metrics)  # the bands, if there are any, stand first
@@ -100,7 +100,7 @@ def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> 
 
 
 def _metric_row(entry: KcMetric, *, banded: bool) -> list[Text]:
-    """Return the cells of a metric; those about bands only if the car has any."""
+    """Return the cells of a metric. Those about bands only if the car has any."""
     value = [
         entry.axle,
         Markup('<span title="{}">{}</span>').format(entry.definition, entry.name.replace("_", " ")),

@@ -38,7 +38,7 @@ _SMALLEST_STEP: Final = 1e-11
 _TOLERANCE: Final = 1e-6
 """Residual at which the search ends [N, N m], heights in units of 0.1 mm."""
 _ROUNDING: Final = 1e-2
-"""Largest residual that rounding may leave; links of 1e9 N/m leave 1e-4."""
+"""Largest residual that rounding may leave. Links of 1e9 N/m leave 1e-4."""
 _HEIGHT_SCALE_NPM: Final = 1e4
 """Factor of the heights, which gives their residual the size of the forces."""
 _STALE: Final = 0.3
@@ -148,7 +148,7 @@ class HeldCar:
         mujoco.mj_fwdPosition(self.model, self.data)
 
     def wheel(self, corner: int) -> WheelPose:
-        """Return the pose of a wheel; its contact point is the lowest point of the rigid circle."""
+        """Return the pose of a wheel. Its contact point is the lowest point of the rigid circle."""
         body = self._wheels[corner]
         centre = self.data.xpos[body].copy()
         return WheelPose(centre, self.data.xmat[body].reshape(3, 3).copy(), centre + self._down(corner))

@@ -34,7 +34,7 @@ _SMALL: Final = {
 
 
 class Axle(NamedTuple):
-    """One axle of the measured car; arrays of its wheels are in the order left, right."""
+    """One axle of the measured car. Arrays of its wheels are in the order left, right."""
 
     name: AxleName
     measured: Measured
@@ -432,7 +432,7 @@ def _braking_recession(axle: Axle) -> float:
 
 
 def _bushes_Npmm(axle: Axle) -> Array:
-    """Stiffness of one of two equal bushes in series in each link, unloaded; nan for an axle without links [N/mm]."""
+    """Stiffness of one of two equal bushes in series in each link, unloaded, or nan without links [N/mm]."""
     model = axle.measured.vehicle.model
     rates = []
     for index in range(model.ntendon):
@@ -443,7 +443,7 @@ def _bushes_Npmm(axle: Axle) -> Array:
 
 
 def _top_mount_Npmm(axle: Axle, direction: str) -> float:
-    """Stiffness of the left top mount; nan for a rigid one [N/mm]."""
+    """Stiffness of the left top mount, or nan for a rigid one [N/mm]."""
     model = axle.measured.vehicle.model
     tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{axle.name[0]}l_mount_{direction}")
     return 1e-3 * float(model.tendon_stiffness[tendon]) if tendon >= 0 else math.nan

@@ -96,7 +96,7 @@ class KcResult:
         return tuple(entry for entry in self.metrics if entry.inside is False)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the metrics as JSON values: name, axle, value, unit, band, inside, source; a missing value is null."""
+        """Return the metrics as JSON values: name, axle, value, unit, band, inside, source. A missing value is null."""
         names = ("name", "axle", "value", "unit", "band", "inside", "source")
         return {"metrics": [{name: getattr(entry, name) for name in names} for entry in self.metrics]}
 
@@ -195,7 +195,7 @@ TESTS: Final = {
         "aligning_opposed", "moment", "moment about the vertical on each wheel, positive towards toe-in", -1.0
     ),
 }  # fmt: skip
-"""Tests by name; AXLE_NAME.csv is the file of a test."""
+"""Tests by name. AXLE_NAME.csv is the file of a test."""
 
 CHANNELS: Final = {
     "travel": ("m", "mm"), "rack": ("m", "mm"), "force": ("N", "N"), "moment": ("Nm", "Nm"),
@@ -203,7 +203,7 @@ CHANNELS: Final = {
     "centre_forward": ("m", "mm"), "centre_outwards": ("m", "mm"), "contact_forward": ("m", "mm"),
     "contact_outwards": ("m", "mm"), "load": ("N", "N"), "damper": ("m", "mm"),
 }  # fmt: skip
-"""Channel -> its SI unit and its unit in a file; channels of a wheel begin with left_ or right_."""
+"""Channel -> its SI unit and its unit in a file. Channels of a wheel begin with left_ or right_."""
 OF_THE_AXLE: Final = ("rack", "force", "moment", "steering_wheel")
 """Channels of the axle, not of a wheel."""
 

@@ -137,7 +137,7 @@ class Dependence(NamedTuple):
 def strongest(
     factors: Mapping[str, Sequence[float] | NDArray[np.float64]], outcome: Sequence[bool] | NDArray[np.bool_]
 ) -> Dependence | None:
-    """Return the factor that an outcome depends on most; None if none is significant or there are too few samples."""
+    """Return the factor that an outcome depends on most, or None if none is significant or samples are too few."""
     happened = np.asarray(outcome, dtype=np.float64)
     if happened.size == 0:
         return None
@@ -227,7 +227,7 @@ def _others(factor: Factor, number: int, point: Point) -> Iterator[Point]:
 
 
 def _driven(plan: Plan, place: Place, point: Point) -> str | None:
-    """Return the metrics of a run with these values; None if it is incomplete."""
+    """Return the metrics of a run with these values, or None if it is incomplete."""
     study = replace(plan.settings.study, recordings="none", curves=(), claims=False)
     settings = replace(plan.settings, study=study, folder=None)
     # A table may hold a whole number of the study as a float.

@@ -53,7 +53,7 @@ class DaskCluster:
         return type(error).__name__ == "KilledWorker" or isinstance(error, CancelledError)
 
     def replace(self) -> None:
-        """Check that the scheduler still exists; the cluster replaces its workers itself."""
+        """Check that the scheduler still exists. The cluster replaces its workers itself."""
         try:
             self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except Exception as reason:
@@ -109,7 +109,7 @@ def connected(scheduler: str) -> Iterator[Any]:
 
 
 def _compare_versions(found: dict[str, Any]) -> None:
-    """Check that client, scheduler and workers have the same versions; ask the workers for that of activesteer."""
+    """Check that client, scheduler and workers have the same versions. Ask the workers for that of activesteer."""
     here = found["client"]
     others = {"the scheduler": found["scheduler"]} | {f"worker {key}": value for key, value in found["workers"].items()}
     for who, theirs in others.items():

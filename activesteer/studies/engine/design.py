@@ -20,7 +20,7 @@ from activesteer.studies.engine.factors import Factor, Value
 DESIGNS: Final = ("grid", "list", "sobol", "latin_hypercube", "random", "saltelli", "morris")
 """Kinds of design."""
 FOR_INDICES: Final = ("saltelli", "morris")
-"""Designs that SALib makes for its sensitivity indices; every factor must be sampled."""
+"""Designs that SALib makes for its sensitivity indices. Every factor must be sampled."""
 MORRIS_LEVELS: Final = 4
 MAX_SAMPLES: Final = 10_000_000
 """Largest number of combinations of a design."""
@@ -33,7 +33,7 @@ class DesignTable:
     kind: str = ""
     """One of `DESIGNS`. Default: `list` if there are cases, `grid` if every factor is a grid, else `sobol`."""
     samples: Annotated[int, Range(1, MAX_SAMPLES)] = 0
-    """Size of the sample; for `saltelli` the base sample (D + 2 runs each), for `morris` trajectories (D + 1 each)."""
+    """Size of the sample. For `saltelli` the base sample (D + 2 runs each), for `morris` trajectories (D + 1 each)."""
     paired: bool = True
     """Whether all controllers are driven with the same sample."""
     maneuvers: str = "all"
@@ -120,7 +120,7 @@ def cases(given: Iterable[Mapping[str, Any]]) -> Samples:
 
 
 def read_cases(path: Path) -> Samples:
-    """Read a list of cases from a CSV file. Its header holds the keys; an empty cell leaves a key unchanged."""
+    """Read a list of cases from a CSV file. Its header holds the keys. An empty cell leaves a key unchanged."""
 
     def fail(problem: str, line: int, key: str | None = None) -> StudyError:
         return StudyError(problem, file=path.name, line=line, key=key)

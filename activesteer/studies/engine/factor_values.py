@@ -16,7 +16,7 @@ from activesteer.studies.engine.study_file import StudyFile, label_of
 
 
 class FactorValues:
-    """Conversion of sample values to overrides; each pair of manoeuvre and vehicle is resolved once."""
+    """Conversion of sample values to overrides. Each pair of manoeuvre and vehicle is resolved once."""
 
     def __init__(self, study: StudyFile) -> None:
         """Prepare the conversion for a study."""
@@ -47,7 +47,7 @@ class FactorValues:
                     raise study.source.fail(place, f"is no other range; {nearest_names(other, ranges)}", other)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the overrides of a run for the keys that vary in its manoeuvre; None keeps the value of the files."""
+        """Return the overrides of a run for the keys that vary in its manoeuvre. None keeps the value of the files."""
         label = label_of(self.study.maneuvers[maneuver])
         found = {}
         # In the order of the file, in which a factor follows the one to which it is relative.
@@ -91,7 +91,7 @@ class FactorValues:
 
 _ORDINARY: Final = 0.6
 _UNUSUAL: Final = 0.8
-"""Largest root mean squares of the distances; settings drawn from uniform ranges around their nominal values have
+"""Largest root mean squares of the distances. Settings drawn from uniform ranges around their nominal values have
 1/sqrt(3) = 0.58."""
 
 

@@ -15,7 +15,7 @@ from activesteer.errors import nearest_names, shown
 from activesteer.limits import MAX_NUMBER
 
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
-"""Kinds of factors; a factor's table has exactly one of these keys."""
+"""Kinds of factors. A factor's table has exactly one of these keys."""
 _OPTIONS: Final = {"choice": ("weights",), "normal": ("truncate",)}
 _ANYWHERE: Final = ("nominal", "of", "grows_with", "maneuvers", "when")
 """Keys that every kind allows."""

@@ -30,11 +30,11 @@ from activesteer.studies.engine.tuning import Goal, Trial, Tuning
 from activesteer.units import parameter_label
 
 _SHOWN_ROWS: Final = 3000
-"""Most runs whose points the page holds; counts and means are over all runs."""
+"""Most runs whose points the page holds. Counts and means are over all runs."""
 _BINS: Final = 40
 _EXTREMES: Final = 5
 _MAX_INDICES: Final = 400
-"""Most sets of indices; each takes some hundredths of a second."""
+"""Most sets of indices. Each takes some hundredths of a second."""
 
 Places = NDArray[np.int64]
 Group = tuple[str, str]
@@ -240,7 +240,7 @@ def _extremes(values: FactorValues, table: pa.Table, rows: Places, part: Array) 
 
 
 def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
-    """Return the command line that drives and replays a run; empty if its manoeuvre or vehicle has no file."""
+    """Return the command line that drives and replays a run, or empty if its manoeuvre or vehicle has no file."""
     study = factor_values.study
     given = {}
     place = {}
@@ -267,7 +267,7 @@ _KEPT, _BROKEN, _GREY = "#5b9fd0", "#b3261e", "0.6"
 
 
 def draw_tuning(found: Tuning, folder: Path) -> list[Path]:
-    """Draw a search into the folder of its command, and return the files; none if no set could be judged."""
+    """Draw a search into the folder of its command, and return the files, or none if no set could be judged."""
     if not found.trials:
         return []
     if found.goal is Goal.VIOLATE:
@@ -340,7 +340,7 @@ def _label_tuning_figure(key: str, texts: Sequence[str]) -> str:
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:
-    """Return the magnitude of Spearman's rank correlation; 0 for a constant."""
+    """Return the magnitude of Spearman's rank correlation, or 0 for a constant."""
     if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0
     return abs(float(np.corrcoef(rankdata(x), rankdata(y))[0, 1]))

@@ -63,7 +63,7 @@ def _of_bytes(value: object) -> str:
 
 @functools.cache
 def source_digest() -> str:
-    """Return the hash of the sources that results depend on; the version number does not change with every edit."""
+    """Return the hash of the sources that results depend on. The version number does not change with every edit."""
     package = Path(activesteer.__file__).parent
     found = {}
     for part in _DECIDING:
@@ -190,7 +190,7 @@ def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[s
 
 
 def differences(settings: Settings) -> str:
-    """Return the differences from the start of the study in words; empty if there are none."""
+    """Return the differences from the start of the study in words, or empty if there are none."""
     try:
         here = present_inputs(settings)
     except ActiveSteerError as error:
@@ -210,7 +210,7 @@ def prepare(workers: Workers, settings: Settings) -> None:
 
 
 def prepare_worker(settings: Settings) -> str:
-    """Compile the native code; return in words why this machine cannot make the runs, or an empty text."""
+    """Compile the native code. Return in words why this machine cannot make the runs, or an empty text."""
     if problem := differences(settings):
         return problem
     install_native_forces()
@@ -256,7 +256,7 @@ _ERROR_CHARACTERS: Final = 500
 CLAIM: Final = "claim_"
 """Prefix of the columns that say whether a claim holds for the sample."""
 DISTANCE: Final = "distance_"
-"""Prefix of the columns that say how far a claim is from holding; see `Claim.distance`."""
+"""Prefix of the columns that say how far a claim is from holding (see `Claim.distance`)."""
 CURVE: Final = "curve_"
 """Prefix of the columns that hold a channel over time."""
 
@@ -266,7 +266,7 @@ class Status(StrEnum):
 
     OK = "ok"
     UNEVALUATED = "unevaluated"
-    """The run is complete but has no metrics; `error` says why."""
+    """The run is complete but has no metrics. `error` says why."""
     FAILED = "failed"
     """The run could not start, or ended early."""
     CRASHED = "crashed"
@@ -292,7 +292,7 @@ def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.
 
 
 def _give_memory_back() -> None:
-    """Return free memory to the system; glibc would keep it in pieces, and a worker would use more and more."""
+    """Return free memory to the system. The C library would keep it in pieces, and a worker would use more and more."""
     with contextlib.suppress(OSError, AttributeError, TypeError):  # other C libraries have no such function
         ctypes.CDLL(None).malloc_trim(0)
 
@@ -341,7 +341,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
 
 
 def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, controller: str) -> Recording | None:
-    """Make one run and fill its row; return the recording of a complete run."""
+    """Make one run and fill its row. Return the recording of a complete run."""
     path = _recording_path(settings, request)
     every = settings.study.recordings
     keeps = every == "all" or (isinstance(every, int) and request.sample % every == 0)
@@ -380,7 +380,7 @@ def _is_kept(patterns: tuple[str, ...], name: str) -> bool:
 
 
 def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, float]:
-    """Return the verdicts (1 if a claim of the paper holds, else 0) and distances; empty if a run is missing."""
+    """Return the verdicts (1 if a claim of the paper holds, else 0) and distances, or empty if a run is missing."""
     try:
         claims = SCENARIOS[maneuver](recordings)
     except (KeyError, ActiveSteerError):

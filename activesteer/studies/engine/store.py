@@ -28,9 +28,9 @@ from activesteer.studies.engine.runs import CURVE, Row, versions
 from activesteer.units import unit_of
 
 IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")
-"""Columns that identify the run of a row; the factors follow them."""
+"""Columns that identify the run of a row. The factors follow them."""
 OUTCOME: Final = ("status", "error")
-"""Columns behind the factors; the metrics follow them."""
+"""Columns behind the factors. The metrics follow them."""
 _TYPES: Final = {"run": pa.int64(), "sample": pa.int64()} | dict.fromkeys(
     ("run_id", "maneuver", "vehicle", "controller", "status", "error"), pa.string()
 )
@@ -55,7 +55,7 @@ def table_of(rows: Sequence[Row], factors: Sequence[str]) -> pa.Table:
 
 
 def joined_schema(schemas: Iterable[pa.Schema]) -> pa.Schema:
-    """Return the columns of all parts; a factor with whole numbers in some parts only becomes a float."""
+    """Return the columns of all parts. A factor with whole numbers in some parts only becomes a float."""
     fields: dict[str, pa.Field] = {}
     for schema in schemas:
         for field in schema:
@@ -65,7 +65,7 @@ def joined_schema(schemas: Iterable[pa.Schema]) -> pa.Schema:
 
 
 def _factor_column(values: Sequence[Any]) -> pa.Array:
-    """Return a column of numbers, texts or truth values; anything else is written as JSON."""
+    """Return a column of numbers, texts or truth values. Anything else is written as JSON."""
     try:
         numbers = any(isinstance(value, float) for value in values)
         plain = [float(value) if numbers and value is not None else value for value in values]
@@ -86,7 +86,7 @@ def _common(a: pa.DataType, b: pa.DataType) -> pa.DataType:
 
 
 def fitted(table: pa.Table, schema: pa.Schema) -> pa.Table:
-    """Return the table with the columns of the schema; missing columns are empty."""
+    """Return the table with the columns of the schema. Missing columns are empty."""
     present = set(table.column_names)
     columns = [
         table[field.name].cast(field.type) if field.name in present else pa.nulls(len(table), field.type)
@@ -151,7 +151,7 @@ class Store:
     """A study's folder, held by one process at a time."""
 
     def __init__(self, folder: Path, factors: Sequence[str]) -> None:
-        """Prepare the store; `opened` opens it."""
+        """Prepare the store. `opened` opens it."""
         self.folder = folder
         self._factors = tuple(factors)
         self._parts = folder / "parts"
@@ -232,7 +232,7 @@ class Store:
             write_text(self.folder / _WITHOUT_EFFECT, json.dumps(factors) + "\n", StudyError)
 
     def without_effect(self) -> list[str]:
-        """Return the stored factors of `note_without_effect`; none if the file is damaged."""
+        """Return the stored factors of `note_without_effect`, or none if the file is damaged."""
         with contextlib.suppress(OSError, ValueError):
             found = json.loads((self.folder / _WITHOUT_EFFECT).read_text(encoding="utf-8"))
             return [str(key)[:_KEY_CHARACTERS] for key in found] if isinstance(found, list) else []
@@ -303,7 +303,7 @@ def _refusing(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Lock the folder of this file while it is in use; on a file system without locks, do nothing."""
+    """Lock the folder of this file while it is in use. On a file system without locks, do nothing."""
     with writing(path, StudyError):
         file = path.open("w")
     with file:

@@ -30,7 +30,7 @@ _MOST: Final = 1e6
 _ROOM: Final = 0.1
 """Margin above which a statement that holds costs nothing."""
 _IMPLAUSIBLE: Final = 0.3
-"""Cost of a setting at the ends of its ranges; a statement that fails costs 1 to 2."""
+"""Cost of a setting at the ends of its ranges. A statement that fails costs 1 to 2."""
 
 
 class Goal(StrEnum):
@@ -46,11 +46,11 @@ class TuneTable:
     """The table [tune] of a study file."""
 
     minimise: dict[str, str] = field(default_factory=dict)
-    """Name -> expression that shall be small; for several, the Pareto front is found."""
+    """Name -> expression that shall be small. For several, the Pareto front is found."""
     satisfy: dict[str, str] = field(default_factory=dict)
-    """Name -> requirement; as many as possible shall hold."""
+    """Name -> requirement. As many as possible shall hold."""
     violate: str = ""
-    """Requirement whose worst case is searched; `controller` stands for the examined controller."""
+    """Requirement whose worst case is searched. `controller` stands for the examined controller."""
     constraints: dict[str, str] = field(default_factory=dict)
     """Name -> requirement that the best set must keep."""
     seeds: tuple[dict[str, Any], ...] = ()
@@ -134,7 +134,7 @@ class Judge:
     """
 
     def __init__(self, plan: Plan, table: TuneTable, examined: str = "") -> None:
-        """Read the expressions of a table; `controller` stands for the examined controller."""
+        """Read the expressions of a table. `controller` stands for the examined controller."""
         study, shared, self._examined = plan.study, plan.settings, examined
         controllers, maneuvers = ([label for label, _ in items] for items in (shared.controllers, shared.maneuvers))
         claims = {claim: (f"{DISTANCE}{claim}", name) for claim, name in SCENARIO_OF.items() if name in maneuvers}
@@ -155,7 +155,7 @@ class Judge:
         self.prior = Prior(study) if table.satisfy else None
 
     def judged(self, rows: Sequence[Row], values: Mapping[str, Any]) -> Judgement | None:
-        """Judge a set by the rows of its runs; None if it cannot be judged."""
+        """Judge a set by the rows of its runs, or None if it cannot be judged."""
         whole = [row["status"] == Status.OK for row in rows]
         if not any(whole) or (self.objectives and not all(whole)):
             return None
@@ -177,7 +177,7 @@ class Judge:
         return Judgement(objectives, margins, constraints) if all(map(math.isfinite, objectives)) else None
 
     def _runs(self, rows: Sequence[Row]) -> list[Runs]:
-        """Return the metrics of the runs for each vehicle; those of a failed run are not defined."""
+        """Return the metrics of the runs for each vehicle. Those of a failed run are not defined."""
         names: dict[str, dict[str, None]] = {}
         for row in rows:
             own = names.setdefault(row["maneuver"], {})

@@ -37,7 +37,7 @@ class Workers(Protocol):
     in_flight: int
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Start a task; the function and its arguments must be picklable."""
+        """Start a task. The function and its arguments must be picklable."""
         ...
 
     def died(self, error: BaseException) -> bool:
@@ -49,7 +49,7 @@ class Workers(Protocol):
         ...
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """Call a function once on every machine before its workers start; return the first objection."""
+        """Call a function once on every machine before its workers start. Return the first objection."""
         ...
 
     def close(self, *, abandon: bool) -> None:
@@ -123,7 +123,7 @@ class LocalProcesses:
         self._pool = self._new_pool()
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """See `Workers`; the function is called here, on this machine."""
+        """See `Workers`. The function is called here, on this machine."""
         return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:
@@ -164,7 +164,7 @@ def _end_with(sentinel: int) -> None:
 
 @contextlib.contextmanager
 def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str | None = None) -> Iterator[Workers]:
-    """Yield this machine's processes, by default one per processor, or a Dask cluster; abandon tasks if the body fails.
+    """Yield this machine's processes, by default one per processor, or a Dask cluster. Abandon tasks if the body fails.
 
     With one job, this process does the work. The scheduler is given by its address or its file.
     """
@@ -196,7 +196,7 @@ def _processors() -> int:
 
 
 _ATTEMPTS: Final = 3
-"""Number of attempts before a task counts as the one that kills its worker; the last attempt runs alone."""
+"""Number of attempts before a task counts as the one that kills its worker. The last attempt runs alone."""
 _engine: Final = threading.RLock()
 """MuJoCo's callbacks belong to the process, so one thread of a worker does one task at a time."""
 

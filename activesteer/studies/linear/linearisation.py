@@ -56,7 +56,7 @@ _DIFFERENCE: Final = 1e-6
 _TORQUE_DIFFERENCE_Nm: Final = 1.0
 _TRIM_ITERATIONS: Final = 10
 _TRIM_TOLERANCE: Final = 1e-11
-"""Largest change of a steady state over a step [m, rad, m/s, rad/s]; rounding leaves 1e-14."""
+"""Largest change of a steady state over a step [m, rad, m/s, rad/s]. Rounding leaves 1e-14."""
 _SOLVER_TOLERANCE: Final = 1e-14
 """Tolerance of MuJoCo's own solver, if a car needs it: an error of 1e-8 would be divided by the small difference."""
 
@@ -140,7 +140,7 @@ MIN_SPEED_MPS: Final = 3.0
 
 _SETTLE_S: Final = 1.0
 _NO_INFLUENCE: Final = 1e-8
-"""Smallest fraction of a mode in any gain of the car for which the state space contains it; symmetric modes have 1e-12,
+"""Smallest fraction of a mode in any gain of the car for which the state space contains it. Symmetric modes have 1e-12,
 the least of the lateral ones 1e-4."""
 
 
@@ -281,7 +281,7 @@ def linearise(
 def linear_car(
     vehicle: FileOrTable = "compact", speed_mps: float = 80.0 / 3.6, overrides: Mapping[str, Any] | None = None
 ) -> LinearCar:
-    """Return the car before reduction, with all modes; see `linearise`."""
+    """Return the car before reduction, with all modes (see `linearise`)."""
     return linear_cars(vehicle, [speed_mps], overrides)[0]
 
 
@@ -291,7 +291,7 @@ def linear_cars(
     overrides: Mapping[str, Any] | None = None,
     controllers: Sequence[Any] = (),
 ) -> list[LinearCar]:
-    """Return the car linearised at several speeds; see `linearise`. Overrides may set parameters of controllers."""
+    """Return the car linearised at several speeds. See `linearise`. Overrides may set parameters of controllers."""
     return [_linearised(vehicle, float(speed), overrides, controllers) for speed in speeds_mps]
 
 

@@ -48,7 +48,7 @@ from activesteer.controllers.linear_form import (
 )
 from activesteer.conventions import GRAVITY_MPS2, Array
 from activesteer.pages import Page, Section, Table, write_page
-from activesteer.plotting import Area, Curve, Panel, Picture, as_svg, draw
+from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
 from activesteer.signals import Measurement
@@ -77,7 +77,7 @@ Response = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop; nan if a margin does not exist, such as the gain margin of a loop above -180 deg.
+    """Margins of one loop, or nan if a margin does not exist, such as the gain margin of a loop above -180 deg.
 
     Attributes:
         gain_dB: Smallest factor on the gain, up or down, that makes the loop marginal [dB].
@@ -112,7 +112,7 @@ def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) ->
 
 
 def weakest(margins: Sequence[Margins]) -> Margins:
-    """Return the smallest of each margin; if one loop is unstable, there are none."""
+    """Return the smallest of each margin. If one loop is unstable, there are none."""
     if unstable := [each for each in margins if each.disk == 0.0]:
         return unstable[0]
     return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
@@ -125,7 +125,7 @@ def _least(values: Array) -> float:
 def round_trip(
     car: LinearCar, answer: Callable[[Array], Response], scenario: Scenario, unit_s: float, frequencies_radps: Array
 ) -> Response:
-    """Return the return ratio M of the demands; the closed loop is u = M u."""
+    """Return the return ratio M of the demands. The closed loop is u = M u."""
     h, config = car.timestep_s, scenario.car.config
     back = np.exp(-1j * frequencies_radps * h)  # one step
     states = np.linalg.solve(
@@ -155,7 +155,7 @@ def _calls(sensor: Sensor, unit_s: float) -> int:
 
 
 def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Response:
-    """Return the frequency response of a sensor: bandwidth, samples, delay; see `sensors.signal_chain`."""
+    """Return the frequency response of a sensor: bandwidth, samples, delay (see `sensors.signal_chain`)."""
     share = -math.expm1(-2.0 * math.pi * sensor.bandwidth_Hz * step_s) if sensor.bandwidth_Hz else 1.0
     samples = _held(_calls(sensor, every * step_s), back**every)
     return share / (1.0 - (1.0 - share) * back) * samples * back ** round((sensor.delay_s or 0.0) / step_s)
@@ -227,7 +227,7 @@ def loop_margins(
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
 ) -> list[LoopMargins]:
-    """Return the margins of every loop of every controller at every speed; an unused actuator has none.
+    """Return the margins of every loop of every controller at every speed. An unused actuator has none.
 
     If a controller uses both actuators, the margins of both together come last.
     """
@@ -367,7 +367,7 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
         sorted(found, key=lambda each: (each.controller, each.loop)), lambda each: (each.controller, each.loop)
     ):
         loops = list(rows)
-        pictures = [as_svg(draw(_picture(loops)))] if loops[0].curves else []
+        pictures = [_picture(loops)] if loops[0].curves else []
         sections.append(Section(f"{controller}, opened at {loop}", pictures=pictures, tables=[_table(loops)]))
     title = f"Stability margins: {vehicle}"
     lead = [_LEAD] if any(each.curves for each in found) else []

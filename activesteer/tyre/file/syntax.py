@@ -24,7 +24,7 @@ from activesteer import limits
 from activesteer.errors import TyreFileError
 from activesteer.files import read_bytes
 
-"""Size of the largest file that is read; real ones have some tens of kilobytes."""
+"""Size of the largest file that is read. Real ones have some tens of kilobytes."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d{1,4})?\Z")
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*\Z")

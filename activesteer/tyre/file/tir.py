@@ -66,7 +66,7 @@ def load_tir(path: str | Path, mounted: Side | None = None, *, slip_tangent: boo
 def tir_from_text(
     text: str, source: Path, mounted: Side | None = None, *, slip_tangent: bool = False
 ) -> TyreParameters:
-    """Read a tyre property file from memory; see `load_tir`. The source is the name in messages."""
+    """Read a tyre property file from memory. See `load_tir`. The source is the name in messages."""
     syntax = parse(text, str(source))
     units = _units(syntax.entries, source)
     lines: dict[str, Entry] = {}
@@ -101,7 +101,7 @@ def tir_from_text(
 
 
 def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> None:
-    """Keep one entry per coefficient, preferably from its own section; two different values are an error."""
+    """Keep one entry per coefficient, preferably from its own section. Two different values are an error."""
     before = lines.get(name)
     if before is None or before.value == entry.value:
         lines[name] = entry
@@ -143,7 +143,7 @@ def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
 
 
 def _side(words: Mapping[str, str], source: Path) -> Side:
-    """Return the side of the vehicle that the file is for; a symmetric tyre counts as a left one."""
+    """Return the side of the vehicle that the file is for. A symmetric tyre counts as a left one."""
     side = words.get("TYRESIDE", "LEFT").upper()
     if side == "RIGHT":
         return "RIGHT"
@@ -194,5 +194,5 @@ def tir_text(parameters: TyreParameters, comment: str = "") -> str:
 
 
 def write_tir(parameters: TyreParameters, path: str | Path, comment: str = "") -> None:
-    """Write a tyre to a .tir file, Latin-1; see `tir_text`."""
+    """Write a tyre to a .tir file, Latin-1 (see `tir_text`)."""
     Path(path).write_text(tir_text(parameters, comment), encoding="latin-1")

@@ -47,7 +47,7 @@ _SLIDING_TO_LINEAR: Final = 3.0
 _SLIDING_TWIST_RAD: Final = 0.12
 """Twist at which the whole patch slides about its middle [rad]: parking torques level off after some 5 to 8 degrees."""
 _NO_TURN_SLIP_1PM: Final = 1e-12
-"""Stands for no turn slip in the formula with turn slip; zero would select the formula without it."""
+"""Stands for no turn slip in the formula with turn slip. Zero would select the formula without it."""
 _SMALLEST_SLIP_LIMIT: Final = 0.01
 """Smallest slip limit of a deflection, whatever the range of a tyre file."""
 _MAX_LOAD_STEPS: Final = 8
@@ -196,7 +196,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
 
 @compiled
 def _load(p, deflection, spin, pressure_Pa, damping_N, fx, fy, gamma):
-    """Return the load [N] under horizontal forces; the damper adds or removes at most the force of the spring."""
+    """Return the load [N] under horizontal forces. The damper adds or removes at most the force of the spring."""
     elastic = vertical_force_loaded(p, deflection, spin, pressure_Pa, fx, fy, gamma)
     elastic += bottoming_force(p, deflection, spin)
     # The load is continuous when the tyre touches down or lifts off, and the road never pulls.

@@ -25,7 +25,7 @@ from activesteer.compilation import compiled
 from activesteer.tyre.kernels.vertical import effective_rolling_radius
 
 EPSILON = 1e-6
-"""Guard of the denominators; it takes the sign of its neighbour, so that the two never cancel."""
+"""Guard of the denominators. It takes the sign of its neighbour, so that the two never cancel."""
 
 MF52 = 52.0
 
@@ -150,7 +150,7 @@ def lateral_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) 
 def slip_induced_side_force(
     p, dfz: float, kappa: float, alpha_s: float, gamma_s: float, mu_fz: float, z2: float
 ) -> float:
-    """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67); mu_fz is mu_y F_z [N]."""
+    """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67). Mu_fz is mu_y F_z [N]."""
     d = mu_fz * (p.RVY1 + p.RVY2 * dfz + p.RVY3 * gamma_s) * math.cos(math.atan(p.RVY4 * alpha_s)) * z2
     return d * math.sin(p.RVY5 * math.atan(p.RVY6 * kappa)) * p.LVYKA
 
@@ -250,7 +250,7 @@ def turn_slip_factors(
 
 
 MIN_RELAXATION_LENGTH_M: Final = 0.02
-"""About the length of a tread block; it keeps the slip defined when the load vanishes."""
+"""About the length of a tread block. It keeps the slip defined when the load vanishes."""
 
 
 @compiled

@@ -13,7 +13,7 @@ from activesteer.compilation import compiled
 
 MF62 = 62.0
 _SOFTEST = 0.1
-"""Smallest factor of the vertical stiffness due to horizontal forces; real tyres stay above 0.8."""
+"""Smallest factor of the vertical stiffness due to horizontal forces. Real tyres stay above 0.8."""
 
 
 @compiled

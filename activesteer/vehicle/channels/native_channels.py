@@ -33,13 +33,13 @@ class RawRows(NamedTuple):
     commands: Array
     """Commands of driver and controller, as `write_commands` leaves them."""
     measured: Array
-    """Measurement on which driver and controller based their commands; empty with ideal sensors."""
+    """Measurement on which driver and controller based their commands, or empty with ideal sensors."""
     brakes: Array
     """A `BRAKE_STATE`."""
     electric: Array
-    """State of an `ElectricDrive`; empty without motors."""
+    """State of an `ElectricDrive`, or empty without motors."""
     estimate: Array
-    """Fields of an `Estimate`; empty without an estimator."""
+    """Fields of an `Estimate`, or empty without an estimator."""
 
 
 ENGINE_ARRAYS: Final = RawRows._fields[: RawRows._fields.index("commands")]
@@ -116,7 +116,7 @@ class Signal(NamedTuple):
 
 
 def signal(group: str, name: str, unit: str, meaning: str, values: Values) -> Signal:
-    """Return a signal of a channel that is stored with 32 bits; see `Channel`."""
+    """Return a signal of a channel that is stored with 32 bits (see `Channel`)."""
     return Signal(Channel(name, unit, meaning, group), values)
 
 
@@ -167,7 +167,7 @@ def _copy_columns(rows, start, count, copies, out, largest):
 
 @inlined
 def axial_force(length, velocity, low, high, first, second, third, damping):
-    """Return the force of a tendon; see `AxialForce`."""
+    """Return the force of a tendon (see `AxialForce`)."""
     x = length - (low if length < low else high if length > high else length)
     spring = x * (first + x * (second + x * third))
     return spring + damping * velocity if damping != 0.0 else spring
@@ -175,7 +175,7 @@ def axial_force(length, velocity, low, high, first, second, third, damping):
 
 @inlined
 def is_limited(law, command, activation, force):
-    """Return 1 for an actuator at a limit of angle, rate or force, else 0; see `Actuator`."""
+    """Return 1 for an actuator at a limit of angle, rate or force, else 0 (see `Actuator`)."""
     target = min(max(command, law.low_rad), law.high_rad)
     rate = (target - activation) / law.lag_s
     beyond = command < law.low_rad or command > law.high_rad or abs(rate) >= law.rate_radps

@@ -127,7 +127,7 @@ def axial_force(model: mujoco.MjModel, tendon: int) -> AxialForce:
 
 
 def _force(model: mujoco.MjModel, tendon: int) -> Values:
-    """Return the axial force of a tendon; a screw in the link adds the force of its actuator."""
+    """Return the axial force of a tendon. A screw in the link adds the force of its actuator."""
     law = axial_force(model, tendon)
     along = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
     screws = np.flatnonzero(along & (model.actuator_trnid[:, 0] == tendon) & (model.actuator_gainprm[:, 0] > 0.0))
@@ -182,7 +182,7 @@ def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
 
 
 def _column_torque(model: mujoco.MjModel, felt: float) -> AxialForce | None:
-    """Return a fraction of the torque in the steering column [N m]; None without a column.
+    """Return a fraction of the torque in the steering column [N m], or None without a column.
 
     The force of the hands' actuator is not this torque. The engine evaluates that force from the demand of this step
     and the angle at its start, but applies the force at the end of the step.

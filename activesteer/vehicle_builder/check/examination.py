@@ -1,4 +1,4 @@
-"""The whole check, in the order of its stages; a stage that fails gives its reason."""
+"""The whole check, in the order of its stages. A stage that fails gives its reason."""
 
 from __future__ import annotations
 

@@ -84,25 +84,25 @@ class CheckReport:
 
 @dataclass(frozen=True)
 class Usual:
-    """Usual and possible range of a value; keys of a table in usual.toml, which has the sources."""
+    """Usual and possible range of a value. Keys of a table in usual.toml, which has the sources."""
 
     topic: str
     words: str
     """Name in the report."""
     usual: tuple[float, ...]
-    """Lowest and highest usual value; a value outside is a warning."""
+    """Lowest and highest usual value. A value outside is a warning."""
     advice: str
     """Advice for a value outside."""
     unit: str = ""
-    """Unit; empty for a pure number or a metric of the rig, which has its own."""
+    """Unit, or empty for a pure number or a metric of the rig, which has its own."""
     possible: tuple[float, ...] = (-math.inf, math.inf)
-    """Lowest and highest possible value; a value outside is an error."""
+    """Lowest and highest possible value. A value outside is an error."""
     axle: str = ""
     name: str = ""
     """Axle and name of a metric of the rig."""
 
     def judged(self, value: float, unit: str = "", **words: str) -> Finding:
-        """Return the finding about a value; nan counts as a warning."""
+        """Return the finding about a value. Nan counts as a warning."""
         unit = (self.unit or unit).removesuffix("-")
         level: Level = "warning"
         if not math.isnan(value):
@@ -128,5 +128,5 @@ def usual_values() -> _File:
 
 
 def judged(quantity: str, value: float, **words: str) -> Finding:
-    """Return the finding about a quantity of usual.toml; see `Usual.judged`."""
+    """Return the finding about a quantity of usual.toml (see `Usual.judged`)."""
     return usual_values().quantity[quantity].judged(value, **words)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from activesteer.pages import Page, Section, Table, Text, failed, passed
-from activesteer.plotting import as_svg, draw
 from tests.reference.chrono.comparison import Comparison
 from tests.reference.chrono.figures import cross_picture, run_picture, sweep_picture, uneven_picture
 from tests.reference.chrono.programme import Validation
@@ -58,14 +57,14 @@ def _runs(result: Validation) -> list[Section]:
     sections = []
     for run, rows in by_run.items():
         if run not in result.runs:
-            pictures = [as_svg(draw(sweep_picture(sweeps[run])))] if run in sweeps else []
+            pictures = [sweep_picture(sweeps[run])] if run in sweeps else []
             sections.append(Section(run, pictures=pictures, tables=[comparison_table(rows)]))
     for run, ours in result.runs.items():
         reference = result.references.get(run)
         if reference is not None and "ay" not in reference:
-            pictures = [as_svg(draw(uneven_picture(run, ours, reference)))]
+            pictures = [uneven_picture(run, ours, reference)]
         else:
-            pictures = [as_svg(draw(picture(run, ours, reference))) for picture in (run_picture, cross_picture)]
+            pictures = [picture(run, ours, reference) for picture in (run_picture, cross_picture)]
         texts = (
             ["The reference of this run is not known here; the page shows our run alone."] if reference is None else []
         )

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.figures import (
+    BY_KIND,
     BY_SCENARIO,
     draw_all,
     figure_11,
     figure_for,
+    over_time,
     style,
     theory,
-    time_histories,
     tracks,
 )
 from activesteer.conventions import run_looks
@@ -40,6 +41,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse, Polygon, Rectangle
 from matplotlib.text import Text
 
+FIGURE_13 = BY_SCENARIO["sine_with_dwell"]["figure_13_sine_with_dwell"]
+LATERAL_RESPONSE = BY_SCENARIO["slalom"]["figure_21_slalom_response"]
 CONES = tuple((x, y) for _, start, end, right, left in LANES for x in (start, end) for y in (right, left))
 
 
@@ -106,9 +109,9 @@ def test_cars_stand_on_their_tracks_in_their_size_and_cones_they_hit_are_crossed
     assert np.asarray(struck.get_xydata()).tolist() == [[45.0, 0.5]]
 
 
-@pytest.mark.parametrize("draw", [time_histories.figure_13, time_histories.lateral_response, tracks.track_figure])
+@pytest.mark.parametrize("draw", [FIGURE_13, LATERAL_RESPONSE, tracks.track_figure])
 def test_curves_are_told_apart_in_grey_by_their_dashes(draw):
-    runs = sines() if draw is time_histories.figure_13 else lane_changes()
+    runs = sines() if draw is FIGURE_13 else lane_changes()
     axis = draw(runs).get_axes()[0]
     styles = {line.get_label(): str(line._unscaled_dash_pattern) for line in axis.get_lines()}
     assert len({styles[look.label] for look in run_looks(runs).values()}) == 3
@@ -118,7 +121,7 @@ def test_curves_are_told_apart_in_grey_by_their_dashes(draw):
     "draw",
     [
         lambda: figure_11({"none": step_steer(), "ars": step_steer(rear_rad=-0.01)}),
-        lambda: time_histories.sine_with_dwell_figure(sines()),
+        lambda: BY_KIND["sine_with_dwell"](sines()),
         lambda: tracks.overview(lane_changes()),
         lambda: tracks.course_figure(lane_changes()),
         lambda: theory.figure_7(step_steer()),
@@ -162,7 +165,7 @@ def test_a_step_fills_the_frame_with_its_transient():
 
 def test_a_car_that_spins_is_shown_whole_in_an_inset_and_does_not_set_the_scale():
     runs = sines() | {"none": sine_with_dwell(sideslip_rad=math.radians(60.0))}
-    (sideslip,) = [axis for axis in time_histories.figure_13(runs).get_axes() if "sideslip" in axis.get_ylabel()]
+    (sideslip,) = [axis for axis in FIGURE_13(runs).get_axes() if "sideslip" in axis.get_ylabel()]
     low, high = sideslip.get_ylim()
     assert math.degrees(0.05) < high - low < 25.0
     (inset,) = sideslip.child_axes
@@ -170,11 +173,11 @@ def test_a_car_that_spins_is_shown_whole_in_an_inset_and_does_not_set_the_scale(
         60.0, rel=0.01
     )
     others = {"ars": runs["ars"], "afs": runs["afs"]}
-    assert all(not axis.child_axes for axis in time_histories.figure_13(others).get_axes())
+    assert all(not axis.child_axes for axis in FIGURE_13(others).get_axes())
 
 
 def test_panels_over_time_are_in_degrees_with_units_at_the_axes():
-    figure = time_histories.steering_and_yaw_rate(lane_changes(yaw_rate=0.2))
+    figure = BY_SCENARIO["slalom"]["figure_20_slalom_steering"](lane_changes(yaw_rate=0.2))
     steering, yaw_rate = figure.get_axes()
     assert "[deg]" in steering.get_ylabel()
     assert "[deg/s]" in yaw_rate.get_ylabel()
@@ -184,13 +187,13 @@ def test_panels_over_time_are_in_degrees_with_units_at_the_axes():
 
 
 def test_added_angles_are_drawn_of_systems_that_add_any_and_not_at_all_where_none_does():
-    assert len(time_histories.figure_13(sines()).get_axes()) == 4
-    alone = time_histories.figure_13({"none": sine_with_dwell()})
+    assert len(FIGURE_13(sines()).get_axes()) == 4
+    alone = FIGURE_13({"none": sine_with_dwell()})
     assert [axis.get_ylabel() for axis in alone.get_axes() if "added" in axis.get_ylabel()] == []
 
 
 def test_the_instants_of_the_standard_are_marked_from_the_completion_of_steer():
-    axis = time_histories.figure_13(sines()).get_axes()[0]
+    axis = FIGURE_13(sines()).get_axes()[0]
     lines = [np.asarray(line.get_xdata(), dtype=float) for line in axis.get_lines()]
     marks = sorted(float(x[0]) for x in lines if x.size == 2)
     assert marks == pytest.approx([COMPLETION_S, COMPLETION_S + 1.0, COMPLETION_S + 1.75], abs=0.02)
@@ -198,7 +201,7 @@ def test_the_instants_of_the_standard_are_marked_from_the_completion_of_steer():
 
 def test_curves_of_long_runs_are_thinned():
     run = along_path(duration_s=30.0)
-    figure = time_histories.figure_24({"none": run})
+    figure = BY_SCENARIO["double_lane_change_low_mu"]["figure_24_slippery_sideslip"]({"none": run})
     assert 2000 < np.size(figure.get_axes()[0].get_lines()[0].get_xdata()) <= 5000
 
 
@@ -279,7 +282,7 @@ def both_angles():
     return run
 
 
-@pytest.mark.parametrize("draw", [figure_11, time_histories.general])
+@pytest.mark.parametrize("draw", [figure_11, over_time.time_figure])
 def test_angles_added_at_both_axles_are_two_kinds_of_line(draw):
     run = both_angles()
     figure = draw({"lqr": run})
@@ -300,7 +303,7 @@ def test_phases_have_borders_and_names():
     for run, later_s in zip(runs.values(), (1.4, 1.6), strict=True):
         phases = (("straight", 0.0), ("turn", 1.0), ("brake", later_s))
         run.metadata["events"] = [{"time_s": at, "kind": "phase", "what": name} for name, at in phases]
-    figure = time_histories.general(runs)
+    figure = over_time.time_figure(runs)
     for axis in figure.get_axes():
         upright = [line for line in axis.get_lines() if np.ptp(np.asarray(line.get_xdata())) == 0.0]
         # The border that both runs share is one line, the other border has the colour of each run.
@@ -314,7 +317,7 @@ def test_another_friction_on_the_way_is_shaded_and_named():
     run = step_steer()
     for corner in ("fl", "fr", "rl", "rr"):
         run.channels[f"{corner}_mu"] = np.where((run.time_s > 1.0) & (run.time_s < 1.5), 0.3, 0.9)
-    figure = time_histories.general({"none": run})
+    figure = over_time.time_figure({"none": run})
     for axis in figure.get_axes():
         (shade,) = axis.patches
         box = shade.get_extents().transformed(axis.transData.inverted())

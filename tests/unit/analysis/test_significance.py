@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from activesteer.analysis.report.results import KEY_FIGURES
-from activesteer.analysis.report.significance import Change, significance
+from activesteer.analysis.report.tables import KEY_FIGURES, Change, significance
 from activesteer.metric_table import METRICS
 from tools.comparison import SHOWN
 

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from activesteer.drawing.panels import MOTION, panels_in
 from activesteer.drawing.wheel_angles import SLICES, factors, tips_beside
 from activesteer.errors import PlaybackError
 from activesteer.playback import runs_of, save
+from activesteer.playback.car import use_colours
 from activesteer.playback.course import extent, map_bounds
-from activesteer.playback.plots import MOTION, axis_range, views
-from activesteer.playback.tyres import use_colours
+from activesteer.playback.plots import axis_range, views
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
 from activesteer.signals import Channel
@@ -148,7 +149,7 @@ def test_what_sensors_say_stands_in_the_plot_of_the_truth(tmp_path: Path) -> Non
     path = "/ars/plots/measured_yaw_rate_radps"
     assert path not in saved(tmp_path, {"ars": ideal}).entities
     assert saved(tmp_path, {"ars": real}).numbers(path, "Scalars:scalars") == pytest.approx(math.degrees(0.3))
-    yaw_rate = next(plot for plot in MOTION if plot.title.startswith("Yaw rate"))
+    yaw_rate = next(plot for plot in panels_in(MOTION) if plot.title.startswith("Yaw rate"))
     (view,) = views([yaw_rate], list(runs_of({"ars": real})))
     assert path in str(view.contents)
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from activesteer.conventions import yaw_of
-from activesteer.playback.geometry import about_vertical, between, rotated, xyzw
+from activesteer.playback.car import about_vertical, between, rotated, xyzw
 
 
 def test_rotated_against_scipy(rng: np.random.Generator) -> None:

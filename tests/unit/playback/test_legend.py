@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from activesteer.playback import runs_of
-from activesteer.playback.legend import _LETTER, _ROW, _WIDTH, _places, height
+from activesteer.playback.layout import _LETTER, _ROW, _WIDTH, _places, height
 from activesteer.playback.plots import curves, pages
 from tests.unit.playback.synthetic import circle
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from activesteer.playback import runs_of
-from activesteer.playback.summary import summary
+from activesteer.playback.viewer import summary
 from tests.unit.playback.synthetic import circle
 
 

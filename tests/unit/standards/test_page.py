@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import datetime
-
-import pytest
+import re
 
 from activesteer.pages import Table, render_page
 from activesteer.plotting import Curve, Panel, Picture
@@ -23,24 +22,22 @@ def examination(word: str, **values: bool) -> Examination:
 
 
 def test_page_shows_all_and_fetches_nothing():
-    pytest.importorskip("matplotlib")
     text = render_page(examination_page(examination("plain", **{"pass": False})))
-    assert text.count("<svg") == 2
+    assert len(re.findall(r"data-picture=\"\d", text)) == 2
     assert ">\N{BALLOT X} fail<" in text
     assert 'class="outside"' in text
     assert "0001-01-01" in text
 
 
 def test_names_stay_text():
-    pytest.importorskip("matplotlib")
     text = render_page(examination_page(examination(EVIL)))
-    assert "<script" not in text
+    assert text.count("<script") == 3
+    assert "<script>alert" not in text
     assert "<img" not in text
     assert "{{ version }}" in text
 
 
 def test_a_method_without_limits_never_says_pass():
-    pytest.importorskip("matplotlib")
     text = render_page(examination_page(examination("plain")))
     assert ">pass<" not in text
     assert ">fail<" not in text

@@ -9,8 +9,7 @@ from activesteer.recording import Poses, Recording
 from activesteer.road.course import Footprint
 from activesteer.signals import Channel
 from activesteer.video.road import edges_beside
-from activesteer.video.traces import Traces
-from activesteer.video.track import Track
+from activesteer.video.track import Traces, Track
 
 SPEED_MPS = 20.0
 CHANNELS = ("slip_angle_rad", "slip_ratio", "tyre_fz_N", "contact_x_m", "contact_y_m")
@@ -70,5 +69,5 @@ def test_edges_hold_all_cars_and_a_circle_has_none():
     assert edges.half_width_m > 8.0
     assert edges.start_m < 0.0
     assert edges.end_m > 100.0
-    assert [label.text for label in edges.labels()] == ["-50 m", "0 m", "50 m", "100 m", "150 m"]
+    assert edges.posts_m().tolist() == [-50.0, 0.0, 50.0, 100.0, 150.0]
     assert edges_beside([np.column_stack([np.zeros(2), (0.0, 60.0)])]) is None

@@ -403,6 +403,7 @@ static void rebase(as_car *c) {
 
 /* Build the car with the changed parameters and let it settle at its speed, straight ahead. */
 int as_settle(as_car *c) {
+    if (!c) return 1;
     if (!c->changed) return 0;
     double values[N_VARIABLES], *u = c->values, sum = 0.0;
     const double *p = values + IN_PARAMETERS;

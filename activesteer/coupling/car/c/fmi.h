@@ -10,16 +10,20 @@ enum { OK = 0, WARNING = 1, DISCARD = 2, ERROR = 3, FATAL = 4 };
 #define NONE(name) API int name(void *c, const uint32_t *r, size_t n) { return n ? ERROR : OK; }
 #define MISSING(name) API int name(void) { return ERROR; }
 
+/* Modes of an instance; a call in a wrong mode is an error. */
+enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8 };
+
 typedef struct Instance Instance;
 struct Instance {
     as_car *car;
+    int mode;
     char *name;
     void (*say)(Instance *, const char *);
     const void *callbacks;
     void *environment;
 };
 
-static as_car *car_of(void *c) { return ((Instance *)c)->car; }
+static as_car *car_of(void *c) { return c ? ((Instance *)c)->car : NULL; }
 
 static void free_instance(void *instance) {
     Instance *c = instance;
@@ -47,16 +51,52 @@ static void *discarded(Instance *c, const char *why) {
 static void *made(Instance *c, const char *token) {
     if (!c) return NULL;
     if (!token || strcmp(token, TOKEN)) return discarded(c, "the token of the description is not that of this library");
+    c->mode = INSTANTIATED;
     c->car = as_create();
     return c->car ? c : discarded(c, as_message(NULL));
 }
 
 static int status(void *c, int failure) {
-    if (failure) ((Instance *)c)->say(c, as_message(car_of(c)));
+    if (failure && c) ((Instance *)c)->say(c, as_message(car_of(c)));
     return failure ? ERROR : OK;
 }
 
+static int is_in(Instance *c, int modes, const char *call) {
+    if (!c) return 0;
+    if (c->mode & modes) return 1;
+    char message[128];
+    snprintf(message, sizeof message, "%s in a wrong order of calls", call);
+    c->say(c, message);
+    return 0;
+}
+
+static int enter_initialization(Instance *c) {
+    if (!is_in(c, INSTANTIATED, "EnterInitializationMode")) return ERROR;
+    c->mode = INITIALIZING;
+    return OK;
+}
+
+static int exit_initialization(Instance *c) {
+    if (!is_in(c, INITIALIZING, "ExitInitializationMode")) return ERROR;
+    if (status(c, as_settle(c->car))) return ERROR;
+    c->mode = STEPPING;
+    return OK;
+}
+
+static int terminate(Instance *c) {
+    if (!is_in(c, STEPPING, "Terminate")) return ERROR;
+    c->mode = TERMINATED;
+    return OK;
+}
+
+static int reset(Instance *c) {
+    if (!c) return ERROR;
+    c->mode = INSTANTIATED;
+    return status(c, as_reset(c->car));
+}
+
 static int get_reals(void *c, const uint32_t *references, size_t n, double *values) {
+    if (!c) return ERROR;
     for (size_t i = 0; i < n; i++) {
         if (references[i] >= (uint32_t)as_count()) return ERROR;
         values[i] = as_get(car_of(c), (int)references[i]);
@@ -73,6 +113,7 @@ static int set_reals(void *c, const uint32_t *references, size_t n, const double
 }
 
 static int do_step(void *c, double step_s) {
+    if (!is_in(c, STEPPING, "DoStep")) return ERROR;
     double steps = step_s / as_timestep_s();
     if (!(steps > 0.5 && steps < 1e6) || fabs(steps - rint(steps)) > 1e-6) {
         char message[128];
@@ -84,6 +125,7 @@ static int do_step(void *c, double step_s) {
 }
 
 static int get_state(void *c, void **state) {
+    if (!c) return ERROR;
     size_t size = as_state_size(car_of(c));
     if (!*state && !(*state = malloc(size))) return ERROR;
     return status(c, as_save(car_of(c), *state, size));

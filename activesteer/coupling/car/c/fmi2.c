@@ -24,11 +24,11 @@ API void *fmi2Instantiate(const char *name, int kind, const char *guid, const ch
     return made(c, guid);
 }
 API void fmi2FreeInstance(void *c) { free_instance(c); }
-API int fmi2SetupExperiment(void *c, int has_tolerance, double tolerance, double start, int has_stop, double stop) { return OK; }
-API int fmi2EnterInitializationMode(void *c) { return OK; }
-API int fmi2ExitInitializationMode(void *c) { return status(c, as_settle(car_of(c))); }
-API int fmi2Terminate(void *c) { return OK; }
-API int fmi2Reset(void *c) { return status(c, as_reset(car_of(c))); }
+API int fmi2SetupExperiment(void *c, int has_tolerance, double tolerance, double start, int has_stop, double stop) { return is_in(c, INSTANTIATED, "SetupExperiment") ? OK : ERROR; }
+API int fmi2EnterInitializationMode(void *c) { return enter_initialization(c); }
+API int fmi2ExitInitializationMode(void *c) { return exit_initialization(c); }
+API int fmi2Terminate(void *c) { return terminate(c); }
+API int fmi2Reset(void *c) { return reset(c); }
 API int fmi2GetReal(void *c, const uint32_t *r, size_t n, double *y) { return get_reals(c, r, n, y); }
 API int fmi2SetReal(void *c, const uint32_t *r, size_t n, const double *u) { return set_reals(c, r, n, u); }
 API int fmi2DoStep(void *c, double time_s, double step_s, int no_set_state) { return do_step(c, step_s); }

@@ -19,10 +19,10 @@ API void *fmi3InstantiateCoSimulation(const char *name, const char *token, const
 API void *fmi3InstantiateModelExchange(void) { return NULL; }
 API void *fmi3InstantiateScheduledExecution(void) { return NULL; }
 API void fmi3FreeInstance(void *c) { free_instance(c); }
-API int fmi3EnterInitializationMode(void *c, bool has_tolerance, double tolerance, double start, bool has_stop, double stop) { return OK; }
-API int fmi3ExitInitializationMode(void *c) { return status(c, as_settle(car_of(c))); }
-API int fmi3Terminate(void *c) { return OK; }
-API int fmi3Reset(void *c) { return status(c, as_reset(car_of(c))); }
+API int fmi3EnterInitializationMode(void *c, bool has_tolerance, double tolerance, double start, bool has_stop, double stop) { return enter_initialization(c); }
+API int fmi3ExitInitializationMode(void *c) { return exit_initialization(c); }
+API int fmi3Terminate(void *c) { return terminate(c); }
+API int fmi3Reset(void *c) { return reset(c); }
 API int fmi3GetFloat64(void *c, const uint32_t *r, size_t n, double *y, size_t values) { return n == values ? get_reals(c, r, n, y) : ERROR; }
 API int fmi3SetFloat64(void *c, const uint32_t *r, size_t n, const double *u, size_t values) { return n == values ? set_reals(c, r, n, u) : ERROR; }
 API int fmi3DoStep(void *c, double time_s, double step_s, bool no_set_state, bool *event, bool *terminate, bool *early, double *last) {

@@ -318,16 +318,26 @@ def test_an_fmu_reports_its_failures_as_status_with_a_message(fmus):
 
     with pytest.raises(Exception, match="instantiate"):
         made("wrong")
-    car = made(description.guid)
-    car.setupExperiment(startTime=0.0)
-    car.enterInitializationMode()
-    car.exitInitializationMode()
-    pedal = next(v.valueReference for v in description.modelVariables if v.name == "brake_pedal")
-    for call in (lambda: car.setReal([pedal], [3.0]), lambda: car.doStep(0.0, 0.0005), lambda: car.getReal([99999])):
+
+    def is_refused(call):
         with pytest.raises(fmi1.FMICallException) as caught:
             call()
         said.append(caught.value.status)
-    assert said == [3, 3, 3]
+
+    car = made(description.guid)
+    for too_early in (lambda: car.doStep(0.0, 0.001), car.exitInitializationMode, car.terminate):
+        is_refused(too_early)
+    car.setupExperiment(startTime=0.0)
+    car.enterInitializationMode()
+    is_refused(lambda: car.doStep(0.0, 0.001))
+    car.exitInitializationMode()
+    pedal = next(v.valueReference for v in description.modelVariables if v.name == "brake_pedal")
+    wrong_values = (
+        lambda: car.setReal([pedal], [3.0]), lambda: car.setReal([pedal], [math.nan]),
+        lambda: car.doStep(0.0, 0.0005), lambda: car.getReal([99999]),
+    )  # fmt: skip
+    for call in wrong_values:
+        is_refused(call)
     state = car.getFMUstate()
     content = car.serializeFMUstate(state)
     car.doStep(0.0, 0.05)
@@ -337,6 +347,8 @@ def test_an_fmu_reports_its_failures_as_status_with_a_message(fmus):
     car.doStep(0.0, 0.05)
     assert car.getReal(rates) == after
     car.terminate()
+    is_refused(lambda: car.doStep(0.05, 0.001))
+    assert said == 9 * [3]
     car.freeInstance()
 
 

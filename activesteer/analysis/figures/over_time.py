@@ -1,41 +1,35 @@
-"""Panels over one time axis that shows the transient; the cars that do not spin set the scale."""
+"""The paper's figures over one time axis that shows the transient; the cars that do not spin set the scale.
+
+These are figures 2 and 11 (step steer), 12 and 13 (sine with dwell), 16, 17, 20, 21, 23 and 24 (along a path).
+"""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.analysis.figures.style import (
-    ADDED,
-    COLUMN_IN,
-    PATCH_COLOUR,
-    SIDESLIP,
-    SPEED,
-    TEXT_PT,
-    YAW_RATE,
-    DrawnRun,
-    curves,
-    draw,
-    draw_added,
-    friction_label,
-    name_curves,
-    plain,
-    present,
-)
+from activesteer.analysis import sine_with_dwell
+from activesteer.analysis.figures import style
+from activesteer.analysis.figures.style import DrawnRun
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import CORNERS
+from activesteer.conventions import CORNERS, RUN_COLOURS, RUN_DASHES, Array, RunLook
+from activesteer.drawing.panels import FIGURE, PANELS, Panel, panels_in
 from activesteer.errors import RecordingError
-from activesteer.plotting import new_figure
+from activesteer.plotting import new_figure, save
 from activesteer.recording.contents import events_of
-from activesteer.units import Quantity
+from activesteer.units import quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_SETTLING: Final = ("yaw_rate", "sideslip", "speed")
+"""Panels whose signals tell when a transient is over."""
 PANEL_IN: Final = 1.05
 """Height of a panel over time [in]."""
 _INSET_FROM: Final = 2.0
@@ -58,16 +52,13 @@ _AFTER: Final = 0.2
 """Time shown before and after the transient, as fractions of its duration."""
 
 
-def fill_panels(axes: Sequence[Axes], drawn: Sequence[DrawnRun], panels: Sequence[Quantity]) -> None:
+def fill_panels(axes: Sequence[Axes], drawn: Sequence[DrawnRun], panels: Sequence[Panel]) -> None:
     """Draw panels over one time axis that shows the transient; the curves of the first panel carry the labels."""
     for row, (axis, panel) in enumerate(zip(axes, panels, strict=True)):
         for curve in drawn:
             label = curve.look.label if row == 0 else ""
-            if panel is ADDED:
-                draw_added(axis, curve)
-            else:
-                draw(axis, curve, panel, label=label)
-        plain(axis, panel.axis_title)
+            style.draw_panel(axis, curve, panel, label)
+        style.plain(axis, panel.quantity.axis_title)
     finish_time(axes, drawn)
     for axis, panel in zip(axes, panels, strict=True):
         show_lost_beside(axis, drawn, panel)
@@ -87,7 +78,7 @@ def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
     start, end = 0.0, max(float(curve.recording.time_s[-1]) for curve in drawn)
     begins, ends = [], []
     for curve in [curve for curve in drawn if not curve.lost] or drawn:
-        for panel in (YAW_RATE, SIDESLIP, SPEED):
+        for panel in (PANELS[name].quantity for name in _SETTLING):
             values = curve.recording[panel.channel]
             band = _SETTLED * float(np.ptp(values))
             moving = np.flatnonzero(np.abs(values - values[0]) > band)
@@ -101,27 +92,28 @@ def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
     return max(start, min(begins) - _BEFORE * lasts), min(end, max(ends) + _AFTER * lasts)
 
 
-def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Quantity) -> None:
+def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> None:
     """Keep the scale of the cars that do not spin, and draw all cars over the whole time in an inset.
 
     The inset stands in the corner that the curves leave free.
     """
     kept = [curve for curve in drawn if not curve.lost]
-    if len(kept) in (0, len(drawn)) or panel is ADDED:
+    if len(kept) in (0, len(drawn)) or panel is PANELS["added"]:
         return
+    quantity = panel.quantity
     left, right = axis.get_xlim()
     corner = right - _INSET_WIDTH * (right - left)
     low, high, corner_low, corner_high = math.inf, -math.inf, math.inf, -math.inf
     for curve in kept:
-        values, time_s = curve.recording[panel.channel] * panel.factor, curve.recording.time_s
+        values, time_s = curve.recording[quantity.channel] * quantity.factor, curve.recording.time_s
         seen, beside = values[(time_s >= left) & (time_s <= right)], values[(time_s >= corner) & (time_s <= right)]
         low, high = min(low, float(seen.min())), max(high, float(seen.max()))
         corner_low = min(corner_low, float(beside.min(initial=0.0)))
         corner_high = max(corner_high, float(beside.max(initial=0.0)))
-    whole = max(float(np.abs(curve.recording[panel.channel]).max()) for curve in drawn) * panel.factor
+    whole = max(float(np.abs(curve.recording[quantity.channel]).max()) for curve in drawn) * quantity.factor
     if whole < _INSET_FROM * max(abs(low), abs(high)):
         return
-    margin = 0.08 * max(high - low, panel.min_span)
+    margin = 0.08 * max(high - low, quantity.min_span)
     low, high = low - margin, high + margin
     # Above or below, wherever the axis grows less to keep the inset clear of the curves.
     top = max(high, low + (corner_high + margin - low) / (1.0 - _INSET_HEIGHT - _INSET_CAPTION))
@@ -131,18 +123,18 @@ def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Quantity) -> 
     place = (1.0 - _INSET_WIDTH, 1.02 - _INSET_HEIGHT if above else 0.02, _INSET_WIDTH, _INSET_HEIGHT - 0.04)
     inset = axis.inset_axes(place, zorder=5)
     for curve in drawn:
-        draw(inset, curve, panel, width=0.8)
+        style.draw_panel(inset, curve, panel, width=0.8)
     start, end = inset.get_xlim()
     # The numbers of the inset stand inside, before the curves begin.
     inset.set_xlim(start - 0.35 * (end - start), end)
-    inset.tick_params(labelsize=TEXT_PT, length=0.0, labelbottom=False)
+    inset.tick_params(labelsize=style.TEXT_PT, length=0.0, labelbottom=False)
     inset.tick_params(axis="y", pad=-3.0)
     inset.locator_params(axis="y", nbins=3, min_n_ticks=2)
     for label in inset.get_yticklabels():
         label.set_horizontalalignment("left")
     axis.annotate(
         "whole run", (place[0], place[1] + (0.0 if above else place[3])), (0, -2 if above else 2),
-        xycoords="axes fraction", textcoords="offset points", va="top" if above else "bottom", fontsize=TEXT_PT,
+        xycoords="axes fraction", textcoords="offset points", va="top" if above else "bottom", fontsize=style.TEXT_PT,
         color="#555555", bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
     )  # fmt: skip
     inset.grid(visible=True, axis="y", color="#dddddd", linewidth=0.5)
@@ -165,15 +157,15 @@ def mark_phases(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
                         event.time_s, color="#777777" if same else curve.look.colour, linewidth=0.8, linestyle=":",
                         zorder=1,
                     )  # fmt: skip
-    width_in = COLUMN_IN - _SIDES_IN
+    width_in = style.COLUMN_IN - _SIDES_IN
     ends: list[float] = []
     for event in (event for event in listed[0] if event.time_s < right):
         at_in = max(0.0, (event.time_s - left) / (right - left)) * width_in
         row = next((row for row, end in enumerate(ends) if end <= at_in), len(ends))
         ends[row : row + 1] = [at_in + _LETTER_IN * (len(event.what) + 1)]
         axes[0].annotate(
-            event.what, (max(event.time_s, left), 1.0), (0, 2 + (TEXT_PT + 1.0) * row),
-            xycoords=("data", "axes fraction"), textcoords="offset points", va="bottom", fontsize=TEXT_PT,
+            event.what, (max(event.time_s, left), 1.0), (0, 2 + (style.TEXT_PT + 1.0) * row),
+            xycoords=("data", "axes fraction"), textcoords="offset points", va="bottom", fontsize=style.TEXT_PT,
             color="#555555", ha="right" if ends[row] > width_in + _LETTER_IN else "left",
         )  # fmt: skip
 
@@ -188,24 +180,120 @@ def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
         changed = np.abs(mu - mu[:, :1]) > _SAME_FRICTION
         edges = np.flatnonzero(np.diff(changed.any(axis=0).astype(int), prepend=0, append=0))
         time_s = curve.recording.time_s.tolist()
-        label = friction_label(float(mu[changed].min()), float(mu[changed].max())) if edges.size else ""
+        label = style.friction_label(float(mu[changed].min()), float(mu[changed].max())) if edges.size else ""
         for begin, end in edges.reshape(-1, 2).tolist():
             for axis in axes:
                 axis.axvspan(
-                    time_s[begin], time_s[end - 1], color=PATCH_COLOUR, alpha=1.0 / len(drawn), linewidth=0.0,
+                    time_s[begin], time_s[end - 1], color=style.PATCH_COLOUR, alpha=1.0 / len(drawn), linewidth=0.0,
                     zorder=0, label=label,
                 )  # fmt: skip
 
 
-def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Quantity]) -> Figure:
-    """Draw panels over one time axis, as wide as a column."""
-    drawn = curves(recordings)
-    shown = present(panels, drawn)
-    figure = new_figure(width_in=COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))
+def time_figure(
+    recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE), *, instants: bool = False
+) -> Figure:
+    """Draw panels over one time axis, as wide as a column; with the instants at which a sine with dwell is judged."""
+    drawn = style.curves(recordings)
+    shown = style.present(panels, drawn)
+    figure = new_figure(width_in=style.COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))
     axes: list[Axes] = list(figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0])
     fill_panels(axes, drawn, shown)
     shade_friction(axes, drawn)
     mark_phases(axes, drawn)
     figure.align_ylabels(axes)
-    name_curves(figure, axes[0])
+    style.name_curves(figure, axes[0])
+    if instants:
+        _mark_instants(figure, recordings)
     return figure
+
+
+def _mark_instants(figure: Figure, recordings: Mapping[str, RecordingLike]) -> None:
+    """Draw vertical lines at the completion of steer and at the two instants after it."""
+    try:
+        completion_s = sine_with_dwell.steering(next(iter(recordings.values()))).completion_s
+    except RecordingError:
+        # An incomplete run has no such instants, but it can be drawn.
+        return
+    axes = figure.get_axes()
+    instants = (("end of steer", 0.0), *((f"+{s:.2f} s", s) for s in sine_with_dwell.INSTANTS_S))
+    left, right = axes[0].get_xlim()
+    # Room for the last text.
+    axes[0].set_xlim(left, max(right, completion_s + max(sine_with_dwell.INSTANTS_S) + 0.12 * (right - left)))
+    for text, later_s in instants:
+        for axis in axes:
+            axis.axvline(completion_s + later_s, color="#999999", linewidth=0.9, linestyle=":", zorder=1)
+        # Only the last text stands right of its line, so that the texts do not overlap.
+        before = later_s < max(sine_with_dwell.INSTANTS_S)
+        axes[0].annotate(
+            text, (completion_s + later_s, 1.0), (-2 if before else 2, -1), xycoords=("data", "axes fraction"),
+            textcoords="offset points", va="top", ha="right" if before else "left",
+            fontsize=style.TEXT_PT, color="#555555",
+        )  # fmt: skip
+
+
+def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
+    """Draw the response to a step steer.
+
+    From the top, over one time axis: yaw rate (dotted: desired by the controller), steering angles (front wheels thin,
+    added angles of rear wheels or front superposition thick), lateral acceleration, sideslip and roll.
+
+    Args:
+        recordings: Runs by label; `none`, `ars` and `afs` get the paper's names and numbers, others keep their own.
+
+    Source: V. Dorsch, Mecatronics-REM 2012, figure 11.
+    """
+    curves = style.curves(recordings)
+    figure = new_figure(width_in=style.COLUMN_IN, height_in=1.1 + 5 * PANEL_IN)
+    axes: list[Axes] = list(figure.subplots(5, 1, sharex=True))
+    yaw_rate, front = PANELS["yaw_rate"], quantity_of("front_steer_rad")._replace(short="steering angles")
+    desired = yaw_rate.lines[1]
+    for curve in curves:
+        style.draw_panel(axes[0], curve, yaw_rate, curve.look.label)
+        if desired.of(curve.recording) is not None:
+            style.draw(axes[0], curve, quantity_of(desired.channel), width=1.0, style=style.DOTTED)
+        style.draw(axes[1], curve, front, width=0.8)
+        style.draw_panel(axes[1], curve, PANELS["added"], width=2.2)
+    style.plain(axes[0], yaw_rate.quantity.axis_title)
+    style.plain(axes[1], front.axis_title)
+    fill_panels(axes[2:], curves, [PANELS[name] for name in ("lateral", "sideslip", "roll")])
+    shade_friction(axes, curves)
+    figure.align_ylabels(axes)
+    style.name_curves(
+        figure, axes[0], [("desired", 1.0, style.DOTTED), ("front wheels", 0.8, "-"), ("added by a system", 2.2, "-")]
+    )
+    return figure
+
+
+def figure_2(
+    recording: RecordingLike,
+    path: str | os.PathLike[str],
+    models: Mapping[str, Mapping[str, Array]] | None = None,
+) -> Path:
+    """Draw yaw rate and roll angle after a step of the steering, in the form of the paper's figure 2, and save it.
+
+    Args:
+        recording: A step steer.
+        path: File to write; its ending gives the format (.png, .pdf, .svg).
+        models: Label -> channel -> values over the time of the recording, drawn beside it: the single-track model
+            (`identification.single_track_response`), which has no roll, and the linear car
+            (`linearisation.linear_response`).
+
+    Source: V. Dorsch, Mecatronics-REM 2012, figure 2.
+    """
+    figure = new_figure(width_in=style.COLUMN_IN, height_in=3.6)
+    axes: list[Axes] = list(figure.subplots(2, 1, sharex=True))
+    car = DrawnRun(recording, RunLook("multibody car", 0, ()))
+    for axis, name in zip(axes, ("yaw_rate", "roll"), strict=True):
+        panel = PANELS[name].quantity
+        style.draw(axis, car, panel, label=car.look.label, width=2.0)
+        for place, (label, channels) in enumerate((models or {}).items(), start=1):
+            if panel.channel in channels:
+                axis.plot(
+                    recording.time_s, channels[panel.channel] * panel.factor, color=RUN_COLOURS[place], linewidth=1.2,
+                    linestyle=(0.0, RUN_DASHES[place]), label=label,
+                )  # fmt: skip
+        style.plain(axis, panel.axis_title)
+    finish_time(axes, [car])
+    figure.align_ylabels(axes)
+    style.name_curves(figure, axes[0])
+    return save(figure, Path(path), RecordingError)

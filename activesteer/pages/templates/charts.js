@@ -1,0 +1,293 @@
+// Plots of a page: shared parts, and charts of the panels of a picture, from `pictures.py`.
+"use strict";
+const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
+// Colours of the stylesheet, light or dark; read again when the scheme changes.
+const PAINTS = ["quiet", "grid", "lane", "cone", "struck", "path", "failed", "ink", "link", ...Array.from({ length: 6 }, (_, i) => `run-${i}`)];
+const paint = {};
+const mix = () => { const style = getComputedStyle(document.documentElement); for (const name of PAINTS) paint[name] = style.getPropertyValue(`--${name}`).trim(); };
+mix();
+const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
+// Least size of a cone [px], otherwise cones and cars have their true size; distance between drawn cars [px].
+const LEAST_CONE = 2, CARS_APART = 110;
+// Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
+const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 106, PRINTED_TRACK_HEIGHT = 170;
+
+const SVG = "http://www.w3.org/2000/svg";
+const element = (name, attributes = {}, ...children) => {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+};
+// Axis labels with a real minus sign and without rounding errors.
+const labels = (unit) => (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit));
+const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
+const shown = (number) => (number == null ? "–" : number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0).replace("-", "−"));
+
+const dashed = (run, width) => run.dashes.map((length) => length * width);
+// Later runs lie over earlier ones; thinner and dashed, they leave these visible.
+const lineWidth = (run) => Math.max(1.5, 2.6 - 0.4 * run);
+
+// Limits of a vertical axis, with some room, and no closer than `least`.
+function padded(low, high, least) {
+  if (low == null) return [0, least];
+  const half = Math.max(0.55 * (high - low), least / 2), middle = (low + high) / 2;
+  return [middle - half, middle + half];
+}
+
+const DARK = matchMedia("(prefers-color-scheme: dark)");
+// All that is drawn anew for another colour scheme, another width, or paper.
+const drawn = [];
+
+function swatchOf(colour, dashes) {
+  const swatch = document.createElementNS(SVG, "svg");
+  swatch.setAttribute("class", "swatch");
+  swatch.setAttribute("viewBox", "0 0 28 6");
+  swatch.style.setProperty("--run", colour);
+  const line = swatch.appendChild(document.createElementNS(SVG, "path"));
+  line.setAttribute("d", "M0 3h28");
+  line.setAttribute("stroke-dasharray", dashes.join(" "));
+  return swatch;
+}
+
+// One finger reads values, two zoom in time, a double tap shows all; up and down the page still scrolls.
+function touchable(u, zoom) {
+  const over = u.over, fingers = new Map();
+  let start = null, tapped = 0;
+  const at = (event) => event.clientX - over.getBoundingClientRect().left;
+  over.addEventListener("pointerdown", (event) => {
+    if (event.pointerType !== "touch") return;
+    fingers.set(event.pointerId, at(event));
+    if (fingers.size === 2) {
+      const [a, b] = [...fingers.values()].sort((p, q) => p - q);
+      start = { a: u.posToVal(a, "x"), b: u.posToVal(b, "x") };
+    } else if (fingers.size === 1) {
+      if (event.timeStamp - tapped < 300) zoom(null);
+      tapped = event.timeStamp;
+    }
+  });
+  over.addEventListener("pointermove", (event) => {
+    if (!fingers.has(event.pointerId)) return;
+    fingers.set(event.pointerId, at(event));
+    if (fingers.size === 1) u.setCursor({ left: at(event), top: event.clientY - over.getBoundingClientRect().top }, true, true);
+    if (fingers.size !== 2 || !start) return;
+    const [a, b] = [...fingers.values()].sort((p, q) => p - q);
+    if (b - a < 10) return;
+    const scale = (start.b - start.a) / (b - a), min = start.a - a * scale;
+    zoom({ min, max: min + over.clientWidth * scale });
+  });
+  for (const name of ["pointerup", "pointercancel"]) {
+    over.addEventListener(name, (event) => { fingers.delete(event.pointerId); if (fingers.size < 2) start = null; });
+  }
+}
+
+const onDark = () => DARK.matches && !document.documentElement.classList.contains("paper");
+const channels = (colour) => [1, 3, 5].map((start) => parseInt(colour.slice(start, start + 2), 16));
+const blend = (one, other, share) => `#${one.map((part, i) => Math.round(part + share * (other[i] - part)).toString(16).padStart(2, "0")).join("")}`;
+const VIRIDIS = ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"].map(channels);
+
+// A colour of a picture on this page: a run's, a shade of the scale, or another, lighter in the dark.
+function inkOf(colour, shade) {
+  if (shade != null) {
+    const at = Math.min(3, Math.floor(4 * shade));
+    colour = blend(VIRIDIS[at], VIRIDIS[at + 1], 4 * shade - at);
+  }
+  if (colour.startsWith("run-")) return paint[colour];
+  if (!onDark() || !colour.startsWith("#")) return colour;
+  // In the dark, a pale colour recedes and a dark one comes forward.
+  const parts = channels(colour), pale = parts[0] + parts[1] + parts[2] > 480;
+  return blend(parts, pale ? [22, 24, 27] : [255, 255, 255], pale ? 0.55 : 0.35);
+}
+
+// A panel: axes, zoom and cursor by uPlot; curves of any shape, areas, limits and notes by this class.
+class Chart {
+  constructor(box, panel, picture) {
+    this.panel = panel;
+    this.picture = picture;
+    this.values = element("span", { class: "values" });
+    const named = panel.title ? [element("b", {}, panel.title), element("span", { class: "quiet" }, panel.y)] : [element("b", {}, panel.y)];
+    this.holder = element("div", { role: "img", "aria-label": `${panel.title} ${panel.y} over ${panel.x}` });
+    const below = element("p", { class: "abscissa quiet" }, panel.x + (panel.above ? `; above: ${panel.above.label}` : ""));
+    box.append(element("figure", { class: `plot${panel.names.length || picture.panels.length === 1 && !panel.equal ? " wide" : ""}` }, element("figcaption", {}, ...named, this.values), this.holder, below));
+    this.limits = { x: this.ends("x"), y: this.ends("y") };
+    this.make();
+    drawn.push(this);
+    new ResizeObserver(() => this.fit()).observe(this.holder);
+  }
+
+  get height() { return this.panel.names.length ? 60 + 32 * this.panel.names.length : this.panel.equal ? 360 : 230; }
+
+  // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
+  ends(key) {
+    const { curves, areas, limits, names, log } = this.panel, given = this.panel[`${key}_range`] || [null, null];
+    if (key === "y" && names.length) return [-1, names.length - 0.3];
+    const all = [...curves.flatMap((curve) => curve[key]), ...(key === "x" ? areas.flatMap((area) => area.x) : [...areas.flatMap((area) => [...area.low, ...area.high]), ...limits.map(([value]) => value)])];
+    const logged = log.includes(key);
+    let low = Infinity, high = -Infinity;
+    for (const value of all) if (value != null && (!logged || value > 0)) { low = Math.min(low, value); high = Math.max(high, value); }
+    if (!(low <= high)) [low, high] = [0, 1];
+    const room = logged || key === "x" && this.panel.zero ? 0 : 0.05 * (high - low) || 0.1 * Math.abs(high) || 1;
+    return [given[0] ?? low - room, given[1] ?? high + room];
+  }
+
+  make() {
+    const { panel } = this, log = (key) => (panel.log.includes(key) ? { distr: 3 } : {});
+    const plain = axis(26), side = { ...axis(52), size: (u, ticks) => Math.max(34, 12 + 7 * Math.max(0, ...(ticks || []).map((tick) => `${tick}`.length))) };
+    // Names stand above their rows, where there is room for them at any width.
+    if (panel.names.length) Object.assign(side, { size: 8, values: () => [], splits: () => panel.names.map((_, i) => i) });
+    const axes = [plain, side];
+    if (panel.above) axes.push({ ...axis(26), side: 0, scale: "x", grid: { show: false }, values: (_, ticks) => labels("")(_, ticks.map((tick) => +between(tick, panel.above.first, panel.above.second).toPrecision(2))) });
+    this.plot = new uPlot({
+      width: this.holder.clientWidth || 360, height: this.height, padding: [8, 14, 0, 0], legend: { show: false },
+      cursor: { sync: { key: `${this.picture.place} ${panel.x}`, scales: ["x", null] }, drag: { x: true, y: true, uni: 20 }, points: { show: false }, y: false },
+      scales: { x: { time: false, ...log("x"), range: (u) => this.range(u, "x") }, y: { ...log("y"), dir: panel.names.length ? -1 : 1, range: (u) => this.range(u, "y") } },
+      axes, series: [{}, { paths: () => null, points: { show: false } }],
+      hooks: { drawAxes: [(u) => this.draw(u)], setCursor: [(u) => this.read(u)] },
+    }, [this.limits.x, this.limits.y], this.holder);
+    touchable(this.plot, (range) => (range ? this.plot.setScale("x", range) : this.whole()));
+  }
+
+  range(u, key) {
+    const { x, y } = this.limits, { width, height } = u.bbox;
+    if (!this.panel.equal || !width || !height) return [...this.limits[key]];
+    const scale = Math.max((x[1] - x[0]) / width, (y[1] - y[0]) / height);
+    const [ends, pixels] = key === "x" ? [x, width] : [y, height], middle = (ends[0] + ends[1]) / 2, half = (scale * pixels) / 2;
+    return [middle - half, middle + half];
+  }
+
+  whole() { this.plot.batch(() => { for (const key of ["x", "y"]) { const [min, max] = this.range(this.plot, key); this.plot.setScale(key, { min, max }); } }); }
+
+  fit(width = null) {
+    const columns = this.holder.parentElement.classList.contains("wide") ? 1 : 2;
+    const room = width == null ? this.holder.clientWidth : columns === 1 ? width : (width - PRINTED_GAP) / 2;
+    if (room > 0 && (room !== this.plot.width || width != null)) { this.plot.setSize({ width: room, height: width == null ? this.height : Math.round(0.65 * this.height) }); this.whole(); }
+  }
+
+  repaint() { this.plot.redraw(false, true); }
+
+  shown() { return this.panel.curves.filter((curve) => !this.picture.hidden.has(curve.label)); }
+
+  draw(u) {
+    const { ctx, bbox } = u, dpr = devicePixelRatio, { panel } = this;
+    const px = (x) => u.valToPos(x, "x", true), py = (y) => u.valToPos(y, "y", true);
+    const level = (y) => { ctx.beginPath(); ctx.moveTo(bbox.left, y); ctx.lineTo(bbox.left + bbox.width, y); ctx.stroke(); };
+    ctx.save();
+    ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
+    ctx.lineJoin = "round";
+    for (const area of panel.areas) {
+      if (this.picture.hidden.has(area.label)) continue;
+      ctx.beginPath();
+      const ends = [...area.x.map((x, i) => [x, area.high[i]]), ...area.x.map((x, i) => [x, area.low[i]]).reverse()];
+      for (const [x, y] of ends) if (x != null && y != null) ctx.lineTo(px(x), py(y));
+      ctx.closePath();
+      ctx.globalAlpha = area.alpha * (onDark() ? 0.3 : 1);
+      ctx.fillStyle = inkOf(area.colour);
+      ctx.fill();
+      ctx.globalAlpha = 1;
+      if (area.edge) { ctx.strokeStyle = inkOf(area.edge); ctx.lineWidth = dpr; ctx.setLineDash([]); ctx.stroke(); }
+    }
+    ctx.strokeStyle = paint.quiet; ctx.lineWidth = 0.7 * dpr; ctx.setLineDash([]);
+    if (panel.zero) { level(py(0)); ctx.beginPath(); ctx.moveTo(px(0), bbox.top); ctx.lineTo(px(0), bbox.top + bbox.height); ctx.stroke(); }
+    for (const curve of this.shown()) {
+      ctx.strokeStyle = ctx.fillStyle = inkOf(curve.colour, curve.shade);
+      ctx.lineWidth = 1.25 * curve.width * dpr;
+      ctx.setLineDash((curve.dashes || []).map((length) => 1.25 * length * curve.width * dpr));
+      ctx.beginPath();
+      let pen = false;
+      curve.x.forEach((x, i) => {
+        if (x == null || curve.y[i] == null) { pen = false; return; }
+        const at = [px(x), py(curve.y[i])];
+        if (curve.dashes) { if (pen) ctx.lineTo(...at); else ctx.moveTo(...at); }
+        pen = true;
+        if (!curve.marker) return;
+        const r = Math.max(1.2, 0.6 * curve.size) * dpr;
+        if (curve.marker === "x") { ctx.moveTo(at[0] - r, at[1] - r); ctx.lineTo(at[0] + r, at[1] + r); ctx.moveTo(at[0] - r, at[1] + r); ctx.lineTo(at[0] + r, at[1] - r); }
+        else if (curve.marker === "D") { for (const [a, b] of [[0, -1], [1, 0], [0, 1], [-1, 0]]) ctx[b === -1 ? "moveTo" : "lineTo"](at[0] + 1.2 * a * r, at[1] + 1.2 * b * r); ctx.closePath(); ctx.fill(); }
+        else { ctx.moveTo(at[0] + r, at[1]); ctx.arc(at[0], at[1], r, 0, 2 * Math.PI); }
+      });
+      if (curve.marker && curve.marker !== "x") ctx.fill();
+      if (curve.dashes || curve.marker === "x") ctx.stroke();
+    }
+    ctx.strokeStyle = paint.failed; ctx.lineWidth = 1.2 * dpr; ctx.setLineDash([5 * dpr, 3 * dpr]);
+    for (const [value] of panel.limits) level(py(value));
+    ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${12 * dpr}px`);
+    ctx.textAlign = "center"; ctx.textBaseline = "top";
+    for (const [x, y, text] of panel.notes) ctx.fillText(text, px(x), py(y) + 3 * dpr);
+    ctx.textAlign = "left"; ctx.textBaseline = "bottom";
+    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 6 * dpr, bbox.width - 8 * dpr));
+    ctx.restore();
+  }
+
+  // Tell the values of the curves at the cursor: by abscissa, or of the nearest point of a curve that turns back.
+  read(u) {
+    const { left, top } = u.cursor;
+    this.values.replaceChildren();
+    if (left == null || left < 0 || this.panel.names.length) return;
+    const x = u.posToVal(left, "x"), found = [];
+    for (const curve of this.shown()) {
+      let best = Infinity, at = null;
+      for (let i = 0; i < curve.x.length; i++) {
+        if (curve.x[i] == null || curve.y[i] == null) continue;
+        const away = curve.turns ? Math.hypot(u.valToPos(curve.x[i], "x") - left, u.valToPos(curve.y[i], "y") - (top ?? 0)) : Math.abs(curve.x[i] - x);
+        if (away < best) { best = away; at = i; }
+      }
+      if (at != null) found.push([curve, at]);
+    }
+    if (!found.length) return;
+    this.values.append(short(x));
+    for (const [curve, at] of found.slice(0, 6)) this.values.append(" ", element("span", { style: `--run: ${inkOf(curve.colour, curve.shade)}`, title: curve.label }, shown(curve.y[at])));
+  }
+}
+
+const short = (value) => `${+value.toPrecision(3)}`.replace("-", "−");
+
+function between(x, first, second) {
+  const rising = first[0] <= first.at(-1) ? [first, second] : [[...first].reverse(), [...second].reverse()];
+  const after = Math.min(Math.max(rising[0].findIndex((value) => value >= x), 1), first.length - 1);
+  const [x0, x1, y0, y1] = [rising[0][after - 1], rising[0][after], rising[1][after - 1], rising[1][after]];
+  return y0 + (y1 - y0) * ((x - x0) / (x1 - x0 || 1));
+}
+
+// The panels of a picture with one legend, whose entries hide what they name.
+function drawPicture(box, picture, place) {
+  Object.assign(picture, { place, hidden: new Set() });
+  const bar = element("div", { class: "toolbar legend" }), seen = new Set(), charts = [];
+  const entry = (label, colour, dashes) => {
+    if (!label || seen.has(label)) return;
+    seen.add(label);
+    const button = element("button", { type: "button", "aria-pressed": "true" }, swatchOf(colour, dashes), label);
+    button.addEventListener("click", () => {
+      const hide = !picture.hidden.delete(label);
+      if (hide) picture.hidden.add(label);
+      button.setAttribute("aria-pressed", String(!hide));
+      for (const chart of charts) chart.plot.redraw(false);
+    });
+    bar.append(button);
+  };
+  for (const panel of picture.panels) {
+    if (panel.legend) bar.append(element("span", { class: "hint" }, panel.legend));
+    for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || [1, 2]).map((length) => 2 * length));
+    for (const area of panel.areas) entry(area.label, inkOf(area.colour), []);
+    for (const [, label] of panel.limits) entry(label, "var(--failed)", [6, 4]);
+  }
+  if (picture.scale) {
+    const [label, low, high] = picture.scale;
+    bar.append(element("span", { class: "hint" }, label), `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`);
+  }
+  if (bar.childNodes.length) box.before(bar);
+  box.replaceChildren();
+  for (const panel of picture.panels) charts.push(new Chart(box, panel, picture));
+}
+
+const repaintAll = () => { mix(); for (const each of drawn) each.repaint(); };
+DARK.addEventListener("change", repaintAll);
+addEventListener("beforeprint", () => {
+  document.documentElement.classList.add("paper");
+  repaintAll();
+  for (const details of document.querySelectorAll(".group > details")) details.open = true;
+  for (const each of drawn) each.fit(PRINTED);
+});
+addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaintAll(); for (const each of drawn) each.fit(); });
+
+const DATA = JSON.parse(document.getElementById("data")?.textContent ?? "{}");
+(DATA.pictures ?? []).forEach((picture, place) => drawPicture(document.querySelector(`.plots[data-picture="${place}"]`), picture, place));

@@ -1,0 +1,171 @@
+"""Every kind of page in a browser, by size and colour scheme: its structure, and that all of it can be read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from activesteer import study
+from activesteer.analysis.report import write_report
+from activesteer.cli import main
+from activesteer.pages import Page, Section, Table, write_page
+from activesteer.plotting import Area, Curve, Panel, Picture
+from activesteer.standards.examination import examination_page
+from activesteer.studies.engine.report import write_report as write_study_report
+from tests.conftest import PHONE
+from tests.contrast import contrast
+from tests.render.test_report_in_browser import TEXT_COLOURS
+from tests.unit.analysis.synthetic_files import lane_changes
+from tests.unit.standards.test_page import examination
+from tests.unit.studies.short import RATIO, short_study
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+    from playwright.sync_api import Page as Shown
+
+pytestmark = pytest.mark.render
+
+DESK = {"viewport": {"width": 1440, "height": 900}}
+DEVICES = {f"{name} {scheme}": device | {"color_scheme": scheme}
+           for name, device in (("desk", DESK), ("phone", PHONE)) for scheme in ("light", "dark")}  # fmt: skip
+# Texts with their size on the screen, drawn ones too.
+SIZES = """() => {
+  const found = [], walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const part = walker.currentNode.parentElement, text = walker.currentNode.textContent.trim();
+    const svg = part.closest("svg");
+    if (!text || !part.checkVisibility() || part.closest("script, style")) continue;
+    const scale = svg ? svg.getBoundingClientRect().width / svg.viewBox.baseVal.width : 1;
+    found.push([parseFloat(getComputedStyle(part).fontSize) * scale, text]);
+  }
+  return found;
+}"""
+STRUCTURE = """() => Object.fromEntries(["h1", "h2", "h3", "figure", "table", "tr", "canvas", "details", "li"]
+  .map((name) => [name, document.querySelectorAll(name).length]))"""
+
+
+def every_panel(folder: Path) -> Path:
+    """Write a page with every kind of panel."""
+    x = np.linspace(0.1, 10.0, 50)
+    wave = Curve(x, np.sin(x), "a wave", "#d55e00")
+    panels = [
+        Panel("time [s]", "yaw rate [deg/s]", [wave, Curve(x, x)], "lines", [Area(x, -1.0, np.cos(x), "band")],
+              [(0.5, "a limit")], notes=[(3.0, 0.0, "a note")]),
+        Panel("frequency [Hz]", "gain [-]", [Curve(x, x**2, marker="o", dashes="")], log="xy"),
+        Panel("real", "imaginary", [Curve(np.cos(x), np.sin(x), shade=0.3)], equal=True, zero=True),
+        Panel("place", "", [Curve([0.5], [0.0], marker="D", dashes="")],
+              names=["a name so long that it would not fit beside the axis of any telephone"]),
+        Panel("travel [mm]", "camber [deg]", [wave], above=("roll [deg]", x, -x)),
+    ]  # fmt: skip
+    picture = Picture("every kind of panel", panels, ("speed [km/h]", 60.0, 160.0))
+    table = Table("", ["quantity", "value", "unit", "remark"], [["yaw rate", "-1.2", "deg/s", "a remark " * 12]] * 3)
+    page = Page(
+        "all", "A page with everything", ["A lead."], [Section("Part", ["Text."], [picture], [table], ["item"])]
+    )
+    return write_page(page, folder / "all.html")
+
+
+def kc(folder: Path) -> Path:
+    assert main(["kc", "-o", str(folder)]) == 0
+    return folder / "kc.html"
+
+
+def of_study(folder: Path) -> Path:
+    table = short_study(0.8, 0.9, 1.0, key=RATIO, controllers=["none", "ars"], title="Ratio")
+    table["factors"]["speed_kmh"] = {"grid": [70.0, 80.0]}
+    study(table, output=folder / "s", jobs=1)
+    return write_study_report(folder / "s")
+
+
+PAGES: dict[str, Callable[[Path], Path]] = {
+    "all": every_panel,
+    "report": lambda folder: write_report(lane_changes(), folder / "report.html"),
+    "standard": lambda folder: write_page(
+        examination_page(examination("a word", **{"pass": False})), folder / "s.html"
+    ),
+    "kc": kc,
+    "study": of_study,
+}
+
+
+@pytest.fixture
+def shown(browser: Browser) -> Iterator[Callable[..., Shown]]:
+    """Open a page; a message of the console, an error, or a request for another resource fails the test."""
+    wrong: list[str] = []
+    contexts: list[Any] = []
+
+    def shown(path: Path, **device: Any) -> Shown:
+        context = browser.new_context(**device)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("console", lambda message: wrong.append(message.text))
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("request", lambda request: wrong.extend({request.url} - {path.as_uri()}))
+        page.goto(path.as_uri())
+        page.wait_for_selector("canvas, main svg")
+        return page
+
+    yield shown
+    for context in contexts:
+        context.close()
+    assert wrong == []
+
+
+def check(page: Shown) -> None:
+    """Nothing is wider than the screen, and every text is large and dark enough."""
+    width = page.viewport_size["width"] if page.viewport_size else 0
+    for details in page.locator("details").all():
+        details.evaluate("(details) => { details.open = true; }")
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    for size, text in page.evaluate(SIZES):
+        assert size >= 10.99, text
+    for ink, paper, text in page.evaluate(TEXT_COLOURS):
+        assert contrast(ink, paper) >= 4.5, text
+    for box in (box for canvas in page.locator("figure canvas").all() if (box := canvas.bounding_box())):
+        assert box["x"] >= 0.0
+        assert box["x"] + box["width"] <= width
+
+
+def test_a_phone_shows_every_kind_of_panel_and_a_row_as_a_card(shown, tmp_path):
+    page = shown(every_panel(tmp_path), **PHONE)
+    check(page)
+    assert page.locator("figure canvas").count() == 5
+    assert page.locator("table thead").is_hidden()
+    box = page.locator("tbody tr").first.bounding_box()
+    assert box
+    assert box["width"] <= 390.0
+
+
+def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_path):
+    page = shown(every_panel(tmp_path), **DESK)
+    figure = page.locator("figure").first
+    figure.scroll_into_view_if_needed()
+    box = figure.locator(".u-over").bounding_box()
+    assert box
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 20.0)
+    assert figure.locator(".values span").count() == 2
+    button = page.locator(".legend button", has_text="a wave")
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+    page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 20.0)
+    assert figure.locator(".values span").count() == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", PAGES)
+def test_every_page_has_one_structure_on_every_screen(shown, tmp_path, folder, kind):
+    path = PAGES[kind](tmp_path)
+    structures = {}
+    for name, device in DEVICES.items():
+        page = shown(path, **device)
+        structures[name] = page.evaluate(STRUCTURE)
+        page.screenshot(path=folder / f"page-{kind}-{name.replace(' ', '-')}.png", full_page=True)
+        check(page)
+    first = structures["desk light"]
+    assert first["h1"] == 1
+    assert first["figure"] == first["canvas"]
+    assert all(found == first for found in structures.values())

@@ -1,0 +1,100 @@
+"""The table of panels: its channels exist, and every view reads it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from activesteer.analysis.figures.over_time import time_figure
+from activesteer.analysis.report.curves import plots
+from activesteer.analysis.report.groups import groups_of
+from activesteer.conventions import CORNERS
+from activesteer.drawing import panels
+from activesteer.drawing.panels import EXPLORE, FIGURE, FILM, PANELS, PATH_DISTANCE, REPORT, VIEWS, Line, panels_in
+from activesteer.playback import plots as rerun_plots
+from activesteer.playback import runs_of
+from activesteer.scenario import resolve
+from activesteer.simulation.simulation import Simulation
+from activesteer.video.gauges import READINGS
+from tests.unit.analysis.synthetic import step_steer
+from tests.unit.analysis.synthetic_files import recording_of
+from tests.unit.playback.synthetic import circle
+
+
+def test_every_channel_of_every_panel_is_recorded() -> None:
+    simulation = Simulation(resolve("step_steer"), "ars")
+    simulation.advance(10)
+    recorded = {channel.name for channel in simulation.recording().channels}
+    for name, panel in PANELS.items():
+        for line in panel.lines:
+            if line.channel == PATH_DISTANCE:
+                continue
+            wanted = {line.channel, line.demand, line.beside} - {""}
+            # A car with sensors or an estimator records a true value under a second name.
+            assert {each.removeprefix("measured_").removeprefix("estimated_") for each in wanted} <= recorded, name
+
+
+def test_every_panel_stands_in_a_view_and_every_view_names_panels() -> None:
+    assert {name for names in VIEWS.values() for name in names} == PANELS.keys()
+    for view, names in VIEWS.items():
+        assert len(set(names)) == len(names), view
+        for panel in panels_in(view):
+            assert panel.extreme is not None or panel.lines_in(view), panel.title
+
+
+@pytest.fixture
+def only_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table in which each view holds nothing but the speed."""
+    monkeypatch.setattr(panels, "VIEWS", {view: ("speed",) for view in VIEWS})
+
+
+@pytest.mark.usefixtures("only_speed")
+def test_report_explore_and_rerun_show_what_the_table_says() -> None:
+    group = groups_of({"none.mcap": recording_of(step_steer())})[0]
+    for view in (REPORT, EXPLORE):
+        assert [panel["title"] for panel in plots(group, view)["panels"]] == ["Speed"]
+    (run,) = runs_of({"none": circle(0.1)})
+    assert {page: [panel.title for panel in shown] for page, shown in rerun_plots.pages(run).items()}["Motion"] == [
+        "Speed"
+    ]
+
+
+def test_figures_have_an_axis_for_each_panel_of_the_table() -> None:
+    pytest.importorskip("matplotlib")
+    figure = time_figure({"none": recording_of(step_steer())})
+    titles = [axis.get_ylabel() for axis in figure.get_axes()]
+    shown = [panel.quantity.axis_title for panel in panels_in(FIGURE)]
+    assert [title for title in shown if title in titles] == titles
+
+
+def test_films_tell_the_values_of_the_table() -> None:
+    assert [reading.channel for reading in READINGS] == [
+        line.channel for panel in panels_in(FILM) for line in panel.lines_in(FILM)
+    ]
+
+
+def test_a_line_without_a_demand_or_without_its_companion_has_no_meaning() -> None:
+    run: dict[str, Any] = {"a_rad": np.ones(3), "a_demand_rad": np.zeros(3)}
+
+    class Run:
+        def __getitem__(self, name: str) -> Any:
+            if name not in run:
+                raise panels.RecordingError(f"there is no {name}")
+            return run[name]
+
+    assert Line("a_rad", demand="a_demand_rad").of(Run()) is None
+    assert Line("a_rad", demand="missing").of(Run()) is not None
+    assert Line("a_rad", beside="missing").of(Run()) is None
+    run["a_demand_rad"][1] = 1.0
+    assert Line("a_rad", demand="a_demand_rad").of(Run()) is not None
+
+
+def test_parts_of_all_corners_have_one_colour() -> None:
+    names = [f"{corner}_{part}_force_N" for corner in CORNERS for part in ("spring", f"link_{corner[0]}")]
+    by_corner = panels.link_panels(names)
+    assert len(by_corner) == len(CORNERS)
+    assert {panel.lines[0].colour for panel in by_corner} == {by_corner[0].lines[0].colour}
+    assert json.dumps([panel.title_with_unit for panel in by_corner]).count("[N]") == len(CORNERS)
