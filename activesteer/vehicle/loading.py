@@ -89,6 +89,7 @@ def _points(bare: mujoco.MjModel, load: Load) -> list[tuple[float, Array]]:
     front, rear = (data.xpos[[bare.body(f"{corner}_wheel").id for corner in pair], 0].mean() for pair in _AXLES)
     below = np.array([rear, 0.0, 0.0])
     boot = below + _BOOT_M if load.payload_position_m is None else np.array(load.payload_position_m)
+    boot = boot + np.array([load.payload_forward_change_m, 0.0, 0.0])
     tank = below + _TANK_M if load.fuel_position_m is None else np.array(load.fuel_position_m)
     roof = np.array([0.5 * (front + rear), 0.0, load.roof_height_m])
     return [(load.payload_kg, boot), (load.fuel_kg, tank), (load.roof_kg, roof)]

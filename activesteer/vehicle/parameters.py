@@ -45,7 +45,7 @@ _MASS_HINT: Final = (
 )
 _GRAVITY_HINT: Final = (
     "load.cg_height_change_m and cg_forward_change_m move the empty car's centre of gravity, load.payload_position_m "
-    "places the payload"
+    "places the payload, payload_forward_change_m shifts it"
 )
 _MASS_HINTS: Final = {
     **dict.fromkeys(("mass", "mass_kg", "mass_factor", "curb_mass_kg", "weight", "weight_kg", "weight_N"), _MASS_HINT),
@@ -192,6 +192,8 @@ class Load:
     """Persons and luggage in addition to the driver [kg]."""
     payload_position_m: Position | None = None
     """Their centre of gravity, vehicle axes [m]; default above the middle of the rear axle, 0.6 m high."""
+    payload_forward_change_m: Annotated[float, Range(-2.0, 4.0)] = 0.0
+    """Forward shift of that position [m]. Unlike the position, it places the payload alike in cars of any wheelbase."""
     roof_kg: Annotated[float, Range(0.0, 500.0)] = 0.0
     """Load on the roof [kg], over the middle of the wheelbase."""
     roof_height_m: Annotated[float, Range(0.5, 4.0)] = 1.6

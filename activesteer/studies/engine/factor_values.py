@@ -32,14 +32,15 @@ class FactorValues:
                 if name not in labels:
                     place = ("factors", factor.key, "maneuvers")
                     raise study.source.fail(place, nearest_names(name, labels), name)
-            for other, value in factor.when.items():
+            for other, wanted in factor.conditions.items():
                 place = ("factors", factor.key, "when", other)
                 if other not in self._factors:
                     raise study.source.fail(
                         place, f"is no other factor; {nearest_names(other, list(self._factors))}", other
                     )
-                if value not in self._factors[other].values:
-                    raise study.source.fail(place, f"{shown(value)} is no value of that factor", value)
+                for value in wanted:
+                    if value not in self._factors[other].values:
+                        raise study.source.fail(place, f"{shown(value)} is no value of that factor", value)
             for other in factor.grows_with:
                 if other not in self._factors or self._factors[other].nominal or self._factors[other].values:
                     ranges = [key for key, of in self._factors.items() if not (of.nominal or of.values)]
@@ -55,7 +56,7 @@ class FactorValues:
             value, factor = values[key], self._factors.get(key)
             if value is None or (factor is not None and factor.maneuvers and label not in factor.maneuvers):
                 continue
-            if factor is not None and any(values.get(other) != needed for other, needed in factor.when.items()):
+            if factor is not None and not factor.acts(values):
                 continue
             if factor is not None and factor.nominal:
                 nominals = self._nominal_of(maneuver, vehicle)
@@ -137,9 +138,8 @@ class Prior:
         """
         found = {}
         for factor in self._searched:
-            acts = all(values.get(other) == wanted for other, wanted in factor.when.items())
             value = values.get(factor.key)
-            if acts and value is not None:
+            if factor.acts(values) and value is not None:
                 low, centre, high, at = (
                     _linear(factor, number) for number in (factor.low, self.nominal[factor.key], factor.high, value)
                 )

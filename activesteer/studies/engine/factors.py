@@ -46,7 +46,7 @@ class Factor:
         grows_with: Other factor -> exponent. The value is also multiplied by that factor, over its value in the
             files, to the power of the exponent.
         maneuvers: Names of the manoeuvres in which the factor varies; empty for all.
-        when: Values of other factors with which the factor varies; empty for all.
+        when: Other factor -> its values with which the factor varies; empty for all.
     """
 
     key: str
@@ -62,6 +62,15 @@ class Factor:
     grows_with: Mapping[str, float] = field(default_factory=dict)
     maneuvers: tuple[str, ...] = ()
     when: Mapping[str, Value] = field(default_factory=dict)
+
+    def acts(self, values: Mapping[str, Value]) -> bool:
+        """Return whether the factor varies with these values of the others."""
+        return all(values.get(other) in wanted for other, wanted in self.conditions.items())
+
+    @property
+    def conditions(self) -> dict[str, list[Value]]:
+        """Return `when` with a list of values for each other factor."""
+        return {other: value if isinstance(value, list) else [value] for other, value in self.when.items()}
 
     def from_unit(self, unit: NDArray[np.float64]) -> list[Value]:
         """Convert cumulative probabilities, 0 to 1, shape (n,), to values of the factor."""

@@ -66,11 +66,13 @@ class Plan:
         study = self.study
         places = list(itertools.product(range(len(study.maneuvers)), range(len(study.vehicles))))
         for samples in self.samples:
-            columns = {key: values for key, values in samples.columns.items() if _has_text(values)}
+            texts = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
+            columns = {key: drawn for key, drawn in samples.columns.items() if key in texts or _has_text(drawn)}
             rows: Iterable[tuple[Any, ...]] = dict.fromkeys(zip(*columns.values(), strict=True))
             if study.tune:  # a search combines values as it proceeds
-                columns = {factor.key: factor.values for factor in study.factors if _has_text(factor.values)}
-                rows = itertools.product(*columns.values())
+                rows = itertools.product(*texts.values())
+            elif texts:  # the check for factors without effect changes one of them
+                rows = dict.fromkeys(other for row in rows for other in _with_one_changed(row, list(texts.values())))
             for row in rows if columns else ():
                 sample = samples[0] | dict(zip(columns, row, strict=True))
                 for place in places:
@@ -99,6 +101,13 @@ class Plan:
 
 def _has_text(values: Iterable[Any]) -> bool:
     return any(isinstance(value, str) for value in values)
+
+
+def _with_one_changed(row: tuple[Any, ...], values: Sequence[Sequence[Any]]) -> Iterator[tuple[Any, ...]]:
+    """Yield a combination, and those that differ from it in one value."""
+    yield row
+    for place, allowed in enumerate(values):
+        yield from ((*row[:place], value, *row[place + 1 :]) for value in allowed)
 
 
 def _labelled(study: StudyFile, key: str) -> Any:
@@ -159,7 +168,8 @@ def _described(
 ) -> list[dict[str, Any]]:
     """Return the inputs of a run at each value of a key, with the other keys as in the first sample if possible."""
     study = factor_values.study
-    needed = next((factor.when for factor in study.factors if factor.key == key), {})
+    conditions = next((factor.conditions for factor in study.factors if factor.key == key), {})
+    needed = {other: wanted[0] for other, wanted in conditions.items()}
     first, cases = {**samples[0], **needed}, study.case_list
     whole = []
     if cases is not None:
