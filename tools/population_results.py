@@ -36,6 +36,8 @@ from activesteer.theory.proportions import Proportion, percent
 NONE: Final = "none"
 REFERENCES: Final = ("ars", "afs", "esc")
 """Reference controllers: the paper's two systems, and the system that the law requires."""
+REQUIRED: Final = "esc"
+"""Reference that no controller may be worse than."""
 TOTAL: Final = "all scenarios"
 STUDY: Final = "population"
 COMPARISON: Final = "comparison"
@@ -117,7 +119,7 @@ class SystemEffect:
 
     Attributes:
         controller: The controller.
-        scenario: The manoeuvre.
+        scenario: The manoeuvre, or `TOTAL`.
         saved: Samples in which the car is not lost, of those in which it is lost without control.
         spoiled: Samples in which the car is lost, of those in which it is not lost without control.
         changes: Peak of the sideslip, remaining oscillation, steering effort, if the manoeuvre has them.
@@ -127,8 +129,10 @@ class SystemEffect:
         lower: Samples with a lower peak sideslip angle than the lowest of the reference controllers; no samples if the
             controller is not compared with them.
         harmed: Samples with harm; see `analysis.harm`.
+        harmed_anywhere: The same, counting stops where the car without control leaves its line.
         growth: Distribution of each measure of harm.
         worst_track_m: Largest growth of lane overstep or path error [m]; nan without such a measure.
+        vehicle: The car; empty for all cars of the population.
     """
 
     controller: str
@@ -140,13 +144,20 @@ class SystemEffect:
     spun: int | None = None
     lower: Proportion = Proportion()
     harmed: Proportion = Proportion()
+    harmed_anywhere: Proportion = Proportion()
     growth: tuple[Change, ...] = ()
     worst_track_m: float = math.nan
+    vehicle: str = ""
 
     def median_change(self, metrics: Sequence[str]) -> float:
         """Return the median change of the first metric that the scenario has, or nan if it has none of them."""
         medians = {change.metric: change.median for change in self.changes}
         return next((medians[name] for name in metrics if name in medians), math.nan)
+
+    def worst(self, measure: str) -> float:
+        """Return the largest growth of a measure [SI], infinite if it is undefined, or nan without the measure."""
+        found = [change for change in self.growth if change.metric == measure]
+        return max((math.inf if math.isnan(change.largest) else change.largest for change in found), default=math.nan)
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -170,7 +181,7 @@ class SystemEffect:
         return cls(**known | read)
 
 
-_PROPORTIONS: Final = ("saved", "spoiled", "lower", "harmed")
+_PROPORTIONS: Final = ("saved", "spoiled", "lower", "harmed", "harmed_anywhere")
 
 
 @dataclass(frozen=True)
@@ -180,10 +191,12 @@ class Population:
     Attributes:
         samples: Number of samples.
         seed: Seed of the samples.
-        vehicle: The car that the samples are variations of.
+        vehicle: The cars that the samples are variations of.
         versions: Versions of the program and its libraries.
         claims: In the order of the paper; none for a comparison of controllers.
         systems: Effects, scenario by scenario, in the order of the controllers.
+        cars: Effects in all scenarios, car by car, for a comparison of controllers.
+        against_required: Effects relative to `REQUIRED` instead of no control, car by car.
         failed: Number of incomplete runs; each counts as lost.
         worst: The runs with the most harm, of each controller.
     """
@@ -194,6 +207,8 @@ class Population:
     versions: Mapping[str, str]
     claims: tuple[ClaimProportion, ...]
     systems: tuple[SystemEffect, ...]
+    cars: tuple[SystemEffect, ...] = ()
+    against_required: tuple[SystemEffect, ...] = ()
     failed: int = 0
     worst: tuple[WorstRun, ...] = ()
 
@@ -213,14 +228,15 @@ class Population:
             name: sum((getattr(effect, name) for effect in own), Proportion()) for name in _PROPORTIONS
         }
         tracks = [effect.worst_track_m for effect in own if not math.isnan(effect.worst_track_m)]
-        return SystemEffect(controller, TOTAL, **sums, worst_track_m=max(tracks, default=math.nan))
+        growth = tuple(change for effect in own for change in effect.growth)
+        return SystemEffect(controller, TOTAL, **sums, growth=growth, worst_track_m=max(tracks, default=math.nan))
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""
         return {
             **asdict(self),
             "claims": [claim.to_json() for claim in self.claims],
-            "systems": [effect.to_json() for effect in self.systems],
+            **{name: [effect.to_json() for effect in getattr(self, name)] for name in _EFFECTS},
             "worst": finite([asdict(run) for run in self.worst]),
         }
 
@@ -230,7 +246,8 @@ class Population:
         try:
             read: dict[str, Any] = {
                 "claims": read_claims(table),
-                "systems": tuple(SystemEffect.from_json(effect) for effect in table["systems"]),
+                **{name: tuple(map(SystemEffect.from_json, table.get(name, ()))) for name in _EFFECTS},
+                "systems": tuple(map(SystemEffect.from_json, table["systems"])),
                 "worst": tuple(map(WorstRun.from_json, table.get("worst", ()))),
             }
             known = {**table, **read}
@@ -269,6 +286,9 @@ class Population:
                 low, median, high = (f"{shown.unit.factor * value:+.3g}" for value in values)
                 lines.append(f"    {shown.label}: {f'{median} {shown.unit_name}'.rstrip()} ({low} to {high})")
         return lines
+
+
+_EFFECTS: Final = ("systems", "cars", "against_required")
 
 
 def read_population(name: str) -> Population | None:
@@ -343,10 +363,12 @@ def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()
     return Population(
         samples=len({row["sample"] for row in rows}),
         seed=planned.seed,
-        vehicle=label_of(planned.vehicles[0]),
+        vehicle=", ".join(map(label_of, planned.vehicles)),
         versions=versions(),
         claims=tuple(_proportion(claim.id, claim.passed, without, planned.factors) for claim in nominal),
         systems=tuple(_effects(rows, systems)),
+        cars=() if planned.claims else tuple(_effects_by_car(rows, systems, NONE)),
+        against_required=() if planned.claims else tuple(_effects_by_car(rows, asked(systems), REQUIRED)),
         failed=sum(row["status"] != "ok" for row in rows),
         worst=() if planned.claims else tuple(_worst(rows, planned, systems)),
     )
@@ -381,36 +403,70 @@ def _numbers(factor: Factor, rows: Sequence[Row]) -> list[float]:
 def _effects(rows: Sequence[Row], systems: Sequence[str]) -> Iterator[SystemEffect]:
     """Yield the effect of each system in each scenario, relative to the same samples without control."""
     for scenario in dict.fromkeys(row["maneuver"] for row in rows):
-        driven = [row for row in rows if row["maneuver"] == scenario]
-        has = _metrics_of(scenario, rows)
-        runs = {(row["controller"], row["sample"]): {name: row[name] for name in has} for row in driven}
-        samples = dict.fromkeys(row["sample"] for row in driven)
+        runs = _runs([row for row in rows if row["maneuver"] == scenario])
         for system in systems:
-            both = [
-                (runs[NONE, sample], runs[system, sample])
-                for sample in samples
-                if (NONE, sample) in runs and (system, sample) in runs
-            ]
-            lost = [(is_lost(without), is_lost(row)) for without, row in both]
-            lowest = [_has_lowest_peak(runs, system, sample) for sample in samples if (system, sample) in runs]
-            grown = [growth_of(*pair) for pair in both]
-            tracks = [track_harm_m(growth) for growth in grown]
-            yield SystemEffect(
-                system,
-                scenario,
-                saved=_count(not after for before, after in lost if before),
-                spoiled=_count(after for before, after in lost if not before),
-                changes=tuple(_change(name, both) for name in CHANGES if name in has),
-                spun_without=sum(has_spun(row) for row, _ in both),
-                spun=sum(has_spun(row) for _, row in both),
-                lower=_count(lowest if asked([system]) and {*REFERENCES} <= {*systems} else ()),
-                harmed=_count(bool(harms(growth)) for growth in grown),
-                growth=tuple(
-                    _distribution(name, [growth[name] for growth in grown if name in growth])
-                    for name in dict.fromkeys(name for growth in grown for name in growth)
-                ),
-                worst_track_m=max((track for track in tracks if not math.isnan(track)), default=math.nan),
-            )
+            lowest = [_has_lowest_peak(runs, system, car) for name, car in runs if name == system]
+            counted = lowest if asked([system]) and {*REFERENCES} <= {*systems} else ()
+            yield _effect(system, scenario, _pairs(runs, system, NONE), lower=_count(counted))
+
+
+def _effects_by_car(rows: Sequence[Row], systems: Sequence[str], reference: str) -> Iterator[SystemEffect]:
+    """Yield the effect of each system on each car in all scenarios together, relative to a reference."""
+    for vehicle in dict.fromkeys(row["vehicle"] for row in rows):
+        runs = _runs([row for row in rows if row["vehicle"] == vehicle])
+        for system in systems:
+            if both := _pairs(runs, system, reference):
+                yield _effect(system, TOTAL, both, vehicle=vehicle)
+
+
+Car = tuple[str, str, int]
+"""Manoeuvre, vehicle and number of the sample."""
+
+
+def _runs(rows: Sequence[Row]) -> dict[tuple[str, Car], Row]:
+    """Return controller and car -> the metrics that the manoeuvre has."""
+    has = {scenario: _metrics_of(scenario, rows) for scenario in dict.fromkeys(row["maneuver"] for row in rows)}
+    return {
+        (row["controller"], (row["maneuver"], row["vehicle"], row["sample"])): {
+            name: row[name] for name in has[row["maneuver"]]
+        }
+        for row in rows
+    }
+
+
+def _pairs(runs: Mapping[tuple[str, Car], Row], system: str, reference: str) -> list[tuple[Row, Row]]:
+    own = ((car, row) for (name, car), row in runs.items() if name == system)
+    return [(runs[reference, car], row) for car, row in own if (reference, car) in runs]
+
+
+def _effect(system: str, scenario: str, both: Sequence[tuple[Row, Row]], **other: Any) -> SystemEffect:
+    lost = [(is_lost(without), is_lost(row)) for without, row in both]
+    grown = [growth_of(*pair) for pair in both]
+    tracks = [track_harm_m(growth) for growth in grown]
+    return SystemEffect(
+        system,
+        scenario,
+        saved=_count(not after for before, after in lost if before),
+        spoiled=_count(after for before, after in lost if not before),
+        changes=tuple(
+            _change(name, both) for name in CHANGES if both and all(name in row for pair in both for row in pair)
+        ),
+        spun_without=sum(has_spun(row) for row, _ in both),
+        spun=sum(has_spun(row) for _, row in both),
+        harmed=_count(bool(harms(growth)) for growth in grown),
+        harmed_anywhere=_count(bool(_harms_anywhere(growth)) for growth in grown),
+        growth=tuple(
+            _distribution(name, [growth[name] for growth in grown if name in growth])
+            for name in dict.fromkeys(name for growth in grown for name in growth)
+        ),
+        worst_track_m=max((track for track in tracks if not math.isnan(track)), default=math.nan),
+        **other,
+    )
+
+
+def _harms_anywhere(change: Mapping[str, float]) -> list[str]:
+    """Return `harms`, with stopping distances also where the car without control leaves its line."""
+    return harms({"stopping" if name == "stopping_elsewhere" else name: growth for name, growth in change.items()})
 
 
 def _count(held: Iterable[bool]) -> Proportion:
@@ -418,11 +474,11 @@ def _count(held: Iterable[bool]) -> Proportion:
     return Proportion(sum(judged), len(judged))
 
 
-def _has_lowest_peak(runs: Mapping[tuple[str, int], Row], system: str, sample: int) -> bool:
+def _has_lowest_peak(runs: Mapping[tuple[str, Car], Row], system: str, car: Car) -> bool:
     """Return whether the peak sideslip angle is below that of every reference. A run without a peak has the largest."""
 
     def peak(controller: str) -> float:
-        row = runs.get((controller, sample), {})
+        row = runs.get((controller, car), {})
         return next((abs(row[name]) for name in SIDESLIP_PEAKS if row.get(name) is not None), math.inf)
 
     return peak(system) < min(peak(name) for name in REFERENCES)
@@ -452,20 +508,20 @@ def _distribution(name: str, values: Sequence[float] | Array) -> Change:
 def _worst(rows: Sequence[Row], planned: StudyFile, systems: Sequence[str]) -> Iterator[WorstRun]:
     """Yield the `_WORST` runs with the most harm of each system, the worst first."""
     values, labels = FactorValues(planned), [label_of(item) for item in planned.maneuvers]
-    without = {(row["maneuver"], row["sample"]): row for row in rows if row["controller"] == NONE}
-    has = {name: _metrics_of(name, rows) for name in labels}
+    cars, runs = [label_of(item) for item in planned.vehicles], _runs(rows)
     for system in systems:
         found = []
         for row in rows:
-            key = row["maneuver"], row["sample"]
-            if row["controller"] == system and key in without:
-                growth = growth_of(*({name: one[name] for name in has[key[0]]} for one in (without[key], row)))
+            car = row["maneuver"], row["vehicle"], row["sample"]
+            if row["controller"] == system and (NONE, car) in runs:
+                growth = growth_of(runs[NONE, car], runs[system, car])
                 if names := harms(growth):
                     found.append((severity(growth), {name: growth[name] for name in names}, row))
         for size, growth, row in sorted(found, key=lambda one: -one[0])[:_WORST]:
-            place = labels.index(row["maneuver"])
-            overrides = planned.overrides | values.overrides(place, 0, {key: row[key] for key in planned.keys})
-            command = run_command(planned.maneuvers[place], system, planned.vehicles[0], overrides, planned.driver)
+            place = labels.index(row["maneuver"]), cars.index(row["vehicle"])
+            overrides = planned.overrides | values.overrides(*place, {key: row[key] for key in planned.keys})
+            vehicle = planned.vehicles[place[1]]
+            command = run_command(planned.maneuvers[place[0]], system, vehicle, overrides, planned.driver)
             yield WorstRun(system, row["maneuver"], row["sample"], size, growth, command)
 
 

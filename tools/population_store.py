@@ -23,6 +23,7 @@ from activesteer.analysis.bands import TRACK, Band
 from activesteer.analysis.claims.judge import SYSTEMS, Claim, Kind
 from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.stored import PAPER, SUMMARY, read_setting
+from activesteer.analysis.harm import MEASURES
 from activesteer.commands.terminal import RunCounter
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
@@ -38,9 +39,12 @@ from activesteer.studies.engine.workers import in_parallel
 from activesteer.theory.proportions import percent
 from tools.make_setting import AROUND
 from tools.population_results import (
+    NONE,
+    REQUIRED,
     STUDY,
     Change,
     Population,
+    SystemEffect,
     population,
     population_study,
     read_population,
@@ -53,7 +57,7 @@ PAGE: Final = DOCS / "population.md"
 CHASSIS_CONTROL: Final = DOCS / "chassis_control.md"
 BEGIN: Final = "<!-- the table is written by tools/renew.py comparison -->\n"
 END: Final = "<!-- end of the table -->\n"
-COMPARED: Final = ("none", "ars", "afs", "esc", "lqr", "integrated")
+COMPARED: Final = ("none", "esc", "lqr", "integrated")
 """Controllers of the comparison, unless others are given."""
 RUNS: Final = "runs.parquet"
 _EVERY: Final = 2
@@ -144,22 +148,61 @@ def comparison_page(text: str, found: Population | None) -> str:
 def _comparison(found: Population) -> list[str]:
     names = found.controllers
     versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
-    scenarios = dict.fromkeys(effect.scenario for effect in found.systems)
     totals = [found.total(name) for name in names]
     lines = [
-        f"{found.samples} samples of the {found.vehicle}, seed {found.seed}; driven with {versions}.",
+        f"{found.samples} samples on each of {found.vehicle}; seed {found.seed}; driven with {versions}.",
         "",
-        _row("runs with harm", [f"`{name}`" for name in names]),
-        "|---|" + "---|" * len(names),
+        *_head("runs with harm", names),
     ]
-    for scenario in scenarios:
+    for scenario in dict.fromkeys(effect.scenario for effect in found.systems):
         own = [effect for effect in found.systems if effect.scenario == scenario]
         lines.append(_row(scenario.replace("_", " "), [str(effect.harmed) for effect in own]))
     lines.append(_row("**all scenarios**", [str(total.harmed) for total in totals]))
-    lines.append(_row("worst harm of the track, m", [f"{total.worst_track_m:.2f}" for total in totals]))
+    lines.append(_row("the same, all stops counted", [str(total.harmed_anywhere) for total in totals]))
     lines.append(_row("lost without control, saved", [str(total.saved) for total in totals]))
     lines.append(_row("not lost without control, spoiled", [str(total.spoiled) for total in totals]))
+    lines += ["", *_head("by car", names)]
+    for vehicle in dict.fromkeys(effect.vehicle for effect in found.cars):
+        own = [effect for effect in found.cars if effect.vehicle == vehicle]
+        lines.append(_row(f"**{vehicle}**: runs with harm", [str(effect.harmed) for effect in own]))
+        lines.append(_row("the same, all stops counted", [str(effect.harmed_anywhere) for effect in own]))
+        for text, measure in _WORST.items():
+            lines.append(_row(text, [_worst(effect, measure) for effect in own]))
+    against = [
+        (
+            f"{effect.vehicle}, `{effect.controller}`",
+            str(effect.harmed_anywhere),
+            *(_worst(effect, measure) for measure in _WORST.values()),
+        )
+        for effect in found.against_required
+    ]
+    if against:
+        lines += ["", *_head(f"against `{REQUIRED}` in place of `{NONE}`", ["runs with harm", *_WORST], "")]
+        lines += [_row(head, cells) for head, *cells in against]
     return [*lines, "", "![Proportions by scenario and controller](pictures/comparison_population.png)"]
+
+
+_WORST: Final = {
+    "worst lane overstep, m": "lane",
+    "worst path error, m": "path",
+    "worst stop, m": "stopping",
+    "worst stop, car without control off its line, m": "stopping_elsewhere",
+    "worst heading at the end, deg": "heading",
+}
+"""Row of the table -> measure of harm."""
+
+
+def _worst(effect: SystemEffect, measure: str) -> str:
+    """Return the largest growth of a measure in its unit. It is undefined if the car is lost."""
+    value = effect.worst(measure)
+    if math.isinf(value):
+        return "lost"
+    return "-" if math.isnan(value) else f"{value * MEASURES[measure].unit.factor:.2f}"
+
+
+def _head(text: str, names: Iterable[str], mark: str = "`") -> list[str]:
+    cells = [f"{mark}{name}{mark}" for name in names]
+    return [_row(text, cells), "|---|" + "---|" * len(cells)]
 
 
 def _row(head: str, cells: Iterable[str]) -> str:

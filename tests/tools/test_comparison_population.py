@@ -88,6 +88,38 @@ def test_the_worst_runs_come_with_the_command_that_repeats_them():
     assert run.command in comparison_text(found)
 
 
+def test_harm_is_counted_car_by_car_with_and_without_the_cars_that_leave_their_line():
+    planned = comparison_study(("none", "esc", "lqr"), 2)
+    samples = planned.samples()[0]
+    metres = {  # stopping distance and deviation from the line
+        ("compact", "none"): (50.0, 0.2), ("compact", "esc"): (50.0, 0.2), ("compact", "lqr"): (50.7, 0.2),
+        ("sedan", "none"): (50.0, 3.0), ("sedan", "esc"): (50.0, 0.7), ("sedan", "lqr"): (63.0, 0.1),
+    }  # fmt: skip
+    rows = [
+        {
+            "run": 0, "sample": 0, "maneuver": "split_mu_braking", "vehicle": vehicle, "controller": name, **samples[0],
+            "status": "ok", "error": "", "stopping_distance_m": stop_m, "lateral_deviation_max_m": aside_m,
+            "heading_end_rad": 0.0,
+        }
+        for (vehicle, name), (stop_m, aside_m) in metres.items()
+    ]  # fmt: skip
+    found = summarise(pa.Table.from_pylist(rows), planned)
+    compact, sedan = (
+        next(car for car in found.cars if (car.vehicle, car.controller) == (vehicle, "lqr"))
+        for vehicle in ("compact", "sedan")
+    )
+    assert (compact.harmed, compact.harmed_anywhere) == (Proportion(1, 1), Proportion(1, 1))
+    assert compact.worst("stopping") == pytest.approx(0.7)
+    assert (sedan.harmed, sedan.harmed_anywhere) == (Proportion(0, 1), Proportion(1, 1))
+    assert sedan.worst("stopping_elsewhere") == pytest.approx(13.0)
+    assert found.total("lqr").harmed_anywhere == Proportion(2, 2)
+    assert found.total("lqr").worst("stopping_elsewhere") == pytest.approx(13.0)
+    [against] = [effect for effect in found.against_required if effect.vehicle == "sedan"]
+    assert against.worst("stopping_elsewhere") == pytest.approx(13.0)  # esc leaves the free side of the lane too
+    again = Population.from_json(json.loads(json.dumps(found.to_json(), allow_nan=False)))
+    assert again.to_json() == found.to_json()
+
+
 def test_what_is_stored_is_what_was_found():
     found = made_up(none=[0.3], ars=[0.2], afs=[0.2], esc=[0.2], lqr=[0.1])
     again = Population.from_json(json.loads(json.dumps(found.to_json(), allow_nan=False)))
@@ -100,9 +132,12 @@ def test_what_is_stored_is_what_was_found():
 def test_every_sample_drives_one_manoeuvre_around_the_limit_of_its_road():
     planned = comparison_study(NAMES, 14)
     plan = Plan(planned)
-    assert len(plan) == 14 * len(NAMES)
+    cars = len(planned.vehicles)
+    assert len(plan) == cars * 14 * len(NAMES)
     runs = [plan.request(run) for run in range(0, len(plan), len(NAMES))]
-    assert sorted(run.maneuver for run in runs) == sorted([*range(7)] * 2)
+    assert sorted(run.maneuver for run in runs) == sorted([*range(7)] * 2 * cars)
+    preset, voltage = "rear_actuator.preset", "rear_actuator.supply_voltage_V"
+    assert all((voltage in run.overrides) == (run.overrides[preset] != "hinge") for run in runs)
     assert all(plan.request(run.run + 1).overrides == run.overrides for run in runs)  # the next controller
     values, place = FactorValues(planned), [label_of(item) for item in planned.maneuvers].index("double_lane_change")
     slippery = values.overrides(place, 0, {"speed_kmh": 1.1, "road.mu": 0.4})

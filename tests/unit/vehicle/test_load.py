@@ -19,6 +19,7 @@ from tests.unit.vehicle.cars import dof, record
 
 LOADS: dict[str, dict[str, Any]] = {
     "boot": {"load.payload_kg": 300.0},
+    "rear seats": {"load.payload_kg": 200.0, "load.payload_forward_change_m": 0.9},
     "right rear seat": {"load.payload_kg": 90.0, "load.payload_position_m": [-1.9, -0.4, 0.6]},
     "roof": {"load.roof_kg": 75.0, "load.roof_height_m": 1.65},
     "empty tank": {"load.fuel_kg": -35.0},
@@ -37,7 +38,10 @@ def carried(vehicle: Vehicle, overrides: dict[str, Any]) -> list[tuple[float, np
     rear_m = -float(dimensions["wheelbase_m"]) + float(_design(vehicle, "fl")[0])  # type: ignore[arg-type]
     middle_m = 0.5 * (rear_m + float(_design(vehicle, "fl")[0]))
     return [
-        (load.get("payload_kg", 0.0), np.array(load.get("payload_position_m", (rear_m, 0.0, 0.6)))),
+        (
+            load.get("payload_kg", 0.0),
+            np.array(load.get("payload_position_m", (rear_m + load.get("payload_forward_change_m", 0.0), 0.0, 0.6))),
+        ),
         (load.get("fuel_kg", 0.0), np.array((rear_m + 0.4, 0.0, 0.35))),
         (load.get("roof_kg", 0.0), np.array((middle_m, 0.0, load.get("roof_height_m", 1.6)))),
     ]

@@ -103,6 +103,14 @@ def test_what_a_scenario_says_behind_a_key() -> None:
             "road.mu.when.sensors.preset",
             "best",
         ),
+        (
+            {
+                "road.mu": {"uniform": [0.8, 1.0], "when": {"sensors.preset": ["ideal", "best"]}},
+                "sensors.preset": {"choice": ["ideal", "production"]},
+            },
+            "road.mu.when.sensors.preset",
+            "best",
+        ),
     ],
 )
 def test_what_cannot_be_is_told_before_anything_runs(factors: dict[str, object], key: str, value: object) -> None:
