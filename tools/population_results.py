@@ -20,7 +20,7 @@ from activesteer.analysis.claims.stored import NO_FACTOR, ClaimProportion, read_
 from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity, track_harm_m
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.conventions import Array
-from activesteer.errors import ParameterError, StudyError
+from activesteer.errors import ManeuverError, ParameterError, StudyError
 from activesteer.files import finite
 from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.scenario import FileOrTable
@@ -197,7 +197,7 @@ class Population:
         systems: Effects, scenario by scenario, in the order of the controllers.
         cars: Effects in all scenarios, car by car, for a comparison of controllers.
         against_required: Effects relative to `REQUIRED` instead of no control, car by car.
-        failed: Number of incomplete runs; each counts as lost.
+        failed: Number of incomplete runs. Each counts as lost, unless no car can start the manoeuvre on its road.
         worst: The runs with the most harm, of each controller.
     """
 
@@ -358,10 +358,13 @@ def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()
     """Count the results of a population's runs as far as it is. A comparison has no nominal claims."""
     rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
     names = [label_of(controller) for controller in planned.controllers]
+    failed = sum(row["status"] != "ok" for row in rows)
+    samples = len({row["sample"] for row in rows})
+    rows = rows if planned.claims else _possible(rows)
     without = [row for row in rows if row["controller"] == NONE]
     systems = [name for name in names if name != NONE]
     return Population(
-        samples=len({row["sample"] for row in rows}),
+        samples=samples,
         seed=planned.seed,
         vehicle=", ".join(map(label_of, planned.vehicles)),
         versions=versions(),
@@ -369,7 +372,7 @@ def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()
         systems=tuple(_effects(rows, systems)),
         cars=() if planned.claims else tuple(_effects_by_car(rows, systems, NONE)),
         against_required=() if planned.claims else tuple(_effects_by_car(rows, asked(systems), REQUIRED)),
-        failed=sum(row["status"] != "ok" for row in rows),
+        failed=failed,
         worst=() if planned.claims else tuple(_worst(rows, planned, systems)),
     )
 
@@ -419,19 +422,24 @@ def _effects_by_car(rows: Sequence[Row], systems: Sequence[str], reference: str)
                 yield _effect(system, TOTAL, both, vehicle=vehicle)
 
 
+def _possible(rows: Sequence[Row]) -> list[Row]:
+    """Return the rows without cars that cannot start their manoeuvre, such as a turn that the road does not bear."""
+    impossible = {_car(row) for row in rows if str(row["error"]).startswith(ManeuverError.__name__)}
+    return [row for row in rows if _car(row) not in impossible]
+
+
 Car = tuple[str, str, int]
 """Manoeuvre, vehicle and number of the sample."""
+
+
+def _car(row: Row) -> Car:
+    return row["maneuver"], row["vehicle"], row["sample"]
 
 
 def _runs(rows: Sequence[Row]) -> dict[tuple[str, Car], Row]:
     """Return controller and car -> the metrics that the manoeuvre has."""
     has = {scenario: _metrics_of(scenario, rows) for scenario in dict.fromkeys(row["maneuver"] for row in rows)}
-    return {
-        (row["controller"], (row["maneuver"], row["vehicle"], row["sample"])): {
-            name: row[name] for name in has[row["maneuver"]]
-        }
-        for row in rows
-    }
+    return {(row["controller"], _car(row)): {name: row[name] for name in has[row["maneuver"]]} for row in rows}
 
 
 def _pairs(runs: Mapping[tuple[str, Car], Row], system: str, reference: str) -> list[tuple[Row, Row]]:
@@ -512,7 +520,7 @@ def _worst(rows: Sequence[Row], planned: StudyFile, systems: Sequence[str]) -> I
     for system in systems:
         found = []
         for row in rows:
-            car = row["maneuver"], row["vehicle"], row["sample"]
+            car = _car(row)
             if row["controller"] == system and (NONE, car) in runs:
                 growth = growth_of(runs[NONE, car], runs[system, car])
                 if names := harms(growth):

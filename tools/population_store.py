@@ -159,6 +159,7 @@ def _comparison(found: Population) -> list[str]:
         lines.append(_row(scenario.replace("_", " "), [str(effect.harmed) for effect in own]))
     lines.append(_row("**all scenarios**", [str(total.harmed) for total in totals]))
     lines.append(_row("the same, all stops counted", [str(total.harmed_anywhere) for total in totals]))
+    lines.append(_row("pairs of runs", [str(total.harmed.number) for total in totals]))
     lines.append(_row("lost without control, saved", [str(total.saved) for total in totals]))
     lines.append(_row("not lost without control, spoiled", [str(total.spoiled) for total in totals]))
     lines += ["", *_head("by car", names)]

@@ -120,6 +120,24 @@ def test_harm_is_counted_car_by_car_with_and_without_the_cars_that_leave_their_l
     assert again.to_json() == found.to_json()
 
 
+def test_a_turn_that_the_road_does_not_bear_is_not_counted():
+    planned = comparison_study(("none", "lqr"), 2)
+    samples = planned.samples()[0]
+    rows = [
+        {
+            "run": 0, "sample": sample, "maneuver": "brake_in_turn", "vehicle": "compact", "controller": name,
+            **samples[sample], "status": "failed" if sample else "ok",
+            "error": "ManeuverError: no angle found" if sample else "",
+            "sideslip_peak_abs_rad": None if sample else 0.1,
+        }
+        for sample in (0, 1)
+        for name in ("none", "lqr")
+    ]  # fmt: skip
+    found = summarise(pa.Table.from_pylist(rows), planned)
+    assert effect_of(found, "lqr").harmed == Proportion(0, 1)
+    assert (found.samples, found.failed) == (2, 2)
+
+
 def test_what_is_stored_is_what_was_found():
     found = made_up(none=[0.3], ars=[0.2], afs=[0.2], esc=[0.2], lqr=[0.1])
     again = Population.from_json(json.loads(json.dumps(found.to_json(), allow_nan=False)))
