@@ -20,7 +20,7 @@ from activesteer.analysis.claims.stored import NO_FACTOR, ClaimProportion, read_
 from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity, track_harm_m
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.conventions import Array
-from activesteer.errors import ManeuverError, ParameterError, StudyError
+from activesteer.errors import ManeuverError, ModelError, ParameterError, StudyError
 from activesteer.files import finite
 from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.scenario import FileOrTable
@@ -423,8 +423,9 @@ def _effects_by_car(rows: Sequence[Row], systems: Sequence[str], reference: str)
 
 
 def _possible(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows without cars that cannot start their manoeuvre, such as a turn that the road does not bear."""
-    impossible = {_car(row) for row in rows if str(row["error"]).startswith(ManeuverError.__name__)}
+    """Return the rows without cars that cannot start: the road does not bear the turn, or the axle not the actuator."""
+    reasons = ManeuverError.__name__, ModelError.__name__
+    impossible = {_car(row) for row in rows if str(row["error"]).startswith(reasons)}
     return [row for row in rows if _car(row) not in impossible]
 
 
