@@ -151,7 +151,7 @@ def _comparison(found: Population) -> list[str]:
     totals = [found.total(name) for name in names]
     lines = [
         f"{found.samples} samples on each of {found.vehicle}; seed {found.seed}; driven with {versions}.",
-        f"{found.failed} runs are left out, whose road does not bear the turn or whose rear axle cannot carry the screw.",
+        f"{found.failed} runs are left out: the road does not bear the turn, or the rear axle cannot carry the screw.",
         "",
         *_head("runs with harm", names),
     ]
