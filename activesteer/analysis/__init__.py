@@ -6,4 +6,7 @@
 - `claims`: the paper's statements about the three systems, as checks, with a scorecard.
 - `tables`, `figures`, `linear_plots`: the same to be read and looked at. The figures need matplotlib
   (`pip install 'activesteer[plot]'`).
+
+In: recordings.
+Out: metrics, claims, harm, tables, figures and reports.
 """
