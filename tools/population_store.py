@@ -24,6 +24,7 @@ from activesteer.analysis.claims.judge import SYSTEMS, Claim, Kind
 from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.stored import PAPER, SUMMARY, read_setting
 from activesteer.analysis.harm import MEASURES
+from activesteer.analysis.harm import TRACK as TRACK_MEASURES
 from activesteer.commands.terminal import RunCounter
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
@@ -168,13 +169,13 @@ def _comparison(found: Population) -> list[str]:
         own = [effect for effect in found.cars if effect.vehicle == vehicle]
         lines.append(_row(f"**{vehicle}**: runs with harm", [str(effect.harmed) for effect in own]))
         lines.append(_row("the same, all stops counted", [str(effect.harmed_anywhere) for effect in own]))
-        for text, measure in _WORST.items():
-            lines.append(_row(text, [_worst(effect, measure) for effect in own]))
+        for text, measures in _WORST.items():
+            lines.append(_row(text, [_worst(effect, measures) for effect in own]))
     against = [
         (
             f"{effect.vehicle}, `{effect.controller}`",
             str(effect.harmed_anywhere),
-            *(_worst(effect, measure) for measure in _WORST.values()),
+            *(_worst(effect, measures) for measures in _WORST.values()),
         )
         for effect in found.against_required
     ]
@@ -185,21 +186,21 @@ def _comparison(found: Population) -> list[str]:
 
 
 _WORST: Final = {
-    "worst lane overstep, m": "lane",
-    "worst path error, m": "path",
-    "worst stop, m": "stopping",
-    "worst stop, car without control off its line, m": "stopping_elsewhere",
-    "worst heading at the end, deg": "heading",
+    "worst track, m": TRACK_MEASURES,
+    "worst stop, m": ("stopping",),
+    "worst stop without a line, m": ("stopping_elsewhere",),
+    "worst heading, deg": ("heading",),
 }
-"""Row of the table -> measure of harm."""
+"""Row of the table -> measures of harm. A car without a line leaves it without control."""
 
 
-def _worst(effect: SystemEffect, measure: str) -> str:
-    """Return the largest growth of a measure in its unit. It is undefined if the car is lost."""
-    value = effect.worst(measure)
-    if math.isinf(value):
-        return "lost"
-    return "-" if math.isnan(value) else f"{value * MEASURES[measure].unit.factor:.2f}"
+def _worst(effect: SystemEffect, measures: Sequence[str]) -> str:
+    """Return the largest growth of the measures in their unit. It is undefined if the car is lost."""
+    values = [value for value in map(effect.worst, measures) if not math.isnan(value)]
+    if not values:
+        return "-"
+    worst = max(values) * MEASURES[measures[0]].unit.factor
+    return f"{worst:.2f}" if math.isfinite(worst) else "lost"
 
 
 def _head(text: str, names: Iterable[str], mark: str = "`") -> list[str]:
