@@ -46,6 +46,16 @@ def test_factor_that_changes_no_metric_is_reported(table, tmp_path, kind):
     assert rows.num_rows == (8 if kind == "grid" else 4)
 
 
+def test_texts_that_no_sample_combines_are_driven_to_find_it(table, tmp_path):
+    factors = {
+        "sensors.preset": {"choice": ["ideal", "production"]},
+        "rear_actuator.preset": {"choice": ["hinge", "screw_3deg"]},
+    }
+    design = {"samples": 1, "kind": "random"}
+    study({**table, "factors": factors, "design": design}, output=tmp_path / "s", jobs=1)
+    assert Store(tmp_path / "s", ()).progress().to_json()["without_effect"] == []
+
+
 def test_nothing_is_said_of_runs_that_all_failed(table):
     plan = Plan(read_study({**table, "factors": {UNUSED: {"grid": [0.0, 1.0]}}}))
     row = {"status": "failed", "maneuver": "step_steer", "vehicle": "compact", "controller": "none", UNUSED: 0.0}
