@@ -128,7 +128,9 @@ class Runs:
         return [self.folder.located(name) for name in choice.controllers]
 
     def _sliders(self, choice: Choice, scenario: Scenario | None = None) -> list[Slider]:
-        return sliders(scenario or self._resolved(choice, {}), self._located(choice))
+        named = {"manoeuvre": choice.maneuver, "car": choice.vehicle}
+        own = {group: self.folder.path / name for group, name in named.items() if name.endswith(".toml")}
+        return sliders(scenario or self._resolved(choice, {}), self._located(choice), own)
 
     def _held(self, choice: RunRequest, scenario: Scenario) -> Scenario:
         """Return a scenario with its amplitude: that of the last search while a slider moves, else a new one."""
