@@ -69,7 +69,7 @@ PRODUCTION: Final = "sensors.preset = production"
 """Key of the samples with the sensors of production cars."""
 _HEAD: Final = """# The population
 
-After this page you know how often each claim holds if car, road, driver, line, gains and sensors vary.
+This page shows how often each claim holds if car, road, driver, line, gains and sensors vary.
 
 `activesteer study population` drives {samples} variations of the {vehicle}, its road, its
 driver, his line and the gains through the paper's five scenarios with all three systems: {runs} runs. The package

@@ -16,7 +16,9 @@ whose limit exceeds the driver's demand is OFF. A front wheel that a controller 
 
 At low speed the tyre builds up force slowly (relaxation length over speed), so that a wheel swings on it, and neither
 its deceleration nor a small slip tell of locking. There HOLD keeps the mean friction torque of the cycles before, and
-only a large slip releases the wheel. At standstill, rising pressures hand the car over to the driver.
+only a large slip releases the wheel. Beyond the peak of its friction a wheel would lock at a held pressure, so each
+wheel first rolls at less, in RECOVER, over the distance in which its tyre follows its slip.
+At standstill, rising pressures hand the car over to the driver.
 
 Source of the cycle by wheel deceleration: Bosch, Automotive Handbook, chapter on ABS; Pasillas-Lepine (2006), Hybrid
 modeling and limit cycle analysis for a class of five-phase anti-lock brake algorithms. Fractions, thresholds and rates
@@ -78,6 +80,15 @@ def _hold(setup, state, wheel):
 
 
 @compiled
+def _roll_before_hold(setup, state, wheel):
+    """Lower the pressure of a cycling wheel: beyond the peak of its friction it would lock at a held pressure."""
+    rolls_Nm = setup.release_fraction * max(state.mean_Nm[wheel], 0.0)
+    state.limit_Pa[wheel] = rolls_Nm / setup.torque_per_pressure_NmpPa[wheel]
+    state.regained_mps2[wheel] = 0.0
+    _begin(state, wheel, RECOVER)
+
+
+@compiled
 def _resume(setup, state, wheel, slow):
     """Build up pressure again from just below the last friction torque."""
     if slow:
@@ -135,11 +146,14 @@ def _rolls_slowly(setup, state, wheel, locking, gain):
 
 
 @inlined
-def _recover(setup, state, wheel, gain, regains, slow):
-    """Advance a wheel that regains speed."""
+def _recover(setup, state, wheel, gain, regains, slow, locking):
+    """Advance a wheel that regains speed; a slow one first rolls until its tyre has followed."""
     state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
     state.regained_mps2[wheel] = max(state.regained_mps2[wheel], gain)
-    if gain < max(_REGAINS_mps2, setup.rolls_fraction * state.regained_mps2[wheel]):
+    if slow and state.phase_s[wheel] < _TYRE_LAG_M / state.reference_mps:
+        if locking and not regains:
+            _begin(state, wheel, RELEASE)
+    elif gain < max(_REGAINS_mps2, setup.rolls_fraction * state.regained_mps2[wheel]):
         _resume(setup, state, wheel, slow)
     elif not regains:
         _begin(state, wheel, RELEASE)
@@ -156,12 +170,13 @@ def _wheel(setup, state, wheel, car_mps2, fed_Pa):
     regains = gain > _REGAINS_mps2 and (slip < largest_slip or (slip < _LOCKED_SLIP and state.wheel_mps2[wheel] > 0.0))
     slow = state.reference_mps < setup.hold_speed_mps
     state.phase_s[wheel] += setup.interval_s
+    locking = slip > largest_slip + setup.hold_slip_mps / state.reference_mps
     _follow_mean(setup, state, wheel, slow)
     if slow and state.phase[wheel] == BUILD:
-        _hold(setup, state, wheel)
+        _roll_before_hold(setup, state, wheel)
     phase = state.phase[wheel]
     if slow and phase in (OFF, HOLD):
-        _rolls_slowly(setup, state, wheel, slip > largest_slip + setup.hold_slip_mps / state.reference_mps, gain)
+        _rolls_slowly(setup, state, wheel, locking, gain)
     elif phase == HOLD:
         _begin(state, wheel, BUILD)
     elif phase in (OFF, BUILD):
@@ -186,7 +201,7 @@ def _wheel(setup, state, wheel, car_mps2, fed_Pa):
             lower = state.limit_Pa[wheel] - setup.fall_Paps * setup.interval_s
             state.limit_Pa[wheel] = max(lower, 0.0)
     else:
-        _recover(setup, state, wheel, gain, regains, slow)
+        _recover(setup, state, wheel, gain, regains, slow, locking)
 
 
 @compiled

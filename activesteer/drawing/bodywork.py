@@ -24,7 +24,7 @@ CHASSIS: Final = "chassis"
 SEE_THROUGH: Final = 0.5
 """Opacity below which a solid of a model is part of its shell."""
 _SALOON_FROM_M: Final = 2.72
-"""Least wheelbase of a car that is drawn as a saloon [m]; others are hatchbacks."""
+"""Least wheelbase of a car that is drawn as a saloon [m]. Others are hatchbacks."""
 _TAIL_M: Final = 0.42, 0.76
 """Foremost place of the tail of a body, ahead of the rear axle, and its height [m]."""
 _DRAWN: Final = {"hatchback": (2.637, 1.8), "saloon": (2.85, 1.86)}
@@ -82,7 +82,7 @@ def _panel_of(panel: Panel, corners: Array) -> Panel:
 
 
 def _cut(triangles: Array, axis: int, at_m: float) -> tuple[Array, Array]:
-    """Cut triangles with normals, shape (n, 3, 6), at a coordinate; return those above and those below."""
+    """Cut triangles with normals, shape (n, 3, 6), at a coordinate. Return those above and those below."""
     side = triangles[:, :, axis] - at_m
     made = []
     for sign in (1.0, -1.0):

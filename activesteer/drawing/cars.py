@@ -49,7 +49,7 @@ def share_seen(apart_m: Array | float) -> Array:
 
 
 SLOWEST_MPS: Final = 1.0
-"""Speed below which the direction is kept [m/s]; that of a car at rest is not defined."""
+"""Speed below which the direction is kept [m/s]. That of a car at rest is not defined."""
 _STEADY_S: Final = 0.35
 """Standard deviation of the window over which the direction is averaged [s]. The camera follows a bend, but no quick
 motion, which therefore stays visible."""
@@ -69,7 +69,7 @@ def direction_of_motion(time_s: Array, places_m: Array, heading_rad: Array) -> A
 
 
 def _smooth(time_s: Array, values: Array) -> Array:
-    """Return a moving average with Gaussian weights and no phase shift; the end values are continued at both ends."""
+    """Return a moving average with Gaussian weights and no phase shift. The end values are continued at both ends."""
     step = float(np.median(np.diff(time_s)))
     reach = round(4.0 * _STEADY_S / step)
     offsets = np.arange(-reach, reach + 1) * step

@@ -53,7 +53,7 @@ class Line(NamedTuple):
     views: tuple[str, ...] = _EVERYWHERE
 
     def of(self, recording: Channels) -> Array | None:
-        """Return the values of a run [SI]; None if they have no meaning."""
+        """Return the values of a run [SI], or None if they have no meaning."""
         if self.beside and not _holds(recording, self.beside):
             return None
         values = recording[self.channel]
@@ -174,7 +174,7 @@ VIEWS: Final = {
     BODY: ("lateral", "roll", "longitudinal"),
     WHEELS: ("wheel_load", "friction_utilisation", "lateral_force", "longitudinal_force", "brake_pressure"),
 }  # fmt: skip
-"""View -> its panels in their order; a report and Explore show those that a run has, in pairs."""
+"""View -> its panels in their order. A report and Explore show those that a run has, in pairs."""
 
 
 def panels_in(view: str) -> tuple[Panel, ...]:

@@ -77,7 +77,7 @@ def tips_beside(size: Footprint) -> Array:
 
 
 class Plan(NamedTuple):
-    """A car in plan view; every part is a closed line in the axes of the car.
+    """A car in plan view. Every part is a closed line in the axes of the car.
 
     Attributes:
         body: Outline of the body [m], shape (points, 2).
@@ -108,7 +108,7 @@ def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
 
 
 def words(angle_rad: float) -> str:
-    """Write the true angle of a wedge and its side; empty for an unknown angle and for one that is as good as zero."""
+    """Write the true angle of a wedge and its side, or empty if the angle is unknown or as good as zero."""
     if not abs(angle_rad) >= _NOTHING_RAD:
         return ""
     side = " left" if angle_rad > 0.0 else " right"

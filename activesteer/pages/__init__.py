@@ -24,27 +24,13 @@ def render_page(page: Page) -> str:
 
 
 def write_page(page: Page, path: Path) -> Path:
-    """Write a page as HTML and return its path; an existing file is replaced.
-
-    Args:
-        page: The page.
-        path: The file; its folder is created if it does not exist.
-
-    Raises:
-        ParameterError: the file cannot be written.
-    """
+    """Write a page as HTML and return its path. An existing file is replaced."""
     make_folder(path.parent, ParameterError)
     return write_text(path, render_page(page), ParameterError)
 
 
 def render(template: str, **content: Any) -> str:
-    """Return the HTML of a template.
-
-    Args:
-        template: File name of the template.
-        **content: Values for the template. Text is escaped, `| tojson` writes data for a script, and markup must be a
-            `Markup`.
-    """
+    """Return the HTML of a template."""
     return _environment().get_template(template).render(content)
 
 

@@ -85,7 +85,7 @@ def _colour(colour: str) -> str:
 
 
 def _numbers(values: ArrayLike, along: ArrayLike | None = None) -> list[float | None]:
-    """Return numbers of five digits, of a line with too many points every n-th; None for one that is not finite."""
+    """Return numbers of five digits, of a line with too many points every n-th, or None for one that is not finite."""
     each = np.asarray(values, np.float64)
     if along is not None:
         each = np.broadcast_to(each, np.shape(along))
@@ -98,7 +98,7 @@ def _one_line(label: str) -> str:
 
 
 Text = str | Markup
-"""Text is escaped; markup must be made by `Markup`."""
+"""Text is escaped. Markup must be made by `Markup`."""
 
 
 _NARROW: Final = 3
@@ -132,7 +132,7 @@ class Table(NamedTuple):
         return len(self.columns) > _NARROW or any(len(cell) > _LONG for row in self.rows for cell in row)
 
     def lines(self) -> Iterator[str]:
-        """Yield the table as aligned text; `!` marks rows that break a limit, `~` rows that nothing is asked of."""
+        """Yield the table as aligned text. `!` marks rows that break a limit, `~` rows that nothing is asked of."""
         rows = [[_plain(cell) for cell in row] for row in (self.columns, *self.rows)]
         places = range(-1, len(self.rows))
         marks = ["! " if place in self.outside else "~ " if place in self.quiet else "  " for place in places]
@@ -140,7 +140,7 @@ class Table(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A section; its parts follow each other in the order of the attributes.
+    """A section. Its parts follow each other in the order of the attributes.
 
     Attributes:
         title: Its heading; empty for none.

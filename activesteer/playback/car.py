@@ -218,7 +218,7 @@ def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> 
 
 
 def body_path(run: Run, body: str) -> str:
-    """Return the entity of a body; entities below it move with the body."""
+    """Return the entity of a body. Entities below it move with the body."""
     return f"{run.scene}/car/{body}"
 
 
@@ -243,7 +243,7 @@ def ghost_path(run: Run, beside: Run) -> str:
 
 
 def _apart(run: Run, other: Run, time_s: Array) -> Array:
-    """Return the distance between the chassis of two runs [m]; a run that has ended keeps its last position."""
+    """Return the distance between the chassis of two runs [m]. A run that has ended keeps its last position."""
     at = []
     for each in (run, other):
         poses = each.recording.poses

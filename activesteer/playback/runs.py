@@ -39,7 +39,7 @@ class Showing(NamedTuple):
 
 
 PLOT_RATE_HZ: Final = 100.0
-"""Largest number of samples of a signal shown per second; a screen cannot show more."""
+"""Largest number of samples of a signal shown per second. A screen cannot show more."""
 
 
 _GREY: Final = "#8d939c"
@@ -80,7 +80,7 @@ class Run(NamedTuple):
 
 
 def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
-    """Return the runs in the paper's order; the three systems always have the same colours.
+    """Return the runs in the paper's order. The three systems always have the same colours.
 
     Args:
         recordings: Name, such as the name of the controller, to recording.

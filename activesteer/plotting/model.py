@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from activesteer.conventions import Array
 
 Dashes = str | tuple[float, tuple[float, ...]]
-"""Dashes of a line as matplotlib takes them; empty for points without a line."""
+"""Dashes of a line as matplotlib takes them, or empty for points without a line."""
 
 
 class Curve(NamedTuple):

@@ -109,7 +109,7 @@ class Obstacle:
     start_m: Annotated[float, Range(FIRST_START_M)]
     """Distance from the start of the manoeuvre, along x or along the path [m]."""
     length_m: Annotated[float, Range(1e-3)] | None = None
-    """Length [m]; wavelength of a `sine_wave`. Length over which a `cross_slope_ramp` turns. Default: without end, for
+    """Length [m]. Wavelength of a `sine_wave`. Length over which a `cross_slope_ramp` turns. Default: without end, for
     a `kerb`."""
     height_m: Height | None = None
     """Height; depth of a `pothole`; amplitude of a `sine_wave` [m]."""

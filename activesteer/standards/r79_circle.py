@@ -53,7 +53,7 @@ FIGURES: Final = (
     "yaw_rate_change_radps", "ay_change_mps2", "lateral_offset_1s_m", "lateral_offset_1s_driver_m",
     "steering_correction_rad", "fault_tolerant_time_s",
 )  # fmt: skip
-"""Values of a fault: largest changes with hands fixed; offset across the path, left positive, with hands fixed and with
+"""Values of a fault: largest changes with hands fixed. Offset across the path, left positive, with hands fixed and with
 the driver. Largest change of the driver's steering wheel angle. Tolerated time, None if no limit is exceeded."""
 _TURNED_S: Final = 3.0
 """Time in which the steering wheel reaches the Ackermann angle of the radius [s]. The limit is a third longer."""

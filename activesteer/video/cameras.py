@@ -63,7 +63,7 @@ def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
 
 
 def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
-    """Place the camera above the car, x to the right and y up as in the plots; it does not rotate with the car."""
+    """Place the camera above the car, x to the right and y up as in the plots. It does not rotate with the car."""
 
     def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
         camera.lookat = track.middle(time_s)
@@ -73,7 +73,7 @@ def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
 
 
 def _wheel(track: Track, corner: str) -> Callable[[mujoco.MjvCamera, float], None]:
-    """Place the camera inboard of a wheel, where its links are; it follows the chassis without roll and heave."""
+    """Place the camera inboard of a wheel, where its links are. It follows the chassis without roll and heave."""
     if corner not in CORNERS:
         raise ParameterError(f"there is no corner {corner!r}; {nearest_names(corner, CORNERS)}", value=corner)
     place = track.wheel_place(corner)

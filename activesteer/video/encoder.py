@@ -30,7 +30,7 @@ _SIDE_LIMIT: Final = 8192
 
 
 class Encoder(Protocol):
-    """Writer of frames. The file appears when the context ends without an error; otherwise nothing is left."""
+    """Writer of frames. The file appears when the context ends without an error. Otherwise nothing is left."""
 
     def write(self, pixels: Pixels) -> None:
         """Append one frame, shape (height, width, 3)."""

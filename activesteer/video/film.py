@@ -53,7 +53,7 @@ class Settings:
     gauges: str = "full"
     """`full`, or `sideslip` for one large number for each car and no markings."""
     cutaway: bool = False
-    """Whether the shells of the cars are transparent; the camera `wheel` always shows them so."""
+    """Whether the shells of the cars are transparent. The camera `wheel` always shows them so."""
 
     def __post_init__(self) -> None:
         """Check the settings."""
@@ -69,7 +69,7 @@ class Settings:
 
 
 class Film:
-    """Scenes and cameras for some recordings; use it in a `with` block."""
+    """Scenes and cameras for some recordings. Use it in a `with` block."""
 
     def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
         """Build the scenes."""
@@ -232,19 +232,7 @@ def make_film(
     settings: Settings | None = None,
     progress: Callable[[float], Any] | None = None,
 ) -> FilmInfo:
-    """Draw a film of recordings and write it to a file.
-
-    Args:
-        recordings: See `Film`.
-        path: The file, ending in .mp4 or .gif; an existing one is replaced when the new one is complete.
-        settings: Camera, size, speed.
-        progress: Called after each frame with the fraction that is done, 0 to 1.
-
-    Raises:
-        ParameterError: a setting or the file's ending is wrong.
-        PlaybackError: nothing can be drawn here, there is no ffmpeg, or the file cannot be written; the message says
-            what is missing.
-    """
+    """Draw a film of recordings and write it to a file."""
     settings = settings or Settings()
     check(path, settings.size)
     rate = frame_rate(path, settings.rate_hz)

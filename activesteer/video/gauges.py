@@ -57,7 +57,7 @@ _SIDE: Final = 3
 """Factor by which plans are drawn larger and then scaled down, because Pillow's lines have hard edges."""
 
 READINGS: Final = tuple(quantity_of(line.channel) for panel in panels_in(FILM) for line in panel.lines_in(FILM))
-"""Values in a row; a narrow frame shows the first ones only."""
+"""Values in a row. A narrow frame shows the first ones only."""
 _ADDED: Final = tuple(line.channel for line in PANELS["added"].lines)
 _WIDEST: Final = {"speed_mps": "188.8", "sideslip_rad": "-18.8"}
 
@@ -76,7 +76,7 @@ class Dials(NamedTuple):
     colour: str
 
     def value(self, channel: str, time_s: float) -> float:
-        """Return a channel at an instant; nan if it is not recorded."""
+        """Return a channel at an instant, or nan if it is not recorded."""
         if channel not in self.recording:
             return math.nan
         return float(np.interp(time_s, self.recording.time_s, self.recording[channel]))
@@ -118,7 +118,7 @@ class Gauges:
         self._plan = int(_PLAN_ASPECT * height), int(height)
 
     def _fit(self, scale: float) -> float:
-        """Set the sizes for a scale; return the height that title and rows cover [pixels]."""
+        """Set the sizes for a scale. Return the height that title and rows cover [pixels]."""
         self._scale = scale
         self._row, self._title_row = max(1, round(_ROW * scale)), max(1, round(_TITLE_ROW * scale))
         self._text, self._small = font(_TEXT * scale), font(_SMALL * scale)
@@ -242,7 +242,7 @@ class LargeSideslip:
         self._name, self._number = font(0.05 * size[1]), font(0.16 * size[1])
 
     def draw(self, pixels: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
-        """Draw names and numbers over a frame; see `Gauges.draw`."""
+        """Draw names and numbers over a frame (see `Gauges.draw`)."""
         picture = Image.fromarray(np.ascontiguousarray(pixels))
         row = round(0.25 * self._size[1])
         gap = round(0.03 * self._size[1])

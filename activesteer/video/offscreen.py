@@ -23,7 +23,7 @@ BACKENDS: Final = {
     "egl": "libegl1 libegl-mesa0 libgl1-mesa-dri",
     "osmesa": "libosmesa6",
 }
-"""Offscreen backends and the apt packages that they need; the backend that can use a graphics card comes first."""
+"""Offscreen backends and the apt packages that they need. The backend that can use a graphics card comes first."""
 
 _LIBRARIES: Final = {"egl": ("libEGL.so.1",), "osmesa": ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")}
 _MAX_GEOMS: Final = 20000
@@ -54,7 +54,7 @@ def backend() -> str:
 
 
 def _problem_with(name: str) -> str | None:
-    """Return the reason why a backend does not work here; None if it works."""
+    """Return the reason why a backend does not work here, or None if it works."""
     environment = {**os.environ, "MUJOCO_GL": name}
     environment.pop("PYOPENGL_PLATFORM", None)
     if (platform := _platform_in_use()) not in (None, name):
@@ -86,7 +86,7 @@ def _loads(library: str) -> bool:
 
 
 def _platform_in_use() -> str | None:
-    """Backend that this process's PyOpenGL has loaded; it cannot be changed any more."""
+    """Backend that this process's PyOpenGL has loaded. It cannot be changed any more."""
     return os.environ.get("PYOPENGL_PLATFORM", "").lower() or None if "OpenGL" in sys.modules else None
 
 
@@ -150,7 +150,7 @@ class Offscreen:
 
 @contextmanager
 def _library(name: str) -> Iterator[None]:
-    """Set MUJOCO_GL while MuJoCo looks up its OpenGL functions; restore it for a viewer that may be started later."""
+    """Set MUJOCO_GL while MuJoCo looks up its OpenGL functions. Restore it for a viewer that may be started later."""
     before = os.environ.get("MUJOCO_GL")
     os.environ["MUJOCO_GL"] = name
     try:

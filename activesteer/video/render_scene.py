@@ -141,7 +141,7 @@ class RenderScene:
         return int(self.model.body_mocapid[self.model.body(body).id])
 
     def place(self, car: int, positions_m: Array, quaternions: Array) -> None:
-        """Place a car; call `update` to apply it."""
+        """Place a car. Call `update` to apply it."""
         data, chassis = self.data, self._chassis[car]
         data.mocap_pos[self._mocap[car]] = positions_m
         data.mocap_quat[self._mocap[car]] = quaternions

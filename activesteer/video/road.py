@@ -41,7 +41,7 @@ _GAP_M: Final = 2.5
 _FAR_M: Final = 2000.0
 """Distance from the origin up to which patches of other friction are drawn [m]."""
 _LEAST_HALF_WIDTH_M, _MOST_HALF_WIDTH_M = 3.75, 25.0
-"""Half widths of a road without a course [m]; a run that needs more is on an open surface."""
+"""Half widths of a road without a course [m]. A run that needs more is on an open surface."""
 _BESIDE_CAR_M, _BEYOND_M = 2.5, 60.0
 """Room between the middle of a car and the edge, and length of the edges ahead and behind [m]."""
 _MARKS_M, _POSTS_M, _POST_M, _POST_HEIGHT_M = 10.0, 50.0, 0.6, 0.9
@@ -52,7 +52,7 @@ _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 
 
 def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None) -> None:
-    """Add the surface; lower friction makes it bluer."""
+    """Add the surface. Lower friction makes it bluer."""
     colour = np.array(_colour(road.mu))
     spec.add_texture(
         name=_TEXTURE,
@@ -148,7 +148,7 @@ class Edges(NamedTuple):
 
 
 def edges_beside(paths: Sequence[Array]) -> Edges | None:
-    """Return edges that all cars stay between; None if a car turns too far for a straight road."""
+    """Return edges that all cars stay between, or None if a car turns too far for a straight road."""
     points = np.concatenate([path[:, :2] for path in paths])
     half = max(_LEAST_HALF_WIDTH_M, float(np.abs(points[:, 1]).max()) + _BESIDE_CAR_M)
     if half > _MOST_HALF_WIDTH_M:

@@ -25,7 +25,7 @@ _PIECE_M: Final = 0.8
 _WIDTH_M: Final = 0.14
 _SLIDES_FROM: Final = 0.15
 """Length of the slip vector, tangent of the slip angle and slip ratio, from which a tyre leaves a mark. Passenger car
-tyres have their largest force at a slip angle of 6 to 10 deg; this is 8.5 deg."""
+tyres have their largest force at a slip angle of 6 to 10 deg. This is 8.5 deg."""
 _LEAST_LOAD_N: Final = 100.0
 _SKID_RGBA: Final = (0.13, 0.13, 0.135, 1.0)
 _PATH_Z_M, _SKID_Z_M = 0.024, 0.014
@@ -51,7 +51,7 @@ class Track:
     """
 
     def __init__(self, recording: Recording, name: str) -> None:
-        """Read the poses that can be drawn; a run that diverged ends with poses that cannot."""
+        """Read the poses that can be drawn. A run that diverged ends with poses that cannot."""
         poses = recording.poses
         self.bodies = poses.names
         whole = poses.usable()
@@ -69,7 +69,7 @@ class Track:
         self._direction_rad = direction_of_motion(self._time_s, middle_m, self._heading_rad)
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
-        """Return positions [m] and orientations w x y z of the bodies; outside the recording, its end poses."""
+        """Return positions [m] and orientations w x y z of the bodies. Outside the recording, its end poses."""
         last = len(self._time_s) - 1
         after = min(max(int(np.searchsorted(self._time_s, time_s, side="right")), min(1, last)), last)
         before = max(after - 1, 0)
@@ -87,7 +87,7 @@ class Track:
         return float(np.interp(time_s, self._time_s, self._heading_rad))
 
     def direction(self, time_s: float) -> float:
-        """Return the averaged direction of motion at an instant [rad]; see `drawing.cars`."""
+        """Return the averaged direction of motion at an instant [rad] (see `drawing.cars`)."""
         return float(np.interp(time_s, self._time_s, self._direction_rad))
 
     def middle(self, time_s: float) -> Array:

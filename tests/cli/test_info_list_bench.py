@@ -139,8 +139,9 @@ def test_bench_has_the_promised_keys_and_ratios(call, monkeypatch):
     )
     driven = SimpleNamespace(vehicle=SimpleNamespace(timestep_s=0.001), replay_us=None, step_us=None)
     for name, instead in {
-        "prepared": lambda scenario: scenario, "DrivenStop": lambda: driven, "_KeptInputs": lambda _: driven,
-        "_asked": lambda *_: [], "_runs_per_min": lambda: 100.0, "_blocks": lambda _: {},
+        "with_amplitude_found": lambda scenario: scenario, "DrivenStop": lambda: driven,
+        "_KeptInputs": lambda _: driven, "_asked": lambda *_: [], "_runs_per_min": lambda: 100.0,
+        "_blocks": lambda _: {},
     }.items():  # fmt: skip
         monkeypatch.setattr(f"activesteer.studies.benchmark.{name}", instead)
     told = call("bench", "--rounds", "1", "--json")

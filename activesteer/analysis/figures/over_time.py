@@ -1,4 +1,4 @@
-"""The paper's figures over one time axis that shows the transient; the cars that do not spin set the scale.
+"""The paper's figures over one time axis that shows the transient. The cars that do not spin set the scale.
 
 These are figures 2 and 11 (step steer), 12 and 13 (sine with dwell), 16, 17, 20, 21, 23 and 24 (along a path).
 """
@@ -71,7 +71,7 @@ def finish_time(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
-    """Return the time from before the first motion to after the last run has settled [s]; runs that spin do not count.
+    """Return the time from before the first motion to after the last run has settled [s]. Runs that spin do not count.
 
     If no run settles, this is the whole time.
     """
@@ -171,7 +171,7 @@ def mark_phases(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Shade the times at which a wheel stands on another friction than at the start; one shade for each run."""
+    """Shade the times at which a wheel stands on another friction than at the start. One shade for each run."""
     for curve in drawn:
         try:
             mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])
@@ -192,7 +192,7 @@ def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 def time_figure(
     recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE), *, instants: bool = False
 ) -> Figure:
-    """Draw panels over one time axis, as wide as a column; with the instants at which a sine with dwell is judged."""
+    """Draw panels over one time axis, as wide as a column. With the instants at which a sine with dwell is judged."""
     drawn = style.curves(recordings)
     shown = style.present(panels, drawn)
     figure = new_figure(width_in=style.COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))

@@ -72,7 +72,7 @@ class DrawnRun(NamedTuple):
 
 
 def curves(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
-    """Return the runs in the paper's order; the three systems always have the same colours."""
+    """Return the runs in the paper's order. The three systems always have the same colours."""
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
     return [
@@ -99,7 +99,7 @@ def draw(
 
 
 def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width: float = LINE_PT) -> None:
-    """Draw the lines of a run; those after the first are dotted."""
+    """Draw the lines of a run. Those after the first are dotted."""
     lines = panel.lines_in(FIGURE)
     # A panel of one line needs it; of several, a run has some.
     shown = lines if len(lines) == 1 else [line for line in lines if line.of(curve.recording) is not None]

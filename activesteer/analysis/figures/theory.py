@@ -26,12 +26,7 @@ TOP_SPEED_MPS: Final = 200.0 / 3.6
 
 
 def figure_7(recording: RecordingLike) -> Figure:
-    """Draw the predicted rear angle over speed, and the part of it that the rear system uses.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-        RecordingError: the metadata do not hold the parameters.
-    """
+    """Draw the predicted rear angle over speed, and the part of it that the rear system uses."""
     single_track = _single_track(recording)
     gain = _number(_parameters(recording, "controllers", "ars"), "prediction_gain", 1.0)
     speed_mps = np.linspace(0.0, TOP_SPEED_MPS, 400)
@@ -64,12 +59,7 @@ def figure_7(recording: RecordingLike) -> Figure:
 
 
 def figure_9(recording: RecordingLike) -> Figure:
-    """Draw the tolerance function of the correctors, with c_off and c_in.
-
-    Raises:
-        ParameterError: matplotlib is not installed.
-        RecordingError: the metadata do not hold the parameters.
-    """
+    """Draw the tolerance function of the correctors, with c_off and c_in."""
     bands: dict[tuple[float, float], list[str]] = {}
     for system in ("ars", "afs"):
         corrector = _parameters(recording, "controllers", system, "corrector")

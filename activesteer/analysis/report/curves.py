@@ -22,7 +22,7 @@ from activesteer.recording.contents import events_of
 from activesteer.road.course import CONE_RADIUS_M, Course
 
 RATE_HZ: Final = 200.0
-"""Most samples of a signal per second; the car's own motion ends below 20 Hz."""
+"""Most samples of a signal per second. The car's own motion ends below 20 Hz."""
 MAX_SAMPLES: Final = 4000
 """Most samples of a signal: twice the pixels of the widest screen, before zooming in."""
 MAX_STEP_S: Final = 0.02
@@ -30,7 +30,7 @@ MAX_STEP_S: Final = 0.02
 OFF_COURSE_M: Final = 6.0
 """Distance beside the course to which the picture shows a car that leaves it [m]."""
 DIGITS: Final = 4
-"""Digits after the first digit of a signal's range; more cannot be seen."""
+"""Digits after the first digit of a signal's range. More cannot be seen."""
 
 
 def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[Array]:
@@ -52,15 +52,7 @@ def _from_path(recording: Recording) -> Array:
 
 
 def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
-    """Return the plots of a group as JSON values.
-
-    Args:
-        group: The runs.
-        view: View whose panels are shown; see `drawing.panels`.
-
-    Returns:
-        Time step and number of samples, runs, plots, marks, and the track if positions were recorded.
-    """
+    """Return the plots of a group as JSON values."""
     grid = time_grid([run.recording.time_s for run in group.runs])
     panels = [shown for panel in panels_in(view) if (shown := _panel(panel, view, group.runs, grid))["series"]]
     return {
@@ -107,12 +99,12 @@ def _panel(panel: Panel, view: str, runs: Sequence[Run], grid: Array) -> dict[st
 
 
 def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
-    """Return the values at the instants of the grid; nan before and after the run."""
+    """Return the values at the instants of the grid, or nan before and after the run."""
     return np.interp(grid, time_s, values, left=math.nan, right=math.nan)
 
 
 def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
-    """Return the values of a curve; for a run too long for samples, the extremes, so that no peak is lost.
+    """Return the values of a curve. For a run too long for samples, the extremes, so that no peak is lost.
 
     Each pair of instants takes the least and the greatest value up to the next pair.
     """

@@ -60,7 +60,7 @@ def _same(recordings: list[Recording], table: str) -> bool:
 
 
 MAX_RUNS: Final = 60
-"""Most runs of a report; with more runs, nobody can read the page and a browser is slow to open it."""
+"""Most runs of a report. With more runs, nobody can read the page and a browser is slow to open it."""
 
 
 class Run(NamedTuple):
@@ -80,7 +80,7 @@ class Run(NamedTuple):
 
     @property
     def problem(self) -> str:
-        """Reason why the run is incomplete; empty for a complete run."""
+        """Reason why the run is incomplete, or empty for a complete run."""
         metadata = self.recording.metadata
         return "" if metadata.get("complete", True) else str(metadata.get("error", "the run did not end properly"))
 
@@ -104,12 +104,7 @@ class Group(NamedTuple):
 
 
 def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
-    """Open recordings, by path; of an incomplete or damaged file, the readable part.
-
-    Raises:
-        ParameterError: a file is named twice.
-        RecordingError: a file cannot be read.
-    """
+    """Open recordings, by path; of an incomplete or damaged file, the readable part."""
     recordings: dict[str, Recording] = {}
     for path in paths:
         if str(path) in recordings:
@@ -119,15 +114,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
 
 
 def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
-    """Return the runs by manoeuvre: first the paper's manoeuvres in its order, then the others; its setting apart.
-
-    Args:
-        recordings: Recordings by their origin.
-
-    Raises:
-        ParameterError: there is no recording, or there are more than `MAX_RUNS`.
-        RecordingError: a recording has no rows.
-    """
+    """Return the runs by manoeuvre: first the paper's manoeuvres in its order, then the others; its setting apart."""
     if not 1 <= len(recordings) <= MAX_RUNS:
         raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}", allowed=MAX_RUNS)
     by_maneuver: dict[tuple[str, bool], dict[str, Recording]] = {}
@@ -142,7 +129,7 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
 
 
 def entry(recording: Recording, table: str, key: str) -> str:
-    """Return an entry of a table of the metadata as text; empty if it does not exist."""
+    """Return an entry of a table of the metadata as text, or empty if it does not exist."""
     values: Any = recording.metadata.get(table)
     return str(values.get(key, "")) if isinstance(values, Mapping) else ""
 

@@ -61,7 +61,7 @@ _MOST_EVENTS: Final = 20
 
 
 class _Section(NamedTuple):
-    """Content of one manoeuvre; the template uses these names."""
+    """Content of one manoeuvre. The template uses these names."""
 
     anchor: str
     group: Group
@@ -76,7 +76,7 @@ class _Section(NamedTuple):
 
 
 def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[str]) -> Path:
-    """Write the report of runs and return its path; an existing file is replaced.
+    """Write the report of runs and return its path. An existing file is replaced.
 
     Args:
         recordings: Recordings by their origin, such as the names of their files.
@@ -90,16 +90,7 @@ def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[st
 
 
 def report_page(recordings: Mapping[str, Recording], made: date | None = None) -> str:
-    """Return the report of runs as HTML; the same recordings and date give the same page.
-
-    Args:
-        recordings: Recordings by their origin.
-        made: Date of the report; by default today.
-
-    Raises:
-        ParameterError: there is no recording.
-        RecordingError: a recording has no rows.
-    """
+    """Return the report of runs as HTML. The same recordings and date give the same page."""
     groups = groups_of(recordings)
     sections = [_section(group, f"group-{number}") for number, group in enumerate(groups, start=1)]
     several = len(groups) > 1

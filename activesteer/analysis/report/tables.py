@@ -28,13 +28,7 @@ class Change(StrEnum):
 
 
 def significance(name: str, value: float, first: float) -> Change:
-    """Compare a metric with its value in the first run.
-
-    Args:
-        name: Name of the metric.
-        value: Its value [SI].
-        first: Its value in the first run [SI].
-    """
+    """Compare a metric with its value in the first run."""
     metric = recorded_metric(name)
     if metric.better is None or not math.isfinite(value - first):
         return Change.OTHER
@@ -68,12 +62,7 @@ class Row(NamedTuple):
 
 
 def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
-    """Return the entries of tables of the metadata: those of the first run in its order, then those of later runs.
-
-    Args:
-        recordings: The runs.
-        tables: Keys of the metadata: tables, or single values. The entries of a single table come without its name.
-    """
+    """Return the entries of tables of the metadata: those of the first run in its order, then those of later runs."""
     flat = [dict(_flat(_chosen(run.metadata, tables))) for run in recordings]
     found = []
     for key in dict.fromkeys(key for entries in flat for key in entries):
@@ -180,7 +169,7 @@ KEY_FIGURES: Final = (
     KeyFigure("Share of time beyond the known surface", ("extended_road_share",)),
     KeyFigure("Largest suspension travel", ("suspension_travel_max_m",)),
 )
-"""Key figures in the order of their columns; a manoeuvre has some of them."""
+"""Key figures in the order of their columns. A manoeuvre has some of them."""
 
 
 HEADLINE: Final = "Peak sideslip [deg]"
@@ -203,7 +192,7 @@ def results(group: Group) -> list[Result]:
     found = []
     for place, run in enumerate(group.runs):
         metrics = run.recording.metrics
-        well = tuple(kept(metrics)) or (("keeps the car",) if any(lost) and not lost[place] else ())
+        well = tuple(kept(metrics)) or (("stays under control",) if any(lost) and not lost[place] else ())
         figures = [_figure(name, metrics, first if place else None) for _, name in chosen]
         if not (_is_judged(group.runs[0]) and _is_judged(run)):
             figures = [figure._replace(change=Change.OTHER) for figure in figures]
@@ -282,7 +271,7 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
 
 
 def changed_parameters(run: Run) -> str:
-    """Describe the overrides of a run, with their values and keys; empty without overrides."""
+    """Describe the overrides of a run, with their values and keys, or empty without overrides."""
     changed: Any = run.recording.metadata.get("overrides")
     return ", ".join(_told(*one) for one in changed.items()) if isinstance(changed, Mapping) else ""
 

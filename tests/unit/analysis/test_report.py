@@ -198,7 +198,7 @@ def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
     assert "2026-01-02" in top
     assert "lost at 57 deg of sideslip" in top
     assert "speed 95 km/h (maneuver.speed_kmh)" in top
-    assert top.count("keeps the car") == 2
+    assert top.count("stays under control") == 2
 
 
 def test_claims_are_judged_where_the_three_systems_are_there(page):

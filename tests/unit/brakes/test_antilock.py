@@ -139,10 +139,13 @@ def test_a_slow_car_is_handed_over_to_the_driver() -> None:
 
 
 def test_a_slow_car_holds_what_the_road_has_borne_and_a_swinging_wheel_does_not_release_it() -> None:
-    """The deceleration would release it at speed; then only a slip far beyond the limit does."""
+    """It first rolls at less, until its tyre has followed: beyond the peak of the friction it would lock. The
+    deceleration would release it at speed; then only a slip far beyond the limit does."""
     setup, state = braking(phase=BUILD, slip=0.0, gain_mps2=-30.0)
     state.reference_mps, state.mean_Nm[0] = 3.0, 800.0
     state.wheel_mps[0] = 2.6
+    rolls = round(0.5 / 3.0 / INTERVAL_S) + 1
+    assert step(setup, state, rolls) == pytest.approx([0.9 * 800.0 / PER_PRESSURE] * rolls)
     limits = step(setup, state, 100)
     assert limits[0] == pytest.approx(800.0 / PER_PRESSURE, rel=1e-3)
     assert 1.0 < limits[-1] / limits[0] < 1.02

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.brakes import Brakes
-from activesteer.brakes.antilock import BUILD, HOLD, OFF, antilock
+from activesteer.brakes.antilock import BUILD, HOLD, OFF, RECOVER, antilock
 from activesteer.brakes.brake_control_unit import follow_car, follow_wheels, step_brakes
 from activesteer.brakes.records import NO_LIMIT_NM
 from tests.unit.brakes.test_hydraulics import of
@@ -93,11 +93,19 @@ def test_either_front_wheel_holds_back_the_other(controlled: int) -> None:
     assert state.allowed_Pa[2] == state.limit_Pa[2]
 
 
-def test_the_anti_lock_system_controls_then_holds_then_hands_over_as_the_car_gets_slow() -> None:
-    for speed_mps, phase in ((5.1, BUILD), (4.9, HOLD), (0.6, HOLD), (0.4, OFF)):
+def test_the_anti_lock_system_controls_then_rolls_and_holds_then_hands_over_as_the_car_gets_slow() -> None:
+    for speed_mps, first, after_1s in (
+        (5.1, BUILD, BUILD),
+        (4.9, RECOVER, HOLD),
+        (0.6, RECOVER, HOLD),
+        (0.4, OFF, OFF),
+    ):
         setup, state = of(CAR)
         state.demand_Pa[:], state.limit_Pa[:], state.phase[0], state.borne_Nm[0] = 5e6, 4e6, BUILD, 440.0
         state.reference_mps = speed_mps
         state.wheel_mps[:] = speed_mps
         antilock(setup, state, 0.0, 0.0, setup.full_pedal_pressure_Pa)
-        assert state.phase[0] == phase
+        assert state.phase[0] == first
+        for _ in range(round(1.0 / INTERVAL_S)):
+            antilock(setup, state, 0.0, 0.0, setup.full_pedal_pressure_Pa)
+        assert state.phase[0] == after_1s
