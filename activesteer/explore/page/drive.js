@@ -93,7 +93,7 @@ export class Drive {
     this.ghost = this.ghosts.get(this.course);
     if (this.ghost) this.scene.car("ghost", 0, 0.35);
     this.frames = [];
-    this.struck = this.best = 0;
+    this.struck = this.passed = 0;
     this.previous = null;
     $("waiting").hidden = false;
     $("start").disabled = false;
@@ -155,7 +155,7 @@ export class Drive {
     if (!this.ready) return;
     const { time_s } = header, scene = this.scene;
     scene.place("you", poses);
-    if (this.ghost) this.follow(time_s);
+    if (this.ghost) scene.place("ghost", this.running ? this.before(time_s) : poses);
     const dt = this.previous ? time_s - this.previous.time_s : 0;
     scene.follow("you", dt || 1, dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [1, 0]);
     this.previous = { time_s, x: poses[0], y: poses[1] };
@@ -169,11 +169,11 @@ export class Drive {
     if (this.sent.has(header.seen)) { this.answered = this.sent.get(header.seen); this.sent.clear(); }
   }
 
-  // The ghost is where the last drive was at this time.
-  follow(time_s) {
+  // Return where the last drive was at this time.
+  before(time_s) {
     const { frames } = this.ghost;
-    while (this.best < frames.length - 1 && frames[this.best + 1].time_s <= time_s) this.best += 1;
-    this.scene.place("ghost", frames[this.best].poses);
+    while (this.passed < frames.length - 1 && frames[this.passed + 1].time_s <= time_s) this.passed += 1;
+    return frames[this.passed].poses;
   }
 
   gauges(header) {
@@ -194,6 +194,9 @@ export class Drive {
 
   draw() {
     this.hands();
+    const now = performance.now();
+    if (this.running) this.scene.lighten(now - this.drawn);
+    this.drawn = now;
     this.scene.draw();
     if (this.answered != null) { this.latencies.push(performance.now() - this.answered); this.answered = null; }
   }
@@ -208,8 +211,8 @@ export class Drive {
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
     const timed = lap ? ` Lap or gates: ${number(lap, 2)} s${faster}.` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
-    const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms in the median, ${Math.round(sorted.at(-1))} ms at most.`;
-    $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${latency} Saved as ${header.file} in ${header.folder}; activesteer replay ${header.file} shows it again.`;
+    const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
+    $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${latency} Saved as ${header.file} in ${header.folder}.`;
     if (this.shown && this.ready) this.prepare();
     if (header.error) this.say(header.error);
   }

@@ -4,6 +4,7 @@ import { onTheme, paint, runColour } from "./look.js";
 
 const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, TURN_S = 0.35, SLOW_MPS = 1;
 const BEHIND = 1e5; // Depth by which a car is drawn behind the one before it, so that the first is whole where they overlap; about 2 m.
+const SLOW_MS = 50, LEAST_RATIO = 0.5;
 const TRAIL_APART_M = 0.4, TRAIL_POINTS = 1500, ROAD_M = 1200, TILE_M = 10;
 
 /* Without WebGL the page shows its curves and tracks; a sentence stands in the place of the cars. */
@@ -15,7 +16,7 @@ function rendererOn(canvas) {
     told.textContent = "This browser has no WebGL, so the cars are not drawn in three dimensions.";
     canvas.after(told);
     canvas.style.display = "none";
-    return { setPixelRatio() {}, setSize() {}, render() {} };
+    return { getPixelRatio: () => 0, setPixelRatio() {}, setSize() {}, render() {} };
   }
 }
 
@@ -97,6 +98,16 @@ export class Scene {
     this.camera.fov = width < height ? 62 : 48;
     this.camera.updateProjectionMatrix();
     this.stale = true;
+  }
+
+  // Draw fewer pixels on a machine that is slow, such as one without a graphics card.
+  lighten(frame_ms) {
+    this.frame_ms = Math.min(frame_ms, 500) * 0.1 + (this.frame_ms ?? 16) * 0.9;
+    const ratio = this.renderer.getPixelRatio();
+    if (this.frame_ms < SLOW_MS || ratio <= LEAST_RATIO) return;
+    this.frame_ms = 16;
+    this.renderer.setPixelRatio(Math.max(LEAST_RATIO, 0.6 * ratio));
+    this.fit();
   }
 
   // Keep the shape of the cars: panels of the message and their points and normals.
