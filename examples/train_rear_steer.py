@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from activesteer import ActuatorCommand, Batch
-from activesteer.learning.tasks import TASKS, sampled_overrides  # with the extra [gym]
+from activesteer.learning.episodes import TASKS, sampled_overrides  # with the extra [gym]
 
 MANEUVERS = {"sine_with_dwell": 4.5, "double_lane_change": 7.5}
 """Manoeuvre -> time after which nothing happens any more [s]."""

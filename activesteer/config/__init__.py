@@ -12,8 +12,12 @@ without effect while other keys have certain values: key -> {other key: its valu
 
 from __future__ import annotations
 
-from activesteer.config.keys import (
+from activesteer.config.source import Range, Source, parse_value, read_toml, toml_text, toml_value
+from activesteer.config.values import (
+    build,
     check_overruled,
+    checked_number,
+    convert,
     dataclass_in,
     element_of,
     field_in_unit,
@@ -23,9 +27,8 @@ from activesteer.config.keys import (
     leaf_keys,
     merged,
     spellings,
+    to_table,
 )
-from activesteer.config.source import Range, Source, parse_value, read_toml, toml_text, toml_value
-from activesteer.config.values import build, checked_number, convert, to_table
 
 __all__ = [
     "Range",

@@ -1,13 +1,23 @@
-"""Cars in pictures: colours, transparent cars, and the direction in which a car moves."""
+"""Outlines and bodies of cars for drawings.
+
+They are added when something is drawn: no model and no recording contains them. `tools/make_bodies.py` makes the
+surfaces.
+"""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from functools import cache
+from itertools import pairwise
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array
+from activesteer.recording import Primitive, ScenePart
+from activesteer.resources import models_dir
+from activesteer.road.course import Footprint
 
 _ASPHALT: Final = np.array((88.0, 90.0, 94.0))
 _ABOVE: Final = np.array((228.0, 190.0, 120.0))
@@ -78,3 +88,135 @@ def _smooth(time_s: Array, values: Array) -> Array:
     even = np.arange(time_s[0] - reach * step, time_s[-1] + (reach + 1) * step, step)
     averaged = np.convolve(np.interp(even, time_s, values), weights / weights.sum(), mode="same")
     return np.asarray(np.interp(time_s, even, averaged), np.float64)
+
+
+CHASSIS: Final = "chassis"
+"""Body that carries the shell and that cameras follow."""
+SEE_THROUGH: Final = 0.5
+"""Opacity below which a solid of a model is part of its shell."""
+_SALOON_FROM_M: Final = 2.72
+"""Least wheelbase of a car that is drawn as a saloon [m]. Others are hatchbacks."""
+_TAIL_M: Final = 0.42, 0.76
+"""Foremost place of the tail of a body, ahead of the rear axle, and its height [m]."""
+_DRAWN: Final = {"hatchback": (2.637, 1.8), "saloon": (2.85, 1.86)}
+"""Wheelbase and width of the surfaces [m]."""
+_COLOURS: Final = {
+    "glass": (0.07, 0.09, 0.12),
+    "trim": (0.06, 0.06, 0.07),
+    "lamp": (0.93, 0.95, 0.98),
+    "tail": (0.72, 0.04, 0.05),
+    "plate": (0.94, 0.94, 0.9),
+    "tyre": (0.05, 0.05, 0.055),
+    "dark": (0.1, 0.1, 0.11),
+    "rim": (0.75, 0.77, 0.8),
+    "mark": (0.95, 0.75, 0.1),
+}
+
+
+class Panel(NamedTuple):
+    """A surface of one colour, fixed in the frame of a body.
+
+    Attributes:
+        body: Name of the body.
+        name: Name of the part, such as `glass`.
+        vertices_m: Its points in the frame of the body [m], shape (n, 3).
+        normals: Directions of the surface there, shape (n, 3).
+        faces: Corners of its triangles, counter-clockwise from outside, shape (m, 3).
+        rgb: Its colour, 0 to 1; None for the paint of the car.
+    """
+
+    body: str
+    name: str
+    vertices_m: Array
+    normals: Array
+    faces: NDArray[np.int32]
+    rgb: tuple[float, float, float] | None
+
+    @property
+    def shell(self) -> bool:
+        """True if the surface belongs to the body, which hides the parts below it, and not to a wheel."""
+        return not self.body.endswith("_wheel")
+
+
+def without_tail(panel: Panel, size: Footprint) -> tuple[Panel, Panel]:
+    """Return a panel of a body without its tail, which hides the rear wheels from behind, and the tail."""
+    corners = np.concatenate([panel.vertices_m, panel.normals], axis=1)[panel.faces]
+    ahead, behind = _cut(corners, 0, -size.wheelbase_m + _TAIL_M[0])
+    above, tail = _cut(behind, 2, _TAIL_M[1])
+    return _panel_of(panel, np.concatenate([ahead, above])), _panel_of(panel, tail)
+
+
+def _panel_of(panel: Panel, corners: Array) -> Panel:
+    points = corners.reshape(-1, 6)
+    faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
+    return panel._replace(vertices_m=points[:, :3], normals=points[:, 3:], faces=faces)
+
+
+def _cut(triangles: Array, axis: int, at_m: float) -> tuple[Array, Array]:
+    """Cut triangles with normals, shape (n, 3, 6), at a coordinate. Return those above and those below."""
+    side = triangles[:, :, axis] - at_m
+    made = []
+    for sign in (1.0, -1.0):
+        inside = sign * side
+        found = list(triangles[(inside >= 0.0).all(axis=1)])
+        for triangle, depth in (
+            (triangles[row], inside[row]) for row in np.flatnonzero((inside.min(1) < 0.0) & (inside.max(1) > 0.0))
+        ):
+            polygon = []
+            for one, next_one in ((0, 1), (1, 2), (2, 0)):
+                if depth[one] >= 0.0:
+                    polygon.append(triangle[one])
+                if depth[one] * depth[next_one] < 0.0:
+                    fraction = depth[one] / (depth[one] - depth[next_one])
+                    polygon.append(triangle[one] + fraction * (triangle[next_one] - triangle[one]))
+            found += [np.stack([polygon[0], *pair]) for pair in pairwise(polygon[1:])]
+        made.append(np.reshape(found, (-1, 3, 6)))
+    return made[0], made[1]
+
+
+def dressed(parts: Sequence[ScenePart], size: Footprint | None) -> tuple[tuple[ScenePart, ...], tuple[Panel, ...]]:
+    """Return a car with a body and wheels."""
+    if size is None:
+        return tuple(parts), ()
+    solids = [part for part in parts if isinstance(part, Primitive)]
+    shell = [solid for solid in solids if solid.body == CHASSIS and solid.rgba[3] < SEE_THROUGH]
+    panels = list(_body(size)) if shell else []
+    hidden = {id(solid) for solid in shell}
+    for body in dict.fromkeys(solid.body for solid in solids if solid.body.endswith("_wheel")):
+        tyre = max((solid for solid in solids if solid.body == body), key=lambda solid: solid.size_m[0])
+        hidden |= {id(solid) for solid in solids if solid.body == body}
+        panels += _wheel(body, 0.5 * tyre.size_m[0], tyre.size_m[2])
+    return tuple(part for part in parts if id(part) not in hidden), tuple(panels)
+
+
+def _body(size: Footprint) -> tuple[Panel, ...]:
+    name = "saloon" if size.wheelbase_m > _SALOON_FROM_M else "hatchback"
+    wheelbase_m, width_m = _DRAWN[name]
+    panels = []
+    for part, vertices, normals, faces in _surfaces(name):
+        points = vertices * (1.0, size.width_m / width_m, 1.0)
+        # Only the part between the axles becomes longer.
+        points[:, 0] -= np.clip(-points[:, 0] / wheelbase_m, 0.0, 1.0) * (size.wheelbase_m - wheelbase_m)
+        panels.append(Panel(CHASSIS, part, points, normals, faces, _COLOURS.get(part)))
+    return tuple(panels)
+
+
+def _wheel(body: str, radius_m: float, width_m: float) -> list[Panel]:
+    return [
+        Panel(body, part, vertices * (radius_m, width_m, radius_m), normals, faces, _COLOURS[part])
+        for part, vertices, normals, faces in _surfaces("wheel")
+    ]
+
+
+@cache
+def _surfaces(name: str) -> tuple[tuple[str, Array, Array, NDArray[np.int32]], ...]:
+    with np.load(models_dir() / "bodies" / f"{name}.npz") as file:
+        return tuple(
+            (
+                part,
+                file[f"{part}_vertices"].astype(np.float64),
+                file[f"{part}_normals"] / 127.0,
+                file[f"{part}_faces"].astype(np.int32),
+            )
+            for part in (key.removesuffix("_faces") for key in file if key.endswith("_faces"))
+        )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS
-from activesteer.drawing.bodywork import CHASSIS, dressed
+from activesteer.drawing.cars import CHASSIS, dressed
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
 from activesteer.simulation.run_context import scene_of

@@ -18,8 +18,7 @@ except ImportError as reason:
     raise not_installed(ParameterError, "activesteer.learning", "gymnasium", "gym") from reason
 
 from activesteer.learning.environments import CarEnv, CarVectorEnv, normalised
-from activesteer.learning.episodes import Episodes
-from activesteer.learning.tasks import TASKS, Task
+from activesteer.learning.episodes import TASKS, Episodes, Task
 
 __all__ = ["TASKS", "CarEnv", "CarVectorEnv", "Episodes", "Task", "normalised"]
 

@@ -15,8 +15,7 @@ from mujoco import MjvCamera
 from numpy.typing import NDArray
 
 from activesteer.errors import ParameterError, SimulationDiverged, nearest_names, shown
-from activesteer.learning.episodes import Episodes, Outcome
-from activesteer.learning.tasks import Task
+from activesteer.learning.episodes import Episodes, Outcome, Task
 from activesteer.recording import Recording
 from activesteer.simulation.simulation import Simulation
 

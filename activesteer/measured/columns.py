@@ -20,7 +20,7 @@ from activesteer.conventions import Array
 from activesteer.errors import RecordingError, nearest_names, shown
 from activesteer.files import is_file, read_bytes, shown_path, why_no_file
 from activesteer.measured import foreign_files
-from activesteer.measured.column import Column, check_rows, numbers, understood
+from activesteer.measured.foreign_files import Column, check_rows, numbers, understood
 
 _HEAD_LINES: Final = 200
 """Number of lines within which the numbers of a CSV must begin."""

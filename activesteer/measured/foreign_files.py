@@ -1,4 +1,4 @@
-"""Readers of files in other programs' formats by libraries with native code: MAT, Parquet, MDF.
+"""Files of other programs, and their columns.
 
 A damaged file may crash such a library. `columns.py` therefore runs this file in a child process.
 """
@@ -8,15 +8,59 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from activesteer import limits
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, not_installed, shown
 from activesteer.files import shown_path
-from activesteer.measured.column import Column, check_rows, numbers, understood
+
+
+class Column(NamedTuple):
+    """Column or signal of a file.
+
+    Attributes:
+        name: Name in the file.
+        unit: Unit in the file; empty if the file states none.
+        read: Function that returns the values, shape (n,), and their own times [s]; None for a shared time column.
+    """
+
+    name: str
+    unit: str
+    read: Callable[[], tuple[Array, Array | None]]
+
+
+def check_rows(count: int, path: Path) -> None:
+    """Refuse a file with too many rows, which its metadata state before the rows are read."""
+    limits.check_count(count, limits.MAX_ROWS, "rows", RecordingError, file=path.name)
+
+
+@contextmanager
+def understood(path: Path, what: str) -> Iterator[None]:
+    """Context that turns any exception of a file reader, as libraries raise, into a RecordingError of one line."""
+    try:
+        yield
+    except RecordingError:
+        raise
+    except Exception as reason:
+        problem = str(reason) or type(reason).__name__
+        raise RecordingError(f"{shown_path(path)} is no readable {what}: {problem}", value=path) from reason
+
+
+def numbers(values: Any, name: str, path: Path) -> Array:
+    """Convert values to numbers, and instants to seconds since the first one."""
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "mM":
+            return (array - array[0]).astype("timedelta64[ns]").astype(np.float64) * 1e-9
+        return np.asarray(array, np.float64)
+    except (TypeError, ValueError, IndexError) as reason:
+        raise RecordingError(f"column {shown(name)} holds no numbers: {reason}", file=path.name) from None
+
 
 _MAT_HEADER: Final = 128
 """Length of the header of a MATLAB file of version 5 [bytes]."""

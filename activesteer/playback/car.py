@@ -11,8 +11,7 @@ import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
 from activesteer.conventions import CORNERS, Array, yaw_of
-from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed
-from activesteer.drawing.cars import bytes_of, direction_of_motion, share_seen
+from activesteer.drawing.cars import CHASSIS, SEE_THROUGH, Panel, bytes_of, direction_of_motion, dressed, share_seen
 from activesteer.drawing.tyre_forces import CHANNELS, force_arrows, force_scale
 from activesteer.playback.runs import Run, times
 from activesteer.recording import Link, Primitive, ScenePart

@@ -9,8 +9,7 @@ import numpy as np
 import rerun as rr
 
 from activesteer.conventions import Array, yaw_of
-from activesteer.drawing.bodywork import CHASSIS
-from activesteer.drawing.cars import bytes_of, height_colours
+from activesteer.drawing.cars import CHASSIS, bytes_of, height_colours
 from activesteer.playback.car import rotated
 from activesteer.playback.runs import Run, times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, Footprint, course_of, footprint_of

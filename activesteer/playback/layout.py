@@ -9,8 +9,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from activesteer.drawing.bodywork import CHASSIS
-from activesteer.drawing.cars import bytes_of
+from activesteer.drawing.cars import CHASSIS, bytes_of
 from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Panel, panels_in
 from activesteer.playback import plots
 from activesteer.playback.car import body_path, ghost_path

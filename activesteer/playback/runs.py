@@ -11,7 +11,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from activesteer.conventions import run_looks
-from activesteer.drawing.bodywork import CHASSIS
+from activesteer.drawing.cars import CHASSIS
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
 

@@ -46,8 +46,7 @@ from activesteer.simulation.native_loop import (
     drive_cars,
 )
 from activesteer.vehicle.car import check_gear
-from activesteer.vehicle.step_bindings import write_command
-from activesteer.vehicle.wheel_set import torque_numbers
+from activesteer.vehicle.step_bindings import torque_numbers, write_command
 
 _WINDOW: Final = 250
 """Steps whose setpoints are tabulated at a time."""

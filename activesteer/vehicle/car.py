@@ -39,8 +39,15 @@ from activesteer.vehicle.loading import load_model
 from activesteer.vehicle.native_forces import install_native_forces
 from activesteer.vehicle.parameters import CLUTCH_OPEN, VehicleParameters
 from activesteer.vehicle.statics import YAW_DOF, static_ride, turn_chassis_back
-from activesteer.vehicle.step_bindings import RecordedArrays, Tape, bind_step, read_through, record_from, write_estimate
-from activesteer.vehicle.wheel_set import WheelSet
+from activesteer.vehicle.step_bindings import (
+    RecordedArrays,
+    Tape,
+    WheelSet,
+    bind_step,
+    read_through,
+    record_from,
+    write_estimate,
+)
 
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _N_DRIVER, _N_ACTUATOR = len(DriverCommand._fields), len(ActuatorCommand._fields)

@@ -13,8 +13,7 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import Array, yaw_of
-from activesteer.drawing.bodywork import CHASSIS, SEE_THROUGH, Panel, dressed, without_tail
-from activesteer.drawing.cars import share_seen, shares_of
+from activesteer.drawing.cars import CHASSIS, SEE_THROUGH, Panel, dressed, share_seen, shares_of, without_tail
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course, Footprint

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS, Array, yaw_of
 from activesteer.drawing import tyre_forces, wheel_angles
-from activesteer.drawing.bodywork import CHASSIS
-from activesteer.drawing.cars import direction_of_motion, shares_of
+from activesteer.drawing.cars import CHASSIS, direction_of_motion, shares_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, footprint_of

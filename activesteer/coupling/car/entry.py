@@ -14,7 +14,7 @@ from activesteer.compilation import compiled_callback
 from activesteer.coupling.car.variables import PLACE_GROUPS, PLACES
 from activesteer.native_memory import f64_pointer, load_numbers, pointer_to, store_numbers, word_pointer, zeros_of
 from activesteer.signals import ActuatorCommand, DriverCommand, numbers_of
-from activesteer.vehicle.channels.car_motion import angle_sides, in_the_road_plane, sideslip_share
+from activesteer.vehicle.channels.corners import angle_sides, in_the_road_plane, sideslip_share
 from activesteer.vehicle.channels.native_channels import (
     Actuator,
     AxialForce,

@@ -12,8 +12,14 @@ from numpy.typing import NDArray
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.sensors.block import MEASURED
-from activesteer.vehicle.channels.car_motion import MOTION_CHANNELS, CarMotion, motion_copied, motion_inputs
-from activesteer.vehicle.channels.corners import brake_signals, corner_signals
+from activesteer.vehicle.channels.corners import (
+    MOTION_CHANNELS,
+    CarMotion,
+    brake_signals,
+    corner_signals,
+    motion_copied,
+    motion_inputs,
+)
 from activesteer.vehicle.channels.native_channels import (
     Actuator,
     AxialForce,

@@ -1,4 +1,4 @@
-"""Channels of the four wheels: tyre forces and slips, contact with the road, position against the chassis, brakes."""
+"""Channels of the corners, and of the motion of the car."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import Final
 
 import mujoco
 import numpy as np
+from numba import types
 
 from activesteer.brakes.records import PER_WHEEL, PLACES
+from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import CORNERS, Array
-from activesteer.signals import CORNERS_IN_WORDS
+from activesteer.signals import CORNERS_IN_WORDS, Channel
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.native_channels import Column, Computed, Signal, Values, sensor, signal
 
@@ -121,3 +123,152 @@ def design_heights_m(model: mujoco.MjModel) -> list[float]:
     axes, place = at_rest.xmat[chassis].reshape(3, 3), at_rest.xpos[chassis]
     wheels = (at_rest.xpos[model.body(f"{corner}_wheel").id] for corner in CORNERS)
     return [float((axes.T @ (wheel - place))[2]) for wheel in wheels]
+
+
+STANDSTILL_MPS: Final = 0.2
+"""Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]: a car at rest swings on its tyres."""
+FULL_SIDESLIP_MPS: Final = 1.0
+"""From this speed on the recorded sideslip angle is the true one; below, it fades to 0 at `STANDSTILL_MPS` [m/s]."""
+ROCKS_BACK_MPS: Final = 1.0
+"""Limit for driving backwards, for a stopped car that swings back on suspension and tyres [m/s]."""
+
+_EXACT: Final = ("x_m", "y_m", "yaw_rad", "front_axle_x_m", "front_axle_y_m")
+"""Channels that grow with the distance and need more than 32 bits in a file."""
+MOTION_CHANNELS: Final = tuple(
+    Channel(name, unit, meaning, "vehicle", name not in _EXACT)
+    for name, unit, meaning in (
+        ("x_m", "m", "position of the centre of gravity, world x"),
+        ("y_m", "m", "position of the centre of gravity, world y (left)"),
+        ("z_m", "m", "height of the centre of gravity above the road"),
+        ("yaw_rad", "rad", "yaw angle, left positive, unwrapped"),
+        ("roll_rad", "rad", "roll angle, positive to the right"),
+        ("pitch_rad", "rad", "pitch angle, positive nose down"),
+        ("vx_mps", "m/s", "longitudinal velocity of the centre of gravity, in the road plane"),
+        ("vy_mps", "m/s", "lateral velocity of the centre of gravity, in the road plane, left positive"),
+        ("vz_mps", "m/s", "vertical velocity of the centre of gravity"),
+        ("speed_mps", "m/s", "speed of the centre of gravity over the road"),
+        ("yaw_rate_radps", "rad/s", "yaw rate, left positive"),
+        ("roll_rate_radps", "rad/s", "roll rate, body-fixed"),
+        ("pitch_rate_radps", "rad/s", "pitch rate, body-fixed"),
+        ("ax_mps2", "m/s2", "longitudinal acceleration, in the road plane"),
+        ("ay_mps2", "m/s2", "lateral acceleration, in the road plane, left positive"),
+        ("az_mps2", "m/s2", "vertical acceleration"),
+        ("sideslip_rad", "rad", "sideslip angle at the centre of gravity, atan(vy/vx); fades to 0 below 1 m/s"),
+        ("front_axle_x_m", "m", "position of the middle of the front axle, world x"),
+        ("front_axle_y_m", "m", "position of the middle of the front axle, world y"),
+    )
+)
+"""Channels of the motion. A channel that is computed has the name of its attribute of `CarMotion`."""
+
+
+def motion_copied(model: mujoco.MjModel) -> dict[str, Column]:
+    """Return the channels of `MOTION_CHANNELS` that are copied from the engine's sensors."""
+    x, y, z = sensor(model, "cg_position")
+    front_x, front_y, _ = sensor(model, "front_axle_position")
+    _, _, vertical = sensor(model, "cg_velocity")
+    roll_rate, pitch_rate, _ = sensor(model, "cg_gyro")
+    return {
+        "x_m": x, "y_m": y, "z_m": z, "front_axle_x_m": front_x, "front_axle_y_m": front_y, "vz_mps": vertical,
+        "roll_rate_radps": roll_rate, "pitch_rate_radps": pitch_rate,
+    }  # fmt: skip
+
+
+def motion_inputs(model: mujoco.MjModel) -> tuple[Column, ...]:
+    """Return the inputs of the other channels: orientation, velocity, acceleration, two of the body's angular rates."""
+    orientation, velocity, acceleration, rates = (
+        sensor(model, name) for name in ("chassis_orientation", "cg_velocity", "cg_accelerometer", "cg_gyro")
+    )
+    return *orientation, *velocity[:2], *acceleration, *rates[1:]
+
+
+_ARRAY: Final = types.Array(types.float64, 2, "A")
+
+
+@inlined
+def angle_sides(w, x, y, z):
+    """Return opposite and adjacent side of yaw and of roll, and the sine of pitch (ISO 8855: yaw, pitch, roll)."""
+    sine = 2.0 * (w * y - x * z)
+    return (
+        2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+        -1.0 if sine < -1.0 else 1.0 if sine > 1.0 else sine,
+    )  # fmt: skip
+
+
+@inlined
+def in_the_road_plane(vx, vy, ax, ay, az, about_y, about_z, sin, sr, sp, cos, cr, cp, gravity_mps2):
+    """Return velocity (two), acceleration (three) and yaw rate from sines and cosines of yaw, roll and pitch."""
+    # An accelerometer measures the specific force. After rotation into the road plane, add gravity, which has a
+    # component in this plane on a grade or a bank.
+    along = cp * ax + sp * (sr * ay + cr * az) + gravity_mps2[0] * cos
+    across = cr * ay - sr * az - gravity_mps2[0] * sin
+    if gravity_mps2[1] != 0.0:  # a bank
+        along += gravity_mps2[1] * sin
+        across += gravity_mps2[1] * cos
+    return (
+        vx * cos + vy * sin, vy * cos - vx * sin, along, across, -sp * ax + cp * (sr * ay + cr * az) + gravity_mps2[2],
+        # Rate of the Euler angle about the road's normal, not about the body's z axis.
+        (sr * about_y + cr * about_z) / cp,
+    )  # fmt: skip
+
+
+@inlined
+def sideslip_share(speed, along):
+    """Return the fraction of the sideslip angle that is recorded at a speed and a velocity along the car [m/s]."""
+    if along < 0.0:
+        return 1.0 if speed > ROCKS_BACK_MPS else 0.0
+    return min(max((speed - STANDSTILL_MPS) / (FULL_SIDESLIP_MPS - STANDSTILL_MPS), 0.0), 1.0)
+
+
+@compiled_call(types.void, _ARRAY, _ARRAY)
+def _all_angle_sides(columns, out):
+    """Write opposite sides, adjacent sides and sine of all rows."""
+    for row in range(len(columns)):
+        out[row, 0], out[row, 2], out[row, 1], out[row, 3], out[row, 4] = angle_sides(
+            columns[row, 0], columns[row, 1], columns[row, 2], columns[row, 3]
+        )
+
+
+@compiled_call(types.void, _ARRAY, _ARRAY, _ARRAY, types.Array(types.float64, 1, "C"), _ARRAY)
+def _all_in_the_road_plane(columns, sines, cosines, gravity_mps2, out):
+    for row in range(len(columns)):
+        out[row, 0], out[row, 1], out[row, 2], out[row, 3], out[row, 4], out[row, 5] = in_the_road_plane(
+            columns[row, 4], columns[row, 5], columns[row, 6], columns[row, 7], columns[row, 8], columns[row, 9],
+            columns[row, 10], sines[row, 0], sines[row, 1], sines[row, 2], cosines[row, 0], cosines[row, 1],
+            cosines[row, 2], gravity_mps2,
+        )  # fmt: skip
+
+
+_COLUMN: Final = types.Array(types.float64, 1, "A")
+
+
+@compiled_call(types.void, _COLUMN, _COLUMN, _COLUMN)
+def _all_sideslip_shares(speed, along, out):
+    for row in range(len(out)):
+        out[row] = sideslip_share(speed[row], along[row])
+
+
+class CarMotion:
+    """Motion of the centre of gravity in the axes of ISO 8855, from sensors in world and body axes."""
+
+    def __init__(self, columns: Array, gravity_mps2: Array, last_yaw_rad: float) -> None:
+        """Evaluate all quantities, which have the names of their channels.
+
+        Sines and angles use numpy, which computes eight at a time; recordings keep its last digits.
+        """
+        sides, angles, turned = (np.empty((len(columns), count), order="F") for count in (5, 3, 6))
+        _all_angle_sides(columns, sides)
+        np.arctan2(sides[:, :2], sides[:, 2:4], out=angles[:, :2])
+        np.arcsin(sides[:, 4], out=angles[:, 2])
+        self.yaw_rad, self.roll_rad, self.pitch_rad = angles.T
+        steps = np.abs(self.yaw_rad[1:] - self.yaw_rad[:-1])
+        # Unwrapping takes longer than everything else; without a jump it only adds 0.
+        if steps.max(initial=abs(self.yaw_rad[0] - last_yaw_rad)) < np.pi:
+            self.yaw_rad += 0.0
+        else:
+            self.yaw_rad[:] = np.unwrap(np.concatenate(([last_yaw_rad], self.yaw_rad)))[1:]
+        _all_in_the_road_plane(columns, np.sin(angles), np.cos(angles), gravity_mps2, turned)
+        self.vx_mps, self.vy_mps, self.ax_mps2, self.ay_mps2, self.az_mps2, self.yaw_rate_radps = turned.T
+        self.speed_mps = np.hypot(columns[:, 4], columns[:, 5])
+        shares = np.empty(len(columns))
+        _all_sideslip_shares(self.speed_mps, self.vx_mps, shares)
+        self.sideslip_rad = shares * np.arctan2(self.vy_mps, self.vx_mps)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.drawing.bodywork import Panel, dressed, without_tail
+from activesteer.drawing.cars import Panel, dressed, without_tail
 from activesteer.recording import Link, Primitive
 from activesteer.resources import models_dir
 from activesteer.road.course import Footprint
