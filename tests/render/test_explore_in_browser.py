@@ -136,6 +136,33 @@ def test_both_tabs_have_their_parts_in_sight(
 
 
 @pytest.mark.slow
+def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, served: tuple[str, Path]) -> None:
+    page, problems = opened(browser, served[0], **PHONE)
+    page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
+    page.tap("#tab-drive")
+    page.select_option("#course", "plane")
+    page.tap("#start", timeout=LIMIT_MS)
+    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
+    wheel, throttle = page.evaluate(BOX, "touch-steer"), page.evaluate(BOX, "touch-throttle")
+    y = wheel["y"] + wheel["height"] / 2
+    left = {"x": wheel["x"] + 0.3 * wheel["width"], "y": y, "id": 1}
+    right = {"x": throttle["x"] + throttle["width"] / 2, "y": y, "id": 2}
+    thumbs = page.context.new_cdp_session(page)
+    thumbs.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [left]})
+    thumbs.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [left, right]})
+    page.wait_for_timeout(1500)
+    thumbs.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.tap("#end")
+    page.wait_for_selector("#driven:has-text('Saved as')", timeout=LIMIT_MS)
+    file = page.inner_text("#driven").partition("Saved as ")[2].partition(" in ")[0]
+    recording = activesteer.Recording.open(served[1] / file)
+    assert recording["y_m"][-1] > 1.0
+    assert recording["speed_mps"].max() > 65.0 / 3.6
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
 def test_the_ghost_of_the_last_drive_drives_along(browser: Browser, served: tuple[str, Path]) -> None:
     page, problems = opened(browser, served[0], viewport={"width": 600, "height": 500})
     page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)

@@ -16,7 +16,7 @@ export class Drive {
     this.number = this.asked = 0;
     this.sent = new Map();
     this.last = "";
-    this.ghosts = new Map(); // course -> {frames, lap_s} of the last drive
+    this.ghosts = new Map(); // course -> {frames, lap_s} of the last drive, preferably of a complete one
     this.touch = { steer: 0, throttle: 0, brake: 0 };
     $("course").replaceChildren(...Object.entries(courses).map(([name, { title }]) => element("option", { value: name }, title)));
     $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
@@ -24,7 +24,7 @@ export class Drive {
     $("drive-controller").addEventListener("change", () => { if (!this.act({ controller: $("drive-controller").value })) this.prepare(); });
     for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => this.act({ mu: +$("drive-mu").value })]]) {
       $(id).addEventListener("input", () => { this.values(); write(); });
-      $(id).addEventListener("change", () => { if (!this.running) this.prepare(); });
+      $(id).addEventListener("change", () => { if (!this.running) { this.start_kmh = +$("drive-speed").value; this.prepare(); } });
     }
     for (const [id, held] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]]) $("drive-speed").addEventListener(id, () => { this.held = held; });
     $("hold").addEventListener("change", () => this.hold());
@@ -62,13 +62,14 @@ export class Drive {
   // Speed and friction of the course, until they are moved.
   ofCourse() {
     const course = courses[$("course").value];
-    $("drive-speed").value = course.speed_kmh;
+    $("drive-speed").value = this.start_kmh = course.speed_kmh;
     $("drive-mu").value = course.mu;
     this.values();
   }
 
-  values() {
-    for (const [id, unit, digits] of [["drive-speed", " km/h", 0], ["drive-mu", "", 2]]) $(id).previousElementSibling.textContent = number(+$(id).value, digits) + unit;
+  values(speed_kmh = +$("drive-speed").value) {
+    $("drive-speed").previousElementSibling.textContent = `${number(speed_kmh, 0)} km/h`;
+    $("drive-mu").previousElementSibling.textContent = number(+$("drive-mu").value, 2);
   }
 
   // Put a car at the start, where it waits for the button. A drive ends.
@@ -165,7 +166,7 @@ export class Drive {
     this.frames.push({ time_s, poses });
     this.lap_s = header.last_lap_s;
     for (const cone of header.cones) { this.struck += 1; scene.knock(cone, header.yaw_rate_degps < 0 ? -1.2 : 1.2); }
-    if (header.hold_kmh != null && !this.held) { $("drive-speed").value = header.hold_kmh; this.values(); }
+    if (header.hold_kmh != null && !this.held) { $("drive-speed").value = header.hold_kmh; this.values(header.hold_kmh); }
     if (this.sent.has(header.seen)) { this.answered = this.sent.get(header.seen); this.sent.clear(); }
   }
 
@@ -207,7 +208,9 @@ export class Drive {
     this.last = "";
     $("end").hidden = true;
     const before = this.ghosts.get(this.course)?.lap_s, lap = this.lap_s;
-    if (this.frames.length) this.ghosts.set(this.course, { frames: this.frames, lap_s: lap });
+    $("drive-speed").value = this.start_kmh; // the pedals have moved it
+    this.values();
+    if (this.frames.length && (lap || !before)) this.ghosts.set(this.course, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
     const timed = lap ? ` Lap or gates: ${number(lap, 2)} s${faster}.` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
