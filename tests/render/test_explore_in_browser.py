@@ -9,12 +9,15 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
 import activesteer
 from tests.conftest import PHONE
+from tests.contrast import contrast
+from tests.render.test_pages_in_browser import DEVICES, SIZES
+from tests.render.test_report_in_browser import TEXT_COLOURS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -98,25 +101,24 @@ def test_without_webgl_the_page_shows_its_curves(browser: Browser, served: tuple
     page.close()
 
 
-STRUCTURE = """() => {
-  const seen = [...document.querySelectorAll("body *")].filter((one) => one.checkVisibility());
-  const texts = seen.filter((one) => [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim()));
-  return { wide: document.documentElement.scrollWidth - innerWidth,
-    small: texts.filter((one) => parseFloat(getComputedStyle(one).fontSize) < 11).map((one) => one.textContent) };
-}"""
 BOX = "(id) => document.getElementById(id).getBoundingClientRect().toJSON()"
 
 
+def assert_readable(page: Page) -> None:
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    for size, text in page.evaluate(SIZES):
+        assert size >= 10.99, text
+    for ink, paper, text in page.evaluate(TEXT_COLOURS):
+        assert contrast(ink, paper) >= 4.5, text
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("size", [{"viewport": {"width": 1440, "height": 900}}, PHONE], ids=["desktop", "phone"])
-def test_both_tabs_have_their_parts_in_sight(
-    browser: Browser, served: tuple[str, Path], size: dict[str, Any], theme: str
-) -> None:
-    page, problems = opened(browser, served[0], **size, color_scheme=theme)
-    height, phone = size["viewport"]["height"], size is PHONE
+@pytest.mark.parametrize("device", DEVICES)
+def test_both_tabs_have_their_parts_in_sight(browser: Browser, served: tuple[str, Path], device: str) -> None:
+    page, problems = opened(browser, served[0], **DEVICES[device])
+    height, phone = page.evaluate("innerHeight"), device.startswith("phone")
     page.wait_for_selector(DONE, timeout=LIMIT_MS)
-    assert page.evaluate(STRUCTURE) == {"wide": 0, "small": []}
+    assert_readable(page)
     page.locator("#curves").scroll_into_view_if_needed()
     page.evaluate("scrollBy(0, 400)")
     sliders, curves = page.evaluate(BOX, "tuning"), page.evaluate(BOX, "curves")
@@ -124,7 +126,7 @@ def test_both_tabs_have_their_parts_in_sight(
     assert sliders["bottom"] < 0.4 * height if phone else sliders["right"] <= curves["left"]
     page.click("#tab-drive")
     page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
-    assert page.evaluate(STRUCTURE) == {"wide": 0, "small": []}
+    assert_readable(page)
     assert page.inner_text("#start") == "Drive at 70 km/h"
     stage, gauges = page.evaluate(BOX, "stage"), page.evaluate(BOX, "gauges")
     assert stage["bottom"] <= height
