@@ -1,9 +1,12 @@
 """Metrics, claims, tables and figures, made from recordings alone.
 
 - `metrics`: the metrics of a recording by its kind of manoeuvre: `step_response`, `frequency_response` (ISO 7401),
-  `handling` (ISO 4138), `sine_with_dwell` (FMVSS 126), `brake_in_turn` (ISO 7975), `straight_braking` (ISO 21994,
+  `handling` (ISO 4138), `sine_with_dwell` (FMVSS 126), `braking` (ISO 7975, ISO 21994,
   ISO 14512), `path_following` (lane change, slalom, any path), `general` for others.
 - `claims`: the paper's statements about the three systems, as checks, with a scorecard.
 - `tables`, `figures`, `linear_plots`: the same to be read and looked at. The figures need matplotlib
   (`pip install 'activesteer[plot]'`).
+
+In: recordings.
+Out: metrics, claims, harm, tables, figures and reports.
 """

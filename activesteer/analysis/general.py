@@ -1,10 +1,15 @@
-"""Metrics of all runs: sizes, energy, ride.
+"""Metrics of all runs: sizes, energy, ride, rollover.
 
 The seat point lies in the middle of the wheelbase, `SEAT_ASIDE_M` beside the middle of the car, on both sides in turn;
 the worse side counts. Its vertical acceleration is that of the centre of gravity plus that of pitch and roll.
 
 Source: ISO 2631-1:1997, annex A (frequency weighting W_k: band limits 0.4 and 100 Hz, transition 12.5 Hz, step 2.37 to
 3.35 Hz).
+
+NHTSA's rollover test counts a run in which both inner wheels leave the ground by two inches at the same time. Here the
+wheels count as lifted while the road does not carry them.
+
+Source: 68 FR 59250 (2003), Consumer Information; New Car Assessment Program; Rollover Resistance.
 """
 
 from __future__ import annotations
@@ -183,3 +188,23 @@ def weighting(frequency_Hz: Array) -> NDArray[np.complex128]:
     transition = (1.0 + s / (2.0 * math.pi * 12.5)) / quadratic(12.5, 0.63)
     step = quadratic(2.37, 0.91) / quadratic(3.35, 0.91) * (2.37 / 3.35) ** 2
     return high / quadratic(100.0, _BUTTERWORTH) * transition * step
+
+
+LIFTED_N: Final = 1.0
+"""Vertical load below which a wheel is lifted [N]."""
+ROLLOVER_KEY_METRICS: Final = (
+    "two_wheel_lift_time_s", "wheel_load_min_N", "roll_peak_abs_rad", "ay_peak_abs_mps2", "sideslip_peak_abs_rad",
+    "yaw_rate_peak_abs_radps", "yaw_rate_rms_radps", "friction_utilisation_max", "steering_wheel_peak_abs_rad",
+    "speed_end_mps",
+)  # fmt: skip
+"""Key metrics, the most telling first."""
+
+
+def rollover_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Return the general metrics, and those of the wheel loads."""
+    loads_N = np.array([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS], dtype=np.float64)
+    lifted = loads_N < LIFTED_N
+    both = (lifted[0] & lifted[2]) | (lifted[1] & lifted[3])
+    step_s = float(recording.time_s[1] - recording.time_s[0])
+    values = {"two_wheel_lift_time_s": float(both.sum()) * step_s, "wheel_load_min_N": float(loads_N.min())}
+    return values | general_metrics(recording)

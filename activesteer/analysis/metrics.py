@@ -6,16 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 from activesteer.analysis import (
-    brake_in_turn,
+    braking,
     frequency_response,
     general,
     handling,
     path_following,
-    rollover,
     sine_with_dwell,
-    slow_ramp,
     step_response,
-    straight_braking,
 )
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 from activesteer.errors import RecordingError, nearest_names
@@ -43,16 +40,16 @@ EVALUATIONS: Final[dict[str, Evaluation]] = {
     "step_steer": _evaluation(step_response.step_response_metrics, step_response.KEY_METRICS),
     "open_loop": _GENERAL,
     "random_steer": _GENERAL,
-    "slowly_increasing_steer": _evaluation(slow_ramp.slow_ramp_metrics, slow_ramp.KEY_METRICS),
+    "slowly_increasing_steer": _evaluation(step_response.slow_ramp_metrics, step_response.SLOW_RAMP_KEY_METRICS),
     "constant_radius": _evaluation(handling.handling_metrics, handling.KEY_METRICS),
     "sine_sweep": _evaluation(frequency_response.frequency_response_metrics, frequency_response.KEY_METRICS),
     "sine_with_dwell": _evaluation(sine_with_dwell.sine_with_dwell_metrics, sine_with_dwell.KEY_METRICS),
     "lane_change": _evaluation(path_following.path_following_metrics, path_following.LANE_CHANGE_KEY_METRICS),
     "slalom": _evaluation(path_following.path_following_metrics, path_following.SLALOM_KEY_METRICS),
     "follow_path": _evaluation(path_following.path_following_metrics, path_following.PATH_KEY_METRICS),
-    "brake_in_turn": _evaluation(brake_in_turn.brake_in_turn_metrics, brake_in_turn.KEY_METRICS),
-    "phases": _evaluation(rollover.rollover_metrics, rollover.KEY_METRICS),
-    "straight_braking": _evaluation(straight_braking.straight_braking_metrics, straight_braking.KEY_METRICS),
+    "brake_in_turn": _evaluation(braking.brake_in_turn_metrics, braking.BRAKE_IN_TURN_KEY_METRICS),
+    "phases": _evaluation(general.rollover_metrics, general.ROLLOVER_KEY_METRICS),
+    "straight_braking": _evaluation(braking.straight_braking_metrics, braking.STRAIGHT_BRAKING_KEY_METRICS),
     "measured": _evaluation(general.measured_metrics, general.KEY_METRICS),
 }
 """Kind of manoeuvre -> its evaluation."""

@@ -1,4 +1,8 @@
-"""Brakes: hydraulics, anti-lock system and traction control, as native code that the car's step calls."""
+"""Brakes: hydraulics, anti-lock system and traction control, as native code that the car's step calls.
+
+In: pedal, demanded brake torques, wheel speeds and the brakes' parameters.
+Out: brake torques of the wheels, and the states of anti-lock system and traction control.
+"""
 
 from activesteer.brakes.parameters import Antilock, Brakes, Hydraulics, TractionControl
 

@@ -8,6 +8,9 @@ key: `road.patches.0.mu` is the `mu` of the first [[road.patches]]. A range is w
 
 A class may define `KEY_HINTS`: keys that users expect but that do not exist -> help. It may define `OVERRULED`: keys
 without effect while other keys have certain values: key -> {other key: its value, None for any}.
+
+In: TOML files and tables.
+Out: frozen dataclasses in SI units, or an error with file, key and line.
 """
 
 from __future__ import annotations

@@ -20,8 +20,7 @@ from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.lqr import Lqr
 from activesteer.controllers.no_control import NoControl, Observer
-from activesteer.controllers.rear_steer import RearSteer
-from activesteer.controllers.sideslip_rear_steer import SideslipRearSteer
+from activesteer.controllers.rear_steer import RearSteer, SideslipRearSteer
 from activesteer.controllers.torque_vectoring import TorqueVectoring
 
 CONTROLLERS: Final[dict[str, type[Any]]] = {

@@ -1,4 +1,8 @@
-"""The driver: from the setpoint, and the path ahead, to steering wheel, drive and brake."""
+"""The driver: from the setpoint, and the path ahead, to steering wheel, drive and brake.
+
+In: the setpoint of a manoeuvre, the measurement, and the motion of the car.
+Out: steering wheel angle, drive torque, brake pedal and gear.
+"""
 
 from activesteer.driver.base import Driver, DriverParameters, DriverSetup
 from activesteer.driver.find import DRIVER, driver_spec, is_driver_file

@@ -11,7 +11,7 @@ from activesteer.conventions import CORNERS
 from activesteer.drawing.cars import CHASSIS, dressed
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
-from activesteer.simulation.run_context import scene_of
+from activesteer.simulation.recorder import scene_of
 from activesteer.vehicle import Vehicle
 
 BODIES: Final = (CHASSIS, *(f"{corner}_wheel" for corner in CORNERS))

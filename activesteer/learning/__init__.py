@@ -6,6 +6,9 @@ Examples:
     >>> env = gymnasium.make("activesteer/SineWithDwell-v0")
     >>> observation, info = env.reset(seed=1)
     >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+
+In: actions of an agent.
+Out: observations, rewards, and recordings of episodes.
 """
 
 from __future__ import annotations

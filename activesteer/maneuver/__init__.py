@@ -2,6 +2,9 @@
 
 A kind of manoeuvre is one file with a subclass of `Maneuver`, and its line in `kinds.KINDS`. The package `analysis`
 evaluates its recordings: `analysis.metrics.EVALUATIONS` needs a line too.
+
+In: TOML files and tables.
+Out: setpoints for the driver, the road, and the duration of a run.
 """
 
 from activesteer.maneuver.base import Maneuver

@@ -36,7 +36,7 @@ from activesteer.recording import Recording
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.signals import Channel
-from activesteer.simulation.run_context import scene_of
+from activesteer.simulation.recorder import scene_of
 from activesteer.units import UNIT_NAMES, alike, find_unit, unit_of
 from activesteer.version import __version__
 

@@ -1,4 +1,8 @@
-"""HTML pages that need no other file and no network: jinja2 templates with one frame and one stylesheet."""
+"""HTML pages that need no other file and no network: jinja2 templates with one frame and one stylesheet.
+
+In: tables, pictures and texts.
+Out: HTML pages that work without a network.
+"""
 
 from __future__ import annotations
 

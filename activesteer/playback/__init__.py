@@ -1,4 +1,8 @@
-"""Playback of recordings in the rerun viewer."""
+"""Playback of recordings in the rerun viewer.
+
+In: recordings.
+Out: rerun recordings and the viewer.
+"""
 
 from activesteer.playback.runs import Run, Showing, runs_of
 from activesteer.playback.viewer import save, serve, show

@@ -1,4 +1,8 @@
-"""Plots: one model of a curve, a panel and a picture, drawn by matplotlib without a screen."""
+"""Plots: one model of a curve, a panel and a picture, drawn by matplotlib without a screen.
+
+In: numbers with names and units.
+Out: figures as PNG, PDF or SVG, and models of pictures for pages.
+"""
 
 from activesteer.plotting.drawing import draw, new_figure, plain_axis, save, save_all
 from activesteer.plotting.model import Area, Curve, Heat, Panel, Picture

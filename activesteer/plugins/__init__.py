@@ -1,4 +1,8 @@
-"""Drivers and controllers of a user: by name, from a file, or as a class, an instance or a factory."""
+"""Drivers and controllers of a user: by name, from a file, or as a class, an instance or a factory.
+
+In: a name, a file, a class or a factory.
+Out: a specification that makes the block, with its declared parameters.
+"""
 
 from activesteer.plugins.file import is_user_module
 from activesteer.plugins.kind import Kind, in_one_line

@@ -1,4 +1,8 @@
-"""Recordings: channel table, MCAP writer and reader, and `Recording`, the arrays of a run by channel name."""
+"""Recordings: channel table, MCAP writer and reader, and `Recording`, the arrays of a run by channel name.
+
+In: rows of channels, poses and metadata.
+Out: MCAP files, and `Recording` with arrays by channel name.
+"""
 
 from activesteer.recording.recording import Recording
 from activesteer.recording.rows import Poses

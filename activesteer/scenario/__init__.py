@@ -1,4 +1,8 @@
-"""Scenarios: manoeuvre, car and driver with their overrides."""
+"""Scenarios: manoeuvre, car and driver with their overrides.
+
+In: names, paths, tables and overrides.
+Out: a checked `Scenario`, from which a run can be repeated.
+"""
 
 from activesteer.scenario.car import CarSpec, FileOrTable, VehicleConfig, load_car
 from activesteer.scenario.overrides import check_gains, read_by, unread_gains

@@ -18,7 +18,7 @@ from activesteer.errors import PlaybackError
 from activesteer.maneuver import Maneuver
 from activesteer.road.course import Footprint
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.run_context import scene_of
+from activesteer.simulation.recorder import scene_of
 from activesteer.units import quantity_of
 from activesteer.video import Car, RenderScene
 from activesteer.video.cameras import CUTAWAY

@@ -26,8 +26,8 @@ import mujoco
 import numpy as np
 
 from activesteer.analysis.handling import CarGeometry, Handling, evaluate
-from activesteer.analysis.slow_ramp import FIT, angle_at
 from activesteer.analysis.source import RecordingLike
+from activesteer.analysis.step_response import FIT, angle_at
 from activesteer.compilation import content_key, processor
 from activesteer.config import to_table
 from activesteer.controllers import controller_spec
@@ -39,8 +39,7 @@ from activesteer.maneuver.steering_tests import RampAngle, SteadyTurn, StepSteer
 from activesteer.recording import Recording
 from activesteer.scenario import CarSpec, FileOrTable, Scenario, resolve
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.recorder import Recorder
-from activesteer.simulation.run_context import RunContext
+from activesteer.simulation.recorder import Recorder, RunContext
 from activesteer.theory.single_track import IDENTIFIED, IDENTIFY, SingleTrackParameters, characteristic_speed
 from activesteer.vehicle.statics import mass_properties
 from activesteer.version import __version__

@@ -30,8 +30,7 @@ from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
 from activesteer.simulation.copies import pickled, unpickled
 from activesteer.simulation.pacing import RealtimePacer
 from activesteer.simulation.preparation import with_amplitude_found
-from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder
-from activesteer.simulation.run_context import RunContext
+from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder, RunContext
 from activesteer.simulation.sampled_controller import slow_actuators
 
 MAX_KEPT_VALUES: Final = 2**25

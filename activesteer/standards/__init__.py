@@ -2,4 +2,7 @@
 
 Every standard is one module with one `Standard`, listed in `catalogue`. `examination` drives and judges the test and
 writes its page.
+
+In: a car with a controller.
+Out: a verdict, metrics and a page.
 """

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S, RATIO_LIMITS
-from activesteer.analysis.slow_ramp import FIT, REFERENCE_MPS2
+from activesteer.analysis.step_response import FIT, REFERENCE_MPS2
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.standard import SIDES, Findings, NoResult, Standard, StandardRun, TestRunner, cell

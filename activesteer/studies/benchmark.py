@@ -41,7 +41,7 @@ from activesteer.simulation.preparation import searched_anew, with_amplitude_fou
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
-from activesteer.tyre.benchmark import bench as tyre_bench
+from activesteer.tyre.report import bench as tyre_bench
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 

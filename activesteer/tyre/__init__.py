@@ -1,4 +1,8 @@
-"""Magic Formula tyres: .tir files, forces and moments, relaxation, contact with the road."""
+"""Magic Formula tyres: .tir files, forces and moments, relaxation, contact with the road.
+
+In: .tir files; slip, load, inclination, pressure.
+Out: forces, moments, relaxation lengths and contact.
+"""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""Key figures of a tyre over load, as numbers, in words and as pictures."""
+"""Report on a tyre: key figures, remarks, and the time of an evaluation."""
 
 from __future__ import annotations
 
 import math
 import os
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -12,10 +13,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from activesteer.compilation import compiled
 from activesteer.plotting import Curve, Panel, Picture, save_all
 from activesteer.text_table import text_table, wrapped_line
 from activesteer.tyre.diagnostics import remarks
 from activesteer.tyre.evaluation import MagicFormula
+from activesteer.tyre.kernels.magic_formula import magic_formula
 from activesteer.tyre.tyre_parameters import TyreParameters
 
 _BAR_PA: Final = 1e5
@@ -321,3 +324,51 @@ def _relaxation_lengths(formula: MagicFormula) -> Picture:
     ]
     panel = Panel("load [kN]", "length [m]", curves, x_range=(0.0, None), y_range=(0.0, longest), zero=True)
     return Picture("relaxation lengths", [panel], width_in=7.5, height_in=4.5)
+
+
+_CALLS: Final = 100_000
+_ROUNDS: Final = 5
+"""Each figure is the best of this many rounds, since disturbances only slow a machine down."""
+
+
+@compiled
+def _scalar_calls(tyre, count, pressure_Pa):
+    """Return the sum of all five outputs of `count` scalar calls with different inputs."""
+    p, total = tyre[0], 0.0
+    for index in range(count):
+        # Small changes, so that the compiler cannot omit a call or move it out of the loop.
+        fraction = (index % 1000) * 0.001
+        fx, fy, mx, my, mz = magic_formula(
+            p, 3000.0 + 2000.0 * fraction, 0.1 * fraction - 0.05, 0.08 - 0.16 * fraction, 0.02, pressure_Pa, 20.0, 0.9
+        )
+        total += fx + fy + mx + my + mz
+    return total
+
+
+def bench(params: TyreParameters, rounds: int = _ROUNDS) -> dict[str, float]:
+    """Measure the full evaluation (combined slip with camber, all five outputs) on one core."""
+    record, pressure = np.atleast_1d(params.record), params["INFLPRES"]
+    rng = np.random.default_rng(0)
+    rows = [rng.uniform(low, high, _CALLS) for low, high in ((500, 8000), (-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.05))]
+    formula = MagicFormula(params)
+    single_calls = _CALLS // 100
+
+    def single() -> None:
+        for _ in range(single_calls):
+            formula.evaluate(4000.0, 0.05, 0.04, 0.02)
+
+    return {
+        "scalar_us": _best_us(lambda: _scalar_calls(record, _CALLS, pressure), _CALLS, rounds),
+        "vectorised_us_per_row": _best_us(lambda: formula.evaluate(*rows), _CALLS, rounds),
+        "python_call_us": _best_us(single, single_calls, rounds),
+    }
+
+
+def _best_us(function: Callable[[], object], count: int, rounds: int) -> float:
+    function()
+    best = float("inf")
+    for _ in range(rounds):
+        start = time.perf_counter()
+        function()
+        best = min(best, time.perf_counter() - start)
+    return best / count * 1e6

@@ -1,4 +1,8 @@
-"""The car in MuJoCo: MJCF and parameters in, commands in, measurements and raw rows out."""
+"""The car in MuJoCo: MJCF and parameters in, commands in, measurements and raw rows out.
+
+In: MJCF, a vehicle file, the driver's and controller's commands.
+Out: measurements, raw rows of channels, and states that can be restored.
+"""
 
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.channels import MAX_VALUE, ChannelMap, RawRows

@@ -1,4 +1,8 @@
-"""A user's own car: made from a table of hardpoints, and checked before it is driven."""
+"""A user's own car: made from a table of hardpoints, and checked before it is driven.
+
+In: a table of hardpoints or of K&C curves.
+Out: a vehicle folder, and findings about it.
+"""
 
 from activesteer.vehicle_builder.build import NewVehicle, new_vehicle
 from activesteer.vehicle_builder.check import CheckReport, Finding, check_vehicle

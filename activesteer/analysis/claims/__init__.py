@@ -3,4 +3,7 @@
 `statements` has a row for each statement, `judge` checks them, `stored` reads what the package stores about them, and
 `scorecard` combines verdicts and reasons. `not_reproduced.toml` lists the claims that are known not to be reproduced,
 with the reason.
+
+In: recordings of the three systems.
+Out: claims with their distances, and a scorecard.
 """

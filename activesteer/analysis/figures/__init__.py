@@ -3,6 +3,9 @@
 `draw_all` makes the figures of whole reproductions, `figure_for` makes one figure of a manoeuvre. matplotlib is an
 extra of the package and imported when a picture is made. Figures 1, 2 and 3 need more than recordings and are made
 elsewhere.
+
+In: recordings.
+Out: figures in the style of the paper.
 """
 
 from __future__ import annotations

@@ -2,6 +2,9 @@
 
 uPlot (https://github.com/leeoniya/uPlot, MIT) draws the plots in the browser; a copy of it is in
 `activesteer/pages/templates`.
+
+In: recordings.
+Out: one HTML page.
 """
 
 from activesteer.analysis.report.groups import open_all

@@ -1,4 +1,8 @@
-"""FMUs for co-simulation, FMI 2.0 and 3.0, as controllers and drivers."""
+"""FMUs for co-simulation, FMI 2.0 and 3.0, as controllers and drivers.
+
+In: an FMU, which is code of others.
+Out: a controller or driver for the loop.
+"""
 
 from activesteer.coupling.fmu.plugin import find_fmu, is_fmu, isolated
 

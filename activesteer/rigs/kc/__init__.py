@@ -1,4 +1,8 @@
-"""Kinematics and compliance of a car with a held chassis and its wheels on pads, measured as on a test bench."""
+"""Kinematics and compliance of a car with a held chassis and its wheels on pads, measured as on a test bench.
+
+In: a car.
+Out: kinematic and compliance curves, their metrics and figures.
+"""
 
 from activesteer.rigs.kc.figures import draw, rear_camber_figure
 from activesteer.rigs.kc.programme import Sweep

@@ -22,4 +22,7 @@ SI and radians, ISO-W axes at the contact point):
     s_hy, s_vy          horizontal and vertical shift of the lateral force [-], [N]
     g_y                 weight of the lateral force at combined slip
     z0 to z8            turn slip factors zeta
+
+In: coefficients, slip, load and road.
+Out: forces and moments, for compiled code and for arrays.
 """

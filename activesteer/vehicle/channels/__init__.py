@@ -1,4 +1,8 @@
-"""The recorded channels, computed from the engine's raw rows: units, axes, signs."""
+"""The recorded channels, computed from the engine's raw rows: units, axes, signs.
+
+In: raw rows of the engine.
+Out: channels with name, unit and meaning.
+"""
 
 from activesteer.vehicle.channels.channel_map import MAX_VALUE, ChannelMap
 from activesteer.vehicle.channels.native_channels import RawRows

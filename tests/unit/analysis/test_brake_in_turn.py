@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.brake_in_turn import BEFORE_S, MIN_YAW_RATE_RADPS
+from activesteer.analysis.braking import BEFORE_S, MIN_YAW_RATE_RADPS
 from activesteer.analysis.metrics import metrics
 from activesteer.errors import RecordingError
 from tests.raising import raises

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.slow_ramp import REFERENCE_MPS2, angle_at
+from activesteer.analysis.step_response import REFERENCE_MPS2, angle_at
 from activesteer.conventions import GRAVITY_MPS2
 
 STEERING_RAD = np.radians(13.5) * np.arange(10_000) * 1e-3

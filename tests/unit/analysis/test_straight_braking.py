@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis.straight_braking import straight_braking_metrics
+from activesteer.analysis.braking import straight_braking_metrics
 from activesteer.conventions import CORNERS
 from activesteer.errors import RecordingError
 from tests.unit.analysis.synthetic import SyntheticRun

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from activesteer.controllers.parameters import RearSteerParameters
-from activesteer.controllers.rear_steer import RearSteer
-from activesteer.controllers.sideslip_rear_steer import SideslipRearSteer
+from activesteer.controllers.rear_steer import RearSteer, SideslipRearSteer
 from activesteer.signals import Estimate
 from tests.unit.controllers.cars import measured, setup, steering
 

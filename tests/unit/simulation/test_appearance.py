@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from activesteer.resources import models_dir
-from activesteer.simulation.run_context import links_of, primitives_of, scene_of
+from activesteer.simulation.recorder import links_of, primitives_of, scene_of
 
 
 @pytest.fixture(scope="module")

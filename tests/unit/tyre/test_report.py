@@ -11,9 +11,8 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.tyre import MagicFormula, TyreParameters
-from activesteer.tyre.benchmark import bench
 from activesteer.tyre.diagnostics import remarks
-from activesteer.tyre.report import describe, draw, envelope, key_figures, size
+from activesteer.tyre.report import bench, describe, draw, envelope, key_figures, size
 from tests.raising import raises
 from tests.reference.tyre_tables import read_coefficients
 from tests.unit.tyre.tyres import TYRES, tyre
