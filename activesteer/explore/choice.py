@@ -1,9 +1,12 @@
-"""Checked choices of the page: names from lists, numbers for keys with a slider."""
+"""Checked choices of the page: names of the package and of a folder, numbers for keys with a slider."""
 
 from __future__ import annotations
 
+import ast
 import re
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +14,7 @@ from activesteer.controllers import CONTROLLERS
 from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.explore.messages import Choice
 from activesteer.files import is_file
+from activesteer.maneuver import KINDS
 from activesteer.resources import (
     list_controller_variants,
     list_drivers,
@@ -18,44 +22,59 @@ from activesteer.resources import (
     list_vehicles,
 )
 
-_OWN_CODE: Final = re.compile(r"[\w.-]+\.py:\w+(\?[\w=.&+-]*)?")
+_CODE: Final = r"[^/\\]+\.py:\w+(\?[\w=.&+-]*)?"
+_TABLE: Final = r"[^/\\]+\.toml"
+_OWN: Final = {
+    "maneuvers": _TABLE, "vehicles": rf"(vehicles/(?!\.)[^/\\]+/)?{_TABLE}", "drivers": f"{_TABLE}|{_CODE}",
+    "controllers": f"{_TABLE}|{_CODE}",
+}  # fmt: skip
+"""List -> form of a name in the folder; `vehicles/NAME/` is where `activesteer vehicle new` puts a car."""
+_TELLING: Final = {"mjcf": "vehicles", "preview_s": "drivers", "system": "controllers"}
+"""Key of a file -> list to which the file belongs. Manoeuvres have a `kind`."""
+_ARGUMENTS: Final = {3: "controllers", 4: "drivers"}
+"""Number of arguments of a method `step`, with `self` -> list to which its class belongs."""
 
 
 class Folder:
-    """Names that the page may use: those of the package, and files directly in one folder."""
+    """Names that the page may use: those of the package, and files of one folder."""
 
     def __init__(self, path: Path) -> None:
         """Take the folder."""
         self.path = path
 
     def names(self) -> dict[str, list[str]]:
-        """Return the names of manoeuvres, vehicles, drivers and controllers."""
-        return {
-            "maneuvers": list_maneuvers(),
-            "vehicles": list_vehicles(),
-            "drivers": list_drivers(),
-            "controllers": list(dict.fromkeys([*CONTROLLERS, *list_controller_variants()])),
-        }
+        """Return the names of manoeuvres, vehicles, drivers and controllers, those of the folder last."""
+        names = _of_package()
+        files = sorted([*self.path.glob("*.toml"), *self.path.glob("*.py"), *self.path.glob("vehicles/*/*.toml")])
+        for file in files:
+            with suppress(OSError, ValueError, SyntaxError):  # a broken file is in no list
+                for kind, name in _content_of(file):
+                    names[kind].append(file.relative_to(self.path).as_posix() + name)
+        return names
 
     def check(self, choice: Choice, courses: Mapping[str, Any] | None = None) -> None:
         """Check the names of a choice."""
-        names = self.names()
-        self._check("maneuver", choice.maneuver, list(courses) if courses else names["maneuvers"], r".+\.toml")
-        self._check("vehicle", choice.vehicle, names["vehicles"], r".+\.toml")
-        self._check("driver", choice.driver, names["drivers"], r".+\.toml")
+        if courses is None:
+            self._check("maneuver", choice.maneuver)
+        elif choice.maneuver not in courses:
+            raise ParameterError(nearest_names(choice.maneuver, courses), key="maneuver", value=choice.maneuver)
+        self._check("vehicle", choice.vehicle)
+        self._check("driver", choice.driver)
         for controller in choice.controllers:
-            self.check_controller(controller)
+            self._check("controller", controller)
 
     def check_controller(self, name: str) -> None:
         """Check the name of a controller, as `check` does."""
-        self._check("controllers", name, self.names()["controllers"], _OWN_CODE.pattern)
+        self._check("controller", name)
 
-    def _check(self, key: str, name: str, known: list[str], own: str) -> None:
-        """Check that a name is known, or that of a file directly in the folder."""
-        if name in known:
+    def _check(self, key: str, name: str) -> None:
+        """Check that the package knows a name, or that it is the name of a file in the folder."""
+        kind = f"{key}s"
+        if name in _of_package()[kind]:
             return
         file = name.partition(":")[0]
-        if not re.fullmatch(own, name) or Path(file).name != file:
+        if not re.fullmatch(_OWN[kind], name):
+            known = self.names()[kind]
             raise ParameterError(
                 f"is {shown(name)}; {nearest_names(name, known)}, or name a file in {self.path} without a folder",
                 key=key, value=name,
@@ -66,6 +85,32 @@ class Folder:
     def located(self, name: str) -> str:
         """Return a name as the simulation takes it: a file with its folder."""
         return str(self.path / name) if ".toml" in name or ".py:" in name else name
+
+
+def _of_package() -> dict[str, list[str]]:
+    return {
+        "maneuvers": list_maneuvers(),
+        "vehicles": list_vehicles(),
+        "drivers": list_drivers(),
+        "controllers": list(dict.fromkeys([*CONTROLLERS, *list_controller_variants()])),
+    }
+
+
+def _content_of(file: Path) -> Iterator[tuple[str, str]]:
+    """Yield the list to which a file belongs, and what its name there ends with. No code of the file is executed."""
+    text = file.read_text("utf-8")
+    if file.suffix == ".toml":
+        table = tomllib.loads(text)
+        kinds = ["maneuvers"] if table.get("kind") in KINDS else [_TELLING[key] for key in _TELLING if key in table]
+        yield from ((kind, "") for kind in kinds[:1])
+        return
+    blocks = ast.parse(text).body if "def step" in text else []
+    for block in (block for block in blocks if isinstance(block, ast.ClassDef)):
+        for method in block.body:
+            if isinstance(method, ast.FunctionDef) and method.name == "step":
+                count = len(method.args.posonlyargs) + len(method.args.args)
+                if count in _ARGUMENTS:
+                    yield _ARGUMENTS[count], f":{block.name}"
 
 
 def check_numbers(values: Mapping[str, float], allowed: Mapping[str, tuple[float, float]]) -> None:

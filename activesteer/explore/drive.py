@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,6 +21,7 @@ from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Act, Start
 from activesteer.explore.runs import Reply, free_path
 from activesteer.road.course import CONE_RADIUS_M, Footprint
+from activesteer.road.road import Road
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.live_view import FramePacer
@@ -42,21 +45,21 @@ class DrivingCourse(NamedTuple):
         maneuver: Manoeuvre whose road and course it has.
         speed_kmh: Speed at the start [km/h].
         radius_m: Radius of a circle to the left that begins at the start [m]; 0 for none.
-        mu: Friction of the road [-]; that of the manoeuvre by default.
+        mu: Friction of the road [-].
     """
 
     title: str
     maneuver: Any
     speed_kmh: float
     radius_m: float = 0.0
-    mu: float | None = None
+    mu: float = 0.9
 
 
 COURSES: Final = {
     "lane_change": DrivingCourse("Double lane change", "double_lane_change", 70.0),
     "slalom": DrivingCourse("Slalom", "slalom", 60.0),
-    "skid_pad": DrivingCourse("Skid pad, radius 40 m", _PLANE, 50.0, radius_m=40.0),
-    "plane": DrivingCourse("Free plane, dry", _PLANE, 60.0),
+    "skid_pad": DrivingCourse("Skid pad, radius 40 m", _PLANE, 50.0, radius_m=40.0, mu=1.0),
+    "plane": DrivingCourse("Free plane, dry", _PLANE, 60.0, mu=1.0),
     "slippery": DrivingCourse("Free plane, packed snow", _PLANE, 40.0, mu=0.3),
 }
 """Name -> place to drive."""
@@ -116,22 +119,25 @@ def _towards(value: float, target: float, most: float) -> float:
 
 
 class DriveSession:
-    """A drive in real time, recorded to a file."""
+    """A car that waits at the start of a course, and its drive in real time, recorded to a file.
+
+    Attributes:
+        path: File of the drive; None while the car waits.
+    """
 
     def __init__(self, choice: Start, folder: Folder, pacer: FramePacer | None = None) -> None:
         """Put the car at the start of a course."""
         folder.check(choice, COURSES)
-        self._folder = folder
+        self._folder, self._name = folder, choice.maneuver
         self._course = course = COURSES[choice.maneuver]
-        overrides = {"speed_kmh": course.speed_kmh, "duration_s": _LONGEST_S}
-        if course.mu is not None:
-            overrides["road.mu"] = course.mu
+        self._speed_kmh = course.speed_kmh if choice.speed_kmh is None else choice.speed_kmh
+        self._mu = course.mu if choice.mu is None else choice.mu
+        overrides = {"speed_kmh": self._speed_kmh, "duration_s": _LONGEST_S, "road.mu": self._mu}
         scenario = resolve(course.maneuver, folder.located(choice.vehicle), overrides, self._take)
         self._simulation = Simulation(scenario, folder.located(choice.controllers[0]))
         self._names = {"controller": choice.controllers[0]}
-        self.path = free_path(folder.path, f"drive_{choice.maneuver}", ".mcap")
+        self.path: Path | None = None
         self._files = ExitStack()
-        self._files.enter_context(self._simulation.recorded_to(self.path))
         vehicle = self._simulation.loop.vehicle
         self._size = Footprint.from_table(vehicle.dimensions())
         self._bodies = [vehicle.body_names.index(name) for name in BODIES]
@@ -141,35 +147,44 @@ class DriveSession:
         self._longest_s = self._busy_s = 0.0
 
     def _take(self, setup: DriverSetup) -> HandDriver:
-        self._driver = HandDriver(setup, self._course.speed_kmh / 3.6)
+        self._driver = HandDriver(setup, self._speed_kmh / 3.6)
         return self._driver
 
     def _cones(self) -> Array:
         course = self._simulation.scenario.maneuver.course
         return np.empty((0, 2)) if course is None else course.cone_centres_m()
 
-    def start(self) -> Reply:
-        """Return the first message: course and shape of the car."""
+    def start(self) -> Iterator[Reply]:
+        """Yield the course with the shape of the car, and the picture at the start."""
         course = self._simulation.scenario.maneuver.course
         header, arrays = shape_of(self._simulation.loop.vehicle)
         lanes = [] if course is None else [lane._asdict() for lane in course.lanes]
-        return Reply(
+        yield Reply(
             {
-                "kind": "drive", "title": self._course.title, "shape": header, "cones": self._cones().tolist(),
-                "lanes": lanes, "radius_m": self._course.radius_m, "file": self.path.name,
+                "kind": "drive", "shape": header, "cones": self._cones().tolist(), "lanes": lanes,
+                "radius_m": self._course.radius_m, "speed_kmh": self._speed_kmh, "mu": self._mu,
             },
             tuple(arrays),
         )  # fmt: skip
+        yield self._picture()
+
+    def go(self) -> Reply:
+        """Let the car drive from now on, recorded to a new file."""
+        self.path = free_path(self._folder.path, f"drive_{self._name}", ".mcap")
+        self._files.enter_context(self._simulation.recorded_to(self.path))
+        return Reply({"kind": "going", "file": self.path.name})
 
     def act(self, message: Act) -> None:
-        """Carry out a message of the page: hands, controller, speed to hold."""
+        """Carry out a message of the page: hands, controller, speed to hold, friction."""
         if message.controller:
             self._folder.check_controller(message.controller)
             loop, name = self._simulation.loop, self._folder.located(message.controller)
             loop.replace_controller(name)
             self._names["controller"] = message.controller
-        if message.hold is not UNSET:
-            self._driver.hold_mps = max(self._simulation.motion.speed_mps, 0.0) if message.hold else None
+        if message.speed_kmh is not UNSET:
+            self._driver.hold_mps = None if message.speed_kmh is None else message.speed_kmh / 3.6
+        if message.mu is not UNSET:
+            self._simulation.loop.vehicle.change_road(Road(mu=message.mu))
         if message.steer is not UNSET:
             self._driver.hands, self._seen = message, message.number
 
@@ -254,8 +269,9 @@ class DriveSession:
                     self._last_lap_s = self._lap_s
 
     def end(self) -> Reply:
-        """Complete the recording."""
+        """Complete the recording of a drive."""
         simulation = self._simulation
+        assert self.path is not None
         problem = ""
         try:
             with self._files:

@@ -21,6 +21,8 @@ _MAX_NUMBERS: Final = 300
 _Name = Annotated[str, Meta(min_length=1, max_length=200)]
 _Number = Annotated[int, Meta(ge=0, le=2**53)]
 _Pedal = Annotated[float, Meta(ge=0.0, le=1.0)]
+_Speed = Annotated[float, Meta(ge=0.0, le=200.0)]
+_Friction = Annotated[float, Meta(ge=0.1, le=1.2)]
 
 
 class Choice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind"):
@@ -55,11 +57,18 @@ class RunRequest(Choice, frozen=True, tag="run"):
 
 
 class Start(Choice, frozen=True, tag="start"):
-    """A drive by hand begins."""
+    """The page asks for a car at the start of a course. It waits there for `Act.go`."""
+
+    id: _Number = 0
+    """Number that the reply repeats."""
+    speed_kmh: _Speed | None = None
+    """Speed at the start; that of the course by default."""
+    mu: _Friction | None = None
+    """Friction of the road; that of the course by default."""
 
 
 class Act(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="act"):
-    """Hands and feet, controller, or the speed to hold during a drive. What is unset stays as it is."""
+    """Hands and feet, controller, speed and friction during a drive. What is unset stays as it is."""
 
     steer: Annotated[float, Meta(ge=-1.0, le=1.0)] | UnsetType = UNSET
     """Position of the steering, -1 full right to 1 full left. Throttle, brake and direct count with it."""
@@ -73,8 +82,12 @@ class Act(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_fie
     """Number of these hands, which the next frame repeats."""
     controller: _Name | UnsetType = UNSET
     """Controller that takes over."""
-    hold: bool | UnsetType = UNSET
-    """Whether to hold the present speed."""
+    speed_kmh: _Speed | UnsetType | None = UNSET
+    """Speed to hold without a foot on a pedal; null lets the car coast."""
+    mu: _Friction | UnsetType = UNSET
+    """Friction of the road from now on."""
+    go: bool = False
+    """Whether the car at the start begins to drive."""
 
 
 class Save(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="save"):
@@ -126,5 +139,5 @@ def add(waiting: deque[Message], message: Message) -> bool:
 def _is_replaced(message: Message) -> bool:
     """Return whether a newer message of its type makes this one useless."""
     if isinstance(message, Act):
-        return message.controller is UNSET and message.hold is UNSET
+        return message.controller is UNSET and message.speed_kmh is UNSET and message.mu is UNSET and not message.go
     return True

@@ -57,18 +57,20 @@ class Runs:
         self.folder = folder
         self._held_rad: dict[tuple[str, str], float] = {}
         self._kept: dict[str, tuple[str, Recording]] = {}  # name -> label and recording of its last run
+        self._limits_of: tuple[Any, dict[str, tuple[float, float]]] = None, {}
         self._choice: tuple[Choice, dict[str, float]] | None = None
 
     def describe(self, choice: Describe) -> Reply:
         """Return the sliders and the car of a choice."""
         self.folder.check(choice)
+        self._limits_of = None, {}  # files may have changed
         scenario = self._resolved(choice, {})
         header, arrays = shape_of(scenario.car.on(scenario.maneuver.road, 1e-3))
         return Reply(
             {
                 "kind": "description",
                 "title": scenario.maneuver.title or choice.maneuver,
-                "sliders": [slider._asdict() for slider in self._sliders(choice, scenario)],
+                "sliders": [slider._asdict() for slider in self._sliders(choice)],
                 "shape": header,
             },
             tuple(arrays),
@@ -77,9 +79,8 @@ class Runs:
     def run(self, choice: RunRequest, stale: Callable[[], bool]) -> Iterator[Reply]:
         """Drive the chosen controllers, and yield a reply for each as soon as it is driven."""
         self.folder.check(choice)
-        allowed = {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
         overrides = choice.values
-        check_numbers(overrides, allowed)
+        check_numbers(overrides, self._limits(choice))
         scenario = self._held(choice, self._resolved(choice, overrides))
         looks = run_looks(choice.controllers)
         self._kept, self._choice = {}, (choice, overrides)
@@ -127,8 +128,17 @@ class Runs:
     def _located(self, choice: Choice) -> list[str]:
         return [self.folder.located(name) for name in choice.controllers]
 
-    def _sliders(self, choice: Choice, scenario: Scenario | None = None) -> list[Slider]:
-        return sliders(scenario or self._resolved(choice, {}), self._located(choice))
+    def _sliders(self, choice: Choice) -> list[Slider]:
+        named = {"manoeuvre": choice.maneuver, "car": choice.vehicle}
+        own = {group: self.folder.path / name for group, name in named.items() if name.endswith(".toml")}
+        return sliders(self._resolved(choice, {}), self._located(choice), own)
+
+    def _limits(self, choice: Choice) -> dict[str, tuple[float, float]]:
+        """Return the limits of the sliders; those of the last choice are kept, since they take as long as a run."""
+        names = choice.maneuver, choice.vehicle, choice.driver, choice.controllers
+        if self._limits_of[0] != names:
+            self._limits_of = names, {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
+        return self._limits_of[1]
 
     def _held(self, choice: RunRequest, scenario: Scenario) -> Scenario:
         """Return a scenario with its amplitude: that of the last search while a slider moves, else a new one."""

@@ -30,6 +30,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from activesteer.errors import ActiveSteerError
+from activesteer.explore.choice import Folder
 from activesteer.explore.drive import COURSES
 from activesteer.explore.messages import MAX_CONTROLLERS, MAX_MESSAGE_BYTES, End, Message, add, read
 from activesteer.explore.worker import work
@@ -132,7 +133,7 @@ class ExploreServer:
         text = (resources.files("activesteer.explore") / "page" / "index.html").read_text("utf-8")
         colours = {
             "light": RUN_COLOURS, "dark": RUN_COLOURS_ON_DARK, "version": __version__,
-            "mostControllers": MAX_CONTROLLERS, "courses": {name: course.title for name, course in COURSES.items()},
+            "mostControllers": MAX_CONTROLLERS, "courses": {name: course._asdict() for name, course in COURSES.items()},
         }  # fmt: skip
         text = text.replace("{{ data }}", json.dumps(colours).replace("<", "\\u003c"))
         return HTMLResponse(text, headers={"Content-Security-Policy": _POLICY.format(host=self._host)})
@@ -162,7 +163,8 @@ class ExploreServer:
             await self._tell(self._page, "this page was opened in another window")
         self._page = page
         if self._ready is not None:
-            await self._deliver(*self._ready)
+            header, arrays = self._ready
+            await self._deliver({**header, **Folder(Path(self._folder)).names()}, arrays)  # the folder as it is now
         try:
             while True:
                 text = await page.receive_text()
@@ -216,7 +218,7 @@ class ExploreServer:
                 continue
             if header["kind"] == "ready":
                 self._ready = header, arrays
-            if header["kind"] in {"saved", "drive"}:
+            if header["kind"] in {"saved", "going"}:
                 names = header["files"] if header["kind"] == "saved" else [header["file"]]
                 self.saved += [self._given_folder / name for name in names]
             if header["kind"] == "report":

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import reduce
+from operator import getitem
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.config import field_in_unit, spellings
+from activesteer.config import field_in_unit, leaf_keys, spellings
 from activesteer.controllers import declared_parameters
 from activesteer.errors import ParameterError
 from activesteer.plugins import Declared
@@ -39,6 +43,8 @@ _CAR: Final = {
 _TIMES: Final = 4.0
 """Greatest value of the slider of a gain, in multiples of its present value."""
 _STEPS: Final = 200
+_COVERED: Final = ("controllers", "single_track", "two_track")
+"""Tables of a vehicle that controllers read; the controllers declare what they take from them."""
 
 
 class Slider(NamedTuple):
@@ -65,14 +71,19 @@ class Slider(NamedTuple):
     value: float
 
 
-def sliders(scenario: Scenario, controllers: Sequence[str]) -> list[Slider]:
-    """Return the sliders of a run."""
+def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Path] | None = None) -> list[Slider]:
+    """Return the sliders of a run; those of `own`, group -> file of the user, include all numbers of the file."""
     found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
+    for group, file in (own or {}).items():
+        found += _of_file(group, scenario, file)
     for name in controllers:
         for key, declared in declared_parameters(name, scenario.car.config.controllers).items():
             if (gain := _gain(key, declared)) is not None:
                 found.append(gain)
-    return list({slider.key: slider for slider in found}.values())
+    first: dict[str, Slider] = {}
+    for slider in found:
+        first.setdefault(slider.key, slider)
+    return list(first.values())
 
 
 def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float, float]]) -> Iterator[Slider]:
@@ -81,6 +92,22 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
             value = value_of(scenario, key)
             if _is_number(value):
                 yield Slider(key, *_label(key), group, min(low, value), max(high, value), step, value)
+
+
+def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
+    """Yield sliders of the positive numbers in a file, from half of each to its double."""
+    table = tomllib.loads(file.read_text("utf-8"))
+    for path in leaf_keys(table):
+        key = ".".join(path)
+        if path[0] in _COVERED or not _is_number(reduce(getitem, path, table)):
+            continue
+        with suppress(ParameterError):  # such as the keys of a table that is read from another file
+            value = value_of(scenario, key)
+            if isinstance(value, float) and value > 0.0:
+                label, unit = _label(key)
+                high = 1.0 if not unit and value <= 1.0 else 2.0 * value
+                digits = 4 - math.floor(math.log10(high))
+                yield Slider(key, label, unit, group, 0.5 * value, high, round(high / _STEPS, digits), value)
 
 
 def _is_number(value: Any) -> bool:

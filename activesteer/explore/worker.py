@@ -42,17 +42,23 @@ class _Worker:
         self._send(Reply({"kind": "ready", **self._folder.names(), "folder": str(self._folder.path)}))
         try:
             while True:
-                self._receive(wait=self._drive is None and not self._waiting)
+                driven = self._drive is not None and self._drive.path is not None
+                self._receive(wait=not driven and not self._waiting)
                 while self._waiting:
                     self._answer(self._waiting.popleft())
-                if self._drive is not None:
+                if self._drive is not None and self._drive.path is not None:
                     self._drive_on(self._drive)
         finally:
-            if self._drive is not None:
-                self._drive.end()
+            list(self._ended())
             for file in self._reports.iterdir():
                 file.unlink()
             self._reports.rmdir()
+
+    def _ended(self) -> Iterator[Reply]:
+        """End a drive, or remove a car that waits."""
+        drive, self._drive = self._drive, None
+        if drive is not None and drive.path is not None:
+            yield drive.end()
 
     def _answer(self, message: Message) -> None:
         try:
@@ -78,18 +84,17 @@ class _Worker:
                 reply = self._runs.report(path)
                 yield Reply({**reply.header, "html": path.read_text("utf-8")})
             case Start():
-                if self._drive is not None:
-                    drive, self._drive = self._drive, None
-                    yield drive.end()
+                yield from self._ended()
                 self._drive = DriveSession(message, self._folder)
-                yield self._drive.start()
+                for reply in self._drive.start():
+                    yield _numbered(reply, message.id)
             case End():
-                if self._drive is not None:
-                    drive, self._drive = self._drive, None
-                    yield drive.end()
+                yield from self._ended()
             case Act():
                 if self._drive is not None:
                     self._drive.act(message)
+                    if message.go and self._drive.path is None:
+                        yield self._drive.go()
 
     def _drive_on(self, drive: DriveSession) -> None:
         try:

@@ -131,9 +131,11 @@ def test_a_flood_of_messages_stops_neither_server_nor_worker(url: str) -> None:
     with Page(url) as page:
         page.say("start", maneuver="plane")
         page.hear("drive")
+        page.say("act", go=True)
+        page.hear("going")
         for number in range(1500):
             page.say("act", steer=0.1, number=number)
-            page.say("act", hold=True)
+            page.say("act", speed_kmh=60.0)
         assert status(url, urlsplit(url).path)[0] == 200
         page.say("end")
         assert page.hear("driven")["error"] == ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,9 @@ import pytest
 
 import activesteer
 from tests.conftest import PHONE
+from tests.contrast import contrast
+from tests.render.test_pages_in_browser import DEVICES, SIZES
+from tests.render.test_report_in_browser import TEXT_COLOURS
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -26,6 +30,7 @@ LAST_YAW_RATE = """() => [...activesteer.runs.values()].map((run) =>
   run.plots.panels.find((panel) => panel.title === "Yaw rate").series[0].values.at(-1))"""
 DONE = "#state:has-text('all after')"
 LIMIT_MS = 60_000
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.fixture(scope="module")
@@ -69,13 +74,13 @@ def test_keys_drive_the_car_and_leave_a_recording(browser: Browser, served: tupl
     page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
     page.click("#tab-drive")
     page.select_option("#course", "plane")
-    page.click("#start")
-    page.wait_for_selector("#gauges dd", timeout=LIMIT_MS)
+    page.click("#start", timeout=LIMIT_MS)  # once the car is ready
+    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
     page.keyboard.down("ArrowLeft")
     page.wait_for_timeout(2000)
     page.keyboard.up("ArrowLeft")
     page.keyboard.press("Escape")
-    page.wait_for_selector("#driven:has-text('saved as')", timeout=LIMIT_MS)
+    page.wait_for_selector("#driven:has-text('Saved as')", timeout=LIMIT_MS)
     recording = activesteer.Recording.open(served[1] / "drive_plane.mcap")
     assert recording["y_m"][-1] > 1.0
     assert recording["yaw_rate_radps"].max() > 0.1
@@ -96,12 +101,99 @@ def test_without_webgl_the_page_shows_its_curves(browser: Browser, served: tuple
     page.close()
 
 
+BOX = "(id) => document.getElementById(id).getBoundingClientRect().toJSON()"
+
+
+def assert_readable(page: Page) -> None:
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    for size, text in page.evaluate(SIZES):
+        assert size >= 10.99, text
+    for ink, paper, text in page.evaluate(TEXT_COLOURS):
+        assert contrast(ink, paper) >= 4.5, text
+
+
 @pytest.mark.slow
-def test_the_page_fits_a_phone(browser: Browser, served: tuple[str, Path]) -> None:
-    page, problems = opened(browser, served[0], **PHONE)
+@pytest.mark.parametrize("device", DEVICES)
+def test_both_tabs_have_their_parts_in_sight(browser: Browser, served: tuple[str, Path], device: str) -> None:
+    page, problems = opened(browser, served[0], **DEVICES[device])
+    height, phone = page.evaluate("innerHeight"), device.startswith("phone")
     page.wait_for_selector(DONE, timeout=LIMIT_MS)
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["viewport"]["width"]
+    assert_readable(page)
+    page.locator("#curves").scroll_into_view_if_needed()
+    page.evaluate("scrollBy(0, 400)")
+    sliders, curves = page.evaluate(BOX, "tuning"), page.evaluate(BOX, "curves")
+    assert 0 <= sliders["top"] < 0.5 * height  # the sliders stay in sight beside or above the curves
+    assert sliders["bottom"] < 0.4 * height if phone else sliders["right"] <= curves["left"]
     page.click("#tab-drive")
-    assert page.locator("#touch-throttle").is_visible()
+    page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
+    assert_readable(page)
+    assert page.inner_text("#start") == "Drive at 70 km/h"
+    stage, gauges = page.evaluate(BOX, "stage"), page.evaluate(BOX, "gauges")
+    assert stage["bottom"] <= height
+    assert gauges["height"] < 0.12 * stage["height"]
+    assert page.evaluate(BOX, "waiting")["bottom"] < stage["top"] + 0.5 * stage["height"]  # the car is free
+    assert page.locator("#touch-throttle").is_visible() == page.locator(".thumbs").is_visible() == phone
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
+def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, served: tuple[str, Path]) -> None:
+    page, problems = opened(browser, served[0], **PHONE)
+    page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
+    page.tap("#tab-drive")
+    page.select_option("#course", "plane")
+    page.tap("#start", timeout=LIMIT_MS)
+    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
+    wheel, throttle = page.evaluate(BOX, "touch-steer"), page.evaluate(BOX, "touch-throttle")
+    y = wheel["y"] + wheel["height"] / 2
+    left = {"x": wheel["x"] + 0.3 * wheel["width"], "y": y, "id": 1}
+    right = {"x": throttle["x"] + throttle["width"] / 2, "y": y, "id": 2}
+    thumbs = page.context.new_cdp_session(page)
+    thumbs.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [left]})
+    thumbs.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [left, right]})
+    page.wait_for_timeout(1500)
+    thumbs.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.tap("#end")
+    page.wait_for_selector("#driven:has-text('Saved as')", timeout=LIMIT_MS)
+    file = page.inner_text("#driven").partition("Saved as ")[2].partition(" in ")[0]
+    recording = activesteer.Recording.open(served[1] / file)
+    assert recording["y_m"][-1] > 1.0
+    assert recording["speed_mps"].max() > 65.0 / 3.6
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
+def test_the_ghost_of_the_last_drive_drives_along(browser: Browser, served: tuple[str, Path]) -> None:
+    page, problems = opened(browser, served[0], viewport={"width": 600, "height": 500})
+    page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
+    page.click("#tab-drive")
+    for cars in (["you"], ["you", "ghost"]):
+        page.click("#start", timeout=LIMIT_MS)
+        page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
+        page.wait_for_timeout(1500)
+        assert page.evaluate("[...activesteerDrive.scene.cars.keys()]") == cars
+        page.click("#end")
+        page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
+    xs = page.evaluate("activesteerDrive.ghosts.get('lane_change').frames.map((frame) => frame.poses[0])")
+    assert xs[-1] - xs[0] > 10.0
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
+def test_an_address_names_files_of_the_folder(browser: Browser, served: tuple[str, Path]) -> None:
+    for name in ("own_controller.py", "own_manoeuvre.toml"):
+        shutil.copy(EXAMPLES / name, served[1])
+    address = "#maneuver=own_manoeuvre.toml&controllers=none,own_controller.py:YawDamper&duration_s=4.5"
+    page, problems = opened(browser, served[0] + address, viewport={"width": 1440, "height": 900})
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    assert len(page.evaluate(LAST_YAW_RATE)) == 2
+    assert "--set duration_s=4.5" in page.inner_text("#command")
+    assert page.locator("[data-key='controllers.YawDamper.gain_s']").is_visible()
+    page.click("#tab-drive")
+    page.select_option("#drive-controller", "own_controller.py:YawDamper")
+    page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
     assert problems == []
     page.close()

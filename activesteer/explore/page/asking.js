@@ -24,10 +24,10 @@ export class Asking {
 }
 
 // Untick the controllers beyond the limit, first the one that was ticked last, and return their names.
-export function untickBeyond(most, boxes, own, ticked) {
+export function untickBeyond(most, boxes, ticked) {
   const on = boxes.filter((box) => box.checked && box !== ticked);
   if (ticked?.checked) on.push(ticked);
-  const beyond = on.slice(Math.max(0, most - (own ? 1 : 0)));
+  const beyond = on.slice(most);
   for (const box of beyond) box.checked = false;
   return beyond.map((box) => box.value);
 }

@@ -2,7 +2,7 @@
 import { element, number, onTheme, paint, runColour } from "./look.js";
 
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-const SHOWN = 6, HEIGHT = 170, GHOST = "59";
+const HEIGHT = 170, CAR_PX = 24, GHOST = "59";
 
 function padded(low, high, least) {
   if (low == null) return [0, least];
@@ -32,7 +32,7 @@ export class Curves {
     if (!all.length) return;
     const longest = all.reduce((a, b) => (a[1].plots.samples * a[1].plots.step_s >= b[1].plots.samples * b[1].plots.step_s ? a : b))[1].plots;
     const time = Array.from({ length: longest.samples }, (_, i) => longest.start_s + i * longest.step_s);
-    const titles = [...new Set(all.flatMap(([, run]) => run.plots.panels.filter((panel) => panel.series.length).map((panel) => panel.title)))].slice(0, SHOWN);
+    const titles = [...new Set(all.flatMap(([, run]) => run.plots.panels.filter((panel) => panel.series.length).map((panel) => panel.title)))];
     for (const [title, { figure, plot }] of this.plots) if (!titles.includes(title)) { plot.destroy(); figure.remove(); this.plots.delete(title); }
     for (const title of titles) {
       const lines = [], data = [time];
@@ -135,15 +135,20 @@ export class Track {
         pen.strokeStyle = runColour(run.place) + tail;
         pen.lineWidth = thick;
         line(track.x, track.y);
-        const i = Math.min(Math.round((this.time - run.plots.start_s) / run.plots.step_s), track.x.length - 1);
-        if (tail || !track.yaw || track.x[i] == null) continue;
-        carFromAbove(track, i).forEach((polygon, part) => {
-          pen.fillStyle = part ? paint("ink") : runColour(run.place);
-          pen.beginPath();
-          for (const corner of polygon) pen.lineTo(...place(...corner));
-          pen.fill();
-        });
       }
+    }
+    // As in three dimensions, the first car is on top. A car is not stretched: it has its shape, along its direction on the map.
+    for (const run of [...this.runs.values()].reverse()) for (const track of run.plots?.track?.tracks ?? []) {
+      const i = Math.min(Math.round((this.time - run.plots.start_s) / run.plots.step_s), track.x.length - 1);
+      if (!track.yaw || track.x[i] == null) continue;
+      const zoom = Math.max(zoomX, CAR_PX / (track.car.ends[1] - track.car.ends[0])), [x, y] = place(track.x[i], track.y[i]);
+      const yaw = Math.atan2(Math.sin(track.yaw[i]) * zoomY, Math.cos(track.yaw[i]) * zoomX);
+      carFromAbove({ ...track, x: { [i]: 0 }, y: { [i]: 0 }, yaw: { [i]: yaw } }, i).forEach((polygon, part) => {
+        pen.fillStyle = part ? paint("ink") : runColour(run.place);
+        pen.beginPath();
+        for (const [ahead, left] of polygon) pen.lineTo(x + zoom * ahead, y - zoom * left);
+        pen.fill();
+      });
     }
     pen.fillStyle = paint("quiet");
     const stretch = zoomY / zoomX;

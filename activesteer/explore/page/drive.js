@@ -1,25 +1,35 @@
-// The tab Drive: keys, gamepad and touch in; the car, gauges and cones out.
+// The tab Drive: keys, gamepad and touch in; the car, its ghost, gauges and cones out.
 import { courses, element, number } from "./look.js";
 import { Scene } from "./scene.js";
 
 const $ = (id) => document.getElementById(id);
 const KEYS = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "throttle", w: "throttle", ArrowDown: "brake", s: "brake", " ": "brake" };
 const SWITCH = ["none", "ars", "afs", "lqr", "esc"], DEAD = 0.06;
+const PLAIN = ["speed", "sideslip", "grip used", "time", "cones hit"]; // gauges that a phone shows
 
 export class Drive {
   constructor(socket, say) {
     this.socket = socket;
     this.say = say;
     this.pressed = new Set();
-    this.shown = this.running = false;
-    this.number = 0;
+    this.shown = this.running = this.held = false;
+    this.number = this.asked = 0;
     this.sent = new Map();
     this.last = "";
+    this.ghosts = new Map(); // course -> {frames, lap_s} of the last drive, preferably of a complete one
     this.touch = { steer: 0, throttle: 0, brake: 0 };
-    $("course").replaceChildren(...Object.entries(courses).map(([name, title]) => element("option", { value: name }, title)));
-    $("start").addEventListener("click", () => (this.running ? this.end() : this.start()));
-    $("hold").addEventListener("change", () => this.act({ hold: $("hold").checked }));
-    $("drive-controller").addEventListener("change", () => { if (this.running) this.act({ controller: $("drive-controller").value }); });
+    $("course").replaceChildren(...Object.entries(courses).map(([name, { title }]) => element("option", { value: name }, title)));
+    $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
+    $("drive-vehicle").addEventListener("change", () => this.prepare());
+    $("drive-controller").addEventListener("change", () => { if (!this.act({ controller: $("drive-controller").value })) this.prepare(); });
+    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => this.act({ mu: +$("drive-mu").value })]]) {
+      $(id).addEventListener("input", () => { this.values(); write(); });
+      $(id).addEventListener("change", () => { if (!this.running) { this.start_kmh = +$("drive-speed").value; this.prepare(); } });
+    }
+    for (const [id, held] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]]) $("drive-speed").addEventListener(id, () => { this.held = held; });
+    $("hold").addEventListener("change", () => this.hold());
+    $("start").addEventListener("click", () => this.act({ go: true }, true));
+    $("end").addEventListener("click", () => this.end());
     addEventListener("keydown", (event) => this.key(event, true));
     addEventListener("keyup", (event) => this.key(event, false));
     addEventListener("blur", () => { this.pressed.clear(); this.hands(); });
@@ -30,45 +40,79 @@ export class Drive {
       $(`touch-${pedal}`).addEventListener("pointerdown", press(1));
       for (const end of ["pointerup", "pointerleave", "pointercancel"]) $(`touch-${pedal}`).addEventListener(end, press(0));
     }
+    this.ofCourse();
     window.activesteerDrive = this; // for tests and the curious
   }
 
   offer(names) {
-    $("drive-vehicle").replaceChildren(...names.vehicles.map((name) => element("option", { value: name }, name)));
-    $("drive-vehicle").value = "compact";
-    $("drive-controller").replaceChildren(...names.controllers.map((name) => element("option", { value: name }, name)));
-    $("drive-controller").value = "none";
+    for (const [id, list, first] of [["drive-vehicle", names.vehicles, "compact"], ["drive-controller", names.controllers, "none"]]) {
+      $(id).replaceChildren(...list.map((name) => element("option", { value: name }, name)));
+      $(id).value = first;
+    }
   }
 
   show(shown) {
     this.shown = shown;
     this.scene ??= new Scene($("drive-view"));
     this.scene.fit();
-    if (!shown && this.running) this.end();
+    if (shown) this.prepare();
+    else this.end();
   }
 
-  start() {
+  // Speed and friction of the course, until they are moved.
+  ofCourse() {
+    const course = courses[$("course").value];
+    $("drive-speed").value = this.start_kmh = course.speed_kmh;
+    $("drive-mu").value = course.mu;
+    this.values();
+  }
+
+  values(speed_kmh = +$("drive-speed").value) {
+    $("drive-speed").previousElementSibling.textContent = `${number(speed_kmh, 0)} km/h`;
+    $("drive-mu").previousElementSibling.textContent = number(+$("drive-mu").value, 2);
+  }
+
+  // Put a car at the start, where it waits for the button. A drive ends.
+  prepare() {
     this.say("");
-    $("driven").textContent = "getting the car ready …";
-    this.latencies = [];
-    this.socket.send({ kind: "start", maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value] });
+    this.ready = false;
+    $("start").disabled = true;
+    $("start").textContent = "Getting the car ready …";
+    this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: +$("drive-speed").value, mu: +$("drive-mu").value });
   }
 
-  failed() { $("driven").textContent = ""; }
+  failed() { $("start").textContent = "This car cannot drive"; }
 
   begin(header, arrays) {
-    this.running = true;
+    if (header.id !== this.asked) return;
+    this.ready = true;
+    this.course = $("course").value;
+    this.timed = header.cones.length > 0 || header.radius_m > 0;
     this.scene.setShape(header.shape, arrays);
     this.scene.car("you", 2);
     this.scene.setCourse(header.cones, header.lanes, header.radius_m);
-    this.struck = 0;
+    this.ghost = this.ghosts.get(this.course);
+    if (this.ghost) this.scene.car("ghost", 0, 0.35);
+    this.frames = [];
+    this.struck = this.passed = 0;
     this.previous = null;
-    $("start").textContent = "End";
-    $("start").blur();
-    $("drive-hint").hidden = true;
-    $("driven").textContent = header.title;
-    this.act({ hold: $("hold").checked });
+    $("waiting").hidden = false;
+    $("start").disabled = false;
+    $("start").textContent = `Drive at ${number(+$("drive-speed").value, 0)} km/h`;
+    $("start").focus({ preventScroll: true });
   }
+
+  going() {
+    this.running = true;
+    this.latencies = [];
+    $("start").blur();
+    $("waiting").hidden = true;
+    $("end").hidden = false;
+    $("driven").textContent = "";
+    this.hold();
+  }
+
+  hold() { this.act({ speed_kmh: $("hold").checked ? +$("drive-speed").value : null }); }
 
   key(event, down) {
     if (!this.shown || !this.running || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -100,35 +144,60 @@ export class Drive {
     this.act({ ...hands, number: this.number });
   }
 
-  act(message) { if (this.running) this.socket.send({ kind: "act", ...message }); }
+  act(message, waiting = false) {
+    if (!(waiting ? this.ready : this.running)) return false;
+    this.socket.send({ kind: "act", ...message });
+    return true;
+  }
+
   end() { this.socket.send({ kind: "end" }); }
 
   frame(header, [poses]) {
-    if (!this.running) return;
-    this.latest = header;
-    this.scene.place("you", poses);
-    this.scene.grow("you");
-    for (const cone of header.cones) { this.struck += 1; this.scene.knock(cone, header.yaw_rate_degps < 0 ? -1.2 : 1.2); }
-    const dt = this.previous ? header.time_s - this.previous.time_s : 0.016;
-    if (dt > 0) this.scene.follow("you", dt, this.previous ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [1, 0]);
-    this.previous = { time_s: header.time_s, x: poses[0], y: poses[1] };
-    if (this.sent.has(header.seen)) { this.answered = this.sent.get(header.seen); this.sent.clear(); }
+    if (!this.ready) return;
+    const { time_s } = header, scene = this.scene;
+    scene.place("you", poses);
+    if (this.ghost) scene.place("ghost", this.running ? this.before(time_s) : poses);
+    const dt = this.previous ? time_s - this.previous.time_s : 0;
+    scene.follow("you", dt || 1, dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [1, 0]);
+    this.previous = { time_s, x: poses[0], y: poses[1] };
     this.gauges(header);
+    if (!this.running) return;
+    scene.grow("you");
+    this.frames.push({ time_s, poses });
+    this.lap_s = header.last_lap_s;
+    for (const cone of header.cones) { this.struck += 1; scene.knock(cone, header.yaw_rate_degps < 0 ? -1.2 : 1.2); }
+    if (header.hold_kmh != null && !this.held) { $("drive-speed").value = header.hold_kmh; this.values(header.hold_kmh); }
+    if (this.sent.has(header.seen)) { this.answered = this.sent.get(header.seen); this.sent.clear(); }
+  }
+
+  // Return where the last drive was at this time.
+  before(time_s) {
+    const { frames } = this.ghost;
+    while (this.passed < frames.length - 1 && frames[this.passed + 1].time_s <= time_s) this.passed += 1;
+    return frames[this.passed].poses;
   }
 
   gauges(header) {
-    const rows = [
-      ["speed", `${number(header.speed_kmh, 0)} km/h`], ["sideslip", `${number(header.sideslip_deg, 1)}°`], ["yaw rate", `${number(header.yaw_rate_degps, 0)} °/s`],
-      ["lateral acc.", `${number(header.ay_mps2, 1)} m/s²`], ["rear wheels", `${number(header.rear_deg, 1)}°`], ["added in front", `${number(header.superposition_deg, 1)}°`],
-      ["friction used", `${number(100 * header.friction_use, 0)} %`], ["control", header.controller], ["time", `${number(header.time_s, 1)} s`],
-      ["lap or gates", header.last_lap_s == null ? `${number(header.lap_s, 1)} s` : `${number(header.last_lap_s, 2)} s`], ["cones hit", `${this.struck}`],
-    ];
-    $("gauges").replaceChildren(...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+    const lap = header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
+    const rows = {
+      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
+      time: this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": `${this.struck}`,
+      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear wheels": `${number(header.rear_deg, 1)}°`,
+      "added in front": `${number(header.superposition_deg, 1)}°`, control: header.controller,
+    };
+    if (!$("gauges").children.length) {
+      $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
+    }
+    Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
+    $("gauges").title = this.timed ? "time: of this lap, or since the first gate; behind the stroke, that of the ghost" : "";
     $("wheel").firstElementChild.setAttribute("transform", `rotate(${-header.steering_wheel_deg})`);
   }
 
   draw() {
     this.hands();
+    const now = performance.now();
+    if (this.running) this.scene.lighten(now - this.drawn);
+    this.drawn = now;
     this.scene.draw();
     if (this.answered != null) { this.latencies.push(performance.now() - this.answered); this.answered = null; }
   }
@@ -137,10 +206,17 @@ export class Drive {
     this.running = false;
     this.sent.clear();
     this.last = "";
-    $("start").textContent = "Start";
+    $("end").hidden = true;
+    const before = this.ghosts.get(this.course)?.lap_s, lap = this.lap_s;
+    $("drive-speed").value = this.start_kmh; // the pedals have moved it
+    this.values();
+    if (this.frames.length && (lap || !before)) this.ghosts.set(this.course, { frames: this.frames, lap_s: lap });
+    const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
+    const timed = lap ? ` Lap or gates: ${number(lap, 2)} s${faster}.` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
-    const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms in the median, ${Math.round(sorted.at(-1))} ms at most.`;
-    $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}; saved as ${header.file} in ${header.folder}.${latency} Look at it again: activesteer replay ${header.file}`;
+    const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
+    $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${latency} Saved as ${header.file} in ${header.folder}.`;
+    if (this.shown && this.ready) this.prepare();
     if (header.error) this.say(header.error);
   }
 }

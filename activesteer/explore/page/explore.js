@@ -7,29 +7,30 @@ import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
 const $ = (id) => document.getElementById(id);
-const FIRST = { maneuver: "sine_with_dwell", controllers: ["none", "ars", "afs"] };
+const FIRST = { maneuver: "sine_with_dwell", vehicle: "compact", driver: "typical", controllers: ["none", "ars", "afs"] };
 
 export function say(text) {
   $("message").textContent = text;
   $("message").hidden = !text;
 }
 
+const narrow = matchMedia("(max-width: 760px)").matches;
 const curves = new Curves($("curves"), (time) => { player.show(time); player.pause(); });
 const track = new Track($("track"));
 const scene = new Scene($("view"));
-const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], asked: 0 };
+const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0 };
 window.activesteer = state; // for tests and the curious
 
 const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), say);
 const drive = new Drive(socket, say);
 
-const choice = () => ({ maneuver: $("maneuver").value, vehicle: $("vehicle").value, driver: $("driver").value, controllers: chosen() });
+const NAMED = ["maneuver", "vehicle", "driver"];
 const boxes = () => [...$("controllers").querySelectorAll("input")];
-const own = () => $("own").value.trim();
-const chosen = () => [...boxes().filter((box) => box.checked).map((box) => box.value), ...(own() ? [own()] : [])];
+const chosen = () => boxes().filter((box) => box.checked).map((box) => box.value);
+const choice = () => ({ ...Object.fromEntries(NAMED.map((id) => [id, $(id).value])), controllers: chosen() });
 
 function describe(ticked) {
-  const unticked = untickBeyond(mostControllers, boxes(), own(), ticked);
+  const unticked = untickBeyond(mostControllers, boxes(), ticked);
   if (!chosen().length) { say("Choose at least one controller."); return; }
   say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "");
   asking.stop();
@@ -39,12 +40,42 @@ function describe(ticked) {
   socket.send({ kind: "describe", id: ++state.id, ...choice() });
 }
 
+// The address names the choice, so that it can be opened again: #maneuver=slalom&controllers=none,lqr&speed_kmh=70
+function readAddress() {
+  const wanted = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
+  for (const id of NAMED) offer($(id), wanted[id] ?? FIRST[id]);
+  const names = wanted.controllers?.split(",") ?? FIRST.controllers;
+  for (const name of names) if (!boxes().some((box) => box.value === name)) addBox(name);
+  for (const box of boxes()) box.checked = names.includes(box.value);
+  state.wanted = wanted;
+  describe();
+}
+
+function writeAddress() {
+  const { controllers, ...names } = choice();
+  history.replaceState(null, "", `#${new URLSearchParams({ ...names, controllers: controllers.join(","), ...state.values })}`);
+  $("chosen").textContent = [...Object.values(names), controllers.join(", ")].join(" · ");
+}
+
+// Choose a name in a list; the program answers a name that it does not know.
+function offer(list, name) {
+  if (![...list.options].some((option) => option.value === name)) list.append(element("option", { value: name }, name));
+  list.value = name;
+}
+
+function addBox(name) {
+  const box = element("input", { type: "checkbox", value: name });
+  box.addEventListener("change", () => describe(box));
+  $("controllers").append(element("label", {}, box, ` ${name}`));
+}
+
 const asking = new Asking((dragging) => {
   if (!dragging || !state.dragged) keepGhosts();
   state.dragged = dragging;
   state.released = false;
   state.asked = performance.now();
   state.first = null;
+  writeAddress();
   $("state").textContent = "driving …";
   if (drive.shown) return;
   socket.send({ kind: "run", id: ++state.id, ...choice(), dragging, values: state.values });
@@ -61,26 +92,18 @@ const hear = {
     for (const [id, names] of [["maneuver", header.maneuvers], ["vehicle", header.vehicles], ["driver", header.drivers]]) {
       $(id).replaceChildren(...names.map((name) => element("option", { value: name }, name)));
     }
-    // The address may choose: #maneuver=slalom&controllers=none,lqr
-    const wanted = new URLSearchParams(location.hash.slice(1)), first = wanted.get("controllers")?.split(",") ?? FIRST.controllers;
-    $("maneuver").value = wanted.get("maneuver") ?? FIRST.maneuver;
-    $("vehicle").value = "compact";
-    $("driver").value = "typical";
     $("controllers").querySelectorAll("label").forEach((label) => label.remove());
-    for (const name of header.controllers) {
-      const box = element("input", { type: "checkbox", value: name });
-      box.checked = first.includes(name);
-      box.addEventListener("change", () => describe(box));
-      $("controllers").append(element("label", {}, box, ` ${name}`));
-    }
+    header.controllers.forEach(addBox);
     drive.offer(header);
-    describe();
+    readAddress();
   },
 
   description(header, arrays) {
     if (header.id !== state.id) return;
     $("title").textContent = header.title;
     state.sliders = header.sliders;
+    for (const { key, low, high } of header.sliders) if (key in state.wanted) state.values[key] = Math.min(high, Math.max(low, +state.wanted[key])) || 0;
+    state.wanted = {};
     showSliders();
     scene.setShape(header.shape, arrays);
     asking.ask(false);
@@ -116,6 +139,7 @@ const hear = {
   },
   drive: (header, arrays) => drive.begin(header, arrays),
   frame: (header, arrays) => drive.frame(header, arrays),
+  going: () => drive.going(),
   driven: (header) => drive.ended(header),
 };
 
@@ -135,19 +159,14 @@ function redraw() {
 }
 
 function showFigures() {
-  const runs = [...state.runs.values()].filter((run) => run.figures), titles = [...new Set(runs.flatMap((run) => run.figures.map((figure) => figure.title)))];
-  const head = element("tr", {}, element("th", {}, ""), ...titles.map((title) => element("th", {}, title, ...unitOf(runs, title))));
-  const rows = runs.map((run) => element("tr", {}, element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), run.label), ...titles.map((title) => {
-    const now = run.figures.find((figure) => figure.title === title), before = state.ghosts.get(run.name)?.figures?.find((figure) => figure.title === title);
-    const change = now?.value != null && before?.value != null ? now.value - before.value : null;
-    return element("td", {}, number(now?.value, now?.digits), element("span", {}, change == null || Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change, now.digits)}`));
+  const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.map((figure) => [figure.title, figure])));
+  const head = element("tr", {}, element("th", {}, ""), ...runs.map((run) => element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), narrow ? run.name.replace(/^.*:|\?.*|\.toml$/g, "") : run.label)));
+  const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
+    const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
+    const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
+    return element("td", {}, number(now?.value, now?.digits), element("span", {}, Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change, now.digits)}`));
   })));
   $("figures").replaceChildren(head, ...rows);
-}
-
-function unitOf(runs, title) {
-  const unit = runs.flatMap((run) => run.figures).find((figure) => figure.title === title)?.unit;
-  return unit ? [element("span", { class: "quiet" }, ` ${unit}`)] : [];
 }
 
 function showSliders() {
@@ -155,7 +174,7 @@ function showSliders() {
   const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
-    box.open = open.size ? open.has(group) : i !== 1 && i < 4;
+    box.open = open.size ? open.has(group) : i === 0 || (!narrow && i !== 1 && i < 4);
     for (const slider of state.sliders.filter((other) => other.group === group)) box.append(sliderOf(slider));
     return box;
   }));
@@ -175,7 +194,7 @@ function sliderOf(slider) {
     write();
     asking.ask(dragging);
   };
-  input.value = slider.value;
+  input.value = state.values[slider.key] ?? slider.value;
   input.addEventListener("input", () => moved(true));
   input.addEventListener("change", () => moved(false));
   input.addEventListener("dblclick", () => { input.value = slider.value; moved(false); });
@@ -230,7 +249,9 @@ const player = {
   },
 };
 
-for (const id of ["maneuver", "vehicle", "driver", "own"]) $(id).addEventListener("change", () => describe());
+$("choice").open = !narrow;
+addEventListener("hashchange", readAddress);
+for (const id of NAMED) $(id).addEventListener("change", () => describe());
 $("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
 $("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });

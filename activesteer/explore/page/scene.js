@@ -3,6 +3,8 @@ import * as THREE from "./three.module.min.js";
 import { onTheme, paint, runColour } from "./look.js";
 
 const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, TURN_S = 0.35, SLOW_MPS = 1;
+const BEHIND = 1e5; // Depth by which a car is drawn behind the one before it, so that the first is whole where they overlap; about 2 m.
+const SLOW_MS = 50, LEAST_RATIO = 0.5;
 const TRAIL_APART_M = 0.4, TRAIL_POINTS = 1500, ROAD_M = 1200, TILE_M = 10;
 
 /* Without WebGL the page shows its curves and tracks; a sentence stands in the place of the cars. */
@@ -14,10 +16,20 @@ function rendererOn(canvas) {
     told.textContent = "This browser has no WebGL, so the cars are not drawn in three dimensions.";
     canvas.after(told);
     canvas.style.display = "none";
-    return { setPixelRatio() {}, setSize() {}, render() {} };
+    return { getPixelRatio: () => 0, setPixelRatio() {}, setSize() {}, render() {} };
   }
 }
 
+function shadeTexture() {
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = 64;
+  const pen = canvas.getContext("2d"), shade = pen.createRadialGradient(32, 32, 12, 32, 32, 32);
+  shade.addColorStop(0, "rgba(0,0,0,.55)");
+  shade.addColorStop(1, "rgba(0,0,0,0)");
+  pen.fillStyle = shade;
+  pen.fillRect(0, 0, 64, 64);
+  return new THREE.CanvasTexture(canvas);
+}
 
 export class Scene {
   constructor(canvas) {
@@ -36,8 +48,10 @@ export class Scene {
     this.asphalt.repeat.set(ROAD_M / TILE_M, ROAD_M / TILE_M);
     this.asphalt.anisotropy = 8;
     this.asphalt.colorSpace = THREE.SRGBColorSpace;
-    this.ground = new THREE.Mesh(new THREE.PlaneGeometry(ROAD_M, ROAD_M), new THREE.MeshBasicMaterial({ map: this.asphalt }));
+    this.ground = new THREE.Mesh(new THREE.PlaneGeometry(ROAD_M, ROAD_M), new THREE.MeshBasicMaterial({ map: this.asphalt, depthWrite: false }));
     this.ground.position.z = -0.02;
+    this.ground.renderOrder = -3;
+    this.shade = shadeTexture();
     this.scene.add(this.ground);
     this.cars = new Map();
     this.course = new THREE.Group();
@@ -81,8 +95,19 @@ export class Scene {
     if (!width || !height) return;
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
+    this.camera.fov = width < height ? 62 : 48;
     this.camera.updateProjectionMatrix();
     this.stale = true;
+  }
+
+  // Draw fewer pixels on a machine that is slow, such as one without a graphics card.
+  lighten(frame_ms) {
+    this.frame_ms = Math.min(frame_ms, 500) * 0.1 + (this.frame_ms ?? 16) * 0.9;
+    const ratio = this.renderer.getPixelRatio();
+    if (this.frame_ms < SLOW_MS || ratio <= LEAST_RATIO) return;
+    this.frame_ms = 16;
+    this.renderer.setPixelRatio(Math.max(LEAST_RATIO, 0.6 * ratio));
+    this.fit();
   }
 
   // Keep the shape of the cars: panels of the message and their points and normals.
@@ -102,7 +127,7 @@ export class Scene {
     const bodies = this.shape.bodies.map(() => new THREE.Group()), painted = [];
     this.shape.panels.forEach((panel, i) => {
       const colour = panel.rgb ? new THREE.Color().setRGB(...panel.rgb, THREE.SRGBColorSpace) : new THREE.Color(runColour(place));
-      const material = new THREE.MeshPhongMaterial({ color: colour, shininess: 50, side: THREE.DoubleSide, transparent: opacity < 1, opacity });
+      const material = new THREE.MeshPhongMaterial({ color: colour, shininess: 50, side: THREE.DoubleSide, transparent: opacity < 1, opacity, polygonOffset: true, polygonOffsetUnits: BEHIND * this.cars.size });
       if (!panel.rgb) painted.push(material);
       bodies[this.shape.bodies.indexOf(panel.body)].add(new THREE.Mesh(this.geometries[i], material));
     });
@@ -111,8 +136,9 @@ export class Scene {
     trail.geometry.setDrawRange(0, 0);
     trail.frustumCulled = false;
     painted.push(trail.material);
-    this.scene.add(...bodies, trail);
-    const car = { bodies, painted, place, trail, points: 0 };
+    const { front_m, rear_m, width_m } = this.shape.size, shadow = this.shadowOf(front_m - rear_m, width_m, (front_m + rear_m) / 2);
+    this.scene.add(...bodies, trail, shadow);
+    const car = { bodies, painted, place, trail, shadow, points: 0 };
     this.cars.set(name, car);
     return car;
   }
@@ -120,7 +146,7 @@ export class Scene {
   remove(name) {
     const car = this.cars.get(name);
     if (!car) return;
-    this.scene.remove(...car.bodies, car.trail);
+    this.scene.remove(...car.bodies, car.trail, car.shadow);
     this.cars.delete(name);
   }
 
@@ -134,7 +160,19 @@ export class Scene {
       body.quaternion.set(poses[a + 4], poses[a + 5], poses[a + 6], poses[a + 3]);
       if (part) body.quaternion.slerp(new THREE.Quaternion(poses[b + 4], poses[b + 5], poses[b + 6], poses[b + 3]), part);
     });
+    const [{ position, quaternion: q }] = car.bodies;
+    car.shadow.position.set(position.x, position.y, 0);
+    car.shadow.rotation.z = Math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z));
     this.stale = true;
+  }
+
+  // A soft dark patch on the ground; a real shadow would draw every car twice.
+  shadowOf(length, width, ahead = 0) {
+    const group = new THREE.Group(), patch = new THREE.Mesh(new THREE.PlaneGeometry(1.25 * length, 1.5 * width), new THREE.MeshBasicMaterial({ map: this.shade, transparent: true, depthWrite: false }));
+    patch.position.set(ahead, 0, 0);
+    patch.renderOrder = -1;
+    group.add(patch);
+    return group;
   }
 
   // The trail of a car up to here; it grows while the car drives, or is drawn whole from its poses.
@@ -164,17 +202,21 @@ export class Scene {
       const cone = new THREE.Mesh(new THREE.ConeGeometry(0.145, 0.5, 16), new THREE.MeshLambertMaterial({ color: 0xf07d00 }));
       cone.rotation.x = Math.PI / 2;
       cone.position.set(x, y, 0.25);
-      this.course.add(cone);
+      const shadow = this.shadowOf(0.4, 0.34);
+      shadow.position.set(x, y, 0);
+      this.course.add(cone, shadow);
       return cone;
     });
     for (const lane of lanes) {
       const length = lane.end_x_m - lane.start_x_m, width = lane.left_y_m - lane.right_y_m;
-      const flat = new THREE.Mesh(new THREE.PlaneGeometry(length, width), new THREE.MeshBasicMaterial({ color: 0xfff2c0, transparent: true, opacity: 0.28 }));
+      const flat = new THREE.Mesh(new THREE.PlaneGeometry(length, width), new THREE.MeshBasicMaterial({ color: 0xfff2c0, transparent: true, opacity: 0.28, depthWrite: false }));
+      flat.renderOrder = -2;
       flat.position.set(lane.start_x_m + length / 2, lane.right_y_m + width / 2, -0.005);
       this.course.add(flat);
     }
     if (radius) {
-      const ring = new THREE.Mesh(new THREE.RingGeometry(radius - 0.1, radius + 0.1, 128), new THREE.MeshBasicMaterial({ color: 0xffffff }));
+      const ring = new THREE.Mesh(new THREE.RingGeometry(radius - 0.1, radius + 0.1, 128), new THREE.MeshBasicMaterial({ color: 0xffffff, transparent: true, depthWrite: false }));
+      ring.renderOrder = -2;
       ring.position.set(0, radius, 0);
       this.course.add(ring);
     }

@@ -1,6 +1,6 @@
 // Just enough of a page to run explore.js without a browser; `sent` has the messages to the program.
 class FakeElement {
-  constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, textContent: "" }); this.classList = { toggle() {} }; }
+  constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, options: [], textContent: "" }); this.classList = { toggle() {} }; }
   setAttribute(key, value) { this.attributes[key] = value; if (["value", "type"].includes(key)) this[key] = String(value); }
   append(...children) { this.children.push(...children.filter((child) => child instanceof FakeElement)); }
   replaceChildren(...children) { this.children = children; }
@@ -13,7 +13,8 @@ class FakeElement {
 const named = new Map();
 export const $ = (id) => { if (!named.has(id)) named.set(id, new FakeElement(id)); return named.get(id); };
 Object.assign(globalThis, {
-  window: globalThis, location: { hash: "" }, requestAnimationFrame() {},
+  window: globalThis, location: { hash: "" }, requestAnimationFrame() {}, addEventListener() {}, matchMedia: () => ({ matches: false }),
+  history: { replaceState: (_state, _title, address) => { location.hash = address; } },
   document: { getElementById: $, createElement: (name) => new FakeElement(name) },
 });
 export const sent = [];
@@ -22,7 +23,7 @@ export class Socket { constructor(heard) { hear = heard; } send(message) { sent.
 export class Curves { show() {} }
 export class Track { show() {} at() {} }
 export class Scene { cars = new Map(); setShape() {} draw() {} }
-export class Drive { offer() {} failed() {} draw() {} show() {} }
+export class Drive { offer() {} going() {} failed() {} draw() {} show() {} }
 export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4;
 export const element = (name, attributes = {}, ...children) => {
   const made = document.createElement(name);

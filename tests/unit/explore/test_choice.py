@@ -11,7 +11,8 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder, check_numbers
-from activesteer.explore.messages import MAX_WAITING, Act, End, Message, RunRequest, Start, add, read
+from activesteer.explore.messages import MAX_WAITING, Act, Describe, End, Message, RunRequest, Start, add, read
+from activesteer.explore.runs import Runs
 from activesteer.explore.sliders import sliders
 from activesteer.scenario import resolve
 
@@ -26,6 +27,17 @@ class Mine:
         return ActuatorCommand(rear_steer_demand_rad=0.0)
 """
 
+OWN_TURN = """
+kind = "open_loop"
+speed_kmh = 70
+duration_s = 4
+hold_last = true
+
+[steering]
+time_s = [0.5, 2.5]
+steering_wheel_deg = [0, 40]
+"""
+
 
 @pytest.mark.parametrize(
     "message",
@@ -33,6 +45,7 @@ class Mine:
         {"maneuver": "/etc/passwd"},
         {"maneuver": "../slalom.toml"},
         {"maneuver": "slalom", "vehicle": "sub/car.toml"},
+        {"maneuver": "slalom", "vehicle": "vehicles/../car.toml"},
         {"maneuver": "slalom", "controllers": ["../mine.py:Mine"]},
         {"maneuver": "slalom", "controllers": ["missing.py:Mine"]},
         {"maneuver": "slalom", "controllers": []},
@@ -73,12 +86,41 @@ def test_a_full_queue_holds_the_newest_choice_and_the_newest_hands() -> None:
     assert isinstance(waiting[-1], Act)
     assert waiting[-1].number == 1499
     assert len(waiting) <= MAX_WAITING
-    assert [add(waiting, Act(hold=True)) for _ in range(200)].count(False) > 0
+    assert [add(waiting, Act(mu=0.5)) for _ in range(200)].count(False) > 0
     assert len(waiting) == MAX_WAITING
     assert add(waiting, End())
     assert not any(isinstance(message, Act) for message in waiting)
     assert [add(waiting, message) for message in (End(), Start(maneuver="plane"), End())] == [True] * 3
     assert [type(message) for message in waiting if isinstance(message, (Start, End))] == [Start, End]
+
+
+def test_files_of_the_folder_are_in_the_lists_and_are_not_executed(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'w').close()\n{OWN}")
+    (tmp_path / "turn.toml").write_text(OWN_TURN)
+    (tmp_path / "broken.toml").write_text("kind = ")
+    (tmp_path / "study.toml").write_text('maneuvers = ["slalom"]')
+    car = tmp_path / "vehicles" / "mine"
+    car.mkdir(parents=True)
+    (car / "mine.toml").write_text('mjcf = "mine.xml"')
+    names = Folder(tmp_path).names()
+    assert {kind: [name for name in found if "." in name] for kind, found in names.items()} == {
+        "maneuvers": ["turn.toml"],
+        "vehicles": ["vehicles/mine/mine.toml"],
+        "drivers": [],
+        "controllers": ["mine.py:Mine"],
+    }
+    assert not (tmp_path / "executed").exists()
+    Folder(tmp_path).check(RunRequest(maneuver="turn.toml", vehicle="vehicles/mine/mine.toml"))
+
+
+def test_the_numbers_of_an_own_manoeuvre_have_sliders(tmp_path: Path) -> None:
+    (tmp_path / "turn.toml").write_text(OWN_TURN)
+    choice = Describe(maneuver="turn.toml")
+    found = {slider["key"]: slider for slider in Runs(Folder(tmp_path)).describe(choice).header["sliders"]}
+    assert (found["speed_kmh"]["low"], found["speed_kmh"]["high"]) == (20.0, 160.0)
+    duration = found["duration_s"]
+    assert (duration["low"], duration["value"], duration["high"]) == (2.0, 4.0, 8.0)
+    assert duration["group"] == "manoeuvre"
 
 
 def test_an_own_controller_in_the_folder_is_found_and_its_parameter_has_a_slider(tmp_path: Path) -> None:

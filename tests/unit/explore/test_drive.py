@@ -28,9 +28,11 @@ class Clock:
         return self.now_s
 
 
-def drive(course: str, folder: Path, controller: str = "none") -> DriveSession:
+def drive(course: str, folder: Path, **more: Any) -> DriveSession:
     pacer = FramePacer(clock=Clock(), sleep=lambda _: None)
-    return DriveSession(Start(maneuver=course, controllers=(controller,)), Folder(folder), pacer)
+    car = DriveSession(Start(maneuver=course, **more), Folder(folder), pacer)
+    car.go()
+    return car
 
 
 def go(car: DriveSession, until_s: float) -> dict[str, Any]:
@@ -42,8 +44,7 @@ def go(car: DriveSession, until_s: float) -> dict[str, Any]:
 
 def test_steering_to_the_left_turns_left_and_the_recording_holds_the_drive(tmp_path: Path) -> None:
     car = drive("plane", tmp_path)
-    shape = car.start()
-    assert shape.header["cones"] == []
+    assert next(car.start()).header["cones"] == []
     car.act(Act(steer=0.5, direct=True, number=7))
     frame = go(car, 1.5)
     assert frame["yaw_rate_degps"] > 5.0
@@ -52,7 +53,7 @@ def test_steering_to_the_left_turns_left_and_the_recording_holds_the_drive(tmp_p
     car.act(Act(controller="ars"))
     assert abs(go(car, 2.0)["rear_deg"]) > 0.05
     end = car.end().header
-    recording = activesteer.Recording.open(car.path)
+    recording = activesteer.Recording.open(tmp_path / "drive_plane.mcap")
     assert recording.time_s[-1] == pytest.approx(end["time_s"], abs=2e-3)
     assert recording["yaw_rate_radps"][-1] > 0.0
 
@@ -71,6 +72,29 @@ def test_the_hands_turn_no_faster_than_hands_and_no_further_than_a_full_turn(tmp
     car.end()
 
 
+def test_a_car_waits_at_the_start_on_the_road_and_leaves_no_file(tmp_path: Path) -> None:
+    car = DriveSession(Start(maneuver="slalom", speed_kmh=45.0, mu=0.5), Folder(tmp_path))
+    course, picture = car.start()
+    assert (course.header["speed_kmh"], course.header["mu"]) == (45.0, 0.5)
+    assert picture.header["time_s"] == 0.0
+    assert picture.header["speed_kmh"] == pytest.approx(45.0, abs=0.5)
+    assert picture.arrays[0][1:, 2] == pytest.approx(0.3, abs=0.03)  # the wheels stand on the road
+    assert car.path is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_speed_and_friction_change_while_the_car_drives(tmp_path: Path) -> None:
+    car = drive("plane", tmp_path, speed_kmh=60.0)
+    car.act(Act(speed_kmh=50.0))
+    assert go(car, 6.0)["speed_kmh"] == pytest.approx(50.0, abs=2.0)
+    car.act(Act(steer=1.0))
+    on_dry = abs(go(car, 7.5)["ay_mps2"])
+    car.act(Act(mu=0.2))
+    assert on_dry > 6.0
+    assert abs(go(car, 9.0)["ay_mps2"]) < 0.25 * 9.81
+    car.end()
+
+
 def test_a_foot_on_the_brake_stops_the_car(tmp_path: Path) -> None:
     car = drive("slippery", tmp_path)
     car.act(Act(brake=1.0, steer=0.0))
@@ -80,7 +104,7 @@ def test_a_foot_on_the_brake_stops_the_car(tmp_path: Path) -> None:
 
 def test_a_car_that_drives_straight_on_hits_cones_once_and_leaves_the_others(tmp_path: Path) -> None:
     car = drive("slalom", tmp_path)
-    cones = car.start().header["cones"]
+    cones = next(car.start()).header["cones"]
     fallen: list[int] = []
     while (header := car.frame().header)["time_s"] < 9.0:
         fallen += header["cones"]

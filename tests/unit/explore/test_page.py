@@ -27,7 +27,7 @@ def script(tmp_path: Path, text: str) -> Any:
     return json.loads(done.stdout)
 
 
-def used(tmp_path: Path, events: str) -> Any:
+def used(tmp_path: Path, events: str, address: str = "") -> Any:
     """Return what the page has after events, with a fake document and a fake program."""
     explore = (PAGE / "explore.js").read_text("utf-8")
     for name in ("curves", "drive", "look", "scene", "socket"):
@@ -37,14 +37,15 @@ def used(tmp_path: Path, events: str) -> Any:
     return script(
         tmp_path,
         f"""import {{ $, describe, drag, finish, hear, sent, slider, start, tick }} from "./fake.mjs";
+        location.hash = {json.dumps(address)};
         await import("./explore.mjs");
         start();
-        sent.length = 0;
+        const before = sent.splice(0);
         {events}
         const runs = sent.filter((one) => one.kind === "run").map((one) => [one.values.speed_kmh, one.dragging]);
         const {{ title, message, state, saved }} = Object.fromEntries(
           ["title", "message", "state", "saved"].map((id) => [id, $(id).textContent]));
-        console.log(JSON.stringify({{ sent, runs, title, message, state, saved }}));""",
+        console.log(JSON.stringify({{ before, sent, runs, title, message, state, saved, address: location.hash }}));""",
     )
 
 
@@ -74,28 +75,18 @@ def test_another_manoeuvre_does_not_wait_for_runs_that_are_dropped(tmp_path: Pat
     assert asked(tmp_path, "drag(1); drag(2); asking.stop(); drag(3);") == [[1, True], [3, True]]
 
 
-@pytest.mark.parametrize(
-    ("own", "ticked", "unticked"),
-    [("", "e", ["e"]), ("", "a", ["a"]), ("", None, ["e"]), ("my.py:C", None, ["d", "e"])],
-)
+@pytest.mark.parametrize(("ticked", "unticked"), [("e", ["e"]), ("a", ["a"]), (None, ["e"])])
 def test_a_controller_beyond_the_limit_is_unticked_and_named(
-    tmp_path: Path, own: str, ticked: str | None, unticked: list[str]
+    tmp_path: Path, ticked: str | None, unticked: list[str]
 ) -> None:
     result = script(
         tmp_path,
         f"""const boxes = [..."abcde"].map((value) => ({{ value, checked: true }}));
         const ticked = boxes.find((box) => box.value === {json.dumps(ticked)});
-        const names = untickBeyond(4, boxes, {json.dumps(own)}, ticked);
+        const names = untickBeyond(4, boxes, ticked);
         console.log(JSON.stringify([names, boxes.filter((box) => !box.checked).map((box) => box.value)]));""",
     )
     assert result == [unticked, unticked]
-
-
-def test_four_controllers_stay_ticked(tmp_path: Path) -> None:
-    text = (
-        'console.log(JSON.stringify(untickBeyond(4, [..."abc"].map((value) => ({ value, checked: true })), "x.py:C")));'
-    )
-    assert script(tmp_path, text) == []
 
 
 def test_enter_in_a_field_cannot_submit_the_page() -> None:
@@ -134,10 +125,18 @@ def test_four_controllers_are_asked_for_and_a_fifth_is_unticked_with_a_message(t
     assert page["message"].startswith("esc is not driven")
 
 
-def test_an_own_controller_takes_the_place_of_the_fifth_visibly(tmp_path: Path) -> None:
-    page = used(tmp_path, 'tick("lqr", true); $("own").value = "my.py:C"; $("own").fire("change");')
-    assert page["sent"][-1]["controllers"] == ["none", "ars", "afs", "my.py:C"]
-    assert page["message"].startswith("lqr is not driven")
+def test_an_address_names_own_files_and_values_of_sliders(tmp_path: Path) -> None:
+    address = "#maneuver=mine.toml&controllers=none,my.py:C%3Fgain=2&speed_kmh=95"
+    page = used(tmp_path, "", address)
+    first, run = page["before"]
+    assert (first["maneuver"], first["vehicle"], first["controllers"]) == (
+        "mine.toml",
+        "compact",
+        ["none", "my.py:C?gain=2"],
+    )
+    assert run["values"] == {"speed_kmh": 95}
+    assert "maneuver=mine.toml" in page["address"]
+    assert "speed_kmh=95" in page["address"]
 
 
 def test_saved_files_are_named_next_to_the_button(tmp_path: Path) -> None:
