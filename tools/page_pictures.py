@@ -51,7 +51,7 @@ def write_pages(folder: Path) -> dict[str, Path]:
     activesteer(["fit", "bmw_m8", "-o", str(folder)])
     return {
         "page_report": report, "page_comparison": comparison, "page_standard": folder / "iso21994.html",
-        "measured_lane_change": folder / "validation.html",
+        "measured_lane_change": folder / "page.html",
     }  # fmt: skip
 
 
