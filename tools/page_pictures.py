@@ -27,7 +27,7 @@ from tests.render.headless import Headless
 PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 SIZE: Final = (1000, 760)
 """Width and height of the browser's window [px]."""
-COLOURS: Final = 128
+COLOURS: Final = 64
 FROM: Final = {"measured_lane_change": "Fitted"}
 """Picture -> heading at its top. By default it shows the top of the page."""
 
