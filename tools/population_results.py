@@ -423,10 +423,13 @@ def _effects_by_car(rows: Sequence[Row], systems: Sequence[str], reference: str)
 
 
 def _possible(rows: Sequence[Row]) -> list[Row]:
-    """Return the rows without cars that cannot start: the road does not bear the turn, or the axle not the actuator."""
+    """Return the rows without cars that cannot start: the road does not bear the turn, or the axle not the actuator.
+
+    Such a car fails with every controller. A failure with only some of them counts against these.
+    """
     reasons = ManeuverError.__name__, ModelError.__name__
-    impossible = {_car(row) for row in rows if str(row["error"]).startswith(reasons)}
-    return [row for row in rows if _car(row) not in impossible]
+    possible = {_car(row) for row in rows if not str(row["error"]).startswith(reasons)}
+    return [row for row in rows if _car(row) in possible]
 
 
 Car = tuple[str, str, int]

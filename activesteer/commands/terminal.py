@@ -42,7 +42,7 @@ def wrapped(text: str) -> Iterator[str]:
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:
-    """Print a value as JSON. In one line for another program that reads it while this program goes on."""
+    """Print a value as JSON, on one line for a program that reads it while this program runs."""
     text = json_text(value)
     text = " ".join(line.strip() for line in text.splitlines()) if one_line else text
     print(text, file=_for_json[-1] if _for_json else None, flush=one_line)

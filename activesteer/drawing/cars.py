@@ -113,7 +113,7 @@ _COLOURS: Final = {
 }
 
 
-class Panel(NamedTuple):
+class BodySurface(NamedTuple):
     """A surface of one colour, fixed in the frame of a body.
 
     Attributes:
@@ -138,7 +138,7 @@ class Panel(NamedTuple):
         return not self.body.endswith("_wheel")
 
 
-def without_tail(panel: Panel, size: Footprint) -> tuple[Panel, Panel]:
+def without_tail(panel: BodySurface, size: Footprint) -> tuple[BodySurface, BodySurface]:
     """Return a panel of a body without its tail, which hides the rear wheels from behind, and the tail."""
     corners = np.concatenate([panel.vertices_m, panel.normals], axis=1)[panel.faces]
     ahead, behind = _cut(corners, 0, -size.wheelbase_m + _TAIL_M[0])
@@ -146,7 +146,7 @@ def without_tail(panel: Panel, size: Footprint) -> tuple[Panel, Panel]:
     return _panel_of(panel, np.concatenate([ahead, above])), _panel_of(panel, tail)
 
 
-def _panel_of(panel: Panel, corners: Array) -> Panel:
+def _panel_of(panel: BodySurface, corners: Array) -> BodySurface:
     points = corners.reshape(-1, 6)
     faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
     return panel._replace(vertices_m=points[:, :3], normals=points[:, 3:], faces=faces)
@@ -174,7 +174,9 @@ def _cut(triangles: Array, axis: int, at_m: float) -> tuple[Array, Array]:
     return made[0], made[1]
 
 
-def dressed(parts: Sequence[ScenePart], size: Footprint | None) -> tuple[tuple[ScenePart, ...], tuple[Panel, ...]]:
+def dressed(
+    parts: Sequence[ScenePart], size: Footprint | None
+) -> tuple[tuple[ScenePart, ...], tuple[BodySurface, ...]]:
     """Return a car with a body and wheels."""
     if size is None:
         return tuple(parts), ()
@@ -189,7 +191,7 @@ def dressed(parts: Sequence[ScenePart], size: Footprint | None) -> tuple[tuple[S
     return tuple(part for part in parts if id(part) not in hidden), tuple(panels)
 
 
-def _body(size: Footprint) -> tuple[Panel, ...]:
+def _body(size: Footprint) -> tuple[BodySurface, ...]:
     name = "saloon" if size.wheelbase_m > _SALOON_FROM_M else "hatchback"
     wheelbase_m, width_m = _DRAWN[name]
     panels = []
@@ -197,13 +199,13 @@ def _body(size: Footprint) -> tuple[Panel, ...]:
         points = vertices * (1.0, size.width_m / width_m, 1.0)
         # Only the part between the axles becomes longer.
         points[:, 0] -= np.clip(-points[:, 0] / wheelbase_m, 0.0, 1.0) * (size.wheelbase_m - wheelbase_m)
-        panels.append(Panel(CHASSIS, part, points, normals, faces, _COLOURS.get(part)))
+        panels.append(BodySurface(CHASSIS, part, points, normals, faces, _COLOURS.get(part)))
     return tuple(panels)
 
 
-def _wheel(body: str, radius_m: float, width_m: float) -> list[Panel]:
+def _wheel(body: str, radius_m: float, width_m: float) -> list[BodySurface]:
     return [
-        Panel(body, part, vertices * (radius_m, width_m, radius_m), normals, faces, _COLOURS[part])
+        BodySurface(body, part, vertices * (radius_m, width_m, radius_m), normals, faces, _COLOURS[part])
         for part, vertices, normals, faces in _surfaces("wheel")
     ]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import RecordingError
-from activesteer.units import ESTIMATED, MEASURED, Quantity, quantity_of
+from activesteer.units import ESTIMATED, MEASURED, DisplayUnit, Quantity, quantity_of
 
 FIGURE, REPORT, EXPLORE, FILM = "figure", "report", "explore", "film"
 MOTION, DRIVING, BODY, WHEELS = "Motion", "Driving", "Body", "Wheels"
@@ -206,9 +206,7 @@ def link_panels(channels: Iterable[str]) -> tuple[Panel, ...]:
     return tuple(panels)
 
 
-_LINK_FORCE: Final = quantity_of("tie_rod_force_N")._replace(
-    unit=quantity_of("roll_rad").unit._replace(name="N", factor=1.0), min_span=100.0
-)
+_LINK_FORCE: Final = quantity_of("tie_rod_force_N")._replace(unit=DisplayUnit("N", 1.0), min_span=100.0)
 
 
 def _holds(recording: Channels, channel: str) -> bool:

@@ -21,7 +21,6 @@ from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Act, Start
 from activesteer.explore.runs import Reply, free_path
 from activesteer.road.course import CONE_RADIUS_M, Footprint
-from activesteer.road.road import Road
 from activesteer.scenario import resolve
 from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.live_view import FramePacer
@@ -184,7 +183,7 @@ class DriveSession:
         if message.speed_kmh is not UNSET:
             self._driver.hold_mps = None if message.speed_kmh is None else message.speed_kmh / 3.6
         if message.mu is not UNSET:
-            self._simulation.loop.vehicle.change_road(Road(mu=message.mu))
+            self._simulation.set("road.mu", message.mu)
         if message.steer is not UNSET:
             self._driver.hands, self._seen = message, message.number
 

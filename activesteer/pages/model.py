@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from activesteer.conventions import RUN_COLOURS
+from activesteer.conventions import RUN_COLOURS, Array
 from activesteer.plotting.model import Curve, Panel, Picture
 from activesteer.text_table import text_table, wrapped_line
 
@@ -66,14 +67,17 @@ def _panel_values(panel: Panel) -> dict[str, Any]:
 
 
 def _curve_values(curve: Curve, colour: str, dashes: Any) -> dict[str, Any]:
-    x = np.asarray(curve.x, np.float64)
+    x, y = np.asarray(curve.x, np.float64), np.asarray(curve.y, np.float64)
+    if len(y) > _MOST_POINTS:
+        kept = _extremes(y)
+        x, y = x[kept], y[kept]
     if isinstance(dashes, tuple) and len(dashes) == 2 and isinstance(dashes[1], tuple):
         dashes = dashes[1]
     elif curve.dashes is None and dashes is None:
         dashes = ()
     steps = np.diff(x[np.isfinite(x)])
     return {
-        "x": _numbers(x), "y": _numbers(curve.y), "label": curve.label, "colour": colour, "dashes": dashes,
+        "x": _numbers(x), "y": _numbers(y), "label": curve.label, "colour": colour, "dashes": dashes,
         "width": curve.width, "marker": curve.marker, "size": curve.size, "shade": curve.shade,
         "turns": bool((steps > 0.0).any() and (steps < 0.0).any()),
     }  # fmt: skip
@@ -84,8 +88,19 @@ def _colour(colour: str) -> str:
     return f"run-{RUN_COLOURS.index(colour)}" if colour in RUN_COLOURS else colour if len(colour) == 7 else _GREY
 
 
+def _extremes(y: Array) -> NDArray[np.intp]:
+    """Return the places of the least and the greatest value in equal stretches of a long curve, so no peak is lost."""
+    edges = np.linspace(0, len(y), _MOST_POINTS // 2 + 1).astype(int)
+    low, high = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
+    places = [
+        start + np.array([low[start:end].argmin(), high[start:end].argmax()])
+        for start, end in itertools.pairwise(edges.tolist())
+    ]
+    return np.unique(np.concatenate([[0], *places, [len(y) - 1]]))
+
+
 def _numbers(values: ArrayLike, along: ArrayLike | None = None) -> list[float | None]:
-    """Return numbers of five digits, of a line with too many points every n-th, or None for one that is not finite."""
+    """Return numbers of five digits, every n-th of too many, or None for a number that is not finite."""
     each = np.asarray(values, np.float64)
     if along is not None:
         each = np.broadcast_to(each, np.shape(along))

@@ -4,7 +4,7 @@ In: recordings.
 Out: rerun recordings and the viewer.
 """
 
-from activesteer.playback.runs import Run, Showing, runs_of
+from activesteer.playback.runs import ReplayedRun, Showing, runs_of
 from activesteer.playback.viewer import save, serve, show
 
-__all__ = ["Run", "Showing", "runs_of", "save", "serve", "show"]
+__all__ = ["ReplayedRun", "Showing", "runs_of", "save", "serve", "show"]

@@ -11,9 +11,17 @@ import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
 from activesteer.conventions import CORNERS, Array, yaw_of
-from activesteer.drawing.cars import CHASSIS, SEE_THROUGH, Panel, bytes_of, direction_of_motion, dressed, share_seen
+from activesteer.drawing.cars import (
+    CHASSIS,
+    SEE_THROUGH,
+    BodySurface,
+    bytes_of,
+    direction_of_motion,
+    dressed,
+    share_seen,
+)
 from activesteer.drawing.tyre_forces import CHANNELS, force_arrows, force_scale
-from activesteer.playback.runs import Run, times
+from activesteer.playback.runs import ReplayedRun, times
 from activesteer.recording import Link, Primitive, ScenePart
 from activesteer.road.course import Footprint, footprint_of
 
@@ -54,7 +62,7 @@ _POINTS_PER_COIL: Final = 16
 _WIRE_RADIUS_M: Final = 0.007
 
 
-def send_links(stream: rr.RecordingStream, run: Run) -> None:
+def send_links(stream: rr.RecordingStream, run: ReplayedRun) -> None:
     """Send every link of the scene whose bodies have poses: rods as cylinders, springs as coils.
 
     Recordings made before links were recorded show none.
@@ -69,7 +77,7 @@ def send_links(stream: rr.RecordingStream, run: Run) -> None:
         _send_spring(stream, run, spring)
 
 
-def link_ends(run: Run, link: Link) -> list[NDArray[np.float64]]:
+def link_ends(run: ReplayedRun, link: Link) -> list[NDArray[np.float64]]:
     """Return the world position of each point of a link [m], each of shape (number of shown poses, 3)."""
     poses = run.recording.poses
     ends = []
@@ -80,7 +88,7 @@ def link_ends(run: Run, link: Link) -> list[NDArray[np.float64]]:
     return ends
 
 
-def _send_rods(stream: rr.RecordingStream, run: Run, links: list[Link]) -> None:
+def _send_rods(stream: rr.RecordingStream, run: ReplayedRun, links: list[Link]) -> None:
     """Send all springs in one entity, because there are many and each changes at every pose."""
     parts = []
     radii: list[float] = []
@@ -103,7 +111,7 @@ def _send_rods(stream: rr.RecordingStream, run: Run, links: list[Link]) -> None:
     stream.send_columns(path, when, columns.partition(lengths=[len(parts)] * len(run.poses)))
 
 
-def _send_spring(stream: rr.RecordingStream, run: Run, spring: Link) -> None:
+def _send_spring(stream: rr.RecordingStream, run: ReplayedRun, spring: Link) -> None:
     ends = link_ends(run, spring)
     length, centre, turn = between(ends[0], ends[-1])
     path = f"{run.scene}/springs/{spring.name}"
@@ -136,7 +144,7 @@ _USE_COLOURS: Final = ((0, 158, 115), (240, 228, 66), (230, 120, 0), (220, 20, 2
 _USED: Final = tuple(f"{corner}_friction_utilisation" for corner in CORNERS)
 
 
-def send_tyre_forces(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) -> None:
+def send_tyre_forces(stream: rr.RecordingStream, run: ReplayedRun, runs: Sequence[ReplayedRun]) -> None:
     """Send an arrow and a disc for each tyre, unless the recording lacks a channel that they need."""
     if not run.has(*_USED, *CHANNELS):
         return
@@ -182,7 +190,7 @@ _CUTAWAY_OPACITY: Final = 0.25
 """Opacity of a body in a cutaway view."""
 
 
-def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> None:
+def send_car(stream: rr.RecordingStream, run: ReplayedRun, *, cutaway: bool = False) -> None:
     """Send bodies, their solids, and two level frames that move with the car.
 
     `NAME/car_frame` has the heading of the car, and `NAME/chase`, the frame of the camera, the direction of motion.
@@ -216,12 +224,12 @@ def send_car(stream: rr.RecordingStream, run: Run, *, cutaway: bool = False) -> 
             _send_panel(stream, run, panel, opacity, f"{body_path(run, panel.body)}/solid/{panel.name}")
 
 
-def body_path(run: Run, body: str) -> str:
+def body_path(run: ReplayedRun, body: str) -> str:
     """Return the entity of a body. Entities below it move with the body."""
     return f"{run.scene}/car/{body}"
 
 
-def send_ghost(stream: rr.RecordingStream, run: Run, beside: Run) -> None:
+def send_ghost(stream: rr.RecordingStream, run: ReplayedRun, beside: ReplayedRun) -> None:
     """Send the body of a car for the view of another run: transparent, and fainter the nearer the two cars are."""
     poses = run.recording.poses
     time_s = poses.time_s[run.poses][::_GHOST_EVERY]
@@ -236,12 +244,12 @@ def send_ghost(stream: rr.RecordingStream, run: Run, beside: Run) -> None:
             stream.send_columns(path, times(time_s), rr.Mesh3D.columns(albedo_factor=painted))
 
 
-def ghost_path(run: Run, beside: Run) -> str:
+def ghost_path(run: ReplayedRun, beside: ReplayedRun) -> str:
     """Return the entity of the ghost of a car in the view of another run."""
     return f"{body_path(run, CHASSIS)}/ghost/{beside.name}"
 
 
-def _apart(run: Run, other: Run, time_s: Array) -> Array:
+def _apart(run: ReplayedRun, other: ReplayedRun, time_s: Array) -> Array:
     """Return the distance between the chassis of two runs [m]. A run that has ended keeps its last position."""
     at = []
     for each in (run, other):
@@ -251,7 +259,7 @@ def _apart(run: Run, other: Run, time_s: Array) -> Array:
     return np.linalg.norm(at[0] - at[1], axis=1)
 
 
-def _bodies(run: Run, parts: Sequence[ScenePart]) -> dict[str, list[Primitive]]:
+def _bodies(run: ReplayedRun, parts: Sequence[ScenePart]) -> dict[str, list[Primitive]]:
     bodies: dict[str, list[Primitive]] = {}
     for part in parts:
         if isinstance(part, Primitive) and part.body in run.recording.poses.names:
@@ -259,7 +267,7 @@ def _bodies(run: Run, parts: Sequence[ScenePart]) -> dict[str, list[Primitive]]:
     return bodies
 
 
-def _send_panel(stream: rr.RecordingStream, run: Run, panel: Panel, opacity: float, path: str) -> None:
+def _send_panel(stream: rr.RecordingStream, run: ReplayedRun, panel: BodySurface, opacity: float, path: str) -> None:
     drawn = rr.Mesh3D.from_fields(
         vertex_positions=panel.vertices_m.astype(np.float32),
         vertex_normals=panel.normals.astype(np.float32),
@@ -269,7 +277,7 @@ def _send_panel(stream: rr.RecordingStream, run: Run, panel: Panel, opacity: flo
     stream.log(path, drawn, static=True)
 
 
-def _paint(run: Run, panel: Panel) -> tuple[int, int, int]:
+def _paint(run: ReplayedRun, panel: BodySurface) -> tuple[int, int, int]:
     red, green, blue = bytes_of(run.colour) if panel.rgb is None else (round(255 * value) for value in panel.rgb)
     return red, green, blue
 

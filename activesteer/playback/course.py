@@ -11,7 +11,7 @@ import rerun as rr
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.cars import CHASSIS, bytes_of, height_colours
 from activesteer.playback.car import rotated
-from activesteer.playback.runs import Run, times
+from activesteer.playback.runs import ReplayedRun, times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
 from activesteer.road.recorded import LIMIT_M
@@ -48,7 +48,7 @@ class Extent(NamedTuple):
     high_y_m: float
 
 
-def extent(runs: Sequence[Run]) -> Extent:
+def extent(runs: Sequence[ReplayedRun]) -> Extent:
     """Return the rectangle that cars and course take up together."""
     points = [_track(run) for run in runs]
     course = _course(runs)
@@ -63,7 +63,7 @@ def extent(runs: Sequence[Run]) -> Extent:
     return Extent(float(low_x), float(high_x), float(low_y), float(high_y))
 
 
-def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
+def send_road(stream: rr.RecordingStream, runs: Sequence[ReplayedRun]) -> None:
     """Send the road with its grid and its patches of other friction."""
     around = extent(runs)
     low_x = np.floor((around.low_x_m - _BEYOND_M / 2) / _TILE_M) * _TILE_M
@@ -94,7 +94,7 @@ def send_road(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
         stream.log(f"{ROAD}/patch_{index}_mu_{round(100 * areas[index].mu)}_percent", surface, static=True)
 
 
-def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
+def send_course(stream: rr.RecordingStream, runs: Sequence[ReplayedRun]) -> None:
     """Send lanes, cones and path if the manoeuvre has them."""
     course = _course(runs)
     if course is None:
@@ -123,7 +123,7 @@ def send_course(stream: rr.RecordingStream, runs: Sequence[Run]) -> None:
         )
 
 
-def send_track(stream: rr.RecordingStream, run: Run, number: int) -> None:
+def send_track(stream: rr.RecordingStream, run: ReplayedRun, number: int) -> None:
     """Send the track of a car and, on the map, its moving outline with steered wheels."""
     track = _track(run)
     line = np.column_stack([track, np.full(len(track), 0.03 + 0.01 * number)])
@@ -146,7 +146,7 @@ def send_track(stream: rr.RecordingStream, run: Run, number: int) -> None:
     )
 
 
-def _outline(run: Run) -> Array:
+def _outline(run: ReplayedRun) -> Array:
     """Return the sides of the car and a stroke for each wheel on the map, shape (poses, strokes, 2 points, 2)."""
     poses, car = run.recording.poses, footprint_of(run.recording.metadata) or Footprint()
     half, front, rear = 0.5 * car.width_m, car.front_m, car.rear_m
@@ -170,7 +170,7 @@ def _outline(run: Run) -> Array:
     return np.stack(strips, axis=1)
 
 
-def _track(run: Run) -> Array:
+def _track(run: ReplayedRun) -> Array:
     """Return the track of the centre of gravity, or of the chassis origin if the former was not recorded."""
     poses = run.recording.poses
     at = poses.positions_m[run.poses, poses.names.index(CHASSIS), :2]
@@ -181,7 +181,7 @@ def _track(run: Run) -> Array:
     return track if len(track) else at
 
 
-def _course(runs: Sequence[Run]) -> Course | None:
+def _course(runs: Sequence[ReplayedRun]) -> Course | None:
     return next((course for run in runs if (course := course_of(run.recording.metadata)) is not None), None)
 
 
@@ -194,7 +194,7 @@ def _flat(points: Array) -> Array:
     return points * (1.0, -1.0)
 
 
-def map_bounds(runs: Sequence[Run]) -> tuple[tuple[float, float], tuple[float, float]]:
+def map_bounds(runs: Sequence[ReplayedRun]) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the ranges of both map axes that show everything [m]."""
     around = extent(runs)
     x = (around.low_x_m - _MAP_MARGIN_M, around.high_x_m + _MAP_MARGIN_M)

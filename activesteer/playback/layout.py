@@ -14,7 +14,7 @@ from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Panel, pan
 from activesteer.playback import plots
 from activesteer.playback.car import body_path, ghost_path
 from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
-from activesteer.playback.runs import TIMELINE, Run, times
+from activesteer.playback.runs import TIMELINE, ReplayedRun, times
 from activesteer.playback.wheel_angles import plan_view, wedges_path
 from activesteer.recording.contents import events_of
 from activesteer.units import display_unit
@@ -90,13 +90,13 @@ class Event(NamedTuple):
     level: rr.TextLogLevel
 
 
-def events(run: Run) -> list[Event]:
+def events(run: ReplayedRun) -> list[Event]:
     """Return the faults of the manoeuvre, the recorded events and the saturations, sorted by time."""
     found = [*_faults(run), *_recorded(run), *_limits(run)]
     return sorted(found, key=lambda event: event.time_s)
 
 
-def _recorded(run: Run) -> list[Event]:
+def _recorded(run: ReplayedRun) -> list[Event]:
     levels = {"fail": ("FAULT ", rr.TextLogLevel.ERROR)}
     found = []
     for event in events_of(run.recording.metadata):
@@ -105,7 +105,7 @@ def _recorded(run: Run) -> list[Event]:
     return found
 
 
-def _faults(run: Run) -> list[Event]:
+def _faults(run: ReplayedRun) -> list[Event]:
     maneuver = run.recording.metadata.get("maneuver")
     faults = maneuver.get("fault") if isinstance(maneuver, Mapping) else None
     last_s = float(run.recording.time_s[-1])
@@ -134,7 +134,7 @@ def _size(fault: Mapping[str, Any]) -> str:
     return said
 
 
-def _limits(run: Run) -> list[Event]:
+def _limits(run: ReplayedRun) -> list[Event]:
     found = []
     time_s = run.recording.time_s
     for channel in run.recording.channels:
@@ -159,7 +159,7 @@ def _spans(active: np.ndarray, time_s: np.ndarray) -> tuple[list[float], list[fl
     return kept_begins, kept_ends + ends[len(begins) - 1 :] if begins else []
 
 
-def send_events(stream: rr.RecordingStream, run: Run) -> None:
+def send_events(stream: rr.RecordingStream, run: ReplayedRun) -> None:
     """Send the warnings of a run, if it has any."""
     found = events(run)
     if found:
@@ -168,13 +168,13 @@ def send_events(stream: rr.RecordingStream, run: Run) -> None:
         stream.send_columns(_warnings_path(run), when, rr.TextLog.columns(text=texts, level=levels))
 
 
-def warnings_view(runs: Sequence[Run]) -> list[rrb.TextLogView]:
+def warnings_view(runs: Sequence[ReplayedRun]) -> list[rrb.TextLogView]:
     """Return the view of the warnings of these runs, or None if there are none."""
     paths = [f"/{_warnings_path(run)}" for run in runs if events(run)]
     return [rrb.TextLogView(origin="/", contents=paths, name="Warnings")] if paths else []
 
 
-def _warnings_path(run: Run) -> str:
+def _warnings_path(run: ReplayedRun) -> str:
     return f"{run.name}/warnings"
 
 
@@ -190,7 +190,7 @@ _ABOVE: Final = rrb.EyeControls3D(position=(-1.3, 0.0, 6.5), look_target=(-1.3, 
 """Eye positions in the frame that follows the car. Its origin lies on the road below the front axle."""
 
 
-def blueprint(runs: Sequence[Run], *, compare: bool, page: int = 0) -> rrb.Blueprint:
+def blueprint(runs: Sequence[ReplayedRun], *, compare: bool, page: int = 0) -> rrb.Blueprint:
     """Return the layout of the viewer."""
     if len(runs) == 1:
         content = _page(runs[0], runs, page)
@@ -208,7 +208,7 @@ def blueprint(runs: Sequence[Run], *, compare: bool, page: int = 0) -> rrb.Bluep
     )
 
 
-def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
+def _page(run: ReplayedRun, runs: Sequence[ReplayedRun], page: int) -> rrb.Horizontal:
     """Return the page of a single run with all its views."""
     return rrb.Horizontal(
         rrb.Vertical(
@@ -226,7 +226,7 @@ def _page(run: Run, runs: Sequence[Run], page: int) -> rrb.Horizontal:
     )
 
 
-def _tab(name: str, shown: Sequence[Panel], run: Run, *, alone: bool) -> rrb.Vertical:
+def _tab(name: str, shown: Sequence[Panel], run: ReplayedRun, *, alone: bool) -> rrb.Vertical:
     views, curves = plots.views(shown, [run]), plots.curves(shown, run, alone=alone)
     names = legend(f"{LEGEND}/{run.name}/{name}", curves)
     high = height(curves)
@@ -235,7 +235,7 @@ def _tab(name: str, shown: Sequence[Panel], run: Run, *, alone: bool) -> rrb.Ver
     )
 
 
-def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
+def _comparison(runs: Sequence[ReplayedRun], page: int) -> rrb.Horizontal:
     """Return the page of all runs: a view for each car, with the others as ghosts, and overlaid plots."""
     loads, use = panels_in(WHEELS)[:2]
     return rrb.Horizontal(
@@ -260,15 +260,17 @@ def _comparison(runs: Sequence[Run], page: int) -> rrb.Horizontal:
     )
 
 
-def _chase(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
+def _chase(run: ReplayedRun, runs: Sequence[ReplayedRun]) -> rrb.Spatial3DView:
     return _car_view(run, runs, run.label, _BEHIND, numbers=len(runs) == 1)
 
 
-def _above(run: Run, runs: Sequence[Run]) -> rrb.Spatial3DView:
+def _above(run: ReplayedRun, runs: Sequence[ReplayedRun]) -> rrb.Spatial3DView:
     return _car_view(run, runs, "From above", _ABOVE, numbers=False)
 
 
-def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D, *, numbers: bool) -> rrb.Spatial3DView:
+def _car_view(
+    run: ReplayedRun, runs: Sequence[ReplayedRun], name: str, eye: rrb.EyeControls3D, *, numbers: bool
+) -> rrb.Spatial3DView:
     others = [other for other in runs if other is not run]
     return rrb.Spatial3DView(
         origin=f"/{run.name}/chase",
@@ -290,7 +292,7 @@ def _car_view(run: Run, runs: Sequence[Run], name: str, eye: rrb.EyeControls3D, 
     )
 
 
-def _map(runs: Sequence[Run]) -> rrb.Spatial2DView:
+def _map(runs: Sequence[ReplayedRun]) -> rrb.Spatial2DView:
     across, down = map_bounds(runs)
     return rrb.Spatial2DView(
         origin=f"/{MAP}",
@@ -299,7 +301,7 @@ def _map(runs: Sequence[Run]) -> rrb.Spatial2DView:
     )
 
 
-def _words(runs: Sequence[Run]) -> rrb.Tabs | rrb.TextDocumentView:
+def _words(runs: Sequence[ReplayedRun]) -> rrb.Tabs | rrb.TextDocumentView:
     """Return the view of the summary, with the warnings behind it if there are any."""
     summary = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")
     warnings = warnings_view(runs)

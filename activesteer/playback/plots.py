@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from activesteer.conventions import CORNERS
 from activesteer.drawing.cars import bytes_of
 from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Line, Panel, link_panels, panels_in
-from activesteer.playback.runs import Run, times
+from activesteer.playback.runs import ReplayedRun, times
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
 """Number of plots on a page -> number of tick labels that fit on one axis in a window of 1280 x 800."""
@@ -29,13 +29,13 @@ OF_CAR: Final = tuple(panel for page in (MOTION, DRIVING, BODY) for panel in pan
 """Panels of the car as a whole: the lines of several runs have the colours of their runs."""
 
 
-def links(run: Run) -> tuple[Panel, ...]:
+def links(run: ReplayedRun) -> tuple[Panel, ...]:
     """Return the panels of the axial forces of links and springs, one for each corner."""
     channels = (channel.name for channel in run.recording.channels if channel.group == "links")
     return link_panels([name for name in channels if name.endswith("_force_N")])
 
 
-def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
+def send_plots(stream: rr.RecordingStream, run: ReplayedRun, *, alone: bool) -> None:
     """Send the signals of every plot."""
     when = times(run.recording.time_s)
     for plot in (*OF_CAR, *panels_in(WHEELS), *links(run)):
@@ -52,17 +52,17 @@ def send_plots(stream: rr.RecordingStream, run: Run, *, alone: bool) -> None:
             stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.recording)))
 
 
-def _name(run: Run, line: Line, *, alone: bool) -> str:
+def _name(run: ReplayedRun, line: Line, *, alone: bool) -> str:
     if not line.name:
         return run.label
     return line.name if alone else f"{run.label}, {line.name}"
 
 
-def _paint(run: Run, line: Line, *, alone: bool) -> str:
+def _paint(run: ReplayedRun, line: Line, *, alone: bool) -> str:
     return line.colour if line.colour and alone else run.colour
 
 
-def _entities(run: Run, plot: Panel) -> list[tuple[str, list[Line]]]:
+def _entities(run: ReplayedRun, plot: Panel) -> list[tuple[str, list[Line]]]:
     """Return the entities of a plot and the lines in each, for the channels that a run has."""
     lines = [line for line in plot.lines_in(MOTION) if run.has(line.channel) and line.of(run.recording) is not None]
     if plot.joined:
@@ -76,12 +76,12 @@ def _entity(plot: Panel) -> str:
     return f"{channel[:2]}_link_forces_N" if channel.endswith("_force_N") else channel[3:]
 
 
-def pages(run: Run) -> dict[str, tuple[Panel, ...]]:
+def pages(run: ReplayedRun) -> dict[str, tuple[Panel, ...]]:
     """Return the plots of a run by page name."""
     return {page: panels_in(page) for page in (MOTION, DRIVING, BODY, WHEELS)} | {"Links": links(run)}
 
 
-def curves(plots: Sequence[Panel], run: Run, *, alone: bool) -> dict[str, str]:
+def curves(plots: Sequence[Panel], run: ReplayedRun, *, alone: bool) -> dict[str, str]:
     """Return the names and colours of the lines of a run."""
     found = {}
     for plot in plots:
@@ -91,7 +91,7 @@ def curves(plots: Sequence[Panel], run: Run, *, alone: bool) -> dict[str, str]:
     return found
 
 
-def views(plots: Sequence[Panel], runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
+def views(plots: Sequence[Panel], runs: Sequence[ReplayedRun]) -> list[rrb.TimeSeriesView]:
     """Return a view for each plot that has data, with the lines of all these runs."""
     shown = []
     found = [(plot, [entity for run in runs for entity in _entities(run, plot)]) for plot in plots]
@@ -102,7 +102,7 @@ def views(plots: Sequence[Panel], runs: Sequence[Run]) -> list[rrb.TimeSeriesVie
     return shown
 
 
-def _range(plot: Panel, runs: Sequence[Run], beside: int) -> tuple[float, float]:
+def _range(plot: Panel, runs: Sequence[ReplayedRun], beside: int) -> tuple[float, float]:
     """Return the range of an axis, chosen from a few so that different runs mostly share it."""
     values = [
         run.channel(line.channel) * plot.quantity.factor
@@ -142,7 +142,7 @@ def axis_range(low: float, high: float, least: float, most: float) -> tuple[floa
         power *= 10.0
 
 
-def views_by_corner(plot: Panel, runs: Sequence[Run]) -> list[rrb.TimeSeriesView]:
+def views_by_corner(plot: Panel, runs: Sequence[ReplayedRun]) -> list[rrb.TimeSeriesView]:
     """Return a view for each wheel of a wheel plot. Each run's lines have the colour of the run."""
     shown = []
     for line in plot.lines:

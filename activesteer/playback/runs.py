@@ -46,7 +46,7 @@ _GREY: Final = "#8d939c"
 """Colour of the first system: its grey on dark cannot be seen on white, and the theme of the viewer is not known."""
 
 
-class Run(NamedTuple):
+class ReplayedRun(NamedTuple):
     """A recording as the viewer shows it.
 
     Attributes:
@@ -79,7 +79,7 @@ class Run(NamedTuple):
         return all(name in self.recording for name in names)
 
 
-def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
+def runs_of(recordings: Mapping[str, Recording]) -> list[ReplayedRun]:
     """Return the runs in the paper's order. The three systems always have the same colours.
 
     Args:
@@ -101,7 +101,7 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[Run]:
         path = re.sub(r"\W", "_", name, flags=re.ASCII)
         path = f"{number}_{path}" if len(recordings) > 1 else path
         shown = recording.at(_shown(recording.time_s))
-        runs.append(Run(shown, path or "run", name, look.label, look.on_dark if look.place else _GREY, poses))
+        runs.append(ReplayedRun(shown, path or "run", name, look.label, look.on_dark if look.place else _GREY, poses))
     return runs
 
 

@@ -23,11 +23,11 @@ from activesteer.playback.car import send_car, send_ghost, send_links, send_tyre
 from activesteer.playback.course import send_course, send_road, send_track
 from activesteer.playback.layout import LEGEND, LEGEND_OF_RUNS, SUMMARY, blueprint, send_events, send_legend
 from activesteer.playback.plots import curves, pages, send_plots
-from activesteer.playback.runs import Run, Showing
+from activesteer.playback.runs import ReplayedRun, Showing
 from activesteer.playback.wheel_angles import send_wheel_angles
 
 
-def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
+def new_stream(runs: Sequence[ReplayedRun], *, compare: bool) -> rr.RecordingStream:
     """Return a stream that has no target yet.
 
     The viewer keeps one layout for each application id while it is open. Another manoeuvre or other runs need another
@@ -41,7 +41,7 @@ def new_stream(runs: Sequence[Run], *, compare: bool) -> rr.RecordingStream:
     return stream
 
 
-def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint, how: Showing) -> None:
+def fill(stream: rr.RecordingStream, runs: Sequence[ReplayedRun], layout: rrb.Blueprint, how: Showing) -> None:
     """Send all data of the runs."""
     stream.send_blueprint(layout, make_active=True, make_default=True)
     several = len(runs) > 1
@@ -68,7 +68,7 @@ def fill(stream: rr.RecordingStream, runs: Sequence[Run], layout: rrb.Blueprint,
     stream.flush()
 
 
-def summary(runs: Sequence[Run], verdict: Sequence[str] = ()) -> str:
+def summary(runs: Sequence[ReplayedRun], verdict: Sequence[str] = ()) -> str:
     """Return a page in Markdown: scenario, results, metrics side by side, systems."""
     lines: list[str] = []
     for text in dict.fromkeys(_scenario(run.recording.metadata) for run in runs):
@@ -121,7 +121,7 @@ _FOOTER_BYTES: Final = 64
 """A complete file has this word among its last bytes."""
 
 
-def save(runs: Sequence[Run], path: Path, how: Showing = _PLAIN) -> None:
+def save(runs: Sequence[ReplayedRun], path: Path, how: Showing = _PLAIN) -> None:
     """Write a .rrd file with its layout.
 
     Args:
@@ -151,7 +151,7 @@ def save(runs: Sequence[Run], path: Path, how: Showing = _PLAIN) -> None:
             raise PlaybackError(f"cannot write {shown_path(path)}: not all of it could be written; is the disk full?")
 
 
-def show(runs: Sequence[Run], how: Showing = _PLAIN) -> None:
+def show(runs: Sequence[ReplayedRun], how: Showing = _PLAIN) -> None:
     """Open the viewer's window and return when it is closed.
 
     Args:
@@ -165,7 +165,7 @@ def show(runs: Sequence[Run], how: Showing = _PLAIN) -> None:
 
 
 def serve(
-    runs: Sequence[Run],
+    runs: Sequence[ReplayedRun],
     announce: Callable[[str], object],
     how: Showing = _PLAIN,
 ) -> None:
@@ -188,7 +188,7 @@ def serve(
 
 def _run_viewer(
     arguments: Sequence[str],
-    runs: Sequence[Run],
+    runs: Sequence[ReplayedRun],
     how: Showing,
     *,
     ready: Callable[[], object] | None = None,

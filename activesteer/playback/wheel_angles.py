@@ -23,7 +23,7 @@ from activesteer.drawing.wheel_angles import (
     wheel_centres,
     words,
 )  # fmt: skip
-from activesteer.playback.runs import Run, times
+from activesteer.playback.runs import ReplayedRun, times
 from activesteer.road.course import Footprint, footprint_of
 
 PLAN: Final = "plan"
@@ -38,7 +38,7 @@ _RAYS: Final = range(1, SLICES + 2, 2)
 """Points of the arc that the plan joins to the tip by lines, because a 2D view cannot fill areas."""
 
 
-def send_wheel_angles(stream: rr.RecordingStream, run: Run, runs: Sequence[Run]) -> None:
+def send_wheel_angles(stream: rr.RecordingStream, run: ReplayedRun, runs: Sequence[ReplayedRun]) -> None:
     """Send the wedges and the plan of a run, unless the recording has no wheel angles."""
     if not run.has(*CHANNELS):
         return
@@ -53,12 +53,12 @@ def send_wheel_angles(stream: rr.RecordingStream, run: Run, runs: Sequence[Run])
     _send_plan(stream, run, runs.index(run), when, (angles, factor), texts, size)
 
 
-def wedges_path(run: Run) -> str:
+def wedges_path(run: ReplayedRun) -> str:
     """Return the entity of the wedges beside the car of a run."""
     return f"{run.name}/car_frame/wheel_angles"
 
 
-def plan_view(runs: Sequence[Run]) -> rrb.Spatial2DView:
+def plan_view(runs: Sequence[ReplayedRun]) -> rrb.Spatial2DView:
     """Return the view of the plans of these runs."""
     found = [footprint_of(run.recording.metadata) or Footprint() for run in runs]
     front = max(size.front_m for size in found) + 1.9
@@ -76,7 +76,12 @@ def plan_view(runs: Sequence[Run]) -> rrb.Spatial2DView:
 
 
 def _send_wedges(
-    stream: rr.RecordingStream, run: Run, when: list[rr.TimeColumn], shapes: Array, texts: list[str], size: Footprint
+    stream: rr.RecordingStream,
+    run: ReplayedRun,
+    when: list[rr.TimeColumn],
+    shapes: Array,
+    texts: list[str],
+    size: Footprint,
 ) -> None:
     tips, rows, corners = tips_beside(size), len(shapes), len(CORNERS)
     placed = np.full((*shapes.shape[:-1], 3), _ABOVE_ROAD_M, np.float32)
@@ -101,7 +106,7 @@ def _send_wedges(
 
 def _send_plan(
     stream: rr.RecordingStream,
-    run: Run,
+    run: ReplayedRun,
     number: int,
     when: list[rr.TimeColumn],
     angles: tuple[Array, Sequence[int]],

@@ -20,7 +20,7 @@ from activesteer.road.course import Footprint
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import scene_of
 from activesteer.units import quantity_of
-from activesteer.video import Car, RenderScene
+from activesteer.video import FilmedCar, RenderScene
 from activesteer.video.cameras import CUTAWAY
 from activesteer.video.gauges import MIN_SPEED_MPS
 
@@ -155,7 +155,7 @@ def scene_for(
     vehicle = simulation.vehicle
     size = Footprint.from_table(vehicle.dimensions())
     colour = run_looks([controller])[controller].on_dark
-    car = Car(scene_of(vehicle.model), vehicle.body_names, colour, CUTAWAY if cutaway else 1.0, size=size)
+    car = FilmedCar(scene_of(vehicle.model), vehicle.body_names, colour, CUTAWAY if cutaway else 1.0, size=size)
     return RenderScene([car], maneuver.course, maneuver.ground)
 
 

@@ -5,6 +5,6 @@ Out: MP4, WebP or PNG files.
 """
 
 from activesteer.video.film import Film, FilmInfo, Settings, make_film
-from activesteer.video.render_scene import Car, RenderScene
+from activesteer.video.render_scene import FilmedCar, RenderScene
 
-__all__ = ["Car", "Film", "FilmInfo", "RenderScene", "Settings", "make_film"]
+__all__ = ["Film", "FilmInfo", "FilmedCar", "RenderScene", "Settings", "make_film"]

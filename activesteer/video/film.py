@@ -21,7 +21,7 @@ from activesteer.video.cameras import CUTAWAY, view
 from activesteer.video.encoder import check, encoder, frame_rate
 from activesteer.video.gauges import Dials, Gauges, LargeSideslip, used
 from activesteer.video.offscreen import Offscreen
-from activesteer.video.render_scene import Car, RenderScene
+from activesteer.video.render_scene import FilmedCar, RenderScene
 from activesteer.video.road import edges_beside
 from activesteer.video.track import Markings, Traces, Track
 
@@ -154,7 +154,7 @@ class _Pane:
         self._view = view(settings.camera, first.track, settings.corner)
         opacity = CUTAWAY if settings.cutaway else self._view.shell_opacity
         cars = [
-            Car(
+            FilmedCar(
                 actor.recording.scene,
                 actor.track.bodies,
                 actor.colour,

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from activesteer.conventions import Array, yaw_of
-from activesteer.drawing.cars import CHASSIS, SEE_THROUGH, Panel, dressed, share_seen, shares_of, without_tail
+from activesteer.drawing.cars import CHASSIS, SEE_THROUGH, BodySurface, dressed, share_seen, shares_of, without_tail
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course, Footprint
@@ -62,7 +62,7 @@ _BASE: Final = """
 """
 
 
-class Car(NamedTuple):
+class FilmedCar(NamedTuple):
     """A car in the scene.
 
     Attributes:
@@ -94,7 +94,7 @@ class RenderScene:
 
     def __init__(
         self,
-        cars: Sequence[Car],
+        cars: Sequence[FilmedCar],
         course: Course | None = None,
         road: Road | None = None,
         size: tuple[int, int] = (640, 480),
@@ -167,7 +167,7 @@ class RenderScene:
         mujoco.mj_tendon(self.model, self.data)
 
 
-def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
+def _add_car(spec: mujoco.MjSpec, car: FilmedCar, prefix: str) -> None:
     bodies = {name: spec.worldbody.add_body(name=prefix + name, mocap=True) for name in car.bodies}
     solids = [part for part in car.parts if isinstance(part, Primitive) and part.body in bodies]
     kinds = {
@@ -203,14 +203,14 @@ def _add_car(spec: mujoco.MjSpec, car: Car, prefix: str) -> None:
     _add_shadow(spec, prefix, solids, car.shell_opacity * (_GHOST_OPACITY if car.ghost else 1.0))
 
 
-def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car, name: str) -> None:
+def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: BodySurface, car: FilmedCar, name: str) -> None:
     if panel.shell and car.size is not None and car.tail_opens:
         panel, tail = without_tail(panel, car.size)
         _add_mesh(spec, body, tail, car, f"{name}{_TAIL}")
     _add_mesh(spec, body, panel, car, name)
 
 
-def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car, name: str) -> None:
+def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: BodySurface, car: FilmedCar, name: str) -> None:
     if not len(panel.faces):
         return
     mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
@@ -225,7 +225,7 @@ def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: Panel, car: Car,
 
 
 def _colour_of(
-    rgba: tuple[float, float, float, float], car: Car, *, shell: bool = False, glass: bool = False
+    rgba: tuple[float, float, float, float], car: FilmedCar, *, shell: bool = False, glass: bool = False
 ) -> tuple[float, float, float, float]:
     r, g, b, a = rgba
     if shell:

@@ -137,6 +137,12 @@ def test_a_turn_that_the_road_does_not_bear_is_not_counted():
     assert effect_of(found, "lqr").harmed == Proportion(0, 1)
     assert (found.samples, found.failed) == (2, 2)
 
+    only_lqr = [
+        row | ({"status": "ok", "error": "", "sideslip_peak_abs_rad": 0.1} if row["controller"] == "none" else {})
+        for row in rows
+    ]
+    assert effect_of(summarise(pa.Table.from_pylist(only_lqr), planned), "lqr").harmed == Proportion(1, 2)
+
 
 def test_what_is_stored_is_what_was_found():
     found = made_up(none=[0.3], ars=[0.2], afs=[0.2], esc=[0.2], lqr=[0.1])

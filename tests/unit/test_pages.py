@@ -13,7 +13,8 @@ from markupsafe import Markup
 
 from activesteer.analysis.report import report_page
 from activesteer.pages import render, render_page
-from activesteer.pages.model import Table
+from activesteer.pages.model import Table, picture_values
+from activesteer.plotting import Curve, Panel, Picture
 from tests.contrast import contrast
 from tests.reference.chrono.comparison import Comparison
 from tests.reference.chrono.kinematics import Curves
@@ -97,3 +98,12 @@ def test_what_a_template_needs_must_be_given():
 def test_lines_of_a_cell_are_apart_in_the_terminal():
     cell = Markup('{}<br><code class="key">{}</code>').format("anti-roll bar <1>", "factors.anti_roll_bar")
     assert list(Table("", ["parameter"], [[cell]]).lines())[1] == "  anti-roll bar <1>, factors.anti_roll_bar"
+
+
+def test_a_long_curve_keeps_its_shortest_peak():
+    y = np.zeros(100_000)
+    y[54_321] = 7.0
+    (panel,) = picture_values(Picture("", [Panel("x", "y", [Curve(np.arange(len(y)), y)])]))["panels"]
+    (curve,) = panel["curves"]
+    assert len(curve["x"]) == len(curve["y"]) <= 2002
+    assert curve["x"][curve["y"].index(7.0)] == 54_321

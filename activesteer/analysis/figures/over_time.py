@@ -192,7 +192,7 @@ def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 def time_figure(
     recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE), *, instants: bool = False
 ) -> Figure:
-    """Draw panels over one time axis, as wide as a column. With the instants at which a sine with dwell is judged."""
+    """Draw panels over one time axis, as wide as a column; a sine with dwell shows when it is judged."""
     drawn = style.curves(recordings)
     shown = style.present(panels, drawn)
     figure = new_figure(width_in=style.COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))

@@ -11,7 +11,7 @@ import numpy as np
 
 from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
-from activesteer.analysis.report.groups import Group, Run, entry
+from activesteer.analysis.report.groups import Group, ReportedRun, entry
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.conventions import Array
 from activesteer.drawing import wheel_angles
@@ -85,7 +85,7 @@ def time_grid(times_s: Sequence[Array]) -> Array:
     return np.rint((start + np.arange(count) * (every * step)) * 1e9) / 1e9
 
 
-def _panel(panel: Panel, view: str, runs: Sequence[Run], grid: Array) -> dict[str, Any]:
+def _panel(panel: Panel, view: str, runs: Sequence[ReportedRun], grid: Array) -> dict[str, Any]:
     series = []
     for number, run in enumerate(runs):
         with suppress(RecordingError):

@@ -63,7 +63,7 @@ MAX_RUNS: Final = 60
 """Most runs of a report. With more runs, nobody can read the page and a browser is slow to open it."""
 
 
-class Run(NamedTuple):
+class ReportedRun(NamedTuple):
     """A recording in a report.
 
     Attributes:
@@ -96,7 +96,7 @@ class Group(NamedTuple):
 
     name: str
     title: str
-    runs: tuple[Run, ...]
+    runs: tuple[ReportedRun, ...]
 
     def by_name(self) -> dict[str, Recording]:
         """Return the recordings by name of the run."""
@@ -136,6 +136,6 @@ def entry(recording: Recording, table: str, key: str) -> str:
 
 def _group(name: str, recordings: Mapping[str, Recording], *, paper: bool) -> Group:
     named = dict(zip(run_names(list(recordings), recordings.values()), recordings.items(), strict=True))
-    runs = tuple(Run(*named[run], run, look) for run, look in run_looks(named).items())
+    runs = tuple(ReportedRun(*named[run], run, look) for run, look in run_looks(named).items())
     title = entry(runs[0].recording, "maneuver", "title") or name
     return Group(name, f"{title}: {SETTINGS[PAPER]}" if paper else title, runs)

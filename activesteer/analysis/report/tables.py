@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
-from activesteer.analysis.report.groups import Group, Run, entry
+from activesteer.analysis.report.groups import Group, ReportedRun, entry
 from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS, Better, recorded_metric
 from activesteer.recording import Recording
 from activesteer.units import display_unit, parameter_label, typeset
@@ -135,7 +135,7 @@ class Result(NamedTuple):
         figures: Its key figures.
     """
 
-    run: Run
+    run: ReportedRun
     losses: tuple[str, ...]
     kept: tuple[str, ...]
     figures: tuple[Figure, ...]
@@ -200,7 +200,7 @@ def results(group: Group) -> list[Result]:
     return found
 
 
-def _is_judged(run: Run) -> bool:
+def _is_judged(run: ReportedRun) -> bool:
     """Return whether a change from or to this run can be good or bad: it is complete, and the car is controlled."""
     return not run.problem and is_controlled(run.recording.metrics)
 
@@ -270,7 +270,7 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
     return titles, rows
 
 
-def changed_parameters(run: Run) -> str:
+def changed_parameters(run: ReportedRun) -> str:
     """Describe the overrides of a run, with their values and keys, or empty without overrides."""
     changed: Any = run.recording.metadata.get("overrides")
     return ", ".join(_told(*one) for one in changed.items()) if isinstance(changed, Mapping) else ""

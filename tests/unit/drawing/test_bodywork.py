@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.drawing.cars import Panel, dressed, without_tail
+from activesteer.drawing.cars import BodySurface, dressed, without_tail
 from activesteer.recording import Link, Primitive
 from activesteer.resources import models_dir
 from activesteer.road.course import Footprint
@@ -15,7 +15,7 @@ COMPACT = Footprint(1.8, 2.637, (0.2, 0.2))
 SALOON = Footprint(1.86, 2.78, (0.2, 0.2))
 
 
-def panels_of(size: Footprint) -> dict[tuple[str, str], Panel]:
+def panels_of(size: Footprint) -> dict[tuple[str, str], BodySurface]:
     return {(panel.body, panel.name): panel for panel in dressed(scene(), size)[1]}
 
 
@@ -75,7 +75,7 @@ def test_the_files_are_small():
     assert sum(file.stat().st_size for file in files) < 300_000
 
 
-def area_m2(panel: Panel) -> float:
+def area_m2(panel: BodySurface) -> float:
     corners = panel.vertices_m[panel.faces]
     return 0.5 * float(
         np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()

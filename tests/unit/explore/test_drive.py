@@ -93,6 +93,9 @@ def test_speed_and_friction_change_while_the_car_drives(tmp_path: Path) -> None:
     assert on_dry > 6.0
     assert abs(go(car, 9.0)["ay_mps2"]) < 0.25 * 9.81
     car.end()
+    assert car.path is not None
+    (event,) = activesteer.Recording.open(car.path).metadata["events"]
+    assert (event["kind"], event["what"]) == ("set", "road.mu = 0.2")
 
 
 def test_a_foot_on_the_brake_stops_the_car(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from activesteer.errors import PlaybackError, RecordingError
 from activesteer.recording import Primitive
 from activesteer.road.course import Course, Footprint
 from activesteer.road.road import Road, RoadPatch
-from activesteer.video import Car, Film, RenderScene, Settings
+from activesteer.video import Film, FilmedCar, RenderScene, Settings
 from activesteer.video.road import Edges
 from activesteer.video.track import Track
 from tests.raising import raises
@@ -23,9 +23,9 @@ COURSE = {
 }
 
 
-def stage(*cars: Car, **more) -> RenderScene:
+def stage(*cars: FilmedCar, **more) -> RenderScene:
     run = circle()
-    return RenderScene(cars or [Car(run.scene, run.poses.names)], **more)
+    return RenderScene(cars or [FilmedCar(run.scene, run.poses.names)], **more)
 
 
 def test_bodies_are_where_they_are_put():
@@ -68,7 +68,9 @@ def test_shadow_turns_with_the_car_but_stays_on_the_road():
 
 def test_ghost_is_clearer_than_the_car_and_has_its_own_colour():
     run = circle()
-    built = stage(Car(run.scene, run.poses.names, "#ff0000"), Car(run.scene, run.poses.names, "#0000ff", ghost=True))
+    built = stage(
+        FilmedCar(run.scene, run.poses.names, "#ff0000"), FilmedCar(run.scene, run.poses.names, "#0000ff", ghost=True)
+    )
     shells = []
     for number in range(2):
         body = built.model.body(f"{number}/chassis")
@@ -80,7 +82,7 @@ def test_ghost_is_clearer_than_the_car_and_has_its_own_colour():
 
 def test_a_ghost_in_the_place_of_a_car_is_not_drawn():
     run = circle()
-    cars = [Car(run.scene, run.poses.names), Car(run.scene, run.poses.names, ghost=True)]
+    cars = [FilmedCar(run.scene, run.poses.names), FilmedCar(run.scene, run.poses.names, ghost=True)]
     built = stage(*cars)
     positions, quaternions = Track(run, "circle").poses(1.0)
     ghost = built.model.body("1/chassis").geomadr[0]
@@ -100,7 +102,7 @@ def test_solids_have_the_size_of_the_recording():
         Primitive("chassis", "sphere", (3.0, 2.0, 1.0)),
         Primitive("nowhere", "box", (1.0, 1.0, 1.0)),
     )
-    model = stage(Car(parts, ("chassis",))).model
+    model = stage(FilmedCar(parts, ("chassis",))).model
     first = int(model.body("0/chassis").geomadr[0])
     assert model.body("0/chassis").geomnum[0] == 3
     expected = [[2.0, 1.0, 0.5], [0.3, 0.1, 0.0], [1.5, 1.0, 0.5]]
@@ -147,7 +149,7 @@ def test_a_recording_with_a_damaged_course_or_road_says_so(more, key):
 
 def test_a_car_that_cannot_be_drawn_says_so():
     with raises(PlaybackError, cause=KeyError):
-        stage(Car((Primitive("chassis", "cone", (1.0, 1.0, 1.0)),), ("chassis",)))
+        stage(FilmedCar((Primitive("chassis", "cone", (1.0, 1.0, 1.0)),), ("chassis",)))
 
 
 def test_a_course_without_end_is_drawn_as_far_as_a_picture_can_hold():
@@ -157,7 +159,7 @@ def test_a_course_without_end_is_drawn_as_far_as_a_picture_can_hold():
 
 def test_open_tail_is_transparent_and_closes_again():
     run = circle()
-    built = stage(Car(run.scene, run.poses.names, "#ff8800", size=Footprint(), tail_opens=True))
+    built = stage(FilmedCar(run.scene, run.poses.names, "#ff8800", size=Footprint(), tail_opens=True))
     tail = [index for index in range(built.model.ngeom) if built.model.geom(index).name.endswith("_tail")]
     assert tail
     closed = built.model.geom_rgba.copy()
