@@ -35,7 +35,6 @@ from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.studies.engine.workers import in_parallel
 from activesteer.studies.reproduction import Progress, drive
-from activesteer.theory.proportions import percent
 from tools.population_results import NONE, STEERING_EFFORT, TOTAL, Population, SystemEffect, asked
 
 if TYPE_CHECKING:
@@ -373,11 +372,10 @@ _COLOURS: Final = (_WORSE, _NEUTRAL, _BETTER)
 _PALEST: Final = 0.2
 """Least depth of the colour of a better or worse value, so that it is seen to be one [-]."""
 _PROPORTIONS: Final = {
-    "harmed": ("runs with harm [%]", 0.0, -1.0),
-    "saved": ("lost without control,\nsaved [%]", 0.0, 1.0),
-    "spoiled": ("fine without control,\nspoiled [%]", 0.0, -1.0),
+    "harmed": ("runs with harm", -1.0),
+    "saved": ("saved of those\nlost without control", 1.0),
 }
-"""Proportion of an effect -> title of its panel, and place in the colours, from -1 to 1, of none and of all runs."""
+"""Proportion of an effect -> title of its panel, and place of all runs in the colours, from -1 to 1."""
 
 
 def comparison_figure(made: Comparison) -> Figure:
@@ -422,18 +420,24 @@ def _legend(better: str, worse: str, neutral: str) -> list[tuple[str, str]]:
 
 
 def comparison_population_figure(made: Population) -> Figure:
-    """Return the figure of a comparison over a population: proportions in percent by scenario and controller."""
+    """Return the figure of a comparison over a population: counts and worst tracks by scenario and controller."""
     names = list(dict.fromkeys(effect.controller for effect in made.systems))
     scenarios = list(dict.fromkeys(effect.scenario for effect in made.systems))
+    rows, blank = [name.replace("_", " ") for name in scenarios], [""] * len(scenarios)
+    effects = {(effect.scenario, effect.controller): effect for effect in made.systems}
+    cells = [[effects.get((scenario, name)) for name in names] for scenario in scenarios]
     panels = []
-    for key, (title, none, every) in _PROPORTIONS.items():
-        proportions = np.full((len(scenarios), len(names)), math.nan)
-        for effect in made.systems:
-            proportions[scenarios.index(effect.scenario), names.index(effect.controller)] = getattr(effect, key).value
-        texts = [["-" if math.isnan(value) else percent(value) for value in row] for row in proportions.tolist()]
-        rows = [name.replace("_", " ") if not panels else "" for name in scenarios]
-        panels.append(Heat(none + (every - none) * proportions, texts, names, rows, (-1.0, 1.0), _COLOURS, title))
-    legend = _legend("better", "worse", "as without control, or in half of the runs")
+    for key, (title, every) in _PROPORTIONS.items():
+        shown = [[cell and getattr(cell, key) for cell in row] for row in cells]
+        shades = np.array([[every * one.value if one else math.nan for one in row] for row in shown])
+        # Counts, because a share of one run says nothing.
+        texts = [[f"{one.count}/{one.number}" if one and one.number else "-" for one in row] for row in shown]
+        panels.append(Heat(shades, texts, names, blank if panels else rows, (-1.0, 1.0), _COLOURS, title))
+    tracks = np.array([[cell.worst_track_m if cell else math.nan for cell in row] for row in cells])
+    texts = [["-" if math.isnan(track) else f"{track:.2f}" for track in row] for row in tracks.tolist()]
+    shades = -np.minimum(tracks / TRACK_HARM_M, 1.0)
+    panels.append(Heat(shades, texts, names, blank, (-1.0, 1.0), _COLOURS, "worst growth of\nthe track error [m]"))
+    legend = _legend("better", f"worse; full colour: all runs, or {TRACK_HARM_M:g} m", "as without control")
     title = f"{made.samples} samples of {made.vehicle}, seed {made.seed}; -: no such run"
     width_in, height_in = 2.0 + 1.5 * max(len(names), 4), 1.4 + 0.3 * len(scenarios)
     return draw(Picture(title, panels, None, len(panels), width_in, height_in, legend, shared_legend=True))

@@ -31,6 +31,12 @@ class Channels(Protocol):
         ...
 
 
+def drawn_values(recording: Channels, channel: str) -> Array:
+    """Return a channel as a line shows it: the sideslip angle of a car that turns round continues beyond 180 deg."""
+    values = recording[channel]
+    return np.unwrap(values) if channel.endswith("sideslip_rad") else values
+
+
 class Line(NamedTuple):
     """A line of a panel.
 
@@ -56,7 +62,7 @@ class Line(NamedTuple):
         """Return the values of a run [SI], or None if they have no meaning."""
         if self.beside and not _holds(recording, self.beside):
             return None
-        values = recording[self.channel]
+        values = drawn_values(recording, self.channel)
         demand = self.demand if self.demand and _holds(recording, self.demand) else ""
         return None if demand and not np.any(recording[demand]) else values
 

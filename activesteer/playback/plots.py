@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 
 from activesteer.conventions import CORNERS
 from activesteer.drawing.cars import bytes_of
-from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Line, Panel, link_panels, panels_in
+from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Line, Panel, drawn_values, link_panels, panels_in
 from activesteer.playback.runs import ReplayedRun, times
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
@@ -47,7 +47,9 @@ def send_plots(stream: rr.RecordingStream, run: ReplayedRun, *, alone: bool) -> 
                 widths=[line.width for line in lines],
             )
             stream.log(path, style, static=True)
-            values = np.stack([run.channel(line.channel) * plot.quantity.factor for line in lines], axis=1)
+            values = np.stack(
+                [drawn_values(run.recording, line.channel) * plot.quantity.factor for line in lines], axis=1
+            )
             columns = rr.Scalars.columns(scalars=values.reshape(-1))
             stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.recording)))
 

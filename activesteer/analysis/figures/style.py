@@ -17,7 +17,7 @@ from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import RunLook, run_looks
-from activesteer.drawing.panels import FIGURE, PANELS, Panel, added_lines
+from activesteer.drawing.panels import FIGURE, PANELS, Panel, added_lines, drawn_values
 from activesteer.errors import ParameterError
 from activesteer.plotting import plain_axis
 from activesteer.units import Quantity
@@ -90,7 +90,7 @@ def draw(
 ) -> None:
     """Draw a channel of a run over time: without a label outside the legend, by default in the run's own style."""
     draw_band(axis, curve, shown.channel, shown.factor)
-    values = thinned(curve.recording[shown.channel]) * shown.factor
+    values = thinned(drawn_values(curve.recording, shown.channel)) * shown.factor
     # A leading underscore keeps a line out of the legend.
     axis.plot(
         thinned(curve.recording.time_s), values, color=curve.look.colour, linewidth=width,

@@ -13,7 +13,18 @@ from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.conventions import CORNERS
 from activesteer.drawing import panels
-from activesteer.drawing.panels import EXPLORE, FIGURE, FILM, PANELS, PATH_DISTANCE, REPORT, VIEWS, Line, panels_in
+from activesteer.drawing.panels import (
+    EXPLORE,
+    FIGURE,
+    FILM,
+    PANELS,
+    PATH_DISTANCE,
+    REPORT,
+    VIEWS,
+    Line,
+    drawn_values,
+    panels_in,
+)
 from activesteer.playback import plots as rerun_plots
 from activesteer.playback import runs_of
 from activesteer.scenario import resolve
@@ -98,3 +109,9 @@ def test_parts_of_all_corners_have_one_colour() -> None:
     assert len(by_corner) == len(CORNERS)
     assert {panel.lines[0].colour for panel in by_corner} == {by_corner[0].lines[0].colour}
     assert json.dumps([panel.title_with_unit for panel in by_corner]).count("[N]") == len(CORNERS)
+
+
+def test_the_sideslip_angle_of_a_car_that_turns_round_has_no_jump() -> None:
+    beyond_deg = np.array([170.0, 179.0, -178.0, -170.0, 178.0])
+    shown = drawn_values({"sideslip_rad": np.radians(beyond_deg), "yaw_rad": np.radians(beyond_deg)}, "sideslip_rad")
+    assert np.degrees(shown) == pytest.approx([170.0, 179.0, 182.0, 190.0, 178.0])
