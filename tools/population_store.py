@@ -182,7 +182,8 @@ def _comparison(found: Population) -> list[str]:
     if against:
         lines += ["", *_head(f"against `{REQUIRED}` in place of `{NONE}`", ["runs with harm", *_WORST], "")]
         lines += [_row(head, cells) for head, *cells in against]
-    return [*lines, "", "![Proportions by scenario and controller](pictures/comparison_population.png)"]
+    caption = "Harmed and saved runs, and the worst track, by scenario and controller"
+    return [*lines, "", f"![{caption}](pictures/comparison_population.png)"]
 
 
 _WORST: Final = {
