@@ -123,6 +123,23 @@ def no_network(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket.socket, "connect", only_here)
 
 
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Every figure that is saved to a file, which stays empty; pages get their pictures."""
+    figure_class = pytest.importorskip("matplotlib.figure").Figure
+    kept, drawn = [], figure_class.savefig
+
+    def keep(self: Any, target: Any, **how: Any) -> None:
+        kept.append(self)
+        if isinstance(target, (str, Path)):
+            Path(target).touch()
+        else:
+            drawn(self, target, **how)
+
+    monkeypatch.setattr(figure_class, "savefig", keep)
+    return kept
+
+
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """A browser without a window; skip the test if there is none."""

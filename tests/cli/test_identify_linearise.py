@@ -36,6 +36,7 @@ def test_identify_writes_the_single_track_model_into_the_vehicle_file(own_vehicl
     assert "[dampers.front]" in written
 
 
+@pytest.mark.slow
 def test_linearise_tells_the_modes_and_draws(tmp_path, capsys):
     assert main(["linearise", "--speed-kmh", "80", "-o", str(tmp_path)]) == 0
     told = capsys.readouterr().out
