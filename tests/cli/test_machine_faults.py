@@ -192,9 +192,8 @@ JUST_BEFORE_A_BLOCK = 1_198
 """One block is almost full and the one before it may still be in the writer's hands, so that most is lost."""
 
 
-@pytest.mark.parametrize(
-    "step", [JUST_BEFORE_A_BLOCK, *(pytest.param(step, marks=pytest.mark.slow) for step in MORE_STEPS)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [JUST_BEFORE_A_BLOCK, *MORE_STEPS])
 def test_a_killed_run_loses_less_than_two_blocks(call, controller, tmp_path: Path, step: int) -> None:
     body = f"if self.steps > {step}:\n    import os\n    os.kill(os.getpid(), 9)\nreturn ActuatorCommand()"
     words = ("run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")

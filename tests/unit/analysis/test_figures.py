@@ -215,6 +215,7 @@ def test_every_kind_has_a_figure(kind, figures, tmp_path):
     assert all(axis.get_lines() for axis in figures[0].get_axes())
 
 
+@pytest.mark.usefixtures("figures")
 def test_a_path_without_gates_can_be_drawn(tmp_path):
     run = along_path(kind="follow_path", lanes=(), last_gate_m=None)
     assert figure_for("follow_path")({"none": run}, tmp_path / "figure.png").exists()
