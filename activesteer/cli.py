@@ -53,7 +53,7 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
     stop.options = options = command_line().parse(arguments)
     try:
         with log_to_terminal(), stdout_for_json() if getattr(options, "json", False) else nullcontext():
-            return options.action(options)
+            return int(options.action(options) or 0)
     except BrokenPipeError:
         raise
     except (ActiveSteerError, OSError) as error:

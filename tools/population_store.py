@@ -25,7 +25,7 @@ from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS, STATE
 from activesteer.analysis.claims.stored import PAPER, SUMMARY, read_setting
 from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.harm import TRACK as TRACK_MEASURES
-from activesteer.commands.terminal import RunCounter
+from activesteer.commands.terminal import Progress
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
 from activesteer.files import atomic_write, make_folder, write_text
@@ -117,8 +117,8 @@ relative to the same sample without control: median, and the range of 90 % of th
 def driven(options: argparse.Namespace, controllers: Sequence[str] | None, name: str) -> tuple[Population, Path]:
     """Drive a population or what is missing of it. Return its results and the folder of its runs."""
     output = options.output or Path("build", name)
-    with RunCounter("population", quiet=False) as counter:
-        found = population(options.samples, controllers, output=output, jobs=options.jobs, progress=counter)
+    with Progress("population", quiet=False) as progress:
+        found = population(options.samples, controllers, output=output, jobs=options.jobs, progress=progress.count)
     return found, output
 
 
@@ -322,8 +322,8 @@ def renew_around(folder: Path, samples: int | None, jobs: int | None) -> None:
         planned = read_study(name)
         if samples is not None:
             planned = replace(planned, design=replace(planned.design, samples=samples))
-        with RunCounter(name, quiet=False) as counter:
-            table = study(planned, output=folder / name, jobs=jobs, progress=counter)
+        with Progress(name, quiet=False) as progress:
+            table = study(planned, output=folder / name, jobs=jobs, progress=progress.count)
         print(store_summary(summarise(table, planned, nominal), name))
 
 

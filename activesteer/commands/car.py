@@ -8,18 +8,20 @@ from typing import Final
 
 from activesteer.commands.options import (
     CAR,
+    FIGURES,
     JSON,
     OVERRIDES,
     VEHICLE_WORDS,
     Group,
-    figures,
     flag,
     option,
     output,
     overrides_of,
 )
-from activesteer.commands.terminal import print_json, tell, tell_files
+from activesteer.commands.terminal import tell
 from activesteer.errors import ParameterError, TyreFileError, nearest_names
+from activesteer.files import write_text
+from activesteer.resources import models_dir
 
 command: Final = Group("car")
 vehicle: Final = command.with_actions("vehicle", "make a car from a table of hardpoints, or check a car")
@@ -35,7 +37,7 @@ vehicle: Final = command.with_actions("vehicle", "make a car from a table of har
     flag("--overwrite", "replace an earlier car in that folder"),
     JSON,
 )  # fmt: skip
-def _new(options: argparse.Namespace) -> int:
+def _new(options: argparse.Namespace) -> None:
     from activesteer.vehicle_builder import new_vehicle
 
     made = new_vehicle(
@@ -47,95 +49,78 @@ def _new(options: argparse.Namespace) -> int:
         kc=options.kc,
         overwrite=options.overwrite,
     )
-    if options.json:
-        print_json({
-            "folder": str(made.folder),
-            "vehicle_file": str(made.vehicle_file),
-            "questions": list(made.questions),
-            "assumptions": [
-                {"key": item.key, "value": item.value, "rule": item.rule} for item in made.assumptions
-            ],
-        })  # fmt: skip
-        return 0
-    print(f"vehicle: {made.vehicle_file}")
-    found = made.trimmed
-    for axle in ("front", "rear"):
-        part = found.axle(axle)
-        print(f"  {axle} springs {1e-3 * part.spring_rate_Npm:.1f} N/mm, {part.spring_force_N:.0f} N as it stands")
-    print(f"  steering ratio {found.ratio:.2f}, chassis {found.chassis.mass_kg:.0f} kg")
-    print(f"  {len(made.assumptions)} missing values were assumed by rules: {made.folder / 'README.md'}")
-    for line in made.questions:
-        print(f"  unusual: {line}")
-    print(f"next: activesteer vehicle check {made.vehicle_file}")
-    return 0
+    values = {
+        "folder": str(made.folder),
+        "vehicle_file": str(made.vehicle_file),
+        "questions": list(made.questions),
+        "assumptions": [{"key": item.key, "value": item.value, "rule": item.rule} for item in made.assumptions],
+    }
+    axles = ((axle, made.trimmed.axle(axle)) for axle in ("front", "rear"))
+    lines = [
+        f"vehicle: {made.vehicle_file}",
+        *(
+            f"  {axle} springs {1e-3 * part.spring_rate_Npm:.1f} N/mm, {part.spring_force_N:.0f} N as it stands"
+            for axle, part in axles
+        ),
+        f"  steering ratio {made.trimmed.ratio:.2f}, chassis {made.trimmed.chassis.mass_kg:.0f} kg",
+        f"  {len(made.assumptions)} missing values were assumed by rules: {made.folder / 'README.md'}",
+        *(f"  unusual: {line}" for line in made.questions),
+        f"next: activesteer vehicle check {made.vehicle_file}",
+    ]
+    tell(options, values, lines)
 
 
 @vehicle("table", "print a table of the package, as a start",
     option("table", "NAME", "name of a table (default: print all names)", nargs="?"),
 )  # fmt: skip
-def _table(options: argparse.Namespace) -> int:
-    from activesteer.errors import ParameterError, nearest_names
-    from activesteer.resources import models_dir
-
+def _table(options: argparse.Namespace) -> None:
     files = {file.stem: file for file in sorted((models_dir() / "tables").iterdir())}
     if options.table is None:
         print("\n".join(file.name for file in files.values()))
-        return 0
-    file = files.get(options.table.removesuffix(".toml").removesuffix(".csv"))
-    if file is None:
+    elif file := files.get(options.table.removesuffix(".toml").removesuffix(".csv")):
+        print(file.read_text(encoding="utf-8"), end="")
+    else:
         raise ParameterError(
             f"no table is named {options.table!r}; {nearest_names(options.table, files)}", value=options.table
         )
-    print(file.read_text(encoding="utf-8"), end="")
-    return 0
 
 
 @vehicle("check", "list missing and implausible values of a car; exit status 1 on errors",
     option("vehicle", "NAME_OR_PATH", "name, vehicle file, or its folder"),
     JSON,
 )  # fmt: skip
-def _check(options: argparse.Namespace) -> int:
-    from activesteer.commands.terminal import tell
+def _check(options: argparse.Namespace) -> bool:
     from activesteer.vehicle_builder import check_vehicle
 
     report = check_vehicle(options.vehicle)
     tell(options, report.as_table(), [report.table()])
-    return 1 if report.count("error") else 0
+    return report.count("error") > 0
 
 
 @vehicle("keyframe", "write the standing position of an edited car",
     option("vehicle", "PATH", "vehicle file or its folder"),
 )  # fmt: skip
-def _keyframe(options: argparse.Namespace) -> int:
-    from activesteer.errors import ParameterError
-    from activesteer.files import write_text
+def _keyframe(options: argparse.Namespace) -> None:
     from activesteer.vehicle_builder.build import keyframe_xml
 
     text, path = keyframe_xml(options.vehicle)
     print(write_text(path, text, ParameterError))
-    return 0
 
 
 @command("tyre", "describe a tyre file, list unusual values, draw curves",
     option("file", "FILE.tir", "a path, or a name in models/tyres"),
-    figures(), JSON,
+    FIGURES, JSON,
 )  # fmt: skip
-def _tyre(options: argparse.Namespace) -> int:
+def _tyre(options: argparse.Namespace) -> None:
     from activesteer.tyre import load_tir
-    from activesteer.tyre.report import describe, key_figures
+    from activesteer.tyre.report import describe, draw, key_figures
 
     params = load_tir(_find(options.file))
-    tell(options, key_figures(params), [describe(params)])
-    if options.output is not None:
-        from activesteer.tyre.report import draw
-
-        tell_files(options, draw(params, options.output))
-    return 0
+    figures = [] if options.output is None else draw(params, options.output)
+    tell(options, key_figures(params), [describe(params)], figures)
 
 
 def _find(name: str) -> Path:
-    from activesteer.resources import models_dir
-
     folder = models_dir() / "tyres"
     for candidate in (Path(name), folder / name, folder / f"{name}.tir"):
         if candidate.is_file():
@@ -147,19 +132,18 @@ def _find(name: str) -> Path:
 
 
 @command("kc", "measure kinematics and compliance of the suspensions",
-    CAR, figures(),
+    CAR, FIGURES,
     option("--tables", "DIR", "write all curves as CSV and the table of the car, as input of vehicle new --kc",
         type=Path),
     JSON,
 )  # fmt: skip
-def _kc(options: argparse.Namespace) -> int:
+def _kc(options: argparse.Namespace) -> None:
     from activesteer.rigs import kinematics_compliance
+    from activesteer.rigs.kc import draw
 
     result = kinematics_compliance(options.vehicle, overrides_of(options))
-    tell(options, result.to_json(), [result.table()])
+    lines = [result.table()]
     if options.tables is not None:
-        from activesteer.errors import ParameterError
-        from activesteer.files import write_text
         from activesteer.rigs.kc.result import write_tables
         from activesteer.scenario import load_car
         from activesteer.vehicle_builder.texts import car_table
@@ -167,13 +151,9 @@ def _kc(options: argparse.Namespace) -> int:
         written = write_tables(result, options.tables)
         text = car_table(load_car(options.vehicle, overrides_of(options)), result)
         written.append(write_text(options.tables / "car.toml", text, ParameterError))
-        if not options.json:
-            print(f"tables: {len(written)} files in {options.tables}")
-    if options.output is not None:
-        from activesteer.rigs.kc import draw
-
-        tell_files(options, draw(result, options.output))
-    return 0
+        lines.append(f"tables: {len(written)} files in {options.tables}")
+    figures = [] if options.output is None else draw(result, options.output)
+    tell(options, result.to_json(), lines, figures)
 
 
 @command("export", "write the car as an FMU or a C library, without Python",
@@ -185,7 +165,7 @@ def _kc(options: argparse.Namespace) -> int:
     output("FILE.fmu", "the FMU (default: VEHICLE.fmu), or with --header the folder (default: VEHICLE)"),
     JSON,
 )  # fmt: skip
-def _export(options: argparse.Namespace) -> int:
+def _export(options: argparse.Namespace) -> None:
     from activesteer.coupling.car import export_fmu, export_library
     from activesteer.files import make_folder
     from activesteer.scenario import resolve
@@ -204,4 +184,3 @@ def _export(options: argparse.Namespace) -> int:
     about = {"file": str(output), "bytes": size, "token": export.token, "timestep_s": export.timestep_s, **count}
     words = ", ".join(f"{number} {cause}s" for cause, number in count.items())
     tell(options, about, [f"{output}: {size / 1e6:.1f} MB, {words}; steps of {1e3 * export.timestep_s:g} ms"])
-    return 0

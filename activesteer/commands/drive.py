@@ -15,15 +15,15 @@ from activesteer.commands.options import (
     CAR,
     JSON,
     Group,
+    check_effect,
     controllers,
-    cutaway,
     driver,
     flag,
     option,
     output,
     scenario_of,
 )
-from activesteer.commands.terminal import BAD, GOOD, ProgressBar, painted, print_entry, print_json
+from activesteer.commands.terminal import BAD, GOOD, Progress, entry, painted, print_json
 from activesteer.errors import ActiveSteerError, ParameterError, shown
 from activesteer.files import make_folder
 
@@ -38,7 +38,7 @@ _OTHER_FILES: Final = frozenset((".mp4", ".gif", ".rrd", ".csv", ".mat", ".parqu
 
 
 @command("list", "list manoeuvres, controllers, drivers, cars, studies, standards", JSON)
-def _list(options: argparse.Namespace) -> int:
+def _list(options: argparse.Namespace) -> None:
     from activesteer import resources
     from activesteer.controllers import CONTROLLERS, read_variant
     from activesteer.standards.catalogue import STANDARDS
@@ -55,14 +55,13 @@ def _list(options: argparse.Namespace) -> int:
     }
     if options.json:
         print_json(found)
-        return 0
+        return
     found["controllers"]["my_file.py:MyController"] = "your own: step(self, command, measurement)"
     found["drivers"]["my_file.py:MyDriver"] = "your own: step(self, setpoint, measurement, motion)"
     for kind, titles in found.items():
         print(f"{kind}:")
         for name, title in titles.items():
-            print_entry(f"  {name:{_WIDTH}} ", title, _WIDTH + 3)
-    return 0
+            print(entry(f"  {name:{_WIDTH}} ", title, _WIDTH + 3))
 
 
 def _titles(names: Iterable[str], find: Callable[[str], Path]) -> dict[str, str]:
@@ -109,9 +108,9 @@ class _Failures(dict[str, str]):
     flag("--plot", "also draw the runs: PNG and PDF"),
     flag("--watch",
         "instead, show one controller in a window of MuJoCo at the pace of --realtime, without a recording"),
-    cutaway("with --watch: "), JSON,
+    flag("--cutaway", "with --watch: show the suspension through the body"), JSON,
 )  # fmt: skip
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> bool:
     from activesteer.controllers import controller_spec
     from activesteer.conventions import DEFAULT_TIMESTEP_S
     from activesteer.coupling.fmu import isolated
@@ -119,9 +118,9 @@ def _run(options: argparse.Namespace) -> int:
     from activesteer.simulation.preparation import with_amplitude_found
 
     if options.watch:
-        return _watch(options)
-    if options.cutaway:
-        raise ParameterError("has an effect with --watch only", key="--cutaway")
+        _watch(options)
+        return False
+    check_effect(options, "an effect with --watch only", "cutaway")
     options.output = options.output or Path("runs")
     options.driver = isolated(options.driver, options.isolate)
     controllers = [controller_spec(isolated(name, options.isolate)) for name in options.controller or ["none"]]
@@ -152,20 +151,20 @@ def _run(options: argparse.Namespace) -> int:
         print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs})
     elif any(recording.metrics for recording in recordings.values()):
         _print_table(recordings, every=options.all)
-    if options.plot and recordings:
-        for figure in _plot(recordings, paths[0].parent, scenario):
-            if not options.json:
-                print(f"figure: {figure}")
-    return 1 if failures else 0
+    figures = _plot(recordings, paths[0].parent, scenario) if options.plot and recordings else ()
+    for figure in figures:
+        if not options.json:
+            print(f"figure: {figure}")
+    return bool(failures)
 
 
-def _watch(options: argparse.Namespace) -> int:
+def _watch(options: argparse.Namespace) -> None:
     from activesteer.scenario import check_gains
+    from activesteer.simulation.live_view import check_display, watch
     from activesteer.simulation.preparation import with_amplitude_found
 
-    for key in ("output", "replace", "all", "isolate", "udp", "plot", "json"):
-        if getattr(options, key) not in (None, False):
-            raise ParameterError("has no effect with --watch: nothing is recorded", key=f"--{key}")
+    unused = ("output", "replace", "all", "isolate", "udp", "plot", "json")
+    check_effect(options, "no effect with --watch: nothing is recorded", *unused)
     if len(options.controller or ["none"]) > 1:
         raise ParameterError("give one controller with --watch", key="-c", value=" ".join(options.controller))
     pace, controller = options.realtime or 1.0, (options.controller or ["none"])[0]
@@ -174,12 +173,8 @@ def _watch(options: argparse.Namespace) -> int:
     # Check the manoeuvre first, with or without a display.
     scenario = scenario_of(options)
     check_gains(scenario.overrides, [controller])
-
-    from activesteer.simulation.live_view import check_display, watch
-
     check_display()
     watch(with_amplitude_found(scenario), controller, pace, cutaway=options.cutaway)
-    return 0
 
 
 def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Namespace) -> Any:
@@ -191,7 +186,7 @@ def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Nam
     link = None
     if options.udp is not None:
         link = UdpLink(UdpPort.read(options.udp, options.udp_timeout, options.udp_reaction))
-    with ProgressBar(name, quiet=quiet) as progress:
+    with Progress(name, quiet=quiet) as progress:
         recording = run_scenario(
             scenario, controller, path=path, progress=progress, realtime=options.realtime or False, link=link
         )  # fmt: skip
@@ -221,16 +216,12 @@ def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
 
     metrics = {label: recording.metrics for label, recording in recordings.items()}
     names = [metric.name for metric in evaluation_of(next(iter(recordings.values()))).key_metrics]
-    told = metrics if every else {run: _chosen(found, names) for run, found in metrics.items()}
-    print(comparison(told, partial(_paint, metrics)))
+    chosen = {run: {name: found[name] for name in names if name in found} for run, found in metrics.items()}
+    print(comparison(metrics if every else chosen, partial(_paint, metrics)))
     _print_outcomes(metrics)
     total = len({name for found in metrics.values() for name in found})
     if not every and total > len(names):
         print(f"{len(names)} of {total} metrics; --all prints all")
-
-
-def _chosen(metrics: Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
-    return {name: metrics[name] for name in names if name in metrics}
 
 
 def _paint(
@@ -314,8 +305,7 @@ def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Pa
 
     name, kind = scenario.maneuver.name, scenario.maneuver.kind
     figures = [figure_for(kind)(recordings, folder / f"{name}{ending}") for ending in (".png", ".pdf")]
-    if kind == "step_steer" and "none" in recordings:
-        run = recordings["none"]
+    if kind == "step_steer" and (run := recordings.get("none")):
         models = models_beside(run)
         figures += [figure_2(run, folder / f"{name}-models{ending}", models) for ending in (".png", ".pdf")]
     return figures
@@ -328,7 +318,7 @@ def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Pa
     JSON,
     description="Open a page in the browser that only this computer can reach; Ctrl-C ends it.",
 )  # fmt: skip
-def _explore(options: argparse.Namespace) -> int:
+def _explore(options: argparse.Namespace) -> None:
     port = options.port or 0
     if not 0 <= port <= 65535:
         raise ParameterError(f"--port: is {port}, must be 0 to 65535")
@@ -353,4 +343,3 @@ def _explore(options: argparse.Namespace) -> int:
             webbrowser.open(server.url)
 
     server.serve(listening)
-    return 0

@@ -7,7 +7,7 @@ import difflib
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.errors import MAX_SHOWN, ParameterError, nearest_names
 from activesteer.resources import DEFAULT_DRIVER
@@ -15,7 +15,8 @@ from activesteer.resources import DEFAULT_DRIVER
 if TYPE_CHECKING:
     from activesteer.scenario import Scenario
 
-Action = Callable[[argparse.Namespace], int]
+Action = Callable[[argparse.Namespace], int | None]
+"""Function of a command. Returns its exit status if this is not 0."""
 _NAME_WIDTH: Final = 12
 SUCCESSORS: Final = {
     "recover": "info FILE.mcap --recover OUT.mcap",
@@ -37,20 +38,8 @@ SUCCESSORS: Final = {
 """Removed command, or command and option -> what does its work now."""
 
 
-class Option(NamedTuple):
-    """An argument of a command, as `argparse` takes it."""
-
-    names: Sequence[str]
-    words: Mapping[str, Any]
-
-
-class OneOf(NamedTuple):
-    """Options of which at most one may be given."""
-
-    options: Sequence[Option]
-
-
-Part = Option | OneOf | Sequence[Option]
+Part = Callable[[Any], object]
+"""Declared argument of a command: adds itself to a parser of `argparse`."""
 
 
 class Group:
@@ -80,10 +69,7 @@ class Group:
         for name, help, description, parts, action in self.commands:
             parser = parsers.add_parser(name, description=description, **({"help": help} if listed else {}))
             for part in parts:
-                group = parser.add_mutually_exclusive_group() if isinstance(part, OneOf) else parser
-                options = part.options if isinstance(part, OneOf) else (part,) if isinstance(part, Option) else part
-                for option in options:
-                    group.add_argument(*option.names, **option.words)
+                part(parser)
             parser.set_defaults(parser=parser)
             if isinstance(action, Group):
                 action.add_to(parser.add_subparsers(required=True, metavar="ACTION"), listed=True)
@@ -92,11 +78,7 @@ class Group:
 
 
 class CommandLine:
-    """All commands of the program, listed by `--help` in groups.
-
-    Attributes:
-        names: Names of the commands.
-    """
+    """All commands of the program, with their `names`, listed by `--help` in groups."""
 
     def __init__(self, version: str, groups: Sequence[Group]) -> None:
         self._parser = argparse.ArgumentParser(
@@ -148,7 +130,7 @@ def _hint(parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -
     return f"`{parser.prog} --help` lists the arguments"
 
 
-def option(names: str, metavar: str | tuple[Any, ...], help: str, default: Any = None, **words: Any) -> Option:
+def option(names: str, metavar: str | tuple[Any, ...], help: str, default: Any = None, **words: Any) -> Part:
     """Declare an argument with a value. Its help ends with the default if there is one."""
     if words.pop("many", False):
         words["action"] = "append"
@@ -156,27 +138,37 @@ def option(names: str, metavar: str | tuple[Any, ...], help: str, default: Any =
     if default is not None:
         words |= {"default": default, "type": words.get("type", type(default))}
         help += f" (default: {default:g})" if isinstance(default, float) else f" (default: {default})"
-    return Option(names.split(), words | {"help": help})
+    return lambda parser: parser.add_argument(*names.split(), help=help, **words)
 
 
-def flag(name: str, help: str) -> Option:
+def flag(name: str, help: str) -> Part:
     """Declare an option without a value."""
-    return Option((name,), {"action": "store_true", "help": help})
+    return lambda parser: parser.add_argument(name, action="store_true", help=help)
+
+
+def several(*parts: Part) -> Part:
+    """Declare arguments that commands share."""
+    return lambda parser: [part(parser) for part in parts]
+
+
+def one_of(*parts: Part) -> Part:
+    """Declare options of which at most one may be given."""
+    return lambda parser: several(*parts)(parser.add_mutually_exclusive_group())
 
 
 JSON: Final = flag("--json", "print JSON and nothing else")
 VEHICLE_WORDS: Final = "a name from `activesteer list`, a vehicle file or its folder"
 VEHICLE: Final = option("--vehicle", "NAME_OR_PATH", VEHICLE_WORDS, "compact")
-OVERRIDES: Final = (
+OVERRIDES: Final = several(
     option("--set", "KEY=VALUE", "replace a parameter, such as road.mu=0.4 or controllers.ars.limit_deg=2",
            many=True, dest="overrides"),
     option("--overrides", "FILE.toml", 'replace the parameters listed in a file, a line such as "road.mu" = 0.4 each',
            many=True, dest="override_files", type=Path),
 )  # fmt: skip
 """Options of `overrides_of`."""
-CAR: Final = (VEHICLE, *OVERRIDES)
+CAR: Final = several(VEHICLE, OVERRIDES)
 JOBS: Final = option("--jobs", "N", "number of processes (default: one per processor)", type=int)
-WORKERS: Final = (
+WORKERS: Final = several(
     JOBS,
     option("--scheduler", "ADDRESS",
            "work on a Dask cluster instead: tcp://host:8786, or the file of `dask scheduler --scheduler-file`"),
@@ -186,7 +178,7 @@ RECORDING: Final = option("file", "FILE.mcap", _RECORDING, type=Path)
 RECORDINGS: Final = option("files", "FILE.mcap", f"{_RECORDING}; several are compared", nargs="+", type=Path)
 
 
-def driver(default: str = "") -> Option:
+def driver(default: str = "") -> Part:
     """Return `--driver`. With a default in words, `options.driver` is None without the option."""
     words = "novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu"
     if default:
@@ -194,7 +186,7 @@ def driver(default: str = "") -> Option:
     return option("--driver", "DRIVER", words, DEFAULT_DRIVER)
 
 
-def controllers(default: str = "none") -> Option:
+def controllers(default: str = "none") -> Part:
     """Return `-c`. `options.controller` is a list, or None for the default, which is given in words."""
     words = (
         "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
@@ -202,19 +194,19 @@ def controllers(default: str = "none") -> Option:
     return option("-c --controller", "CONTROLLER", f"{words}; may be repeated (default: {default})", many=True)
 
 
-def output(metavar: str, help: str, default: str | None = None) -> Option:
+def output(metavar: str, help: str, default: str | None = None) -> Part:
     """Return `-o`. The help says what is written there, and what happens without the option if it has no default."""
     return option("-o --output", metavar, help, None if default is None else Path(default), type=Path)
 
 
-def cutaway(when: str = "") -> Option:
-    """Return `--cutaway`. `when` says with which option it has an effect."""
-    return flag("--cutaway", f"{when}show the suspension through the body")
+FIGURES: Final = output("DIR", "folder for figures (default: no figures)")
 
 
-def figures() -> Option:
-    """Return `-o` of a command that draws figures only with this option."""
-    return output("DIR", "folder for figures (default: no figures)")
+def check_effect(options: argparse.Namespace, effect: str, *keys: str) -> None:
+    """Refuse options that were given although they have no effect; `effect` says when."""
+    for key in keys:
+        if getattr(options, key) not in (None, False):
+            raise ParameterError(f"has {effect}", key=f"--{key}")
 
 
 def numbers(text: str) -> list[float]:

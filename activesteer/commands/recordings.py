@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import re
 import sys
 import time
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,32 +17,27 @@ from activesteer.commands.options import (
     VEHICLE,
     WORKERS,
     Group,
-    cutaway,
+    check_effect,
     flag,
     option,
     output,
 )
 from activesteer.commands.terminal import (
-    BAD,
-    GOOD,
-    ProgressBar,
-    painted,
-    print_entry,
+    Progress,
+    entry,
     print_json,
     print_notes,
     printable,
     tell,
-    tell_files,
 )
 from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
 from activesteer.files import atomic_write, shown_path
-from activesteer.text_table import text_table
 
 if TYPE_CHECKING:
-    from activesteer.measured.comparison import Comparison
     from activesteer.recording import Recording
 
 command: Final = Group("recordings")
+_CUTAWAY: Final = flag("--cutaway", "show the suspension through the body")
 _CORNERS: Final = ("fl", "fr", "rl", "rr")
 """As in `activesteer.conventions`, which takes too long to import for `--help`."""
 
@@ -56,7 +49,7 @@ _CORNERS: Final = ("fl", "fr", "rl", "rr")
         "incomplete", type=Path),
     JSON,
 )  # fmt: skip
-def _info(options: argparse.Namespace) -> int:
+def _info(options: argparse.Namespace) -> None:
     from activesteer.analysis.harm import kept, losses
     from activesteer.analysis.tables import comparison
     from activesteer.recording import Recording
@@ -64,56 +57,53 @@ def _info(options: argparse.Namespace) -> int:
 
     recording = Recording.open(options.file, recover=True)
     if options.recover is not None:
-        return _recover(recording, options)
-    metadata = recording.metadata
-    time_s = recording.time_s
+        _recover(recording, options)
+        return
+    metadata, time_s = recording.metadata, recording.time_s
     if options.json:
         channels = {each.name: {"unit": each.unit, "meaning": each.meaning} for each in recording.channels}
         span = {"from_s": float(time_s[0]), "to_s": float(time_s[-1])} if len(time_s) else {}
         print_json(
             {"steps": len(time_s), **span, "metadata": metadata, "metrics": recording.metrics, "channels": channels}
         )
-        return 0
+        return
     span = f"{time_s[0]:.3f} to {time_s[-1]:.3f} s, {len(time_s)} steps" if len(time_s) else "no steps"
     print(f"{shown_path(options.file)}: {span}")
     for key in ("maneuver", "vehicle"):
         table = metadata.get(key, {})
-        print_entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}")
+        print(entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}"))
     uses_truth = ", which uses the truth" if metadata.get("controller_uses_truth") else ""
-    print_entry("controller: ", f"{metadata.get('controller', '?')}{uses_truth}")
+    print(entry("controller: ", f"{metadata.get('controller', '?')}{uses_truth}"))
     sensors = metadata.get("vehicle", {}).get("sensors", {})
     if "seed" in sensors or sensors.get("preset", "ideal") != "ideal":
-        print_entry("sensors: ", f"{sensors.get('preset', '?')}, seed {sensors.get('seed', 'none')}")
-    print_entry("driver: ", _driver(metadata.get("driver", "?")))
+        print(entry("sensors: ", f"{sensors.get('preset', '?')}, seed {sensors.get('seed', 'none')}"))
+    print(entry("driver: ", _driver(metadata.get("driver", "?"))))
     for key in ("overrides", "versions"):
         if metadata.get(key):
-            print_entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items()))
+            print(entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items())))
     for event in events_of(metadata):
-        print_entry(f"at {event.time_s:.3f} s: ", f"{event.kind} {event.what}")
+        print(entry(f"at {event.time_s:.3f} s: ", f"{event.kind} {event.what}"))
     if not metadata.get("complete", True):
-        print_entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly")))
+        print(entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly"))))
     if result := [*losses(recording.metrics), *kept(recording.metrics)]:
-        print_entry("result: ", ", ".join(result))
+        print(entry("result: ", ", ".join(result)))
     if recording.metrics:
         print(comparison({"metrics": recording.metrics}))
     print("channels:")
     width = max((len(channel.name) for channel in recording.channels), default=0)
     for channel in recording.channels:
         head = f"  {channel.name:{width}} {channel.unit or '-':6} "
-        print_entry(head, channel.meaning, len(head))
-    print_entry("attachments: ", ", ".join(recording.attachments))
-    return 0
+        print(entry(head, channel.meaning, len(head)))
+    print(entry("attachments: ", ", ".join(recording.attachments)))
 
 
-def _recover(recording: Recording, options: argparse.Namespace) -> int:
-    if options.json:
-        raise ParameterError("has no effect with --recover", key="--json")
+def _recover(recording: Recording, options: argparse.Namespace) -> None:
+    check_effect(options, "no effect with --recover", "json")
     if options.recover.exists() and options.recover.samefile(options.file):
         raise ParameterError(f"--recover {options.recover} is the input file; choose another name")
     recording.save(options.recover)
     span = f"{len(recording)} steps up to {recording.time_s[-1]:.3f} s" if len(recording) else "no steps"
     print(f"{options.recover}: {span}")
-    return 0
 
 
 def _driver(recorded: Any) -> str:
@@ -135,15 +125,12 @@ def _driver(recorded: Any) -> str:
     output("FILE.html", "the page; replaces an existing one", "report.html"),
     description="Write a page that needs no network: scorecard, plots, track, metrics, parameters, versions.",
 )  # fmt: skip
-def _report(options: argparse.Namespace) -> int:
+def _report(options: argparse.Namespace) -> None:
     from activesteer.analysis.report import open_all, write_report
-    from activesteer.errors import ParameterError
 
     if options.output.suffix.lower() not in {".html", ".htm"}:
         raise ParameterError(f"-o {options.output}: the name of a report ends in .html")
-
     print(f"report: {write_report(open_all(options.files), options.output)}")
-    return 0
 
 
 @command("compare", "compare measured runs with a simulated one",
@@ -166,7 +153,7 @@ def _report(options: argparse.Namespace) -> int:
     "simulation. With a folder of measured runs, or of a measured circle, predict the measurement first. The exit "
     "status is 1 if a quantity is outside.",
 )  # fmt: skip
-def _compare(options: argparse.Namespace) -> int:
+def _compare(options: argparse.Namespace) -> bool:
     if options.new is not None:
         from activesteer.measured.folder_file import write_template
 
@@ -175,23 +162,18 @@ def _compare(options: argparse.Namespace) -> int:
         for file in write_template(options.new):
             print(file)
         print(f"next: activesteer fit {options.new} -o {options.new}/page; then replace the lines marked with <-")
-        return 0
-    of_recordings, of_folder = ("standard", "filter", "noise"), ("samples", "jobs", "scheduler")
-    is_folder = len(options.files) == 1 and options.files[0].suffix != ".mcap"
-    for name in of_recordings if is_folder else of_folder:
-        if getattr(options, name) is not None:
-            raise ParameterError(f"has no effect with {'a folder' if is_folder else 'recordings'}", key=f"--{name}")
-    if is_folder:
+        return False
+    if len(options.files) == 1 and options.files[0].suffix != ".mcap":
         from activesteer.commands.studying import judge
 
+        check_effect(options, "no effect with a folder", "standard", "filter", "noise")
         return judge(str(options.files[0]), options, page=options.output)
-    return _recordings(options)
-
-
-def _recordings(options: argparse.Namespace) -> int:
     from activesteer.measured.comparison import compare
+    from activesteer.measured.pages import comparison_page
+    from activesteer.pages import write_page
     from activesteer.recording import Recording
 
+    check_effect(options, "no effect with recordings", "samples", "jobs", "scheduler")
     if len(options.files) < 2:
         raise ParameterError("at least two recordings are needed: measured ones, and the simulated one last")
     *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
@@ -199,38 +181,11 @@ def _recordings(options: argparse.Namespace) -> int:
         measured, simulated, options.standard or "iso19365", filtered=options.filter or "iso15037",
         noise=options.noise != "none",
     )  # fmt: skip
-    if options.output is not None:
-        from activesteer.measured.pages import comparison_page
-        from activesteer.pages import write_page
-
-        names = [file.stem for file in options.files]
-        write_page(comparison_page(found, names[:-1], names[-1]), options.output)
-    tell(options, found.to_json(), _compared_lines(options.files, found))
-    if options.output is not None:
-        tell_files(options, [options.output], "page")
-    return 0 if found.inside else 1
-
-
-def _compared_lines(files: Sequence[Path], found: Comparison) -> Iterator[str]:
-    from activesteer.measured.comparison import FILTERS, words
-
-    for file, shift_s in zip(files, found.shifts_s, strict=False):
-        later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"
-        yield f"time shift of {file}: {later}"
-    chosen = FILTERS[found.filtered]
-    yield f"filter of both sides: {'none' if chosen is None else chosen.words()}"
-    yield from (f"not filtered: {problem}" for problem in found.unfiltered)
-    rows = [["", "rms", "tolerance", "inside", ""]]
-    for each in found.quantities:
-        label, residual, tolerance, share, _ = words(each)
-        value, _, unit = residual.partition(" ")
-        rows.append([f"{label}, {unit}", value, tolerance.replace(f" {unit}", ""), share, _verdict(each.inside)])
-    yield from text_table(rows, repeat=1, marks=["  "] * len(rows))
-    yield _verdict(found.inside)
-
-
-def _verdict(inside: bool) -> str:
-    return painted("inside", GOOD) if inside else painted("outside", BAD)
+    names = [file.stem for file in options.files]
+    page = comparison_page(found, names[:-1], names[-1])
+    written = [] if options.output is None else [write_page(page, options.output)]
+    tell(options, found.to_json(), page.lines(), written, "page")
+    return not found.inside
 
 
 @command("replay", "show recordings in 3D, with signals and metrics",
@@ -238,10 +193,10 @@ def _verdict(inside: bool) -> str:
     option("-o --output --save", "OUT.rrd", "write a file for the viewer instead of opening a window", type=Path),
     flag("--web", "serve a page for a browser until Ctrl-C"),
     flag("--compare", "show only the page that compares several files side by side"),
-    cutaway(),
+    _CUTAWAY,
     description="Open recordings in the rerun viewer, several in one window.",
 )  # fmt: skip
-def _replay(options: argparse.Namespace) -> int:
+def _replay(options: argparse.Namespace) -> None:
     # Threads of rerun would repeat our messages on the terminal.
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
     try:
@@ -267,7 +222,6 @@ def _replay(options: argparse.Namespace) -> int:
         serve(runs, _announce, how)
     elif options.output is None:
         show(runs, how)
-    return 0
 
 
 def _announce(url: str) -> None:
@@ -298,10 +252,10 @@ def _size(text: str) -> tuple[int, int]:
     option("--size", "WxH", "pixels", "1280x720", type=_size),
     option("--fps", "FPS", "pictures per second (default: 30, GIF: 20)", type=float),
     option("--speed", "FACTOR", "pace: 0.25 is slow motion, 4 is fast", 1.0),
-    cutaway(),
+    _CUTAWAY,
     description="Draw a recording without a window, and write an MP4 or a GIF.",
 )  # fmt: skip
-def _video(options: argparse.Namespace) -> int:
+def _video(options: argparse.Namespace) -> None:
     from activesteer.recording import Recording
     from activesteer.recording.recording import run_names
     from activesteer.video import Settings, make_film
@@ -315,7 +269,7 @@ def _video(options: argparse.Namespace) -> int:
     if options.layout == "side-by-side" and not options.compare:
         raise ParameterError("--layout side-by-side needs --compare OTHER.mcap")
     recordings = [Recording.open(file, recover=True) for file in files]
-    output = options.output if options.output is not None else options.file.with_suffix(".mp4")
+    output = options.output or options.file.with_suffix(".mp4")
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
     settings = Settings(
         options.camera,
@@ -329,7 +283,7 @@ def _video(options: argparse.Namespace) -> int:
     )
     named = dict(zip(run_names(files, recordings), recordings, strict=True))
     started = time.monotonic()
-    with ProgressBar(f"{output}", quiet=False) as progress:
+    with Progress(f"{output}", quiet=False) as progress:
         made = make_film(named, output, settings, progress)
     took = time.monotonic() - started
     print(
@@ -337,7 +291,6 @@ def _video(options: argparse.Namespace) -> int:
         f"made in {took:.1f} s",
         file=sys.stderr,
     )
-    return 0
 
 
 @command("import", "convert measured data to a recording",
@@ -351,7 +304,7 @@ def _video(options: argparse.Namespace) -> int:
     description="Read CSV, MAT, Parquet or MDF files of one run. Columns become channels in SI units with the signs "
     "of ISO 8855 on a uniform time. Without a map, columns are recognised by the names that exporters write.",
 )  # fmt: skip
-def _import(options: argparse.Namespace) -> int:
+def _import(options: argparse.Namespace) -> None:
     from activesteer.measured.importing import import_file
     from activesteer.recording import check_target
 
@@ -372,4 +325,3 @@ def _import(options: argparse.Namespace) -> int:
     head = f"{output}: {len(recording)} rows, {recording.time_s[0]:.3f} to {recording.time_s[-1]:.3f} s"
     columns = (f"  {name:24} {printable(column)}" for name, column in found.taken.items())
     tell(options, {"file": str(output), **about}, [head, *columns])
-    return 0

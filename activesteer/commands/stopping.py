@@ -32,19 +32,14 @@ _MCAP_END: Final = b"\x89MCAP0\r\n"
 
 
 class StopSignals:
-    """Handler of the signals that stop the program.
-
-    Attributes:
-        number: Number of the signal that arrived; None before.
-        options: Options of the command. `output` is the file or folder that it writes; `saved`, if set, lists the
-            only files in a folder that are its own; `how_to_resume`, if set, follows the list of saved files.
-        finished: Whether the command is done and only the interpreter has to end.
-    """
+    """Handler of the signals that stop the program."""
 
     def __init__(self) -> None:
         self.number: int | None = None
+        # `output` is the file or folder that the command writes; `saved`, if set, lists its own files in a shared
+        # folder; `how_to_resume`, if set, follows the list of saved files.
         self.options: argparse.Namespace | None = None
-        self.finished = False
+        self.finished = False  # only the interpreter has to end
         self._begun_ns = time.time_ns() - _CLOCK_STEP_NS
         self._watching = self._raised = False
         self._ending = threading.Lock()

@@ -16,11 +16,12 @@ from activesteer.commands.options import (
     OVERRIDES,
     WORKERS,
     Group,
-    OneOf,
+    check_effect,
     controllers,
     driver,
     flag,
     numbers,
+    one_of,
     option,
     output,
     overrides_of,
@@ -28,22 +29,18 @@ from activesteer.commands.options import (
 from activesteer.commands.terminal import (
     BAD,
     GOOD,
-    ProgressBar,
-    RunCounter,
+    Progress,
     painted,
     print_notes,
     printable,
     table_lines,
     tell,
-    tell_files,
 )
 from activesteer.errors import ParameterError, StudyError
 from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.text_table import text_table
 
 if TYPE_CHECKING:
-    from activesteer.measured.fit_result import Fit
     from activesteer.measured.fitting import FitProgress
     from activesteer.studies.engine.tuning import Trial, Tuning
     from activesteer.studies.linear.margins import LoopMargins
@@ -84,18 +81,18 @@ _CONTROLLER_COLUMNS: Final = {
     option("--driver", "DRIVER", "a driver instead of the study's"),
     option("--samples", "N", "number of samples instead of the study's", type=int),
     OVERRIDES, WORKERS,
-    OneOf((
+    one_of(
         option("--limit", "N", "drive at most N runs now", type=int),
         flag("--status", "only print the progress of the study in DIR"),
         flag("--report", "only write DIR/report.html for the finished runs"),
-    )),
+    ),
     JSON,
 )  # fmt: skip
-def _study(options: argparse.Namespace) -> int:
-    if options.limit is not None and options.limit < 1:
-        raise StudyError(f"--limit {options.limit}: at least 1 is needed")
+def _study(options: argparse.Namespace) -> bool:
     from activesteer.studies.engine.study_file import changed_study, read_study
 
+    if options.limit is not None and options.limit < 1:
+        raise StudyError(f"--limit {options.limit}: at least 1 is needed")
     given = Path(options.study)
     changes = {
         "controllers": options.controller, "vehicles": options.vehicle, "driver": options.driver,
@@ -111,15 +108,15 @@ def _study(options: argparse.Namespace) -> int:
         read_study(options.study)
         raise StudyError(f"-o DIR is needed: the folder for the results of {options.study}")
     if options.status:
-        progress = _progress_of(folder)
-        tell(options, progress, _status(progress))
-        return 0
+        made = _progress_of(folder)
+        tell(options, made, _status(made))
+        return False
     if options.report:
         from activesteer.studies.engine.report import write_report
 
         path = write_report(folder)
         tell(options, {"report": str(path)}, [f"report: {path}"])
-        return 0
+        return False
     from activesteer.studies.engine.store import RESULTS, read_environment
     from activesteer.studies.engine.study import study
 
@@ -127,20 +124,20 @@ def _study(options: argparse.Namespace) -> int:
         read_environment(given)  # refuses a folder without a study
     options.output = folder
     options.how_to_resume = f"; resume with `activesteer study {folder}`"
-    with RunCounter("study", quiet=options.json) as counter:
+    with Progress("study", quiet=options.json) as progress:
         study(
             given / "study.toml" if given.is_dir() else changed_study(options.study, changes),
             output=folder,
             jobs=options.jobs,
             scheduler=options.scheduler,
             limit=options.limit,
-            progress=counter,
+            progress=progress.count,
         )
     result = folder / RESULTS
     made = _progress_of(folder)
     end = f"results: {result}" if result.exists() else f"not finished; resume with `activesteer study {folder}`"
     tell(options, made | {"results": str(result) if result.exists() else None}, [*_status(made), end])
-    return 1 if made["by_status"] and set(made["by_status"]) <= {"failed", "crashed"} else 0
+    return bool(made["by_status"]) and set(made["by_status"]) <= {"failed", "crashed"}
 
 
 def _progress_of(folder: Path) -> dict[str, Any]:
@@ -163,19 +160,19 @@ def _status(progress: dict[str, Any]) -> Iterator[str]:
     controllers("with the goal violate, those of the file"),
     option("-m --maneuver", "MANEUVER",
         "one of the file; may be repeated (default: with the goal violate, all of the file)", many=True),
-    OneOf((
+    one_of(
         option("--trials", "N", "total number of sets of each search (default: that of the file)", type=int),
         option("--runs", "N", "the same as a budget of runs, of which a set needs several", type=int),
-    )),
+    ),
     WORKERS, JSON,
     description="Search the ranges of the factors of a study for values that minimise objectives, satisfy as many "
     "statements as possible, or violate a requirement. The exit status is 1 if the requirement is violated.",
 )  # fmt: skip
-def _tune(options: argparse.Namespace) -> int:
+def _tune(options: argparse.Namespace) -> bool:
     from activesteer.studies.engine.tuning import Goal, tune
 
     options.how_to_resume = "; the same command resumes it"
-    with ProgressBar("tune", quiet=options.json) as bar:
+    with Progress("tune", quiet=options.json) as bar:
         found = tune(
             options.study,
             options.output,
@@ -187,13 +184,15 @@ def _tune(options: argparse.Namespace) -> int:
             scheduler=options.scheduler,
             progress=lambda what, done, total: bar(done / total, f"{what} {done}/{total} sets".lstrip()),
         )
-    if found[0].goal is not Goal.VIOLATE:
-        tell(options, found[0].to_json(), _lines(found[0]), _draw(found, options.output))
-        return 0
     violated = any(one.violations for one in found)
-    values = {"violated": violated, "searches": [one.to_json() for one in found]}
-    tell(options, values, (line for one in found for line in _worst(one)), _draw(found, options.output))
-    return int(violated)
+    if found[0].goal is Goal.VIOLATE:
+        values = {"violated": violated, "searches": [one.to_json() for one in found]}
+    else:
+        values = found[0].to_json()
+    figures = _draw(found, options.output)
+    values |= {"figures": [str(path) for path in figures]}
+    tell(options, values, (line for one in found for line in (_worst if one.requirement else _lines)(one)), figures)
+    return violated
 
 
 def _lines(found: Tuning) -> Iterator[str]:
@@ -235,7 +234,6 @@ def _values(trial: Trial, indent: str = "  ") -> Iterator[str]:
 
 def _draw(found: list[Tuning], folder: Path) -> list[Path]:
     """Draw each search, or nothing without matplotlib."""
-    from activesteer.errors import ParameterError
     from activesteer.studies.engine.report import draw_tuning
 
     try:
@@ -253,47 +251,30 @@ def _draw(found: list[Tuning], folder: Path) -> list[Path]:
     description="Drive the inputs of recordings again, and find by least squares the values of the factors of a study "
     "for which the car matches the recordings best.",
 )  # fmt: skip
-def _fit(options: argparse.Namespace) -> int:
+def _fit(options: argparse.Namespace) -> bool:
+    from activesteer.measured.fit_result import fit_page, write_fit
+    from activesteer.measured.fitting import fit
     from activesteer.measured.folder_file import is_measured
 
     if is_measured(options.study):
         page = None if options.output is None else options.output / "page.html"
         return judge(options.study, options, page=page, fitted=True)
-    from activesteer.measured.fitting import fit
 
-    with ProgressBar("fit", quiet=options.json) as bar:
+    with Progress("fit", quiet=options.json) as bar:
 
         def progress(here: FitProgress) -> None:
             so_far = "" if math.isnan(here.misfit) else f", differences {here.misfit:.3g} times the noise"
             bar(here.done / here.total, f"round {here.round}, {here.done}/{here.total} runs{so_far}")
 
         found = fit(options.study, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
-    files = []
-    if options.output is not None:
-        from activesteer.measured.fit_result import write_fit
-
-        files = write_fit(found, Path(options.study).stem, options.output)
+    name = Path(options.study).stem
+    files = [] if options.output is None else write_fit(found, name, options.output)
     print_notes(found.notes)
-    tell(options, found.to_json(), [*_fit_lines(found), *map(str, files)])
-    return 0
+    tell(options, found.to_json(), fit_page(found, name).lines(), files, "written")
+    return False
 
 
-def _fit_lines(found: Fit) -> Iterator[str]:
-    from activesteer.measured.fit_result import rests_on
-
-    width = max(len(one.key) for one in found.parameters)
-    yield from (f"{one.key:{width}}  {one.words}" for one in found.parameters)
-    yield from (f"correlation {value:+.2f}  {one}, {other}" for one, other, value in found.pairs(0.5))
-    rows = [["", "", "noise", "rms", "fitted", "independent"]]
-    for recording, label, noise, before, after, samples, independent in (each.words() for each in found.compared):
-        values = (text.partition(" ")[0] for text in (noise, before, after))
-        rows.append([recording, f"{label}, {noise.partition(' ')[2]}", *values, f"{independent} of {samples}"])
-    yield from text_table(rows, text=2, repeat=2, marks=["  "] * len(rows))
-    yield f"{found.rounds} rounds, {found.runs} runs; the remaining difference is {found.misfit:.3g} times the noise"
-    yield from rests_on(found)[:1]
-
-
-def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: bool = False) -> int:
+def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: bool = False) -> bool:
     """Predict a measurement, with `fitted` also fit the factors of the folder, and print the verdict."""
     from activesteer.measured.circle import SAMPLES, validate_circle
     from activesteer.measured.folder import validate_measured
@@ -308,17 +289,16 @@ def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: 
     samples = getattr(options, "samples", None)
     if samples is not None and not is_circle:
         raise ParameterError(f"has an effect with a measured circle only, and {name} is none", key="--samples")
-    with ProgressBar("fit" if fitted else "compare", quiet=options.json) as bar:
+    with Progress("fit" if fitted else "compare", quiet=options.json) as bar:
         if is_circle:
             result = validate_circle(file, samples or SAMPLES, jobs, scheduler=scheduler, progress=bar)
         else:
             result = validate_measured(file, jobs, fitted=fitted, scheduler=scheduler, progress=bar)
             print_notes(result.notes)
     told = measured_page(result)
-    tell(options, result.to_json(), (*told.lines(), "inside" if result.inside else "outside"))
-    if page is not None:
-        tell_files(options, [write_page(told, page)], "page")
-    return 0 if result.inside else 1
+    pages = [] if page is None else [write_page(told, page)]
+    tell(options, result.to_json(), (*told.lines(), "inside" if result.inside else "outside"), pages, "page")
+    return not result.inside
 
 
 @command("identify", "understeer, limits and controller models of a vehicle (ISO 4138)",
@@ -326,7 +306,7 @@ def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: 
     flag("--write", "also write [single_track] and [two_track] of the vehicle file"),
     JSON,
 )  # fmt: skip
-def _identify(options: argparse.Namespace) -> int:
+def _identify(options: argparse.Namespace) -> None:
     from activesteer.resources import check_own, find_vehicle
     from activesteer.studies.linear.identification import identify, write_identified
 
@@ -348,7 +328,6 @@ def _identify(options: argparse.Namespace) -> int:
         write_identified(file, result, command, datetime.date.today().isoformat())
         if not options.json:
             print(f"written to {file}")
-    return 0
 
 
 @command("linearise", "modes of the full car, and stability of its loops",
@@ -371,20 +350,21 @@ def _identify(options: argparse.Namespace) -> int:
     "actuators, car and sensors, opened at the rear actuator and at the superposition; --set "
     "sensors.preset=production takes real sensors.",
 )  # fmt: skip
-def _linearise(options: argparse.Namespace) -> int:
-    effects = {"controller": ("driver", "controller"), "driver": ("driver",), "study": ("controller",)}
-    for name, loops in effects.items():
-        if getattr(options, name) is not None and options.loop not in loops:
-            raise ParameterError(f"has an effect with --loop {' or '.join(loops)} only", key=f"--{name}")
-    for name in ("jobs", "scheduler"):
-        if getattr(options, name) is not None and options.study is None:
-            raise ParameterError("has an effect with --study only", key=f"--{name}", value=getattr(options, name))
+def _linearise(options: argparse.Namespace) -> None:
+    if options.loop is None:
+        check_effect(options, "an effect with --loop driver or controller only", "controller")
+    if options.loop != "driver":
+        check_effect(options, "an effect with --loop driver only", "driver")
+    if options.loop != "controller":
+        check_effect(options, "an effect with --loop controller only", "study")
+    if options.study is None:
+        check_effect(options, "an effect with --study only", "jobs", "scheduler")
     if options.output is not None:
         make_folder(options.output, ParameterError)
-    return {None: _modes, "driver": _driver_loop, "controller": _controller_loop}[options.loop](options)
+    {None: _modes, "driver": _driver_loop, "controller": _controller_loop}[options.loop](options)
 
 
-def _modes(options: argparse.Namespace) -> int:
+def _modes(options: argparse.Namespace) -> None:
     from activesteer.scenario import check_gains
     from activesteer.studies.linear.linearisation import eigenvalue_table, linear_car, linear_cars
 
@@ -405,12 +385,15 @@ def _modes(options: argparse.Namespace) -> int:
             draw_bode({label: car.state_space()}, options.output / "bode.png"),
             draw_root_locus(systems, speeds, options.output / "root_locus.png"),
         ]
-    values = {"speed_mps": car.speed_mps, "modes": [mode.to_json() for mode in modes]}
+    values = {
+        "speed_mps": car.speed_mps,
+        "modes": [mode.to_json() for mode in modes],
+        "figures": list(map(str, figures)),
+    }
     tell(options, values, [f"{options.vehicle} at {label}", eigenvalue_table(modes)], figures)
-    return 0
 
 
-def _driver_loop(options: argparse.Namespace) -> int:
+def _driver_loop(options: argparse.Namespace) -> None:
     from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, SPEEDS_KMH, driver_loops
 
     driver = options.driver or DEFAULT_DRIVER
@@ -422,17 +405,19 @@ def _driver_loop(options: argparse.Namespace) -> int:
         overrides_of(options),
     )
     rows = [loop.to_json() for loop in loops]
-    tell(options, rows, [f"{driver} in {options.vehicle}", *table_lines(rows, _DRIVER_COLUMNS)])
+    figures = []
     if options.output is not None:
         from activesteer.analysis.linear_plots import driver_loops_figure
         from activesteer.plotting import save
 
         figure = driver_loops_figure(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-        tell_files(options, [save(figure, options.output / "driver.png")])
-    return 0
+        figures.append(save(figure, options.output / "driver.png"))
+    tell(options, rows, [f"{driver} in {options.vehicle}", *table_lines(rows, _DRIVER_COLUMNS)], figures)
 
 
-def _controller_loop(options: argparse.Namespace) -> int:
+def _controller_loop(options: argparse.Namespace) -> None:
+    from activesteer.studies.linear.margins import write_margins_page
+
     found = _margins(options)
     rows = [margins.to_json() for margins in found]
     if not rows:
@@ -443,25 +428,19 @@ def _controller_loop(options: argparse.Namespace) -> int:
         changed = ", ".join(f"{key} = {value:.3g}" for key, value in least["factors"].items())
         where = f"{least['controller']}, {least['loop']}, {least['speed_kmh']:.0f} km/h"
         lines.append(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
-    tell(options, rows, lines)
-    if options.output is not None:
-        from activesteer.studies.linear.margins import write_margins_page
-
-        tell_files(options, [write_margins_page(found, str(options.vehicle), options.output)], "page")
-    return 0
+    pages = [] if options.output is None else [write_margins_page(found, str(options.vehicle), options.output)]
+    tell(options, rows, lines, pages, "page")
 
 
 def _margins(options: argparse.Namespace) -> list[LoopMargins]:
-    from activesteer.studies.linear.margins import SPEEDS_KMH, loop_margins
+    from activesteer.studies.linear.margins import SPEEDS_KMH, loop_margins, worst_margins
 
     speeds_kmh, overrides = options.speeds_kmh or SPEEDS_KMH, overrides_of(options)
     controllers = options.controller or ("ars", "afs")
     if options.study is None:
         return loop_margins(controllers, options.vehicle, speeds_kmh, overrides)
-    from activesteer.studies.linear.margins import worst_margins
-
-    with RunCounter("margins", quiet=options.json) as counter:
+    with Progress("margins", quiet=options.json) as progress:
         return worst_margins(
-            options.study, controllers, options.vehicle, speeds_kmh, overrides, counter,
+            options.study, controllers, options.vehicle, speeds_kmh, overrides, progress.count,
             jobs=options.jobs, scheduler=options.scheduler,
         )  # fmt: skip

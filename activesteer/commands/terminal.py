@@ -48,22 +48,18 @@ def print_json(value: Any, *, one_line: bool = False) -> None:
     print(text, file=_for_json[-1] if _for_json else None, flush=one_line)
 
 
-def tell(options: argparse.Namespace, values: Any, lines: Iterable[str], figures: Iterable[Path] | None = None) -> None:
-    """Print values with `--json`, else lines. If figures can be drawn, the values have their paths as `figures`."""
+def tell(
+    options: argparse.Namespace, values: Any, lines: Iterable[str], files: Iterable[Path] = (), word: str = "figure"
+) -> None:
+    """Print values with `--json`, else lines, and a line for each written file."""
     if options.json:
-        print_json(values if figures is None else values | {"figures": [str(path) for path in figures]})
+        print_json(values)
         return
     for line in lines:
         command = "activesteer " in line  # to be copied
         print("\n".join([line] if command else [part for one in line.split("\n") for part in wrapped_line(one)]))
-    tell_files(options, figures or ())
-
-
-def tell_files(options: argparse.Namespace, paths: Iterable[Path], word: str = "figure") -> None:
-    """Print the paths of files as they are written, but nothing with `--json`."""
-    for path in paths:
-        if not options.json:
-            print(f"{word}: {path}")
+    for path in files:
+        print(f"{word}: {path}")
 
 
 _for_json: Final[list[TextIO]] = []
@@ -119,16 +115,13 @@ def coloured(text: str) -> str:
 def print_notes(notes: Iterable[str]) -> None:
     """Print to standard error what is unusual in a result, a note in each line."""
     for note in notes:
-        print_entry("! ", note, file=sys.stderr)
+        print(entry("! ", note), file=sys.stderr)
 
 
-def print_entry(head: str, text: str, hanging: int = 2, file: TextIO | None = None) -> None:
-    """Print a head and a text in lines of 80 columns. Further lines are indented.
-
-    The text may come from any file: control characters are printed as escape sequences.
-    """
+def entry(head: str, text: str, hanging: int = 2) -> str:
+    """Return a head and a text, which may come from any file, in lines of 80 columns; further lines are indented."""
     lines = textwrap.wrap(printable(text), COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **WHOLE)
-    print("\n".join(lines) or head.rstrip(), file=file)
+    return "\n".join(lines) or head.rstrip()
 
 
 def printable(text: str) -> str:
@@ -155,61 +148,39 @@ _LINE_EVERY_S: Final = 10.0
 """Time between two lines of a log [s]."""
 
 
-class ProgressBar:
-    """Bar that shows which fraction of the work is done."""
+class Progress:
+    """Bar on a terminal that shows which fraction of the work is done. A log gets lines for runs that are counted."""
 
     def __init__(self, label: str, *, quiet: bool) -> None:
-        self._label = label
-        self._shown = not quiet and sys.stderr.isatty()
+        self._label, self._quiet = label, quiet
+        self._bar = not quiet and sys.stderr.isatty()
         self._width = 0
+        self._begun_s = self._said_s = time.monotonic()
 
-    def __enter__(self) -> ProgressBar:
+    def __enter__(self) -> Progress:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._shown:
+        if self._bar:
             print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)
 
     def __call__(self, fraction: float, note: str = "") -> None:
         """Show a fraction, 0 to 1, and a note."""
-        if self._shown:
+        if self._bar:
             filled = round(_CELLS * fraction)
             line = f"{self._label} [{'#' * filled}{' ' * (_CELLS - filled)}] {fraction:4.0%} {note}"
             print("\r" + line.ljust(self._width), end="", file=sys.stderr, flush=True)
             self._width = max(self._width, len(line))
 
-
-class RunCounter:
-    """Progress of many runs: number, rate and remaining time.
-
-    A terminal gets a bar; a log, as of a batch job, gets a line every ten seconds.
-    """
-
-    def __init__(self, label: str, *, quiet: bool) -> None:
-        self._bar = ProgressBar(label, quiet=quiet)
-        self._as_lines = not quiet and not sys.stderr.isatty()
-        self._begun_s = self._said_s = time.monotonic()
-
-    def __enter__(self) -> RunCounter:
-        self._begun_s = self._said_s = time.monotonic()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.__exit__()
-
-    def __call__(self, counted: StudyProgress) -> None:
-        """Show the progress."""
+    def count(self, runs: StudyProgress) -> None:
+        """Show number, rate and remaining time of many runs: a log, as of a batch job, gets a line in ten seconds."""
         now_s = time.monotonic()
-        words = _words(counted, now_s - self._begun_s)
-        self._bar(counted.done / counted.total, words)
-        if self._as_lines and (now_s - self._said_s >= _LINE_EVERY_S or counted.done == counted.total):
+        rate = runs.here / max(now_s - self._begun_s, 1e-6)
+        left_s = round((runs.total - runs.done) / rate) if rate > 0.0 else 0
+        clock = f"{left_s // 3600}:{left_s // 60 % 60:02}:{left_s % 60:02}"
+        failed = f", {runs.failed} failed" if runs.failed else ""
+        words = f"{runs.done}/{runs.total} runs, {rate:.3g} runs/s, {clock} left{failed}"
+        self(runs.done / runs.total, words)
+        if not self._bar and not self._quiet and (now_s - self._said_s >= _LINE_EVERY_S or runs.done == runs.total):
             print(words, file=sys.stderr, flush=True)
             self._said_s = now_s
-
-
-def _words(counted: StudyProgress, elapsed_s: float) -> str:
-    rate = counted.here / max(elapsed_s, 1e-6)
-    left_s = round((counted.total - counted.done) / rate) if rate > 0.0 else 0
-    clock = f"{left_s // 3600}:{left_s // 60 % 60:02}:{left_s % 60:02}"
-    failed = f", {counted.failed} failed" if counted.failed else ""
-    return f"{counted.done}/{counted.total} runs, {rate:.3g} runs/s, {clock} left{failed}"

@@ -335,7 +335,7 @@ def write_fit(found: Fit, name: str, folder: Path) -> list[Path]:
     texts = {
         "fit.json": json_text(found.to_json()) + "\n",
         "overrides.toml": overrides_text(found, name),
-        "fit.html": render_page(_page(found, name)),
+        "fit.html": render_page(fit_page(found, name)),
     }
     return [write_text(folder / file, text, StudyError) for file, text in texts.items()]
 
@@ -351,7 +351,8 @@ def overrides_text(found: Fit, name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _page(found: Fit, name: str) -> Page:
+def fit_page(found: Fit, name: str) -> Page:
+    """Return the page of a fit."""
     lead: list[str | Markup] = [
         f"{found.runs} runs in {found.rounds} rounds; the remaining difference is {found.misfit:.3g} times the noise "
         "as stated."

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.commands.terminal import RunCounter
+from activesteer.commands.terminal import Progress
 from activesteer.studies.engine.study import StudyProgress
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -134,12 +134,12 @@ def test_ctrl_c_says_how_to_go_on(file, tmp_path, words, made, how):
 
 
 def test_a_log_gets_a_line_of_progress_at_the_end(capsys):
-    with RunCounter("study", quiet=False) as counter:
-        counter(StudyProgress(done=4, total=8, failed=0, here=2))
+    with Progress("study", quiet=False) as progress:
+        progress.count(StudyProgress(done=4, total=8, failed=0, here=2))
         assert capsys.readouterr().err == ""  # not more than one in ten seconds
-        counter(StudyProgress(done=8, total=8, failed=1, here=6))
+        progress.count(StudyProgress(done=8, total=8, failed=1, here=6))
     line = capsys.readouterr().err
     assert re.fullmatch(r"8/8 runs, \S+ runs/s, 0:00:00 left, 1 failed\n", line)
-    with RunCounter("study", quiet=True) as counter:
-        counter(StudyProgress(done=8, total=8, failed=1, here=6))
+    with Progress("study", quiet=True) as progress:
+        progress.count(StudyProgress(done=8, total=8, failed=1, here=6))
     assert capsys.readouterr().err == ""
