@@ -168,7 +168,7 @@ def _compare(options: argparse.Namespace) -> bool:
 
         check_effect(options, "no effect with a folder", "standard", "filter", "noise")
         return judge(str(options.files[0]), options, page=options.output)
-    from activesteer.measured.comparison import compare
+    from activesteer.measured.comparison import assumptions, compare
     from activesteer.measured.pages import comparison_page
     from activesteer.pages import write_page
     from activesteer.recording import Recording
@@ -184,7 +184,7 @@ def _compare(options: argparse.Namespace) -> bool:
     names = [file.stem for file in options.files]
     page = comparison_page(found, names[:-1], names[-1])
     written = [] if options.output is None else [write_page(page, options.output)]
-    tell(options, found.to_json(), page.lines(), written, "page")
+    tell(options, found.to_json(), (*page.lines(), *assumptions(found)), written, "page")
     return not found.inside
 
 
