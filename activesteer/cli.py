@@ -9,7 +9,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from activesteer.commands.options import CommandLine
+    from activesteer.commands.arguments import CommandLine
     from activesteer.commands.stopping import StopSignals
 
 
@@ -73,7 +73,7 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
 def command_line() -> CommandLine:
     """Return the command line with all commands, in the groups in which `--help` lists them."""
     from activesteer.commands import car, drive, recordings, studying, verify
-    from activesteer.commands.options import CommandLine
+    from activesteer.commands.arguments import CommandLine
     from activesteer.version import __version__
 
     groups = [module.command for module in (drive, recordings, car, studying, verify)]

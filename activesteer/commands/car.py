@@ -6,36 +6,25 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-from activesteer.commands.options import (
-    CAR,
-    FIGURES,
-    JSON,
-    OVERRIDES,
-    VEHICLE_WORDS,
-    Group,
-    flag,
-    option,
-    output,
-    overrides_of,
-)
-from activesteer.commands.terminal import tell
+from activesteer.commands import arguments, terminal
 from activesteer.errors import ParameterError, TyreFileError, nearest_names
 from activesteer.files import write_text
 from activesteer.resources import models_dir
 
-command: Final = Group("car")
+command: Final = arguments.Group("car")
 vehicle: Final = command.with_actions("vehicle", "make a car from a table of hardpoints, or check a car")
 
 
 @vehicle("new", "make a car from a table of hardpoints, masses, springs and bushings",
-    option("name", "NAME", "name of the car"),
-    option("--table", "FILE", ".toml or .csv; see docs/own_car.md (default with --kc: its car.toml)", type=Path),
-    option("--kc", "DIR", "measurements of a K&C rig, for axles of kind curves", type=Path),
-    output("DIR", "folder for the files (default: vehicles/NAME)"),
-    option("--front", "KIND", "mcpherson, double_wishbone, curves (default: that of the table)"),
-    option("--rear", "KIND", "five_link, multilink, double_wishbone, curves (default: that of the table)"),
-    flag("--overwrite", "replace an earlier car in that folder"),
-    JSON,
+    arguments.option("name", "NAME", "name of the car"),
+    arguments.option("--table", "FILE",
+        ".toml or .csv; see docs/own_car.md (default with --kc: its car.toml)", type=Path),
+    arguments.option("--kc", "DIR", "measurements of a K&C rig, for axles of kind curves", type=Path),
+    arguments.output("DIR", "folder for the files (default: vehicles/NAME)"),
+    arguments.option("--front", "KIND", "mcpherson, double_wishbone, curves (default: that of the table)"),
+    arguments.option("--rear", "KIND", "five_link, multilink, double_wishbone, curves (default: that of the table)"),
+    arguments.flag("--overwrite", "replace an earlier car in that folder"),
+    arguments.JSON,
 )  # fmt: skip
 def _new(options: argparse.Namespace) -> None:
     from activesteer.vehicle_builder import new_vehicle
@@ -67,11 +56,11 @@ def _new(options: argparse.Namespace) -> None:
         *(f"  unusual: {line}" for line in made.questions),
         f"next: activesteer vehicle check {made.vehicle_file}",
     ]
-    tell(options, values, lines)
+    terminal.tell(options, values, lines)
 
 
 @vehicle("table", "print a table of the package, as a start",
-    option("table", "NAME", "name of a table (default: print all names)", nargs="?"),
+    arguments.option("table", "NAME", "name of a table (default: print all names)", nargs="?"),
 )  # fmt: skip
 def _table(options: argparse.Namespace) -> None:
     files = {file.stem: file for file in sorted((models_dir() / "tables").iterdir())}
@@ -86,19 +75,19 @@ def _table(options: argparse.Namespace) -> None:
 
 
 @vehicle("check", "list missing and implausible values of a car; exit status 1 on errors",
-    option("vehicle", "NAME_OR_PATH", "name, vehicle file, or its folder"),
-    JSON,
+    arguments.option("vehicle", "NAME_OR_PATH", "name, vehicle file, or its folder"),
+    arguments.JSON,
 )  # fmt: skip
 def _check(options: argparse.Namespace) -> bool:
     from activesteer.vehicle_builder import check_vehicle
 
     report = check_vehicle(options.vehicle)
-    tell(options, report.as_table(), [report.table()])
+    terminal.tell(options, report.as_table(), [report.table()])
     return report.count("error") > 0
 
 
 @vehicle("keyframe", "write the standing position of an edited car",
-    option("vehicle", "PATH", "vehicle file or its folder"),
+    arguments.option("vehicle", "PATH", "vehicle file or its folder"),
 )  # fmt: skip
 def _keyframe(options: argparse.Namespace) -> None:
     from activesteer.vehicle_builder.build import keyframe_xml
@@ -108,40 +97,35 @@ def _keyframe(options: argparse.Namespace) -> None:
 
 
 @command("tyre", "describe a tyre file, list unusual values, draw curves",
-    option("file", "FILE.tir", "a path, or a name in models/tyres"),
-    FIGURES, JSON,
+    arguments.option("file", "FILE.tir", "a path, or a name in models/tyres"),
+    arguments.FIGURES, arguments.JSON,
 )  # fmt: skip
 def _tyre(options: argparse.Namespace) -> None:
     from activesteer.tyre import load_tir
     from activesteer.tyre.report import describe, draw, key_figures
 
-    params = load_tir(_find(options.file))
+    name, folder = options.file, models_dir() / "tyres"
+    file = next((path for path in (Path(name), folder / name, folder / f"{name}.tir") if path.is_file()), None)
+    if file is None:
+        words = nearest_names(name, [path.name for path in folder.glob("*.tir")])
+        raise TyreFileError(f"there is no tyre file {name}, neither as a path nor in models/tyres; {words}", value=name)
+    params = load_tir(file)
     figures = [] if options.output is None else draw(params, options.output)
-    tell(options, key_figures(params), [describe(params)], figures)
-
-
-def _find(name: str) -> Path:
-    folder = models_dir() / "tyres"
-    for candidate in (Path(name), folder / name, folder / f"{name}.tir"):
-        if candidate.is_file():
-            return candidate
-    names = [path.name for path in folder.glob("*.tir")]
-    raise TyreFileError(
-        f"there is no tyre file {name}, neither as a path nor in models/tyres; {nearest_names(name, names)}", value=name
-    )
+    terminal.tell(options, key_figures(params), [describe(params)], figures)
 
 
 @command("kc", "measure kinematics and compliance of the suspensions",
-    CAR, FIGURES,
-    option("--tables", "DIR", "write all curves as CSV and the table of the car, as input of vehicle new --kc",
+    arguments.CAR, arguments.FIGURES,
+    arguments.option("--tables", "DIR",
+        "write all curves as CSV and the table of the car, as input of vehicle new --kc",
         type=Path),
-    JSON,
+    arguments.JSON,
 )  # fmt: skip
 def _kc(options: argparse.Namespace) -> None:
     from activesteer.rigs import kinematics_compliance
     from activesteer.rigs.kc import draw
 
-    result = kinematics_compliance(options.vehicle, overrides_of(options))
+    result = kinematics_compliance(options.vehicle, arguments.overrides_of(options))
     lines = [result.table()]
     if options.tables is not None:
         from activesteer.rigs.kc.result import write_tables
@@ -149,28 +133,28 @@ def _kc(options: argparse.Namespace) -> None:
         from activesteer.vehicle_builder.texts import car_table
 
         written = write_tables(result, options.tables)
-        text = car_table(load_car(options.vehicle, overrides_of(options)), result)
+        text = car_table(load_car(options.vehicle, arguments.overrides_of(options)), result)
         written.append(write_text(options.tables / "car.toml", text, ParameterError))
         lines.append(f"tables: {len(written)} files in {options.tables}")
     figures = [] if options.output is None else draw(result, options.output)
-    tell(options, result.to_json(), lines, figures)
+    terminal.tell(options, result.to_json(), lines, figures)
 
 
 @command("export", "write the car as an FMU or a C library, without Python",
-    option("vehicle", "VEHICLE", VEHICLE_WORDS),
-    OVERRIDES,
-    option("--maneuver", "MANEUVER", "manoeuvre that gives road and speed at the start", "straight_line"),
-    option("--fmi", (2, 3), "version of FMI", 2),
-    flag("--header", "write a shared library with a C header instead"),
-    output("FILE.fmu", "the FMU (default: VEHICLE.fmu), or with --header the folder (default: VEHICLE)"),
-    JSON,
+    arguments.option("vehicle", "VEHICLE", arguments.VEHICLE_WORDS),
+    arguments.OVERRIDES,
+    arguments.option("--maneuver", "MANEUVER", "manoeuvre that gives road and speed at the start", "straight_line"),
+    arguments.option("--fmi", (2, 3), "version of FMI", 2),
+    arguments.flag("--header", "write a shared library with a C header instead"),
+    arguments.output("FILE.fmu", "the FMU (default: VEHICLE.fmu), or with --header the folder (default: VEHICLE)"),
+    arguments.JSON,
 )  # fmt: skip
 def _export(options: argparse.Namespace) -> None:
     from activesteer.coupling.car import export_fmu, export_library
     from activesteer.files import make_folder
     from activesteer.scenario import resolve
 
-    scenario = resolve(options.maneuver, options.vehicle, overrides_of(options))
+    scenario = resolve(options.maneuver, options.vehicle, arguments.overrides_of(options))
     name = scenario.car.name
     output = options.output or Path(name if options.header else f"{name}.fmu")
     if options.header:
@@ -183,4 +167,4 @@ def _export(options: argparse.Namespace) -> None:
     count = {cause: sum(v.causality == cause for v in export.variables) for cause in ("input", "output", "parameter")}
     about = {"file": str(output), "bytes": size, "token": export.token, "timestep_s": export.timestep_s, **count}
     words = ", ".join(f"{number} {cause}s" for cause, number in count.items())
-    tell(options, about, [f"{output}: {size / 1e6:.1f} MB, {words}; steps of {1e3 * export.timestep_s:g} ms"])
+    terminal.tell(options, about, [f"{output}: {size / 1e6:.1f} MB, {words}; steps of {1e3 * export.timestep_s:g} ms"])

@@ -11,33 +11,22 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.options import (
-    CAR,
-    JSON,
-    Group,
-    check_effect,
-    controllers,
-    driver,
-    flag,
-    option,
-    output,
-    scenario_of,
-)
-from activesteer.commands.terminal import BAD, GOOD, Progress, entry, painted, print_json
+from activesteer.commands import arguments, terminal
 from activesteer.errors import ActiveSteerError, ParameterError, shown
 from activesteer.files import make_folder
 
 if TYPE_CHECKING:
     from activesteer.plugins import Plugin
+    from activesteer.scenario import Scenario
 
-command: Final = Group("drive")
+command: Final = arguments.Group("drive")
 _WIDTH: Final = 25
 """Width of the column of names."""
 _OTHER_FILES: Final = frozenset((".mp4", ".gif", ".rrd", ".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf"))
 """Endings of files of other commands. Such a name for a folder is a mistake."""
 
 
-@command("list", "list manoeuvres, controllers, drivers, cars, studies, standards", JSON)
+@command("list", "list manoeuvres, controllers, drivers, cars, studies, standards", arguments.JSON)
 def _list(options: argparse.Namespace) -> None:
     from activesteer import resources
     from activesteer.controllers import CONTROLLERS, read_variant
@@ -54,14 +43,14 @@ def _list(options: argparse.Namespace) -> None:
         "standards": {name: standard.title for name, standard in STANDARDS.items()},
     }
     if options.json:
-        print_json(found)
+        terminal.print_json(found)
         return
     found["controllers"]["my_file.py:MyController"] = "your own: step(self, command, measurement)"
     found["drivers"]["my_file.py:MyDriver"] = "your own: step(self, setpoint, measurement, motion)"
     for kind, titles in found.items():
         print(f"{kind}:")
         for name, title in titles.items():
-            print(entry(f"  {name:{_WIDTH}} ", title, _WIDTH + 3))
+            print(terminal.entry(f"  {name:{_WIDTH}} ", title, _WIDTH + 3))
 
 
 def _titles(names: Iterable[str], find: Callable[[str], Path]) -> dict[str, str]:
@@ -86,29 +75,29 @@ class _Failures(dict[str, str]):
 
 
 @command("run", "drive a manoeuvre and record it",
-    option("maneuver", "MANEUVER",
+    arguments.option("maneuver", "MANEUVER",
         "a name from `activesteer list`, a TOML file, or a recording, whose inputs are driven again"),
-    CAR, driver(),
-    option("--fault", "PART:KIND[=SIZE]@START[-END]",
+    arguments.CAR, arguments.driver(),
+    arguments.option("--fault", "PART:KIND[=SIZE]@START[-END]",
         "let an actuator or a sensor fail, such as rear:stuck@2.0 or yaw_rate_sensor:offset=2degps@1-3; replaces the "
         "faults of the manoeuvre", many=True, dest="faults"),
-    controllers(),
-    output("FILE_OR_DIR", "a file *.mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)"),
-    flag("--replace", "replace recordings of other settings"),
-    flag("--all", "print all metrics, not only the key metrics of the manoeuvre"),
-    option("--isolate", "SECONDS",
+    arguments.controllers(),
+    arguments.output("FILE_OR_DIR", "a file *.mcap, or a folder for MANEUVER-CONTROLLER.mcap (default: runs)"),
+    arguments.flag("--replace", "replace recordings of other settings"),
+    arguments.flag("--all", "print all metrics, not only the key metrics of the manoeuvre"),
+    arguments.option("--isolate", "SECONDS",
         "run each FMU in a process of its own, in which it may crash, or hang for this time (default: 5 s)",
         type=float, nargs="?", const=5.0),
-    option("--realtime", "FACTOR", "pace the steps to the clock; 2 is twice as fast (default: 1)", type=float,
+    arguments.option("--realtime", "FACTOR", "pace the steps to the clock; 2 is twice as fast (default: 1)", type=float,
         nargs="?", const=1.0),
-    option("--udp", "[HOST:]PORT", "take commands of another process, on this machine by default"),
-    option("--udp-timeout", "SECONDS", "time without a command", 0.1),
-    option("--udp-reaction", ("release", "hold", "stop"),
+    arguments.option("--udp", "[HOST:]PORT", "take commands of another process, on this machine by default"),
+    arguments.option("--udp-timeout", "SECONDS", "time without a command", 0.1),
+    arguments.option("--udp-reaction", ("release", "hold", "stop"),
         "what follows: the run's own driver and controller, the last command, or the end", "release"),
-    flag("--plot", "also draw the runs: PNG and PDF"),
-    flag("--watch",
+    arguments.flag("--plot", "also draw the runs: PNG and PDF"),
+    arguments.flag("--watch",
         "instead, show one controller in a window of MuJoCo at the pace of --realtime, without a recording"),
-    flag("--cutaway", "with --watch: show the suspension through the body"), JSON,
+    arguments.flag("--cutaway", "with --watch: show the suspension through the body"), arguments.JSON,
 )  # fmt: skip
 def _run(options: argparse.Namespace) -> bool:
     from activesteer.controllers import controller_spec
@@ -120,11 +109,11 @@ def _run(options: argparse.Namespace) -> bool:
     if options.watch:
         _watch(options)
         return False
-    check_effect(options, "an effect with --watch only", "cutaway")
+    arguments.check_effect(options, "an effect with --watch only", "cutaway")
     options.output = options.output or Path("runs")
     options.driver = isolated(options.driver, options.isolate)
     controllers = [controller_spec(isolated(name, options.isolate)) for name in options.controller or ["none"]]
-    scenario, failures, alone = scenario_of(options), _Failures(), len(controllers) == 1
+    scenario, failures, alone = _scenario(options), _Failures(), len(controllers) == 1
     check_gains(scenario.overrides, controllers)
     # Check all controllers before the first run.
     for controller in controllers:
@@ -148,7 +137,7 @@ def _run(options: argparse.Namespace) -> bool:
             | ({"error": failures[label]} if label in failures else {})
             for controller, path in driving
         ]
-        print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs})
+        terminal.print_json({"maneuver": scenario.maneuver.name, "vehicle": scenario.car.name, "runs": runs})
     elif any(recording.metrics for recording in recordings.values()):
         _print_table(recordings, every=options.all)
     figures = _plot(recordings, paths[0].parent, scenario) if options.plot and recordings else ()
@@ -158,20 +147,28 @@ def _run(options: argparse.Namespace) -> bool:
     return bool(failures)
 
 
+def _scenario(options: argparse.Namespace) -> Scenario:
+    from activesteer.scenario import resolve
+
+    faults = {"fault": " ".join(options.faults)} if options.faults else {}
+    overrides = arguments.overrides_of(options, faults)
+    return resolve(options.maneuver, options.vehicle, overrides, options.driver, options.controller or ())
+
+
 def _watch(options: argparse.Namespace) -> None:
     from activesteer.scenario import check_gains
     from activesteer.simulation.live_view import check_display, watch
     from activesteer.simulation.preparation import with_amplitude_found
 
     unused = ("output", "replace", "all", "isolate", "udp", "plot", "json")
-    check_effect(options, "no effect with --watch: nothing is recorded", *unused)
+    arguments.check_effect(options, "no effect with --watch: nothing is recorded", *unused)
     if len(options.controller or ["none"]) > 1:
         raise ParameterError("give one controller with --watch", key="-c", value=" ".join(options.controller))
     pace, controller = options.realtime or 1.0, (options.controller or ["none"])[0]
     if not 0.01 <= pace <= 100.0:
         raise ParameterError(f"--realtime: is {pace:g}, must be 0.01 to 100 with --watch")
     # Check the manoeuvre first, with or without a display.
-    scenario = scenario_of(options)
+    scenario = _scenario(options)
     check_gains(scenario.overrides, [controller])
     check_display()
     watch(with_amplitude_found(scenario), controller, pace, cutaway=options.cutaway)
@@ -186,27 +183,23 @@ def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Nam
     link = None
     if options.udp is not None:
         link = UdpLink(UdpPort.read(options.udp, options.udp_timeout, options.udp_reaction))
-    with Progress(name, quiet=quiet) as progress:
+    with terminal.Progress(name, quiet=quiet) as progress:
         recording = run_scenario(
             scenario, controller, path=path, progress=progress, realtime=options.realtime or False, link=link
         )  # fmt: skip
-    if not quiet:
-        for words in _clock_words(recording.metadata):
-            print(f"{name}: {words}", file=sys.stderr)
-        print(f"{name}: {path}", file=sys.stderr)
-    if problem := recording.metadata.get("metrics_error"):
-        print(f"{name}: no metrics: {problem}", file=sys.stderr)
-    return recording
-
-
-def _clock_words(metadata: Mapping[str, Any]) -> Iterator[str]:
-    """Describe pace and messages of a run by the clock."""
+    lines, metadata = [], recording.metadata
     if (paced := metadata.get("realtime")) is not None:
         late = ", ".join(f"{word} {1e3 * paced[f'jitter_{word}_s']:.3g} ms" for word in ("p50", "p99", "max"))
-        share = f"{100.0 * paced['late_share']:.3g} % later than 0.2 ms"
-        yield f"{paced['missed_deadlines']} of {paced['steps']} deadlines missed; steps begin late by {late}; {share}"
+        missed = f"{paced['missed_deadlines']} of {paced['steps']} deadlines missed; steps begin late by {late}"
+        lines.append(f"{missed}; {100.0 * paced['late_share']:.3g} % later than 0.2 ms")
     if (told := metadata.get("udp")) is not None:
-        yield "UDP messages: " + ", ".join(f"{number} {word}" for word, number in told.items())
+        lines.append("UDP messages: " + ", ".join(f"{number} {word}" for word, number in told.items()))
+    lines = [] if quiet else [*lines, str(path)]
+    if problem := metadata.get("metrics_error"):
+        lines.append(f"no metrics: {problem}")
+    for line in lines:
+        print(f"{name}: {line}", file=sys.stderr)
+    return recording
 
 
 def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
@@ -233,8 +226,8 @@ def _paint(
 
     if not (is_controlled(metrics[run]) and is_controlled(next(iter(metrics.values())))):
         return text
-    colour = {Change.BETTER: GOOD, Change.WORSE: BAD}.get(significance(name, value, first))
-    return text if colour is None else painted(text, colour)
+    colour = {Change.BETTER: terminal.GOOD, Change.WORSE: terminal.BAD}.get(significance(name, value, first))
+    return text if colour is None else terminal.painted(text, colour)
 
 
 def _print_outcomes(metrics: Mapping[str, Mapping[str, float]]) -> None:
@@ -242,9 +235,9 @@ def _print_outcomes(metrics: Mapping[str, Mapping[str, float]]) -> None:
     from activesteer.analysis.harm import kept, losses
 
     for label, found in metrics.items():
-        for words, colour in ((losses(found), BAD), (kept(found), GOOD)):
+        for words, colour in ((losses(found), terminal.BAD), (kept(found), terminal.GOOD)):
             if text := ", ".join(words):
-                print(f"{label}: {painted(text, colour)}")
+                print(f"{label}: {terminal.painted(text, colour)}")
 
 
 def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) -> list[Path]:
@@ -312,10 +305,10 @@ def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Pa
 
 
 @command("explore", "change a run by sliders, or drive the car by hand, in a local page",
-    option("--port", "N", "port on 127.0.0.1 (default: a free one)", type=int),
-    flag("--no-browser", "print the address and open no browser"),
-    output("DIR", "folder of your own controllers and manoeuvres, and of saved recordings", "."),
-    JSON,
+    arguments.option("--port", "N", "port on 127.0.0.1 (default: a free one)", type=int),
+    arguments.flag("--no-browser", "print the address and open no browser"),
+    arguments.output("DIR", "folder of your own controllers and manoeuvres, and of saved recordings", "."),
+    arguments.JSON,
     description="Open a page in the browser that only this computer can reach; Ctrl-C ends it.",
 )  # fmt: skip
 def _explore(options: argparse.Namespace) -> None:
@@ -335,7 +328,7 @@ def _explore(options: argparse.Namespace) -> None:
 
     def listening() -> None:
         if options.json:
-            print_json({"url": server.url, "port": server.port}, one_line=True)
+            terminal.print_json({"url": server.url, "port": server.port}, one_line=True)
         else:
             print(server.url, flush=True)
             print("Ctrl-C ends the page", file=sys.stderr)

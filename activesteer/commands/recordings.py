@@ -7,47 +7,29 @@ import os
 import re
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.options import (
-    JSON,
-    RECORDING,
-    RECORDINGS,
-    VEHICLE,
-    WORKERS,
-    Group,
-    check_effect,
-    flag,
-    option,
-    output,
-)
-from activesteer.commands.terminal import (
-    Progress,
-    entry,
-    print_json,
-    print_notes,
-    printable,
-    tell,
-)
+from activesteer.commands import arguments, terminal
 from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
 from activesteer.files import atomic_write, shown_path
 
 if TYPE_CHECKING:
     from activesteer.recording import Recording
 
-command: Final = Group("recordings")
-_CUTAWAY: Final = flag("--cutaway", "show the suspension through the body")
+command: Final = arguments.Group("recordings")
+_CUTAWAY: Final = arguments.flag("--cutaway", "show the suspension through the body")
 _CORNERS: Final = ("fl", "fr", "rl", "rr")
 """As in `activesteer.conventions`, which takes too long to import for `--help`."""
 
 
 @command("info", "print the contents of a recording, or repair it",
-    RECORDING,
-    option("--recover", "OUT.mcap",
+    arguments.RECORDING,
+    arguments.option("--recover", "OUT.mcap",
         "instead, write the readable part of a damaged or cut recording to a new file, which stays marked as "
         "incomplete", type=Path),
-    JSON,
+    arguments.JSON,
 )  # fmt: skip
 def _info(options: argparse.Namespace) -> None:
     from activesteer.analysis.harm import kept, losses
@@ -56,14 +38,19 @@ def _info(options: argparse.Namespace) -> None:
     from activesteer.recording.contents import events_of
 
     recording = Recording.open(options.file, recover=True)
-    if options.recover is not None:
-        _recover(recording, options)
-        return
     metadata, time_s = recording.metadata, recording.time_s
+    if options.recover is not None:
+        arguments.check_effect(options, "no effect with --recover", "json")
+        if options.recover.exists() and options.recover.samefile(options.file):
+            raise ParameterError(f"--recover {options.recover} is the input file; choose another name")
+        recording.save(options.recover)
+        span = f"{len(time_s)} steps up to {time_s[-1]:.3f} s" if len(time_s) else "no steps"
+        print(f"{options.recover}: {span}")
+        return
     if options.json:
         channels = {each.name: {"unit": each.unit, "meaning": each.meaning} for each in recording.channels}
         span = {"from_s": float(time_s[0]), "to_s": float(time_s[-1])} if len(time_s) else {}
-        print_json(
+        terminal.print_json(
             {"steps": len(time_s), **span, "metadata": metadata, "metrics": recording.metrics, "channels": channels}
         )
         return
@@ -71,39 +58,30 @@ def _info(options: argparse.Namespace) -> None:
     print(f"{shown_path(options.file)}: {span}")
     for key in ("maneuver", "vehicle"):
         table = metadata.get(key, {})
-        print(entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}"))
+        print(terminal.entry(f"{key}: ", f"{table.get('name', '?')} {table.get('title', '')}"))
     uses_truth = ", which uses the truth" if metadata.get("controller_uses_truth") else ""
-    print(entry("controller: ", f"{metadata.get('controller', '?')}{uses_truth}"))
+    print(terminal.entry("controller: ", f"{metadata.get('controller', '?')}{uses_truth}"))
     sensors = metadata.get("vehicle", {}).get("sensors", {})
     if "seed" in sensors or sensors.get("preset", "ideal") != "ideal":
-        print(entry("sensors: ", f"{sensors.get('preset', '?')}, seed {sensors.get('seed', 'none')}"))
-    print(entry("driver: ", _driver(metadata.get("driver", "?"))))
+        print(terminal.entry("sensors: ", f"{sensors.get('preset', '?')}, seed {sensors.get('seed', 'none')}"))
+    print(terminal.entry("driver: ", _driver(metadata.get("driver", "?"))))
     for key in ("overrides", "versions"):
         if metadata.get(key):
-            print(entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items())))
+            print(terminal.entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items())))
     for event in events_of(metadata):
-        print(entry(f"at {event.time_s:.3f} s: ", f"{event.kind} {event.what}"))
+        print(terminal.entry(f"at {event.time_s:.3f} s: ", f"{event.kind} {event.what}"))
     if not metadata.get("complete", True):
-        print(entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly"))))
+        print(terminal.entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly"))))
     if result := [*losses(recording.metrics), *kept(recording.metrics)]:
-        print(entry("result: ", ", ".join(result)))
+        print(terminal.entry("result: ", ", ".join(result)))
     if recording.metrics:
         print(comparison({"metrics": recording.metrics}))
     print("channels:")
     width = max((len(channel.name) for channel in recording.channels), default=0)
     for channel in recording.channels:
         head = f"  {channel.name:{width}} {channel.unit or '-':6} "
-        print(entry(head, channel.meaning, len(head)))
-    print(entry("attachments: ", ", ".join(recording.attachments)))
-
-
-def _recover(recording: Recording, options: argparse.Namespace) -> None:
-    check_effect(options, "no effect with --recover", "json")
-    if options.recover.exists() and options.recover.samefile(options.file):
-        raise ParameterError(f"--recover {options.recover} is the input file; choose another name")
-    recording.save(options.recover)
-    span = f"{len(recording)} steps up to {recording.time_s[-1]:.3f} s" if len(recording) else "no steps"
-    print(f"{options.recover}: {span}")
+        print(terminal.entry(head, channel.meaning, len(head)))
+    print(terminal.entry("attachments: ", ", ".join(recording.attachments)))
 
 
 def _driver(recorded: Any) -> str:
@@ -121,8 +99,8 @@ def _driver(recorded: Any) -> str:
 
 
 @command("report", "compare recordings on one HTML page",
-    RECORDINGS,
-    output("FILE.html", "the page; replaces an existing one", "report.html"),
+    arguments.RECORDINGS,
+    arguments.output("FILE.html", "the page; replaces an existing one", "report.html"),
     description="Write a page that needs no network: scorecard, plots, track, metrics, parameters, versions.",
 )  # fmt: skip
 def _report(options: argparse.Namespace) -> None:
@@ -134,21 +112,23 @@ def _report(options: argparse.Namespace) -> None:
 
 
 @command("compare", "compare measured runs with a simulated one",
-    option("files", "FILE.mcap",
+    arguments.option("files", "FILE.mcap",
         "recordings: measured ones, whose mean is compared, and the simulated one last; or a folder with a "
         "validation.toml, or bmw_m8 or tesla_model_s", nargs="*", type=Path),
-    option("--new", "FOLDER", "make a folder with an example, to be replaced by your measured runs", type=Path),
-    option("--standard", ("iso19364", "iso19365"),
+    arguments.option("--new", "FOLDER",
+        "make a folder with an example, to be replaced by your measured runs", type=Path),
+    arguments.option("--standard", ("iso19364", "iso19365"),
         "iso19364: cross plots over the lateral acceleration, for steady-state driving; iso19365: over time (default)"),
-    option("--filter", ("iso15037", "fmvss126", "none"),
+    arguments.option("--filter", ("iso15037", "fmvss126", "none"),
         "zero-phase Butterworth filter of both sides: iso15037 (8 poles, 10.1 Hz; default), fmvss126 (12 poles, 6 Hz, "
         "steering wheel 10 Hz), or none"),
-    option("--noise", ("estimate", "none"),
+    arguments.option("--noise", ("estimate", "none"),
         "widen the corridor by the noise of the measurement, estimated from it (default), or not"),
-    output("FILE.html", "the page (default: no page)"),
-    option("--samples", "N", "with a measured circle: number of samples of what varies from lap to lap (default: 200)",
+    arguments.output("FILE.html", "the page (default: no page)"),
+    arguments.option("--samples", "N",
+        "with a measured circle: number of samples of what varies from lap to lap (default: 200)",
         type=int),
-    WORKERS, JSON,
+    arguments.WORKERS, arguments.JSON,
     description="Find the time shift, and print the share of the measurement inside the tolerance corridor of the "
     "simulation. With a folder of measured runs, or of a measured circle, predict the measurement first. The exit "
     "status is 1 if a quantity is outside.",
@@ -166,14 +146,14 @@ def _compare(options: argparse.Namespace) -> bool:
     if len(options.files) == 1 and options.files[0].suffix != ".mcap":
         from activesteer.commands.studying import judge
 
-        check_effect(options, "no effect with a folder", "standard", "filter", "noise")
+        arguments.check_effect(options, "no effect with a folder", "standard", "filter", "noise")
         return judge(str(options.files[0]), options, page=options.output)
     from activesteer.measured.comparison import assumptions, compare
     from activesteer.measured.pages import comparison_page
     from activesteer.pages import write_page
     from activesteer.recording import Recording
 
-    check_effect(options, "no effect with recordings", "samples", "jobs", "scheduler")
+    arguments.check_effect(options, "no effect with recordings", "samples", "jobs", "scheduler")
     if len(options.files) < 2:
         raise ParameterError("at least two recordings are needed: measured ones, and the simulated one last")
     *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
@@ -184,15 +164,25 @@ def _compare(options: argparse.Namespace) -> bool:
     names = [file.stem for file in options.files]
     page = comparison_page(found, names[:-1], names[-1])
     written = [] if options.output is None else [write_page(page, options.output)]
-    tell(options, found.to_json(), (*page.lines(), *assumptions(found)), written, "page")
+    terminal.tell(options, found.to_json(), (*page.lines(), *assumptions(found)), written, "page")
     return not found.inside
 
 
+def _named(files: Sequence[Path]) -> dict[str, Recording]:
+    """Open recordings, and give each run a name."""
+    from activesteer.analysis.report import open_all
+    from activesteer.recording.recording import run_names
+
+    opened = list(open_all(files).values())
+    return dict(zip(run_names(files, opened), opened, strict=True))
+
+
 @command("replay", "show recordings in 3D, with signals and metrics",
-    RECORDINGS,
-    option("-o --output --save", "OUT.rrd", "write a file for the viewer instead of opening a window", type=Path),
-    flag("--web", "serve a page for a browser until Ctrl-C"),
-    flag("--compare", "show only the page that compares several files side by side"),
+    arguments.RECORDINGS,
+    arguments.option("-o --output --save", "OUT.rrd",
+        "write a file for the viewer instead of opening a window", type=Path),
+    arguments.flag("--web", "serve a page for a browser until Ctrl-C"),
+    arguments.flag("--compare", "show only the page that compares several files side by side"),
     _CUTAWAY,
     description="Open recordings in the rerun viewer, several in one window.",
 )  # fmt: skip
@@ -204,16 +194,10 @@ def _replay(options: argparse.Namespace) -> None:
     except ImportError as error:
         raise PlaybackError("replay needs the viewer rerun: pip install rerun-sdk") from error
     from activesteer.analysis.verdict import verdict
-    from activesteer.recording import Recording
-    from activesteer.recording.recording import run_names
 
     if options.compare and len(options.files) < 2:
         raise ParameterError(f"--compare needs at least two files, and {options.files[0]} is one")
-    if len(set(options.files)) != len(options.files):
-        raise ParameterError(f"a file is named twice: {', '.join(str(file) for file in options.files)}")
-    recordings = [Recording.open(file, recover=True) for file in options.files]
-    names = run_names(options.files, recordings)
-    named = dict(zip(names, recordings, strict=True))
+    named = _named(options.files)
     runs, how = runs_of(named), Showing(options.compare, options.cutaway, tuple(verdict(named)))
     if options.output is not None:
         save(runs, options.output, how)
@@ -241,34 +225,30 @@ def _size(text: str) -> tuple[int, int]:
 
 
 @command("video", "make a film of a recording",
-    RECORDING,
-    output("OUT.mp4|gif", "the film (default: FILE.mp4 beside the recording)"),
-    option("--camera", ("chase", "top", "wheel"), "camera position", "chase"),
-    option("--corner", _CORNERS, "wheel for the camera `wheel` (default: fl)"),
-    option("--compare", "OTHER.mcap", "also show the car of another recording; may be repeated", many=True, type=Path),
-    option("--layout", ("overlay", "side-by-side"), "transparent cars in one picture, or one picture for each car",
+    arguments.RECORDING,
+    arguments.output("OUT.mp4|gif", "the film (default: FILE.mp4 beside the recording)"),
+    arguments.option("--camera", ("chase", "top", "wheel"), "camera position", "chase"),
+    arguments.option("--corner", _CORNERS, "wheel for the camera `wheel` (default: fl)"),
+    arguments.option("--compare", "OTHER.mcap",
+        "also show the car of another recording; may be repeated", many=True, type=Path),
+    arguments.option("--layout", ("overlay", "side-by-side"),
+        "transparent cars in one picture, or one picture for each car",
         "overlay"),
-    option("--gauges", ("full", "sideslip"), "all gauges, or one large sideslip angle for each car", "full"),
-    option("--size", "WxH", "pixels", "1280x720", type=_size),
-    option("--fps", "FPS", "pictures per second (default: 30, GIF: 20)", type=float),
-    option("--speed", "FACTOR", "pace: 0.25 is slow motion, 4 is fast", 1.0),
+    arguments.option("--gauges", ("full", "sideslip"), "all gauges, or one large sideslip angle for each car", "full"),
+    arguments.option("--size", "WxH", "pixels", "1280x720", type=_size),
+    arguments.option("--fps", "FPS", "pictures per second (default: 30, GIF: 20)", type=float),
+    arguments.option("--speed", "FACTOR", "pace: 0.25 is slow motion, 4 is fast", 1.0),
     _CUTAWAY,
     description="Draw a recording without a window, and write an MP4 or a GIF.",
 )  # fmt: skip
 def _video(options: argparse.Namespace) -> None:
-    from activesteer.recording import Recording
-    from activesteer.recording.recording import run_names
     from activesteer.video import Settings, make_film
 
-    files = [options.file, *(options.compare or ())]
-    for number, other in enumerate(files):
-        if other.resolve() in [file.resolve() for file in files[:number]]:
-            raise ParameterError(f"--compare {other}: this file is already shown")
     if options.corner and options.camera != "wheel":
         raise ParameterError("belongs to --camera wheel", key="--corner", value=options.corner)
     if options.layout == "side-by-side" and not options.compare:
         raise ParameterError("--layout side-by-side needs --compare OTHER.mcap")
-    recordings = [Recording.open(file, recover=True) for file in files]
+    named = _named([options.file, *(options.compare or ())])
     output = options.output or options.file.with_suffix(".mp4")
     rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
     settings = Settings(
@@ -281,9 +261,8 @@ def _video(options: argparse.Namespace) -> None:
         gauges=options.gauges,
         cutaway=options.cutaway,
     )
-    named = dict(zip(run_names(files, recordings), recordings, strict=True))
     started = time.monotonic()
-    with Progress(f"{output}", quiet=False) as progress:
+    with terminal.Progress(f"{output}", quiet=False) as progress:
         made = make_film(named, output, settings, progress)
     took = time.monotonic() - started
     print(
@@ -294,13 +273,13 @@ def _video(options: argparse.Namespace) -> None:
 
 
 @command("import", "convert measured data to a recording",
-    option("files", "FILE",
+    arguments.option("files", "FILE",
         "a .csv, .txt, .mat, .parquet or .mf4 file, or several of one run, each with its own times", nargs="+",
         type=Path),
-    option("--map", "MAP.toml", "column and unit of each channel", type=Path),
-    VEHICLE,
-    output("OUT.mcap", "the recording (default: FILE.mcap)"),
-    JSON,
+    arguments.option("--map", "MAP.toml", "column and unit of each channel", type=Path),
+    arguments.VEHICLE,
+    arguments.output("OUT.mcap", "the recording (default: FILE.mcap)"),
+    arguments.JSON,
     description="Read CSV, MAT, Parquet or MDF files of one run. Columns become channels in SI units with the signs "
     "of ISO 8855 on a uniform time. Without a map, columns are recognised by the names that exporters write.",
 )  # fmt: skip
@@ -319,9 +298,9 @@ def _import(options: argparse.Namespace) -> None:
             recording.save(part)
         except RecordingError as error:
             raise RecordingError(error.problem.replace(str(part), str(output))) from error
-    print_notes(found.notes)
+    terminal.print_notes(found.notes)
     step_s = float(recording.time_s[1] - recording.time_s[0])
     about = {"rows": len(recording), "step_s": step_s, "channels": found.taken, "notes": list(found.notes)}
     head = f"{output}: {len(recording)} rows, {recording.time_s[0]:.3f} to {recording.time_s[-1]:.3f} s"
-    columns = (f"  {name:24} {printable(column)}" for name, column in found.taken.items())
-    tell(options, {"file": str(output), **about}, [head, *columns])
+    columns = (f"  {name:24} {terminal.printable(column)}" for name, column in found.taken.items())
+    terminal.tell(options, {"file": str(output), **about}, [head, *columns])

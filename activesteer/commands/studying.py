@@ -7,35 +7,11 @@ import datetime
 import math
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from activesteer.commands.options import (
-    CAR,
-    JSON,
-    OVERRIDES,
-    WORKERS,
-    Group,
-    check_effect,
-    controllers,
-    driver,
-    flag,
-    numbers,
-    one_of,
-    option,
-    output,
-    overrides_of,
-)
-from activesteer.commands.terminal import (
-    BAD,
-    GOOD,
-    Progress,
-    painted,
-    print_notes,
-    printable,
-    table_lines,
-    tell,
-)
+from activesteer.commands import arguments, terminal
 from activesteer.errors import ParameterError, StudyError
 from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
@@ -43,9 +19,8 @@ from activesteer.resources import DEFAULT_DRIVER
 if TYPE_CHECKING:
     from activesteer.measured.fitting import FitProgress
     from activesteer.studies.engine.tuning import Trial, Tuning
-    from activesteer.studies.linear.margins import LoopMargins
 
-command: Final = Group("study")
+command: Final = arguments.Group("study")
 _SHOWN_FALLS: Final = 8
 """Number of improvements that are printed."""
 _LOCUS_KMH: Final = (40.0, 60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
@@ -74,19 +49,19 @@ _CONTROLLER_COLUMNS: Final = {
 
 
 @command("study", "drive many runs over varied parameters",
-    option("study", "STUDY_OR_DIR", "a study file or its name, or the folder of a study"),
-    output("DIR", "folder for the results, needed for a new study; a study found there is resumed"),
-    controllers("those of the study"),
-    option("--vehicle", "NAME_OR_PATH", "a car instead of the study's; may be repeated", many=True),
-    option("--driver", "DRIVER", "a driver instead of the study's"),
-    option("--samples", "N", "number of samples instead of the study's", type=int),
-    OVERRIDES, WORKERS,
-    one_of(
-        option("--limit", "N", "drive at most N runs now", type=int),
-        flag("--status", "only print the progress of the study in DIR"),
-        flag("--report", "only write DIR/report.html for the finished runs"),
+    arguments.option("study", "STUDY_OR_DIR", "a study file or its name, or the folder of a study"),
+    arguments.output("DIR", "folder for the results, needed for a new study; a study found there is resumed"),
+    arguments.controllers("those of the study"),
+    arguments.option("--vehicle", "NAME_OR_PATH", "a car instead of the study's; may be repeated", many=True),
+    arguments.option("--driver", "DRIVER", "a driver instead of the study's"),
+    arguments.option("--samples", "N", "number of samples instead of the study's", type=int),
+    arguments.OVERRIDES, arguments.WORKERS,
+    arguments.one_of(
+        arguments.option("--limit", "N", "drive at most N runs now", type=int),
+        arguments.flag("--status", "only print the progress of the study in DIR"),
+        arguments.flag("--report", "only write DIR/report.html for the finished runs"),
     ),
-    JSON,
+    arguments.JSON,
 )  # fmt: skip
 def _study(options: argparse.Namespace) -> bool:
     from activesteer.studies.engine.study_file import changed_study, read_study
@@ -96,7 +71,7 @@ def _study(options: argparse.Namespace) -> bool:
     given = Path(options.study)
     changes = {
         "controllers": options.controller, "vehicles": options.vehicle, "driver": options.driver,
-        "overrides": overrides_of(options), "samples": options.samples,
+        "overrides": arguments.overrides_of(options), "samples": options.samples,
     }  # fmt: skip
     changes = {key: value for key, value in changes.items() if value not in (None, {})}
     if changes and given.is_dir():
@@ -109,13 +84,13 @@ def _study(options: argparse.Namespace) -> bool:
         raise StudyError(f"-o DIR is needed: the folder for the results of {options.study}")
     if options.status:
         made = _progress_of(folder)
-        tell(options, made, _status(made))
+        terminal.tell(options, made, _status(made))
         return False
     if options.report:
         from activesteer.studies.engine.report import write_report
 
         path = write_report(folder)
-        tell(options, {"report": str(path)}, [f"report: {path}"])
+        terminal.tell(options, {"report": str(path)}, [f"report: {path}"])
         return False
     from activesteer.studies.engine.store import RESULTS, read_environment
     from activesteer.studies.engine.study import study
@@ -124,7 +99,7 @@ def _study(options: argparse.Namespace) -> bool:
         read_environment(given)  # refuses a folder without a study
     options.output = folder
     options.how_to_resume = f"; resume with `activesteer study {folder}`"
-    with Progress("study", quiet=options.json) as progress:
+    with terminal.Progress("study", quiet=options.json) as progress:
         study(
             given / "study.toml" if given.is_dir() else changed_study(options.study, changes),
             output=folder,
@@ -136,7 +111,7 @@ def _study(options: argparse.Namespace) -> bool:
     result = folder / RESULTS
     made = _progress_of(folder)
     end = f"results: {result}" if result.exists() else f"not finished; resume with `activesteer study {folder}`"
-    tell(options, made | {"results": str(result) if result.exists() else None}, [*_status(made), end])
+    terminal.tell(options, made | {"results": str(result) if result.exists() else None}, [*_status(made), end])
     return bool(made["by_status"]) and set(made["by_status"]) <= {"failed", "crashed"}
 
 
@@ -150,29 +125,30 @@ def _status(progress: dict[str, Any]) -> Iterator[str]:
     counts = ", ".join(f"{number} {status}" for status, number in progress["by_status"].items()) or "none"
     at_work = "; a process is at work" if progress["running"] else ""
     yield f"{progress['done']} of {progress['total']} runs are done: {counts}{at_work}"
-    yield from (f"{number:6}  {printable(error)}" for error, number in progress["errors"].items())
+    yield from (f"{number:6}  {terminal.printable(error)}" for error, number in progress["errors"].items())
     yield from (f"without effect: {key} changes no metric of any run" for key in progress["without_effect"])
 
 
 @command("tune", "minimise objectives, satisfy statements or violate a requirement",
-    option("study", "STUDY", "a study file with a table [tune], or its name"),
-    output("DIR", "folder of the search; a search found there is resumed", "tuning"),
-    controllers("with the goal violate, those of the file"),
-    option("-m --maneuver", "MANEUVER",
+    arguments.option("study", "STUDY", "a study file with a table [tune], or its name"),
+    arguments.output("DIR", "folder of the search; a search found there is resumed", "tuning"),
+    arguments.controllers("with the goal violate, those of the file"),
+    arguments.option("-m --maneuver", "MANEUVER",
         "one of the file; may be repeated (default: with the goal violate, all of the file)", many=True),
-    one_of(
-        option("--trials", "N", "total number of sets of each search (default: that of the file)", type=int),
-        option("--runs", "N", "the same as a budget of runs, of which a set needs several", type=int),
+    arguments.one_of(
+        arguments.option("--trials", "N", "total number of sets of each search (default: that of the file)", type=int),
+        arguments.option("--runs", "N", "the same as a budget of runs, of which a set needs several", type=int),
     ),
-    WORKERS, JSON,
+    arguments.WORKERS, arguments.JSON,
     description="Search the ranges of the factors of a study for values that minimise objectives, satisfy as many "
     "statements as possible, or violate a requirement. The exit status is 1 if the requirement is violated.",
 )  # fmt: skip
 def _tune(options: argparse.Namespace) -> bool:
+    from activesteer.studies.engine.report import draw_tuning
     from activesteer.studies.engine.tuning import Goal, tune
 
     options.how_to_resume = "; the same command resumes it"
-    with Progress("tune", quiet=options.json) as bar:
+    with terminal.Progress("tune", quiet=options.json) as bar:
         found = tune(
             options.study,
             options.output,
@@ -189,16 +165,23 @@ def _tune(options: argparse.Namespace) -> bool:
         values = {"violated": violated, "searches": [one.to_json() for one in found]}
     else:
         values = found[0].to_json()
-    figures = _draw(found, options.output)
+    figures: list[Path] = []
+    with suppress(ParameterError):  # matplotlib is not installed
+        figures = [path for one in found for path in draw_tuning(one, options.output)]
     values |= {"figures": [str(path) for path in figures]}
-    tell(options, values, (line for one in found for line in (_worst if one.requirement else _lines)(one)), figures)
+    terminal.tell(
+        options, values, (line for one in found for line in (_worst if one.requirement else _lines)(one)), figures
+    )
     return violated
 
 
 def _lines(found: Tuning) -> Iterator[str]:
     yield f"{found.done} sets tried, {found.failed} with a failed run; the best:"
     for trial in found.front:
-        yield "  ".join(f"{name} {value:.6g}" for name, value in trial.objectives.items()) or _held(trial)
+        fails = [name for name in trial.margins if name not in trial.holding]
+        about = f"{len(trial.holding)} of {len(trial.margins)} hold, implausibility {trial.implausibility:.2f}"
+        about += f", set {trial.number}{'; fails: ' * bool(fails)}{' '.join(fails)}"
+        yield "  ".join(f"{name} {value:.6g}" for name, value in trial.objectives.items()) or about
         if found.plausibility is None or trial is found.front[0]:
             yield from _values(trial)
     if pairs := found.never_together:
@@ -206,20 +189,15 @@ def _lines(found: Tuning) -> Iterator[str]:
     yield from (f"without effect: {key} changes no metric of any run" for key in found.without_effect)
 
 
-def _held(trial: Trial) -> str:
-    fails = [name for name in trial.margins if name not in trial.holding]
-    about = f"{len(trial.holding)} of {len(trial.margins)} hold, implausibility {trial.implausibility:.2f}"
-    return f"{about}, set {trial.number}{'; fails: ' * bool(fails)}{' '.join(fails)}"
-
-
 def _worst(found: Tuning) -> Iterator[str]:
-    verdict = painted("VIOLATED", BAD) if found.violations else painted("not violated", GOOD)
+    word, colour = ("VIOLATED", terminal.BAD) if found.violations else ("not violated", terminal.GOOD)
     failed = f", {found.failed} sets not judged" if found.failed else ""
     yield f"{found.controller}, {found.maneuver}: {found.requirement}"
     if not found.front:
         yield f"  no set could be judged in {found.runs} runs{failed}"
         return
-    yield f"  {verdict} in {found.violations} of {len(found.trials)} sets ({found.runs} runs{failed})"
+    sets = f"{found.violations} of {len(found.trials)} sets"
+    yield f"  {terminal.painted(word, colour)} in {sets} ({found.runs} runs{failed})"
     falls = found.fall
     yield f"  least margin {falls[-1][1]:.6g}"
     shown = falls if len(falls) <= _SHOWN_FALLS else [*falls[:1], *falls[1 - _SHOWN_FALLS :]]
@@ -232,22 +210,12 @@ def _values(trial: Trial, indent: str = "  ") -> Iterator[str]:
     yield from (f"{indent}{key} = {value!r}" for key, value in trial.values.items())
 
 
-def _draw(found: list[Tuning], folder: Path) -> list[Path]:
-    """Draw each search, or nothing without matplotlib."""
-    from activesteer.studies.engine.report import draw_tuning
-
-    try:
-        return [path for one in found for path in draw_tuning(one, folder)]
-    except ParameterError:
-        return []
-
-
 @command("fit", "fit parameters of a car to recordings, with intervals",
-    option("study", "STUDY",
+    arguments.option("study", "STUDY",
         "a study file (or its name) with recordings as manoeuvres and a table [fit]; or a folder of measured runs "
         "with a validation.toml, or bmw_m8: fitted in one window, judged in another"),
-    output("DIR", "folder for fit.json, fit.html and overrides.toml, or for page.html (default: none)"),
-    WORKERS, JSON,
+    arguments.output("DIR", "folder for fit.json, fit.html and overrides.toml, or for page.html (default: none)"),
+    arguments.WORKERS, arguments.JSON,
     description="Drive the inputs of recordings again, and find by least squares the values of the factors of a study "
     "for which the car matches the recordings best.",
 )  # fmt: skip
@@ -260,7 +228,7 @@ def _fit(options: argparse.Namespace) -> bool:
         page = None if options.output is None else options.output / "page.html"
         return judge(options.study, options, page=page, fitted=True)
 
-    with Progress("fit", quiet=options.json) as bar:
+    with terminal.Progress("fit", quiet=options.json) as bar:
 
         def progress(here: FitProgress) -> None:
             so_far = "" if math.isnan(here.misfit) else f", differences {here.misfit:.3g} times the noise"
@@ -269,8 +237,8 @@ def _fit(options: argparse.Namespace) -> bool:
         found = fit(options.study, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
     name = Path(options.study).stem
     files = [] if options.output is None else write_fit(found, name, options.output)
-    print_notes(found.notes)
-    tell(options, found.to_json(), fit_page(found, name).lines(), files, "written")
+    terminal.print_notes(found.notes)
+    terminal.tell(options, found.to_json(), fit_page(found, name).lines(), files, "written")
     return False
 
 
@@ -289,22 +257,22 @@ def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: 
     samples = getattr(options, "samples", None)
     if samples is not None and not is_circle:
         raise ParameterError(f"has an effect with a measured circle only, and {name} is none", key="--samples")
-    with Progress("fit" if fitted else "compare", quiet=options.json) as bar:
+    with terminal.Progress("fit" if fitted else "compare", quiet=options.json) as bar:
         if is_circle:
             result = validate_circle(file, samples or SAMPLES, jobs, scheduler=scheduler, progress=bar)
         else:
             result = validate_measured(file, jobs, fitted=fitted, scheduler=scheduler, progress=bar)
-            print_notes(result.notes)
+            terminal.print_notes(result.notes)
     told = measured_page(result)
     pages = [] if page is None else [write_page(told, page)]
-    tell(options, result.to_json(), (*told.lines(), "inside" if result.inside else "outside"), pages, "page")
+    terminal.tell(options, result.to_json(), (*told.lines(), "inside" if result.inside else "outside"), pages, "page")
     return not result.inside
 
 
 @command("identify", "understeer, limits and controller models of a vehicle (ISO 4138)",
-    CAR,
-    flag("--write", "also write [single_track] and [two_track] of the vehicle file"),
-    JSON,
+    arguments.CAR,
+    arguments.flag("--write", "also write [single_track] and [two_track] of the vehicle file"),
+    arguments.JSON,
 )  # fmt: skip
 def _identify(options: argparse.Namespace) -> None:
     from activesteer.resources import check_own, find_vehicle
@@ -314,36 +282,36 @@ def _identify(options: argparse.Namespace) -> None:
         if not options.json:
             print(f"{test} ...", file=sys.stderr)
 
-    file, overrides = find_vehicle(options.vehicle), overrides_of(options)
+    file, overrides = find_vehicle(options.vehicle), arguments.overrides_of(options)
     if options.write:
         if overrides:
             raise ParameterError("writes into the vehicle file, so leave out --set and --overrides", key="--write")
         check_own(file)
         options.output = file
     result = identify(options.vehicle, overrides, progress)
-    tell(options, result.to_json(), [result.table()])
+    lines = [result.table()]
     if options.write:
         vehicle = f" --vehicle {options.vehicle}" if options.vehicle != "compact" else ""
         command = f"activesteer identify{vehicle} --write"
         write_identified(file, result, command, datetime.date.today().isoformat())
-        if not options.json:
-            print(f"written to {file}")
+        lines.append(f"written to {file}")
+    terminal.tell(options, result.to_json(), lines)
 
 
 @command("linearise", "modes of the full car, and stability of its loops",
-    CAR,
-    option("--loop", ("driver", "controller"), "instead of the modes, stability of a loop"),
-    controllers("with --loop ars and afs, with --loop driver also none"),
-    driver(f"{DEFAULT_DRIVER}; with --loop driver"),
-    option("--speed-kmh", "V,V",
+    arguments.CAR,
+    arguments.option("--loop", ("driver", "controller"), "instead of the modes, stability of a loop"),
+    arguments.controllers("with --loop ars and afs, with --loop driver also none"),
+    arguments.driver(f"{DEFAULT_DRIVER}; with --loop driver"),
+    arguments.option("--speed-kmh", "V,V",
         "speeds, separated by commas (default: 80; with --loop driver 60, 80 ... 140; with --loop controller 60, 80 "
-        "... 160)", type=numbers, action="extend", dest="speeds_kmh"),
-    option("--study", "STUDY",
+        "... 160)", type=arguments.numbers, action="extend", dest="speeds_kmh"),
+    arguments.option("--study", "STUDY",
         "with --loop controller: smallest margins over the samples of a study (file or name); controllers are "
         "designed for the car without the factors of the study"),
-    WORKERS,
-    output("DIR", "folder for figures, with --loop controller for a page (default: none)"),
-    JSON,
+    arguments.WORKERS,
+    arguments.output("DIR", "folder for figures, with --loop controller for a page (default: none)"),
+    arguments.JSON,
     description="Print the modes of the full car at a speed. With --loop driver, print crossover frequency, phase "
     "margin and damping of the loop of driver, controller and car, and the damping after a small step of the path, "
     "for the same loop and for a run. With --loop controller, print margins of the loop of controller, control unit, "
@@ -352,13 +320,13 @@ def _identify(options: argparse.Namespace) -> None:
 )  # fmt: skip
 def _linearise(options: argparse.Namespace) -> None:
     if options.loop is None:
-        check_effect(options, "an effect with --loop driver or controller only", "controller")
+        arguments.check_effect(options, "an effect with --loop driver or controller only", "controller")
     if options.loop != "driver":
-        check_effect(options, "an effect with --loop driver only", "driver")
+        arguments.check_effect(options, "an effect with --loop driver only", "driver")
     if options.loop != "controller":
-        check_effect(options, "an effect with --loop controller only", "study")
+        arguments.check_effect(options, "an effect with --loop controller only", "study")
     if options.study is None:
-        check_effect(options, "an effect with --study only", "jobs", "scheduler")
+        arguments.check_effect(options, "an effect with --study only", "jobs", "scheduler")
     if options.output is not None:
         make_folder(options.output, ParameterError)
     {None: _modes, "driver": _driver_loop, "controller": _controller_loop}[options.loop](options)
@@ -371,7 +339,7 @@ def _modes(options: argparse.Namespace) -> None:
     speeds_kmh = options.speeds_kmh or [80.0]
     if len(speeds_kmh) > 1:
         raise ParameterError("give one speed for the modes", key="--speed-kmh", value=speeds_kmh)
-    overrides = overrides_of(options)
+    overrides = arguments.overrides_of(options)
     check_gains(overrides, ())
     car = linear_car(options.vehicle, speeds_kmh[0] / 3.6, overrides)
     modes, figures = car.modes(), []
@@ -390,7 +358,7 @@ def _modes(options: argparse.Namespace) -> None:
         "modes": [mode.to_json() for mode in modes],
         "figures": list(map(str, figures)),
     }
-    tell(options, values, [f"{options.vehicle} at {label}", eigenvalue_table(modes)], figures)
+    terminal.tell(options, values, [f"{options.vehicle} at {label}", eigenvalue_table(modes)], figures)
 
 
 def _driver_loop(options: argparse.Namespace) -> None:
@@ -402,7 +370,7 @@ def _driver_loop(options: argparse.Namespace) -> None:
         options.vehicle,
         options.controller or ("none", "ars", "afs"),
         options.speeds_kmh or SPEEDS_KMH,
-        overrides_of(options),
+        arguments.overrides_of(options),
     )
     rows = [loop.to_json() for loop in loops]
     figures = []
@@ -412,35 +380,30 @@ def _driver_loop(options: argparse.Namespace) -> None:
 
         figure = driver_loops_figure(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
         figures.append(save(figure, options.output / "driver.png"))
-    tell(options, rows, [f"{driver} in {options.vehicle}", *table_lines(rows, _DRIVER_COLUMNS)], figures)
+    terminal.tell(
+        options, rows, [f"{driver} in {options.vehicle}", *terminal.table_lines(rows, _DRIVER_COLUMNS)], figures
+    )
 
 
 def _controller_loop(options: argparse.Namespace) -> None:
-    from activesteer.studies.linear.margins import write_margins_page
+    from activesteer.studies.linear.margins import SPEEDS_KMH, loop_margins, worst_margins, write_margins_page
 
-    found = _margins(options)
+    speeds_kmh, overrides = options.speeds_kmh or SPEEDS_KMH, arguments.overrides_of(options)
+    loops = options.controller or ("ars", "afs"), options.vehicle, speeds_kmh, overrides
+    if options.study is None:
+        found = loop_margins(*loops)
+    else:
+        with terminal.Progress("margins", quiet=options.json) as progress:
+            workers = {"jobs": options.jobs, "scheduler": options.scheduler}
+            found = worst_margins(options.study, *loops, progress.count, **workers)
     rows = [margins.to_json() for margins in found]
     if not rows:
         raise ParameterError("none of these controllers uses a measurement, so there is no loop", key="-c")
-    lines = [*table_lines(rows, _CONTROLLER_COLUMNS)]
+    lines = [*terminal.table_lines(rows, _CONTROLLER_COLUMNS)]
     if options.study:
         least = min(rows, key=lambda row: row["disk_margin"])
         changed = ", ".join(f"{key} = {value:.3g}" for key, value in least["factors"].items())
         where = f"{least['controller']}, {least['loop']}, {least['speed_kmh']:.0f} km/h"
         lines.append(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
     pages = [] if options.output is None else [write_margins_page(found, str(options.vehicle), options.output)]
-    tell(options, rows, lines, pages, "page")
-
-
-def _margins(options: argparse.Namespace) -> list[LoopMargins]:
-    from activesteer.studies.linear.margins import SPEEDS_KMH, loop_margins, worst_margins
-
-    speeds_kmh, overrides = options.speeds_kmh or SPEEDS_KMH, overrides_of(options)
-    controllers = options.controller or ("ars", "afs")
-    if options.study is None:
-        return loop_margins(controllers, options.vehicle, speeds_kmh, overrides)
-    with Progress("margins", quiet=options.json) as progress:
-        return worst_margins(
-            options.study, controllers, options.vehicle, speeds_kmh, overrides, progress.count,
-            jobs=options.jobs, scheduler=options.scheduler,
-        )  # fmt: skip
+    terminal.tell(options, rows, lines, pages, "page")

@@ -35,12 +35,6 @@ def table_lines(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -
     return text_table([list(columns.values()), *cells], text=0, repeat=2, least=10, gap=1)
 
 
-def wrapped(text: str) -> Iterator[str]:
-    """Yield lines of 80 columns. The continuation of a longer line is indented four columns further than the line."""
-    for line in text.splitlines():
-        yield coloured("\n".join(wrapped_line(line)))
-
-
 def print_json(value: Any, *, one_line: bool = False) -> None:
     """Print a value as JSON, on one line for a program that reads it while this program runs."""
     text = json_text(value)
@@ -91,20 +85,12 @@ def stdout_for_json() -> Iterator[None]:
                 raise
 
 
-def in_colour() -> bool:
-    """Return whether standard output is coloured: on a terminal, or with FORCE_COLOR, and never with NO_COLOR.
-
-    Source: no-color.org, force-color.org.
-    """
-    if os.environ.get("NO_COLOR"):
-        return False
-    forced = os.environ.get("FORCE_COLOR", "")
-    return forced not in ("", "0") or (sys.stdout.isatty() and os.environ.get("TERM") != "dumb")
-
-
 def painted(text: str, colour: int) -> str:
-    """Return the text in a colour if output is coloured."""
-    return f"\x1b[{colour}m{text}\x1b[0m" if in_colour() and text.strip() else text
+    """Return the text in a colour on a terminal, or with FORCE_COLOR (force-color.org), and never with NO_COLOR."""
+    forced = os.environ.get("FORCE_COLOR", "") not in ("", "0")
+    coloured = forced or (sys.stdout.isatty() and os.environ.get("TERM") != "dumb")
+    plain = bool(os.environ.get("NO_COLOR")) or not text.strip()
+    return f"\x1b[{colour}m{text}\x1b[0m" if coloured and not plain else text
 
 
 def coloured(text: str) -> str:

@@ -4,34 +4,18 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from activesteer.commands.options import (
-    CAR,
-    JOBS,
-    JSON,
-    VEHICLE,
-    WORKERS,
-    Group,
-    check_effect,
-    controllers,
-    driver,
-    flag,
-    one_of,
-    option,
-    output,
-    overrides_of,
-)
-from activesteer.commands.terminal import Progress, coloured, entry, print_json, tell, wrapped
+from activesteer.commands import arguments, terminal
 from activesteer.errors import ParameterError
 from activesteer.files import write_json
 
 if TYPE_CHECKING:
     from activesteer.studies.reproduction import Reproduction
 
-command: Final = Group("verify")
+command: Final = arguments.Group("verify")
 SETTINGS: Final = {"paper": "paper's setting", "literature": "driver from literature"}
 """As in `activesteer.analysis.claims.stored`, which takes too long to import for `--help`."""
 
@@ -44,16 +28,16 @@ def _setting(name: str) -> str:
 
 
 @command("reproduce", "drive the scenarios of the paper and check its claims",
-    output("DIR", "folder for recordings, report and figures", "runs"),
-    VEHICLE,
-    option("--setting", tuple(SETTINGS),
+    arguments.output("DIR", "folder for recordings, report and figures", "runs"),
+    arguments.VEHICLE,
+    arguments.option("--setting", tuple(SETTINGS),
         "paper: the most plausible numbers found for what the paper leaves open, selected by the verdicts; "
         "literature: the nominal car with a driver from published ranges (default). Both may be given",
         many=True, dest="settings", type=_setting),
-    JOBS,
-    flag("--all", "also print every claim with its numbers"),
-    flag("--figures", "also draw the figures"),
-    JSON,
+    arguments.JOBS,
+    arguments.flag("--all", "also print every claim with its numbers"),
+    arguments.flag("--figures", "also draw the figures"),
+    arguments.JSON,
 )  # fmt: skip
 def _reproduce(options: argparse.Namespace) -> int:
     """Drive the 15 runs in every setting asked for, and tell the verdicts."""
@@ -70,26 +54,25 @@ def _reproduce(options: argparse.Namespace) -> int:
     if options.figures:
         figures = draw_figures(results[settings[0]].recordings(), options.output / "figures", options.vehicle)
     status = max(result.exit_status for result in results.values())
-    if options.json:
-        tables = [_json(result) for result in results.values()]
-        about = {"figures": list(map(str, figures)), "report": None if report is None else str(report)}
-        print_json({**(tables[0] if len(tables) == 1 else {"settings": tables}), **about, "exit_status": status})
-        return status
+    tables, lines = [], []
     for name, result in results.items():
-        if len(results) > 1:
-            print(f"{SETTINGS[name]}:")
-        if options.all:
-            print("\n".join(wrapped(result.scorecard.to_text())))
-        print(f"recordings: {3 * len(result.paths)} MCAP files in {folders[name]}")
-        _print_scenarios(result)
+        failures = {f"{scenario} {system}": problem for (scenario, system), problem in result.failures.items()}
+        files = [str(path) for systems in result.paths.values() for path in systems.values()]
+        tables.append({**result.scorecard.to_json(), "files": files, "failures": failures})
+        lines += [f"{SETTINGS[name]}:"] if len(results) > 1 else []
+        lines += [terminal.coloured(result.scorecard.to_text())] if options.all else []
+        lines += [f"recordings: {3 * len(result.paths)} MCAP files in {folders[name]}", *_scenarios(result)]
     if report is not None:
-        print(f"report: {report}")
+        lines.append(f"report: {report}")
     if figures:
-        print(f"figures: {len(figures)} files in {options.output / 'figures'}")
+        lines.append(f"figures: {len(figures)} files in {options.output / 'figures'}")
     if not options.all:
-        print("--all prints every claim with its numbers")
+        lines.append("--all prints every claim with its numbers")
     if "paper" not in settings and options.vehicle == "compact":
-        print("--setting paper drives the most plausible numbers for what the paper leaves open")
+        lines.append("--setting paper drives the most plausible numbers for what the paper leaves open")
+    values = tables[0] if len(tables) == 1 else {"settings": tables}
+    about = {"figures": list(map(str, figures)), "report": None if report is None else str(report)}
+    terminal.tell(options, values | about | {"exit_status": status}, lines)
     return status
 
 
@@ -97,7 +80,7 @@ def _driven(options: argparse.Namespace, folders: Mapping[str, Path]) -> dict[st
     from activesteer.studies.reproduction import reproduce
 
     results: dict[str, Reproduction] = {}
-    with Progress("reproduce", quiet=options.json) as bar:
+    with terminal.Progress("reproduce", quiet=options.json) as bar:
 
         def show(what: str, done: int, total: int) -> None:
             begun = len(results)
@@ -110,14 +93,8 @@ def _driven(options: argparse.Namespace, folders: Mapping[str, Path]) -> dict[st
     return results
 
 
-def _json(result: Reproduction) -> dict[str, Any]:
-    failures = {f"{scenario} {system}": problem for (scenario, system), problem in result.failures.items()}
-    files = [str(path) for systems in result.paths.values() for path in systems.values()]
-    return {**result.scorecard.to_json(), "files": files, "failures": failures}
-
-
-def _print_scenarios(result: Reproduction) -> None:
-    """Print how many claims are reproduced, by scenario and in all, with the texts of the others."""
+def _scenarios(result: Reproduction) -> Iterator[str]:
+    """Yield how many claims are reproduced, by scenario and in all, with the texts of the others."""
     from activesteer.analysis.claims.scorecard import Verdict
     from activesteer.analysis.claims.statements import SCENARIO_OF
 
@@ -127,17 +104,18 @@ def _print_scenarios(result: Reproduction) -> None:
         judged = [item for item in result.scorecard.judged if scenario in (SCENARIO_OF[item.claim.id], "all")]
         held = sum(item.claim.passed for item in judged)
         count = f"{held} of {len(judged)} claims reproduced" if judged else "not judged: a run failed"
-        print(f"{scenario:{width}}  {count}")
+        yield f"{scenario:{width}}  {count}"
         for item in judged:
             if item.verdict in words and scenario != "all":
-                print(entry(f"  {item.claim.id}  {coloured(words[item.verdict])}  ", item.claim.text, hanging=6))
+                head = f"  {item.claim.id}  {terminal.coloured(words[item.verdict])}  "
+                yield terminal.entry(head, item.claim.text, hanging=6)
 
 
 @command("test", "test a car by a standard",
-    option("standard", "STANDARD", "name of the standard (default: print all names)", nargs="?"),
-    controllers(), CAR, driver("the driver of the standard"),
-    output("DIR", "folder for page, JSON and runs; an interrupted test is resumed there (default: none)"),
-    WORKERS, JSON,
+    arguments.option("standard", "STANDARD", "name of the standard (default: print all names)", nargs="?"),
+    arguments.controllers(), arguments.CAR, arguments.driver("the driver of the standard"),
+    arguments.output("DIR", "folder for page, JSON and runs; an interrupted test is resumed there (default: none)"),
+    arguments.WORKERS, arguments.JSON,
 )  # fmt: skip
 def _test(options: argparse.Namespace) -> bool:
     from activesteer.pages import write_page
@@ -145,12 +123,12 @@ def _test(options: argparse.Namespace) -> bool:
 
     if options.output is not None:
         options.how_to_resume = "; the same command resumes it"
-    with Progress(options.standard or "test", quiet=options.json) as bar:
+    with terminal.Progress(options.standard or "test", quiet=options.json) as bar:
         result = examine(
             options.standard or "",
             options.controller or ["none"],
             options.vehicle,
-            overrides_of(options),
+            arguments.overrides_of(options),
             driver=options.driver,
             output=options.output,
             jobs=options.jobs,
@@ -169,23 +147,24 @@ def _test(options: argparse.Namespace) -> bool:
     lines = [result.standard.title]
     for controller, found in result.findings.items():
         word = {True: "passed", False: "FAILED", None: ""}[found.passed]
-        lines.append(entry(coloured(f"{controller:12} {word:7}"), found.summary, 20))
-    tell(options, values, lines, files, "written")
+        lines.append(terminal.entry(terminal.coloured(f"{controller:12} {word:7}"), found.summary, 20))
+    terminal.tell(options, values, lines, files, "written")
     return bool(result.failed)
 
 
 @command("bench", "where the time of a step goes",
-    one_of(
-        flag("--tyre", "what a tyre's evaluation costs instead"),
-        flag("--maneuvers",
+    arguments.one_of(
+        arguments.flag("--tyre", "what a tyre's evaluation costs instead"),
+        arguments.flag("--maneuvers",
             "drive the paper's scenarios instead and compare their key metrics with the stored baseline; exit with 1 "
             "if one has drifted"),
-        flag("--batch", "measure many cars in one native call instead: car-steps per second, processor time, memory"),
+        arguments.flag("--batch",
+            "measure many cars in one native call instead: car-steps per second, processor time, memory"),
     ),
-    flag("--renew", "with --maneuvers: store the metrics as the new baseline"),
-    output("SUMMARY.md", "with --maneuvers: write a summary in Markdown"),
-    JSON,
-    option("--rounds", "N", "the best of N counts (default: 5)", type=int),
+    arguments.flag("--renew", "with --maneuvers: store the metrics as the new baseline"),
+    arguments.output("SUMMARY.md", "with --maneuvers: write a summary in Markdown"),
+    arguments.JSON,
+    arguments.option("--rounds", "N", "the best of N counts (default: 5)", type=int),
     description="Where the time of a step goes, in microseconds. Ratios to `bare` compare with an engine that has "
     "neither tyres nor motion, ratios to `engine` with the engine alone on the same drive, its inputs played back.",
 )  # fmt: skip
@@ -195,16 +174,16 @@ def _bench(options: argparse.Namespace) -> bool:
     if options.rounds is not None and options.rounds < 1:
         raise ParameterError(f"--rounds {options.rounds}: at least 1 is needed")
     if options.maneuvers:
-        check_effect(options, "no effect with --maneuvers: each is driven once", "rounds")
+        arguments.check_effect(options, "no effect with --maneuvers: each is driven once", "rounds")
         return _maneuvers(options)
-    check_effect(options, "an effect with --maneuvers only", "renew", "output")
+    arguments.check_effect(options, "an effect with --maneuvers only", "renew", "output")
     rounds = options.rounds or benchmark.ROUNDS
     if options.batch:
         results = benchmark.bench_batch(rounds)
-        tell(options, results, [benchmark.batch_table(results)])
+        terminal.tell(options, results, [benchmark.batch_table(results)])
     else:
         results = (benchmark.bench_tyre if options.tyre else benchmark.bench)(rounds)
-        tell(options, results, (f"{name:28} {value:8.2f}" for name, value in results.items()))
+        terminal.tell(options, results, (f"{name:28} {value:8.2f}" for name, value in results.items()))
     return False
 
 
@@ -234,5 +213,5 @@ def _maneuvers(options: argparse.Namespace) -> bool:
         *map(str, drifts),
         f"{checked - len(drifts)} of {checked} key metrics are as in the baseline",
     ]
-    tell(options, benchmark.as_json(found, drifts), lines)
+    terminal.tell(options, benchmark.as_json(found, drifts), lines)
     return bool(drifts)

@@ -21,7 +21,7 @@ from activesteer.errors import ParameterError, nearest_names
 
 @dataclass(frozen=True)
 class LinkKind:
-    """One link between chassis (or rack) and knuckle, with its default elasticity."""
+    """One link between chassis (or rack) and knuckle of the left side, with its elasticity."""
 
     name: str
     inner: str
@@ -35,7 +35,7 @@ class LinkKind:
     damping_Nspm: float
     """Damping of the rubber [N s/m]."""
     reason: str
-    """Meaning of the default."""
+    """Meaning or source of these values."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +203,11 @@ class Mount:
     outer: str
     start_m: Array | None
     length_m: float
+
+    @property
+    def on_arm(self) -> bool:
+        """True if the tendon ends at the outer joint of an arm."""
+        return self.start_m is not None and self.lever != 1.0
 
 
 def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, Array], ratio: float = 1.0) -> Mount:

@@ -19,7 +19,7 @@ from activesteer.units import known_unit
 from activesteer.vehicle.electric_drive import Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind, Mount, mount
-from activesteer.vehicle_builder.design import Axle, CarDesign, Link, Log, Solid, TopMount
+from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, TopMount
 from activesteer.vehicle_builder.kc_fit import MeasuredAxle, measured_axle
 from activesteer.vehicle_builder.kc_tables import KcTables
 from activesteer.vehicle_builder.table import AxleTable, CarTable, LinkTable, TopMountTable
@@ -275,9 +275,8 @@ def _axle(
     if table.damper_on is None and not kind.strut and not kind.guided:
         log.note(f"{axle}.damper_on", damper_on, "as the spring")
     frequency = table.ride_frequency_Hz
-    if measured is not None and measured.wheel_rate_Npm is not None:
-        pass
-    elif table.spring_rate_Npm is None and table.wheel_rate_Npm is None and frequency is None:
+    rate = measured.wheel_rate_Npm if measured is not None else None
+    if rate is table.spring_rate_Npm is table.wheel_rate_Npm is frequency is None:
         frequency = 1.2 if front else 1.4
         log.note(f"{axle}.ride_frequency_Hz", f"{frequency:g} Hz", "passenger car; the rear faster, against pitch")
     damping = table.damping_ratio
@@ -288,7 +287,7 @@ def _axle(
         axle,
         kind,
         points,
-        tuple(_link(axle, link, table.links.get(link.name), log) for link in kind.links),
+        tuple(_link(axle, link, table.links.get(link.name, LinkTable()), log) for link in kind.links),
         table,
         tyre,
         parameters,
@@ -334,9 +333,8 @@ def _solid(
     return Solid(kg, default_cg if cg is None else np.array(cg), np.array(inertia))
 
 
-def _link(axle: str, kind: LinkKind, table: LinkTable | None, log: Log) -> Link:
-    table = table or LinkTable()
-    hardening, remark = table.hardening_Npm3, "given"
+def _link(axle: str, kind: LinkKind, table: LinkTable, log: Log) -> LinkKind:
+    key, hardening, remark = f"{axle}.links.{kind.name}", table.hardening_Npm3, "given"
     if table.stiffness_Npm is not None:
         stiffness = table.stiffness_Npm
     elif table.bushings_Npm is not None:
@@ -347,26 +345,23 @@ def _link(axle: str, kind: LinkKind, table: LinkTable | None, log: Log) -> Link:
             words = nearest_names(table.bushing, BUSHINGS_NPM)
             raise ParameterError(
                 f"no class of bushings is named {table.bushing!r}; {words}",
-                key=f"{axle}.links.{kind.name}.bushing",
+                key=f"{key}.bushing",
                 value=table.bushing,
             )
         stiffness, remark = 0.5 * BUSHINGS_NPM[table.bushing], f"two bushings of class {table.bushing}"
-        log.note(f"{axle}.links.{kind.name}.stiffness_Npm", f"{stiffness:g} N/m", remark)
+        log.note(f"{key}.stiffness_Npm", f"{stiffness:g} N/m", remark)
     else:
         stiffness, remark = kind.stiffness_Npm, f"assumed: {kind.reason}"
         hardening = kind.hardening_Npm3 if hardening is None else hardening
-        log.note(
-            f"{axle}.links.{kind.name}",
-            f"{stiffness:g} N/m" + (f" + {hardening:g} N/m3" if hardening else "") + f", {kind.damping_Nspm:g} N s/m",
-            kind.reason,
-        )
+        cubic = f" + {hardening:g} N/m3" if hardening else ""
+        log.note(key, f"{stiffness:g} N/m{cubic}, {kind.damping_Nspm:g} N s/m", kind.reason)
     damping = table.damping_Nspm
     if damping is None and table.stiffness_Npm is table.bushings_Npm is table.bushing is None:
         damping = kind.damping_Nspm
     elif damping is None:
         damping = next(value for minimum, value in _DAMPING if stiffness >= minimum)
-        log.note(f"{axle}.links.{kind.name}.damping_Nspm", f"{damping:g} N s/m", "by stiffness, as in the compact")
-    return Link(kind.name, kind.inner, kind.outer, stiffness, hardening or 0.0, damping, remark)
+        log.note(f"{key}.damping_Nspm", f"{damping:g} N s/m", "by stiffness, as in the compact")
+    return LinkKind(kind.name, kind.inner, kind.outer, stiffness, hardening or 0.0, damping, remark)
 
 
 def _damper_ratio(axle: str, table: AxleTable, measured: MeasuredAxle | None, log: Log) -> float:
@@ -376,9 +371,7 @@ def _damper_ratio(axle: str, table: AxleTable, measured: MeasuredAxle | None, lo
     return log.take(f"{axle}.damper_ratio", given, 1.0, "damper and stops as they act at the wheel")
 
 
-def _anti_roll_bar(
-    axle: str, table: AxleTable, measured: MeasuredAxle | None, half_track: float, log: Log
-) -> float:  # fmt: skip
+def _anti_roll_bar(axle: str, table: AxleTable, measured: MeasuredAxle | None, half_track: float, log: Log) -> float:
     if table.anti_roll_bar_Nmprad is not None:
         # Both wheels carry k (z_l - z_r) = k t phi at an arm of t/2 each: K = k t2.
         return table.anti_roll_bar_Nmprad / (2.0 * half_track) ** 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -20,7 +20,7 @@ from activesteer.vehicle.electric_actuators import RearActuator, SuperpositionAc
 from activesteer.vehicle.electric_drive import Battery, Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle.statics import mass_properties, point_mass_inertia
-from activesteer.vehicle_builder.axle_kinds import AxleKind, Mount
+from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind, Mount
 from activesteer.vehicle_builder.kc_fit import MeasuredAxle
 from activesteer.vehicle_builder.table import AxleTable, CarTable
 
@@ -41,19 +41,6 @@ class Solid:
     mass_kg: float
     cg_m: Array
     inertia_kgm2: Array
-
-
-@dataclass(frozen=True)
-class Link:
-    """A link of the left side."""
-
-    name: str
-    inner: str
-    outer: str
-    stiffness_Npm: float
-    hardening_Npm3: float
-    damping_Nspm: float
-    remark: str
 
 
 @dataclass(frozen=True)
@@ -81,7 +68,7 @@ class Axle:
     name: str
     kind: AxleKind
     points: dict[str, Array]
-    links: tuple[Link, ...]
+    links: tuple[LinkKind, ...]
     table: AxleTable
     tyre: str
     tyre_parameters: TyreParameters
@@ -245,37 +232,8 @@ def _words(values: tuple[float, ...] | Array) -> str:
 _DIGITS: Final = 7
 
 
-class Hardware(Protocol):
-    """Source of actuators, motors and sensors: a table of a car, or a vehicle file."""
-
-    @property
-    def rear_actuator(self) -> RearActuator | None:
-        """Actuator of the rear wheels."""
-        ...
-
-    @property
-    def superposition_actuator(self) -> SuperpositionActuator | None:
-        """Actuator of the superposition."""
-        ...
-
-    @property
-    def motors(self) -> Motors | None:
-        """Electric motors."""
-        ...
-
-    @property
-    def battery(self) -> Battery | None:
-        """Battery of the motors."""
-        ...
-
-    @property
-    def sensors(self) -> Sensors | None:
-        """Sensors of the controllers."""
-        ...
-
-
-def hardware_tables(part: Hardware) -> dict[str, Any]:
-    """Return the tables of actuators, motors, battery and sensors that are not empty."""
+def hardware_tables(part: Any) -> dict[str, Any]:
+    """Return the tables of actuators, motors, battery and sensors that are not empty, of a car's table or file."""
     tables = {
         "rear_actuator": to_table(part.rear_actuator or RearActuator(), defaults=False),
         "superposition_actuator": to_table(part.superposition_actuator or SuperpositionActuator(), defaults=False),

@@ -61,18 +61,8 @@ class Load:
     beside: Array
 
 
-@dataclass(frozen=True)
-class Elasticity:
-    """Fitted fields of `AxleCurves`, and a remark on their basis."""
-
-    stiffness: tuple[float, ...]
-    hardening: tuple[float, ...]
-    hardening_square: tuple[float, ...]
-    remark: str
-
-
-def fitted(loads: list[Load]) -> Elasticity:
-    """Fit stiffness and hardening about the curves to the measured compliance.
+def fitted(loads: list[Load]) -> tuple[dict[str, tuple[float, ...]], str]:
+    """Fit stiffness and hardening about the curves to the measured compliance: fields of `AxleCurves`, and a remark.
 
     Directions that are rigid in the tests, as most are in an axle with few soft bushings, keep a small compliance: a
     wheel oscillates on them at 320 Hz, which is 0.007 mm/kN across the car, or 0.005 deg of wind-up per 100 N m.
@@ -112,12 +102,12 @@ def fitted(loads: list[Load]) -> Elasticity:
         floor = _FLOOR + modes[:, fast] @ modes[:, fast].T / _FASTEST
         compliance, springs, square = parts(refined(numbers) if loads else numbers)
     names = ", ".join(load.name for load in loads)
-    return Elasticity(
-        upper_triangle(np.asarray(np.linalg.inv(compliance), dtype=np.float64)),
-        tuple(float(f"{value:.6g}") for value in springs.ravel()) if hardens else (),
-        tuple(float(f"{value:.6g}") for value in square),
-        f"measured: {names}; not loaded in a test: as usual" if names else "not measured: usual values",
-    )
+    elastic = {
+        "stiffness": upper_triangle(np.asarray(np.linalg.inv(compliance), dtype=np.float64)),
+        "hardening": tuple(float(f"{value:.6g}") for value in springs.ravel()) if hardens else (),
+        "hardening_square": tuple(float(f"{value:.6g}") for value in square),
+    }
+    return elastic, f"measured: {names}; not loaded in a test: as usual" if names else "not measured: usual values"
 
 
 def _start(forces: Array, wanted: Array, weight: Array) -> Array:
@@ -234,23 +224,17 @@ def measured_axle(
         if axle == "front"
         else _servo(wheel_centre_m, kingpin_m) / servo_Nmprad
     )
-    elastic = fitted(_loads(axle, tests, rolling_radius_m, beside))
-    load = tests["parallel_travel"].moved("load")
+    elastic, remark = fitted(_loads(axle, tests, rolling_radius_m, beside))
+    load, damper = (tests["parallel_travel"].moved(name) for name in ("load", "damper"))
     wheel_load = None if load is None else smoothed(tests["parallel_travel"].x, load, travel)
-    curves = replace(
-        placeholder,
-        stiffness=elastic.stiffness,
-        hardening=elastic.hardening,
-        hardening_square=elastic.hardening_square,
-    )
     return MeasuredAxle(
-        curves,
+        replace(placeholder, **elastic),
         None if wheel_load is None else _listed(wheel_load),
         _anti_roll_bar(tests, travel, wheel_load),
-        _damper_ratio(tests["parallel_travel"]),
+        None if damper is None else abs(_slope(tests["parallel_travel"], damper)),
         _rack_lift(tests),
         rough,
-        elastic.remark,
+        remark,
         tuple(unusual(axle, tests)),
     )
 
@@ -398,13 +382,6 @@ def _rack_lift(tests: dict[str, Samples]) -> float:
     rate, reach_m = _slope(opposite, sprung), 0.4 * float(np.abs(steered.x).max())
     rise, push = (_slope(steered, value, reach_m, 2) for value in (lifted, load))
     return float(f"{rise - push / rate:.6g}")
-
-
-def _damper_ratio(samples: Samples) -> float | None:
-    length = samples.moved("damper")
-    if length is None:
-        return None
-    return abs(_slope(samples, length))
 
 
 def _slope(samples: Samples, values: Array, reach_m: float = 1.01 * _NEAR_M, degree: int = 1) -> float:

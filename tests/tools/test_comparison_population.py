@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import math
 import shlex
+from argparse import Namespace
 
 import pyarrow as pa
 import pytest
 
-from activesteer.commands.options import pairs
+from activesteer.commands.arguments import overrides_of
 from activesteer.errors import ParameterError, StudyError
 from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.studies.engine.factor_values import FactorValues, label_of
@@ -79,7 +80,7 @@ def test_the_worst_runs_come_with_the_command_that_repeats_them():
     planned = comparison_study(("none", "lqr"), 3)
     words = shlex.split(run.command)
     assert words[:5] == ["activesteer", "run", "sine_with_dwell", "-c", "lqr"]
-    given = pairs(words[words.index("--set") + 1 :: 2], "--set", "")
+    given = overrides_of(Namespace(override_files=None, overrides=words[words.index("--set") + 1 :: 2]))
     sample = planned.samples()[0][2]
     needed = planned.overrides | FactorValues(planned).overrides(0, 0, sample)
     assert given == {key: value for key, value in needed.items() if key != "driver"}

@@ -71,22 +71,16 @@ def _mirror(model: mujoco.MjModel, points: dict[str, Array]) -> Iterator[Finding
                 wrong.append(name)
     yield _any("right side mirrors the left side", wrong, "edit both sides; see docs/suspension.md")
     unlike = []
-    for index in range(model.nbody):
-        name = model.body(index).name
-        if name[:2] in _OPPOSITE and name[2:3] == "_":
-            other = model.body(_OPPOSITE[name[:2]] + name[2:]).id
-            same = np.isclose(model.body_mass[index], model.body_mass[other], rtol=1e-9)
-            if not same or not np.allclose(model.body_inertia[index], model.body_inertia[other], rtol=1e-6):
-                unlike.append(name)
-    for index in range(model.ntendon):
-        name = model.tendon(index).name
-        if name[:2] in _OPPOSITE and name[2:3] == "_":
-            other = model.tendon(_OPPOSITE[name[:2]] + name[2:]).id
-            same = model.tendon_stiffness[index] == model.tendon_stiffness[other]
-            if not same or not np.allclose(
-                model.tendon_lengthspring[index], model.tendon_lengthspring[other], rtol=1e-9
-            ):
-                unlike.append(name)
+    for part, count, values in (
+        (model.body, model.nbody, ((model.body_mass, 1e-9), (model.body_inertia, 1e-6))),
+        (model.tendon, model.ntendon, ((model.tendon_stiffness, 0.0), (model.tendon_lengthspring, 1e-9))),
+    ):
+        for index in range(count):
+            name = part(index).name
+            if name[:2] in _OPPOSITE and name[2:3] == "_":
+                other = part(_OPPOSITE[name[:2]] + name[2:]).id
+                if not all(np.allclose(array[index], array[other], rtol=rtol) for array, rtol in values):
+                    unlike.append(name)
     yield _any("equal masses, springs and bushings on both sides", unlike, "edit both sides, or the class of both")
 
 

@@ -7,13 +7,10 @@ import difflib
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from activesteer.errors import MAX_SHOWN, ParameterError, nearest_names
 from activesteer.resources import DEFAULT_DRIVER
-
-if TYPE_CHECKING:
-    from activesteer.scenario import Scenario
 
 Action = Callable[[argparse.Namespace], int | None]
 """Function of a command. Returns its exit status if this is not 0."""
@@ -217,20 +214,9 @@ def numbers(text: str) -> list[float]:
         raise argparse.ArgumentTypeError(f"{text!r} is no list of numbers such as 60,100") from None
 
 
-def scenario_of(options: argparse.Namespace) -> Scenario:
-    """Return the scenario that the arguments describe."""
-    from activesteer.scenario import resolve
-
-    faults = {"fault": " ".join(options.faults)} if options.faults else {}
-    overrides = overrides_of(options, faults)
-    given = getattr(options, "controller", None) or ()
-    controllers = [given] if isinstance(given, str) else given
-    return resolve(options.maneuver, options.vehicle, overrides, options.driver, controllers)
-
-
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the parameters that `--overrides` and `--set` replace."""
-    from activesteer.config import read_toml
+    """Return the parameters that `--overrides` and `--set` replace, with values as in TOML; any other is a text."""
+    from activesteer.config import parse_value, read_toml
 
     values = dict(given or {})
     for path in options.override_files or ():
@@ -241,22 +227,11 @@ def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = 
             if key in values:
                 raise source.fail((key,), "is given twice; leave one out")
         values |= table
-    return pairs(options.overrides or (), "--set", "road.mu=0.4", values)
-
-
-def pairs(texts: Sequence[str], option: str, example: str, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the keys and values of a repeated option `key=value`, beside those that are given already.
-
-    A value is written as in TOML; any other value is a text.
-    """
-    from activesteer.config import parse_value
-
-    values = dict(given or {})
-    for text in texts:
+    for text in options.overrides or ():
         key, sign, value = (part.strip() for part in text.partition("="))
         if not sign or not key:
             shortened = text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
-            raise ParameterError(f"{option} {shortened}: KEY=VALUE is needed, as in {option} {example}", value=text)
+            raise ParameterError(f"--set {shortened}: KEY=VALUE is needed, as in --set road.mu=0.4", value=text)
         if key in values:
             raise ParameterError("is given twice; leave one out", key=key, value=value, overridden=True)
         values[key] = parse_value(value)
