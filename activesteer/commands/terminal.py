@@ -50,8 +50,9 @@ def tell(
         print_json(values)
         return
     for line in lines:
-        command = "activesteer " in line  # to be copied
-        print("\n".join([line] if command else [part for one in line.split("\n") for part in wrapped_line(one)]))
+        # A command or a path is there to be copied.
+        copied = "activesteer " in line or os.path.exists(line.rpartition(" ")[2])
+        print("\n".join([line] if copied else [part for one in line.split("\n") for part in wrapped_line(one)]))
     for path in files:
         print(f"{word}: {path}")
 

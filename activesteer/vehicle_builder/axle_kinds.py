@@ -40,24 +40,15 @@ class LinkKind:
 
 @dataclass(frozen=True)
 class AxleKind:
-    """One kind of suspension.
-
-    Attributes:
-        name: Name in a table.
-        axles: Axles that can have it, `front` or `rear`.
-        links: Its links.
-        points: Points needed in addition to the ends of the links.
-        carriers: Possible carriers of a spring or damper: `strut`, `knuckle`, the `travel` of the wheel itself, or an
-            arm (name to its inner points) of one or two links.
-        spring_on: Default carrier of the spring.
-    """
+    """One kind of suspension."""
 
     name: str
-    axles: tuple[str, ...]
+    axles: tuple[str, ...]  # that can have it
     links: tuple[LinkKind, ...]
-    points: tuple[str, ...]
+    points: tuple[str, ...]  # in addition to the ends of the links
+    # Of a spring or damper: `strut`, `knuckle`, the `travel` of the wheel, or an arm with its one or two inner points.
     carriers: dict[str, tuple[str, ...]]
-    spring_on: str
+    spring_on: str  # default carrier of the spring
 
     @property
     def strut(self) -> bool:
@@ -168,14 +159,9 @@ KINDS: Final = (MCPHERSON, DOUBLE_WISHBONE, DOUBLE_WISHBONE_REAR, FIVE_LINK, MUL
 DEFAULTS: Final = {"front": "mcpherson", "rear": "five_link"}
 
 
-def kinds_for(axle: str) -> dict[str, AxleKind]:
-    """Return the kinds of suspension of a front or rear axle by name."""
-    return {kind.name: kind for kind in KINDS if axle in kind.axles}
-
-
 def kind_of(axle: str, name: str) -> AxleKind:
     """Return a kind of suspension."""
-    kinds = kinds_for(axle)
+    kinds = {kind.name: kind for kind in KINDS if axle in kind.axles}
     if name not in kinds:
         raise ParameterError(f"no {axle} suspension is named {name!r}; {nearest_names(name, kinds)}", value=name)
     return kinds[name]
@@ -187,22 +173,13 @@ _MIN_LEVER, _MAX_LEVER = 0.05, 1.5
 
 @dataclass(frozen=True)
 class Mount:
-    """Attachment of a spring or damper.
+    """Attachment of a spring or damper."""
 
-    Attributes:
-        carrier: Carrier of its lower end.
-        lever: Force at the outer joint of the arm, or along the wheel travel, per force of the spring; 1 on the
-            knuckle.
-        outer: Site at which the tendon ends, without the corner.
-        start_m: Start of the tendon on the chassis; None if it lies along a strut or acts along the travel.
-        length_m: Length in the design position; 0 along a strut.
-    """
-
-    carrier: str
-    lever: float
-    outer: str
-    start_m: Array | None
-    length_m: float
+    carrier: str  # of its lower end
+    lever: float  # force at the arm's outer joint, or along the wheel travel, per force of the spring; 1 on the knuckle
+    outer: str  # site at which the tendon ends, without the corner
+    start_m: Array | None  # start of the tendon on the chassis; None along a strut or along the travel
+    length_m: float  # in the design position; 0 along a strut
 
     @property
     def on_arm(self) -> bool:

@@ -11,8 +11,6 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import mujoco
-
 from activesteer.errors import ActiveSteerError, ParameterError, TyreFileError, nearest_names, shown
 from activesteer.files import is_file, user_path, writing
 from activesteer.resources import models_dir
@@ -28,7 +26,7 @@ from activesteer.vehicle_builder.kc_tables import KcTables, read_kc
 from activesteer.vehicle_builder.mjcf import mjcf_files
 from activesteer.vehicle_builder.table import CarTable, check_points, chosen_kinds, in_vehicle_axes, read_table
 from activesteer.vehicle_builder.texts import readme_text, vehicle_text
-from activesteer.vehicle_builder.trim import Trimmed, trim
+from activesteer.vehicle_builder.trim import Trimmed, compiled_model, trim
 
 
 def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
@@ -163,19 +161,15 @@ def _drive(folder: Path, car: CarDesign, trimmed: Trimmed) -> list[str]:
         found = two_track_of(file, run_scenario)
     except ActiveSteerError as reason:
         return [f"no [two_track], which estimators need: {reason}"]
-    file.write_text(vehicle_text(car, trimmed, _compiled(folder, car), found), encoding="utf-8")
+    file.write_text(vehicle_text(car, trimmed, compiled_model(file.with_suffix(".xml")), found), encoding="utf-8")
     return []
-
-
-def _compiled(folder: Path, car: CarDesign) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_path(str(folder / f"{car.name}.xml"))
 
 
 def _write(folder: Path, car: CarDesign, trimmed: Trimmed, *, final: bool = False) -> Path:
     """Write MJCF and vehicle file. Only the final file holds the single-track model of the car itself."""
     for name, text in mjcf_files(car, trimmed).items():
         (folder / name).write_text(text, encoding="utf-8")
-    model = _compiled(folder, car) if final else None
+    model = compiled_model(folder / f"{car.name}.xml") if final else None
     file = folder / f"{car.name}.toml"
     file.write_text(vehicle_text(car, trimmed, model), encoding="utf-8")
     return file

@@ -25,32 +25,25 @@ from activesteer.vehicle_builder.kc_tables import KcTables
 from activesteer.vehicle_builder.table import AxleTable, CarTable, LinkTable, TopMountTable
 
 
-def _steering_axis(front: Axle) -> tuple[Array, Array]:
-    """Return lower and upper point of the front steering axis, without elasticity."""
-    upper = front.points["strut_top" if front.kind.strut else "uca_outer"]
-    return front.points["lca_outer"], upper
-
-
 def rack_sign(front: Axle) -> float:
     """Return the sign of the rack's y when the left wheel steers left; default: that of tie rods behind the axle."""
     if front.kind.guided:
         return -1.0
-    return math.copysign(1.0, _rack_per_steer(_steering_axis(front), *_tie_rod(front)))
+    return math.copysign(1.0, _rack_per_steer(front))
 
 
-def _tie_rod(front: Axle) -> tuple[Array, Array]:
-    return front.points["tie_rod_inner"], front.points["tie_rod_outer"]
-
-
-def _rack_per_steer(axis: tuple[Array, Array], inner: Array, outer: Array) -> float:
+def _rack_per_steer(front: Axle) -> float:
     """Return the rack travel to the left per steer angle of the left wheel, rigid links [m/rad]."""
-    along = (axis[1] - axis[0]) / np.linalg.norm(axis[1] - axis[0])
+    # The steering axis without elasticity.
+    lower, upper = front.points["lca_outer"], front.points["strut_top" if front.kind.strut else "uca_outer"]
+    inner, outer = front.points["tie_rod_inner"], front.points["tie_rod_outer"]
+    along = (upper - lower) / np.linalg.norm(upper - lower)
     rod = outer - inner
     if abs(rod[1]) < 1e-3:
         raise ParameterError(
             "the tie rod does not run across the car: tie_rod_inner and tie_rod_outer have the same y", key="front"
         )
-    moved = np.cross(along, outer - axis[0])
+    moved = np.cross(along, outer - lower)
     per_steer = float(rod @ moved / rod[1])
     if abs(per_steer) < 0.02:
         raise ParameterError(
@@ -67,7 +60,7 @@ def rack_per_steer_m(front: Axle) -> float:
         rack, steer = front.measured.curves.rack_m, front.measured.curves.rack_steer_rad
         near = np.argsort(np.abs(rack))[:5]
         return 1.0 / float(np.polyfit(np.array(rack)[near], np.array(steer)[near], 1)[0])
-    return abs(_rack_per_steer(_steering_axis(front), *_tie_rod(front)))
+    return abs(_rack_per_steer(front))
 
 
 def rack_limit_m(front: Axle) -> float:
@@ -230,23 +223,18 @@ def _axle(
         points |= {name: centre + np.array(beside) for name, beside in _DRAWN.items()}
     outer = np.mean([points[link.outer] for link in kind.links] or [points["damper_outer"]], axis=0)
     knuckle = _solid(
-        f"{axle}.knuckle", table.knuckle_mass_kg, table.knuckle_cg, table.knuckle_inertia_kgm2,
-        (20.5 if kind.strut else 18.0) if front else 12.5, 0.5 * (centre + outer), (0.3, 0.28, 0.16), 20.5,
-        "between the wheel centre and the mean of the outer points", log,
+        axle, "knuckle", table, (20.5 if kind.strut else 18.0) if front else 12.5, 0.5 * (centre + outer),
+        (0.3, 0.28, 0.16), 20.5, "between the wheel centre and the mean of the outer points", log,
     )  # fmt: skip
     strut = carrier = None
     if kind.strut:
         top, bottom = points["strut_top"], points["strut_bottom"]
         down = (bottom - top) / np.linalg.norm(bottom - top)
-        strut = _solid(
-            f"{axle}.strut", table.strut_mass_kg, table.strut_cg, table.strut_inertia_kgm2, 3.0, top + 0.1 * down,
-            (0.03, 0.03, 0.006), 3.0, "0.1 m below the top mount", log,
-        )  # fmt: skip
+        inertia = (0.03, 0.03, 0.006)
+        strut = _solid(axle, "strut", table, 3.0, top + 0.1 * down, inertia, 3.0, "0.1 m below the top mount", log)
     if not front:
-        carrier = _solid(
-            f"{axle}.carrier", table.carrier_mass_kg, table.carrier_cg, table.carrier_inertia_kgm2, 6.0,
-            centre - np.array([0.0, 0.04, 0.0]), (0.04, 0.05, 0.04), 6.0, "40 mm inside the wheel centre", log,
-        )  # fmt: skip
+        inside, inertia = centre - np.array([0.0, 0.04, 0.0]), (0.04, 0.05, 0.04)
+        carrier = _solid(axle, "carrier", table, 6.0, inside, inertia, 6.0, "40 mm inside the wheel centre", log)
     spin = log.take(
         f"{axle}.wheel_spin_inertia_kgm2", table.wheel_spin_inertia_kgm2, wheel_kg * (0.736 * radius) ** 2,
         "radius of gyration 0.736 of the tyre's radius", "kg m2",
@@ -310,10 +298,9 @@ def _axle(
 
 
 def _solid(
-    key: str,
-    mass: float | None,
-    cg: tuple[float, ...] | None,
-    inertia: tuple[float, ...] | None,
+    axle: str,
+    part: str,
+    table: AxleTable,
     default_kg: float,
     default_cg: Array,
     default_inertia: tuple[float, ...],
@@ -322,7 +309,9 @@ def _solid(
     log: Log,
 ) -> Solid:
     """Return the mass properties of one part; a missing inertia scales with the mass."""
-    kg = log.take(f"{key}_mass_kg", mass, default_kg, "a part of this kind in the compact's class", "kg")
+    key = f"{axle}.{part}"
+    mass_kg, cg, inertia = (getattr(table, f"{part}_{name}") for name in ("mass_kg", "cg", "inertia_kgm2"))
+    kg = log.take(f"{key}_mass_kg", mass_kg, default_kg, "a part of this kind in the compact's class", "kg")
     if cg is None:
         log.note(f"{key}_cg", " ".join(f"{value:.3f}" for value in default_cg) + " m", where)
     if inertia is None:

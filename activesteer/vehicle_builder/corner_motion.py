@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 
@@ -14,32 +12,26 @@ _ROTATION_M = 0.3
 """Length that makes a rotation comparable with a displacement: the size of a knuckle."""
 
 
-@dataclass(frozen=True)
-class CornerMotion:
-    """Motion of one corner.
+def corner_motion(model: mujoco.MjModel, corner: str) -> tuple[dict[str, float], float]:
+    """Return the shortening of each tendon per wheel travel in bump, with rigid links, and the firmness.
 
-    Attributes:
-        links: Names of its links.
-        firmness: Smallest singular value of the directions of the links: 0 if two links constrain the same direction,
-            0.05 to 0.5 in cars.
-        per_travel: Tendon to shortening per wheel travel in bump, rigid links.
+    The firmness is the smallest singular value of the directions of the links: 0 if two links constrain the same
+    direction, 0.05 to 0.5 in cars. Chassis and rack are held, and springs are left out.
     """
-
-    links: tuple[str, ...]
-    firmness: float
-    per_travel: dict[str, float]
-
-
-def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
-    """Return the motion of a corner with held chassis and rack, without springs."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
-    dofs, scale = _freedoms(model, corner)
+    dofs, lengths = [], []
+    for dof in range(model.nv):
+        joint = model.joint(int(model.dof_jntid[dof]))
+        if joint.name.startswith(f"{corner}_") and not joint.name.endswith(("_spin", "_steer")):
+            dofs.append(dof)
+            lengths.append(1.0 if int(joint.type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE) else _ROTATION_M)
+    scale = np.array(lengths)
     rows = {name: row[dofs] for name, row in _tendon_rows(model, data, corner).items()}
     if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_camber") >= 0:
         # Curves guide the wheel: springs and dampers act along the travel, and all else follows it.
         travel = dofs.index(int(model.joint(f"{corner}_z").dofadr[0]))
-        return CornerMotion((), 1.0, {name: -float(row[travel]) for name, row in rows.items()})
+        return {name: -float(row[travel]) for name, row in rows.items()}, 1.0
     links = tuple(name for name in rows if not name.endswith(("_spring", "_damper")))
     jacobian = np.array([rows[name] for name in links]).reshape(len(links), len(dofs)) / scale
     lengths = np.linalg.norm(jacobian, axis=1, keepdims=True)
@@ -58,21 +50,7 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> CornerMotion:
         raise ModelError(
             "the links let the wheel move, but not up and down; are two of their points exchanged?", key=corner
         )
-    per_travel = {name: -float(row @ direction) / rise for name, row in rows.items()}
-    return CornerMotion(links, float(values[-1]), per_travel)
-
-
-def _freedoms(model: mujoco.MjModel, corner: str) -> tuple[list[int], Array]:
-    """Return the degrees of freedom of a corner's bodies without spin and steering, and a length for each [m]."""
-    dofs, scale = [], []
-    for dof in range(model.nv):
-        joint = model.joint(int(model.dof_jntid[dof]))
-        if not joint.name.startswith(f"{corner}_") or joint.name.endswith(("_spin", "_steer")):
-            continue
-        dofs.append(dof)
-        slide = int(joint.type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
-        scale.append(1.0 if slide else _ROTATION_M)
-    return dofs, np.array(scale)
+    return {name: -float(row @ direction) / rise for name, row in rows.items()}, float(values[-1])
 
 
 def _tendon_rows(model: mujoco.MjModel, data: mujoco.MjData, corner: str) -> dict[str, Array]:

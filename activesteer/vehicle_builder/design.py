@@ -45,20 +45,12 @@ class Solid:
 
 @dataclass(frozen=True)
 class TopMount:
-    """The top mount of a strut or damper.
+    """The top mount of a strut or damper: slide `z` along the axis of the left side, a strut also `x`, `y`."""
 
-    Attributes:
-        directions: Unit vector of each slide of the left side, vehicle axes: `z` along the axis, upwards; a strut also
-            has `x` and `y` across it, forward and to the left.
-        stiffness_Npm: Stiffness of each slide [N/m].
-        damping_Nspm: Damping of each slide [N s/m].
-        rod: Piston and rod of a damper; None for a strut, which has a body of its own.
-    """
-
-    directions: dict[str, Array]
+    directions: dict[str, Array]  # unit vector of each slide, vehicle axes: upwards, forward, to the left
     stiffness_Npm: dict[str, float]
     damping_Nspm: dict[str, float]
-    rod: Solid | None
+    rod: Solid | None  # piston and rod of a damper; None for a strut, which has its own body
 
 
 @dataclass
@@ -179,12 +171,13 @@ def chassis_of(car: CarDesign, model: mujoco.MjModel, log: Log) -> Solid:
             inertia = _usual_inertia(table.chassis_kg, base, car, 0.5)
             log.note("mass.chassis_inertia_kgm2", _words(inertia), _INERTIA_RULE)
         return Solid(table.chassis_kg, np.array(table.chassis_cg), np.array(inertia))
-    if table.total_kg is None or table.front_fraction is None or table.cg_height_m is None:
-        raise ParameterError(
-            "total_kg, front_fraction and cg_height_m are needed, or chassis_kg and chassis_cg", key="mass"
-        )
+    assert table.total_kg is not None
+    assert table.front_fraction is not None
+    assert table.cg_height_m is not None
     mass = table.total_kg - others.mass_kg
-    cg = np.array([_cg_x(car, table.front_fraction), 0.0, table.cg_height_m])
+    # The weights act on the contact points, below the wheel centres.
+    rear, front = car.rear.wheel_centre_m[0], car.front.wheel_centre_m[0]
+    cg = np.array([float(rear + table.front_fraction * (front - rear)), 0.0, table.cg_height_m])
     if mass < 0.3 * table.total_kg:
         raise ParameterError(
             f"wheels, knuckles and rack weigh {others.mass_kg:.0f} kg of {table.total_kg:.0f} kg", key="mass.total_kg"
@@ -217,12 +210,6 @@ def _usual_inertia(mass: float, base: float, car: CarDesign, front_fraction: flo
     yaw = 0.915 * mass * to_front * (base - to_front)
     track = car.front.wheel_centre_m[1] + car.rear.wheel_centre_m[1]
     return round(mass * (0.4 * track) ** 2, 1), round(0.95 * yaw, 1), round(yaw, 1)
-
-
-def _cg_x(car: CarDesign, front_fraction: float) -> float:
-    """Return x of the centre of gravity from the weights on the contact points, below the wheel centres."""
-    rear, front = car.rear.wheel_centre_m[0], car.front.wheel_centre_m[0]
-    return float(rear + front_fraction * (front - rear))
 
 
 def _words(values: tuple[float, ...] | Array) -> str:

@@ -43,21 +43,14 @@ _FIRST_SPRINGS: Final = np.array([1.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, -0.5, 
 
 @dataclass(frozen=True)
 class Load:
-    """One test of compliance on the left wheel.
-
-    Attributes:
-        name: The test.
-        direction: Load at the wheel centre per unit of x: forces along x and y, moments about x, y and z.
-        x: Values of the variable [N, N m].
-        moved: Coordinate to its change [m, rad]; None if not measured.
-        beside: Compliance in series with the wheel's own, shape (5, 5): the rack that both wheels push in the same
-            direction, or the servo of the rear steering.
-    """
+    """One test of compliance on the left wheel."""
 
     name: str
-    direction: Array
-    x: Array
-    moved: dict[str, Array | None]
+    direction: Array  # load at the wheel centre per unit of x: forces along x and y, moments about x, y and z
+    x: Array  # values of the variable [N, N m]
+    moved: dict[str, Array | None]  # coordinate to its change [m, rad]; None if not measured
+    # Compliance in series with the wheel's own, shape (5, 5): the rack that both wheels push in the same direction, or
+    # the servo of the rear steering.
     beside: Array
 
 
@@ -168,28 +161,18 @@ _DIGITS: Final = 7
 
 @dataclass(frozen=True)
 class MeasuredAxle:
-    """Measurements of an axle, for one wheel.
+    """Measurements of an axle, for one wheel. None stands for what was not measured."""
 
-    Attributes:
-        curves: Measured curves, and the stiffness.
-        wheel_load_N: Load over `curves.travel_m`, relative to the standing car [N]; None if not measured.
-        anti_roll_bar_Npm: Rate from opposite and parallel travel; None if they do not show it.
-        damper_ratio: Shortening of the damper per wheel travel; None if not measured.
-        rack_lift: Rise of the left wheel centre per travel of the rack to the left, at a fixed spring length: the work
-            of the wheel load as caster raises one wheel and lowers the other.
-        roughness: Channel to the largest distance of a sample from the curve through all samples, in SI units.
-        stiffness_remark: Basis of the elastic part.
-        questions: Unusual measurements.
-    """
-
-    curves: AxleCurves
-    wheel_load_N: tuple[float, ...] | None
-    anti_roll_bar_Npm: float | None
-    damper_ratio: float | None
+    curves: AxleCurves  # measured curves, and the stiffness
+    wheel_load_N: tuple[float, ...] | None  # over `curves.travel_m`, relative to the standing car
+    anti_roll_bar_Npm: float | None  # from opposite and parallel travel
+    damper_ratio: float | None  # shortening of the damper per wheel travel
+    # Rise of the left wheel centre per travel of the rack to the left, at a fixed spring length: the work of the wheel
+    # load as caster raises one wheel and lowers the other.
     rack_lift: float
-    roughness: dict[str, float]
-    stiffness_remark: str
-    questions: tuple[str, ...]
+    roughness: dict[str, float]  # channel to the largest distance of a sample from the curve, SI units
+    stiffness_remark: str  # basis of the elastic part
+    questions: tuple[str, ...]  # unusual measurements
 
     @property
     def wheel_rate_Npm(self) -> float | None:

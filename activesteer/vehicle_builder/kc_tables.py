@@ -16,7 +16,7 @@ question.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -25,9 +25,9 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 
 from activesteer import limits
-from activesteer.config import Source, read_toml
+from activesteer.config import Source, build, read_toml
 from activesteer.conventions import Array
-from activesteer.errors import ParameterError, nearest_names, shown
+from activesteer.errors import ParameterError, nearest_names
 from activesteer.files import csv_number, is_file, is_folder, read_csv
 from activesteer.rigs.kc.result import CHANNELS, OF_THE_AXLE, TESTS
 from activesteer.units import UNIT_NAMES, alike, find_unit
@@ -51,16 +51,10 @@ _GREATEST_WAY_M: Final = 10.0
 
 @dataclass(frozen=True)
 class Samples:
-    """One test for the left wheel, SI units.
+    """One test for the left wheel, SI units."""
 
-    Attributes:
-        x: Variable: travel, rack to the left, force forwards or to the left, moment to the left; shape (n,).
-        channels: Channel to samples, shape (n,).
-        file: Name of the file.
-    """
-
-    x: Array
-    channels: dict[str, Array]
+    x: Array  # travel, rack to the left, force forwards or to the left, moment to the left; shape (n,)
+    channels: dict[str, Array]  # channel to samples, shape (n,)
     file: str
 
     def moved(self, name: str) -> Array | None:
@@ -105,7 +99,7 @@ def read_kc(folder: Path, axles: list[str]) -> KcTables:
     """Read the tests of a folder."""
     if not is_folder(folder):
         raise ParameterError(f"there is no folder {folder}")
-    names, signs = _translation(folder)
+    names = _translation(folder)
     _check_files(folder)
     tests: dict[str, dict[str, Samples]] = {axle: {} for axle in axles}
     pinion = None
@@ -114,7 +108,7 @@ def read_kc(folder: Path, axles: list[str]) -> KcTables:
             file = next((path for end in ("csv", "toml") if is_file(path := folder / f"{axle}_{name}.{end}")), None)
             if file is None:
                 continue
-            columns = _columns(file, names, signs)
+            columns = _columns(file, names)
             if name == "steering":
                 pinion = _complete_rack(columns, file)
             found[name] = _left_wheel(columns, name, file)
@@ -133,38 +127,37 @@ def _check_files(folder: Path) -> None:
             raise ParameterError(f"no test is named so; {nearest_names(path.stem, known)}", file=path.name)
 
 
-def _translation(folder: Path) -> tuple[dict[str, str], dict[str, float]]:
+@dataclass(frozen=True)
+class _Names:
+    """Tables of names.toml."""
+
+    names: dict[str, str] = field(default_factory=dict)
+    signs: dict[str, float] = field(default_factory=dict)
+
+
+def _translation(folder: Path) -> _Names:
     file = folder / NAMES_FILE
     if not is_file(file):
-        return {}, {}
+        return _Names()
     raw, source = read_toml(file)
-    for key, table in raw.items():
-        if key not in ("names", "signs"):
-            raise source.fail((key,), f"there is no such table; {nearest_names(key, ('names', 'signs'))}")
-        if not isinstance(table, dict):
-            raise source.fail((key,), f"{shown(table)} is no table")
-    for name, channel in raw.get("names", {}).items():
-        if not isinstance(channel, str):
-            raise source.fail(("names", name), f"{shown(channel)} is no channel with its unit, as 'left_toe [deg]'")
-    signs: dict[str, float] = {}
-    for channel, sign in raw.get("signs", {}).items():
+    found = build(_Names, raw, source)
+    for channel, sign in found.signs.items():
         if channel not in CHANNELS:
             raise source.fail(("signs", channel), f"no channel is named so; {nearest_names(channel, CHANNELS)}")
         if sign not in (1, -1):
             raise source.fail(("signs", channel), f"{sign!r} is no sign; 1 and -1 are")
-        signs[channel] = float(sign)
-    return dict(raw.get("names", {})), signs
+    return found
 
 
-def _columns(file: Path, names: Mapping[str, str], signs: Mapping[str, float]) -> dict[str, Array]:
+def _columns(file: Path, names: _Names) -> dict[str, Array]:
     """Return channels (with side) to values in SI units and our signs."""
     columns: dict[str, Array] = {}
     for head, values in _raw_columns(file).items():
-        channel, factor = _channel(file, head, names.get(head, head))
+        channel, factor = _channel(file, head, names.names.get(head, head))
         if channel in columns:
             raise ParameterError(f"two columns are {channel}", file=file.name, key=head)
         bare = channel.removeprefix("left_").removeprefix("right_")
-        columns[channel] = factor * signs.get(bare, 1.0) * values
+        columns[channel] = factor * names.signs.get(bare, 1.0) * values
         greatest, reached = _GREATEST.get(bare, _GREATEST_WAY_M), float(np.abs(columns[channel]).max(initial=0.0))
         if reached > greatest:
             raise ParameterError(
@@ -288,39 +281,24 @@ def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
     return Samples(x[order], channels, file.name)
 
 
-_NEAR: Final = {
-    "parallel_travel": 0.02,
-    "steering": 0.02,
-    "side_force": 1500.0,
-    "side_force_opposed": 1500.0,
-    "braking_force": 1500.0,
-    "drive_force": 1500.0,
-    "aligning_moment": 100.0,
-    "aligning_moment_opposed": 100.0,
-}
-"""Range about zero within which a slope counts [m, N, N m]."""
+_NEAR: Final = {"travel": 0.02, "rack": 0.02, "force": 1500.0, "moment": 100.0}
+"""Variable -> range about zero within which a slope counts [m, N, N m]."""
 _HINT: Final = f" ({NAMES_FILE} turns the sign of a channel)"
 _MUST_RISE: Final = (
     ("parallel_travel", "load", "the wheel load falls in bump: is travel positive in bump?"),
     ("steering", "-toe", "the left wheel turns to the right as the rack steers left: signs of rack and toe?"),
     # The force does work at the contact point; a wheel that leans over may move its centre the other way.
     ("side_force", "contact_outwards", "the contact moves against the side force: sign of force or way outwards?"),
-    (
-        "side_force_opposed",
-        "contact_outwards",
-        "the contact moves against the side force: sign of force or way outwards?",
-    ),
     ("braking_force", "contact_forward", "the contact moves against the longitudinal force: sign of force or way?"),
     ("drive_force", "centre_forward", "the wheel moves against the longitudinal force: sign of force or way?"),
     ("aligning_moment", "-toe", "the wheel turns against the moment: sign of moment or toe?"),
-    ("aligning_moment_opposed", "-toe", "the wheel turns against the moment: sign of moment or toe?"),
 )
 """Test, channel that has to rise with the variable, and message if it falls."""
 
 
 def check_signs(tests: dict[str, Samples]) -> None:
     """Check the signs of the slopes."""
-    for name, channel, words in _MUST_RISE:
+    for name, channel, words in ((name + end, *rest) for name, *rest in _MUST_RISE for end in ("", "_opposed")):
         if name not in tests or (slope := _slope(name, tests[name], channel)) is None:
             continue
         if slope < -_least(name, channel, tests[name]):
@@ -356,7 +334,7 @@ def _slope(name: str, samples: Samples, channel: str) -> float | None:
     values = samples.channels.get(channel.removeprefix("-"))
     if values is None:
         return None
-    near = np.abs(samples.x) <= _NEAR[name]
+    near = np.abs(samples.x) <= _NEAR[TESTS[name].variable]
     if int(near.sum()) < 3:
         near = np.ones(len(samples.x), dtype=bool)
     return (-1.0 if channel.startswith("-") else 1.0) * float(np.polyfit(samples.x[near], values[near], 1)[0])
@@ -365,4 +343,4 @@ def _slope(name: str, samples: Samples, channel: str) -> float | None:
 def _least(name: str, channel: str, samples: Samples) -> float:
     """Smallest slope that counts: 0.02 mm or 0.002 deg, or 10 N, over the evaluated range."""
     step = 10.0 if channel == "load" else 3e-5 if channel.endswith("toe") else 2e-5
-    return step / min(_NEAR[name], float(np.abs(samples.x).max()))
+    return step / min(_NEAR[TESTS[name].variable], float(np.abs(samples.x).max()))

@@ -327,18 +327,19 @@ _ONE_OF: Final = (
     ("spring_rate_Npm", "wheel_rate_Npm", "ride_frequency_Hz"),
     ("damper_force_N", "damper_Nspm", "damping_ratio"),
     ("anti_roll_bar_Npm", "anti_roll_bar_Nmprad"),
+    ("stiffness_Npm", "bushings_Npm", "bushing"),
+    ("ratio", "pinion_radius_m"),
 )
-"""Keys of an axle of which one is enough."""
-_STIFFNESS: Final = ("stiffness_Npm", "bushings_Npm", "bushing")
+"""Keys of a part of which one is enough."""
+_TOGETHER: Final = (("damper_velocity_mps", "damper_force_N"), ("axis_lower", "axis_upper"))
+"""Keys of a part that belong together."""
 
 
 def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source) -> None:
     """Check names, number and units of all points, and units of other values."""
     problems = [
         *_name_problems(table, kinds),
-        *_axle_contradictions("front", table.front),
-        *_axle_contradictions("rear", table.rear),
-        *_car_contradictions(table),
+        *_contradictions(table),
         *_length_problems(table),
         *_unit_problems(table),
     ]
@@ -346,17 +347,25 @@ def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source)
         raise ParameterError("\n  ".join([f"{source.name}: {len(problems)} errors:", *problems]))
 
 
-def _axle_contradictions(axle: str, given: AxleTable) -> Iterator[str]:
-    for group in _ONE_OF:
-        ways = [way for way in group if getattr(given, way) is not None]
-        if len(ways) > 1:
-            yield f"{axle}: {' and '.join(ways)} say the same; give one of them"
-    if (given.damper_force_N is None) != (given.damper_velocity_mps is None):
-        yield f"{axle}: damper_velocity_mps and damper_force_N belong together; give both"
-    for name, link in given.links.items():
-        ways = [way for way in _STIFFNESS if getattr(link, way) is not None]
-        if len(ways) > 1:
-            yield f"{axle}.links.{name}: {' and '.join(ways)} say the same; give one of them"
+def _contradictions(table: CarTable) -> Iterator[str]:
+    parts = {name: getattr(table, name) for name in ("front", "rear", "steering", "rear_steering")}
+    for axle in ("front", "rear"):
+        parts |= {f"{axle}.links.{name}": link for name, link in table.axle(axle).links.items()}
+    for path, part in parts.items():
+        given = {key for group in (*_ONE_OF, *_TOGETHER) for key in group if getattr(part, key, None) is not None}
+        for group in _ONE_OF:
+            if len(ways := [way for way in group if way in given]) > 1:
+                yield f"{path}: {' and '.join(ways)} say the same; give one of them"
+        for group in _TOGETHER:
+            if len(given.intersection(group)) == 1:
+                yield f"{path}: {' and '.join(group)} belong together; give both"
+    mass = table.mass
+    if (mass.total_kg is None) == (mass.chassis_kg is None):
+        yield "mass: total_kg (of the whole car) or chassis_kg is needed, one of them"
+    if mass.total_kg is not None and (mass.front_fraction is None or mass.cg_height_m is None):
+        yield "mass: with total_kg, front_fraction and cg_height_m are needed"
+    if mass.chassis_kg is not None and mass.chassis_cg is None:
+        yield "mass: with chassis_kg, chassis_cg is needed"
 
 
 def _name_problems(table: CarTable, kinds: Mapping[str, AxleKind]) -> Iterator[str]:
@@ -382,20 +391,6 @@ def _name_problems(table: CarTable, kinds: Mapping[str, AxleKind]) -> Iterator[s
             on = getattr(given, key)
             if on is not None and on not in kind.carriers:
                 yield f"{axle}.{key}: nothing that could carry it is named {on!r}; {nearest_names(on, kind.carriers)}"
-
-
-def _car_contradictions(table: CarTable) -> Iterator[str]:
-    mass = table.mass
-    if (mass.total_kg is None) == (mass.chassis_kg is None):
-        yield "mass: total_kg (of the whole car) or chassis_kg is needed, one of them"
-    if mass.total_kg is not None and (mass.front_fraction is None or mass.cg_height_m is None):
-        yield "mass: with total_kg, front_fraction and cg_height_m are needed"
-    if mass.chassis_kg is not None and mass.chassis_cg is None:
-        yield "mass: with chassis_kg, chassis_cg is needed"
-    if table.steering.ratio is not None and table.steering.pinion_radius_m is not None:
-        yield "steering: ratio and pinion_radius_m say the same; give one of them"
-    if (table.rear_steering.axis_lower is None) != (table.rear_steering.axis_upper is None):
-        yield "rear_steering: axis_lower and axis_upper belong together; give both"
 
 
 def all_points(table: CarTable) -> Iterator[tuple[str, Point]]:

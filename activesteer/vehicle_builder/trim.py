@@ -170,7 +170,7 @@ def _swept(
             held.equilibrium(cases[index])
             poses[index], loads[index] = _poses(held), held.load_N
             if rack is not None:
-                rack[index] = _rack(held)
+                rack[index] = held.data.qpos[int(held.model.joint("rack").qposadr[0])]
     held.reset()
     return poses, loads, standing, standing_loads
 
@@ -187,10 +187,6 @@ def _poses(held: HeldCar) -> Array:
             np.arctan2(-x, y) * INWARDS[corner], pose.centre_m[2],
         ])  # fmt: skip
     return np.array(rows)
-
-
-def _rack(held: HeldCar) -> float:
-    return float(held.data.qpos[int(held.model.joint("rack").qposadr[0])])
 
 
 def _left(poses: Array, corner: int) -> Array:
@@ -258,10 +254,10 @@ def trim(car: CarDesign, write: Write, log: Log) -> Trimmed:
         assert axle.measured is not None
         trimmed.axle(axle.name).curves = axle.measured.curves
     mjcf = write(trimmed).with_suffix(".xml")
-    model = _compiled(mjcf)
+    model = compiled_model(mjcf)
     trimmed.chassis = chassis_of(car, model, log)
     write(trimmed)
-    model = _compiled(mjcf)
+    model = compiled_model(mjcf)
     body = mass_properties(model)
     trimmed.cg_m = float(body.cg_m[0]), float(body.cg_m[2])
     fraction = float(body.cg_m[0] - car.rear.wheel_centre_m[0]) / car.wheelbase_m
@@ -277,7 +273,7 @@ def trim(car: CarDesign, write: Write, log: Log) -> Trimmed:
     rates: dict[str, float | None] = {}
     sprung: dict[str, float] = {}
     for axle in car.axles:
-        motion = corner_motion(model, axle.corner).per_travel
+        motion, _ = corner_motion(model, axle.corner)
         ratios[axle.name] = motion[f"{axle.corner}_spring"], motion[f"{axle.corner}_damper"]
         for part, ratio in zip(("spring", "damper"), ratios[axle.name], strict=True):
             if not 0.15 < ratio < 1.6:
@@ -303,7 +299,8 @@ def trim(car: CarDesign, write: Write, log: Log) -> Trimmed:
     return trimmed
 
 
-def _compiled(mjcf: Path) -> mujoco.MjModel:
+def compiled_model(mjcf: Path) -> mujoco.MjModel:
+    """Return the compiled model of a file."""
     try:
         return mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as reason:

@@ -302,7 +302,7 @@ def test_roll_stiffness_is_that_of_springs_and_bar(axle: str) -> None:
     result = compact()
     model = result.measured.vehicle.model
     bar = float(model.tendon_stiffness[model.tendon(f"{axle}_anti_roll_bar").id])
-    ratio = corner_motion(model, "fl").per_travel["fl_damper"] if axle == "front" else 1.0
+    ratio = corner_motion(model, "fl")[0]["fl_damper"] if axle == "front" else 1.0
     rate = 1e3 * result[axle, "wheel_rate"] + 2.0 * bar * ratio**2
     track = 1e-3 * result[axle, "track"]
     assert 1e3 * result[axle, "roll_stiffness"] == pytest.approx(0.5 * rate * track**2, rel=0.02)

@@ -5,17 +5,23 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
 
 import mujoco
 import numpy as np
 
-from activesteer.errors import ActiveSteerError
+from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.errors import ActiveSteerError, ModelError, SimulationDiverged, nearest_names
 from activesteer.resources import find_vehicle
 from activesteer.rigs.kc import KcResult, kinematics_compliance
-from activesteer.scenario import load_car
-from activesteer.vehicle_builder.check.findings import CheckReport, Finding, Level, judged, usual_values
-from activesteer.vehicle_builder.check.geometry import geometry, missing_parts
-from activesteer.vehicle_builder.check.standing import standing
+from activesteer.scenario import CarSpec, load_car
+from activesteer.signals import ActuatorCommand, DriverCommand
+from activesteer.vehicle import Vehicle, engine_warnings_held
+from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.statics import mass_properties
+from activesteer.vehicle_builder.check.findings import CheckReport, Finding, Level, checked, judged, usual_values
+from activesteer.vehicle_builder.corner_motion import corner_motion
 
 
 def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
@@ -42,7 +48,7 @@ def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
     except ActiveSteerError as reason:
         findings.append(Finding("standing", "static equilibrium", "error", "none", "", str(reason)))
         return CheckReport(name, tuple(findings))
-    findings += standing(standing_car, car)
+    findings += _standing(standing_car, car)
     try:
         findings += _riding(kinematics_compliance(file))
     except ActiveSteerError as reason:
@@ -74,6 +80,285 @@ def _sign(result: KcResult) -> Finding:
     turned = sweep.steer_rad[-1, :2] - sweep.steer_rad[sweep.zero, :2]
     good = bool((turned > 0.0).all()) and float(sweep.x[-1]) > 0.0
     degrees = ", ".join(f"{math.degrees(angle):.1f}" for angle in np.asarray(turned))
-    advice = "" if good else "reverse the axis of the joint `rack`: its positive travel has to steer left"
-    level: Level = "ok" if good else "error"
-    return Finding("steering", "left turn of the steering wheel steers left", level, f"{degrees} deg", "", advice)
+    advice = "reverse the axis of the joint `rack`: its positive travel has to steer left"
+    return checked("steering", "left turn of the steering wheel steers left", good, f"{degrees} deg", advice)
+
+
+_MIRROR_M: Final = 1e-6
+_TOUCH_M: Final = 0.005
+"""Smallest distance of the lines of two rods [m]."""
+_OPPOSITE: Final = {"fl": "fr", "rl": "rr"}
+_MIRRORED: Final = np.array([1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class _Rod:
+    name: str
+    start_m: Array
+    end_m: Array
+
+    @property
+    def length_m(self) -> float:
+        return float(np.linalg.norm(self.end_m - self.start_m))
+
+
+def geometry(model: mujoco.MjModel) -> Iterator[Finding]:
+    """Return all findings about the hardpoints."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    origin = data.xpos[model.body("chassis").id]
+    points = {model.site(index).name: data.site_xpos[index] - origin for index in range(model.nsite)}
+    wrong = [
+        name
+        for name, point in points.items()
+        if name[:3] in {f"{corner}_" for corner in CORNERS} and point[1] * (1.0 if name[1] == "l" else -1.0) <= 0.0
+    ]
+    advice = "y is positive on the left; change its sign, and x, y, z of the table"
+    yield _any("points on the side of their wheel", wrong, advice)
+    yield from _mirror(model, points)
+    rods = _rods(model, data)
+    for word, choose in (("shortest", min), ("longest", max)) if rods else ():
+        rod = choose(rods, key=lambda rod: rod.length_m)
+        yield judged("link_length", rod.length_m, which=word, rod=rod.name)
+    yield from _order(rods, points)
+    yield from _crossings(rods)
+    yield from _reach(points)
+    for axle, corner in (("front", "fl"), ("rear", "rl")):
+        try:
+            yield judged("firmness", corner_motion(model, corner)[1], axle=axle)
+        except ModelError as reason:
+            yield Finding("geometry", f"{axle} links hold the wheel", "error", "no", "", str(reason))
+
+
+def _mirror(model: mujoco.MjModel, points: dict[str, Array]) -> Iterator[Finding]:
+    wrong = []
+    for name, point in points.items():
+        if name[:2] in _OPPOSITE and name[2:3] == "_":
+            other = points.get(_OPPOSITE[name[:2]] + name[2:])
+            if other is None or np.abs(other - _MIRRORED * point).max() > _MIRROR_M:
+                wrong.append(name)
+    yield _any("right side mirrors the left side", wrong, "edit both sides; see docs/suspension.md")
+    unlike = []
+    for part, count, values in (
+        (model.body, model.nbody, ((model.body_mass, 1e-9), (model.body_inertia, 1e-6))),
+        (model.tendon, model.ntendon, ((model.tendon_stiffness, 0.0), (model.tendon_lengthspring, 1e-9))),
+    ):
+        for index in range(count):
+            name = part(index).name
+            if name[:2] in _OPPOSITE and name[2:3] == "_":
+                other = part(_OPPOSITE[name[:2]] + name[2:]).id
+                if not all(np.allclose(array[index], array[other], rtol=rtol) for array, rtol in values):
+                    unlike.append(name)
+    yield _any("equal masses, springs and bushings on both sides", unlike, "edit both sides, or the class of both")
+
+
+def _any(what: str, wrong: list[str], advice: str) -> Finding:
+    named = ", ".join(wrong[:6]) + (f" and {len(wrong) - 6} more" if len(wrong) > 6 else "")
+    return checked("geometry", what, not wrong, f"no: {named}" if wrong else "yes", advice)
+
+
+def _rods(model: mujoco.MjModel, data: mujoco.MjData) -> list[_Rod]:
+    """Return the links of the left side that run straight between two sites."""
+    rods = []
+    for index in range(model.ntendon):
+        name = model.tendon(index).name
+        first, count = int(model.tendon_adr[index]), int(model.tendon_num[index])
+        straight = count == 2 and (model.wrap_type[first : first + 2] == int(mujoco.mjtWrap.mjWRAP_SITE)).all()
+        if name[:3] in ("fl_", "rl_") and straight and not name.endswith(("_spring", "_damper", "_guide")):
+            start, end = (data.site_xpos[int(site)].copy() for site in model.wrap_objid[first : first + 2])
+            rods.append(_Rod(name, start, end))
+    return rods
+
+
+def _order(rods: list[_Rod], points: dict[str, Array]) -> Iterator[Finding]:
+    """Check that knuckle ends are further out than inner ends, and upper joints above lower ones."""
+    crossed = [
+        rod.name
+        for rod in rods
+        if abs(rod.end_m[1] - rod.start_m[1]) > abs(rod.end_m[0] - rod.start_m[0]) and rod.end_m[1] < rod.start_m[1]
+    ]
+    yield _any("inner ends further in than outer ends", crossed, "its inner and outer point seem to be exchanged")
+    upside = []
+    for corner in ("fl", "rl"):
+        for upper, lower in (("uca", "lca"), ("trailing_upper", "trailing_lower"), ("camber_link", "spring_link")):
+            above = [
+                point[2] for name, point in points.items() if name.startswith(f"{corner}_{upper}") and "outer" in name
+            ]
+            below = [
+                point[2] for name, point in points.items() if name.startswith(f"{corner}_{lower}") and "outer" in name
+            ]
+            if above and below and max(above) <= min(below):
+                upside.append(f"{corner}_{upper} below {corner}_{lower}")
+    yield _any("upper links above lower links", upside, "exchange them, or check z of their outer points")
+
+
+def _crossings(rods: list[_Rod]) -> Iterator[Finding]:
+    crossing = []
+    for number, one in enumerate(rods):
+        for two in rods[number + 1 :]:
+            ends = [(a, b) for a in (one.start_m, one.end_m) for b in (two.start_m, two.end_m)]
+            if one.name[:2] != two.name[:2] or any(np.linalg.norm(a - b) < 1e-4 for a, b in ends):
+                continue
+            gap = _distance(one, two)
+            if gap < _TOUCH_M:
+                crossing.append(f"{one.name} and {two.name} ({1e3 * gap:.1f} mm)")
+    level: Level = "warning" if crossing else "ok"
+    words = "yes: " + ", ".join(crossing) if crossing else "no"
+    advice = "two rods cannot pass through each other; is a point exchanged?" if crossing else ""
+    yield Finding("geometry", "links that cross", level, words, "", advice)
+
+
+def _distance(one: _Rod, two: _Rod) -> float:
+    """Return the smallest distance of two segments by alternating projection, exact for convex segments [m]."""
+    s, t = 0.5, 0.5
+    u, v = one.end_m - one.start_m, two.end_m - two.start_m
+    for _ in range(200):
+        s = float(np.clip((two.start_m + t * v - one.start_m) @ u / max(u @ u, 1e-12), 0.0, 1.0))
+        t = float(np.clip((one.start_m + s * u - two.start_m) @ v / max(v @ v, 1e-12), 0.0, 1.0))
+    return float(np.linalg.norm(one.start_m + s * u - two.start_m - t * v))
+
+
+def _reach(points: dict[str, Array]) -> Iterator[Finding]:
+    """Check that the points of a suspension are near its wheel and not outside it."""
+    far, outside = [], []
+    for corner in ("fl", "rl"):
+        centre = points[f"{corner}_wheel_centre"]
+        for name, point in points.items():
+            if not name.startswith(f"{corner}_") or name.endswith(("wheel_centre", "_lever")):
+                continue
+            if np.abs(point - centre).max() > 1.2:
+                far.append(f"{name} ({np.abs(point - centre).max():.2f} m)")
+            elif point[1] > centre[1] + 0.05:
+                outside.append(f"{name} ({1e3 * (point[1] - centre[1]):.0f} mm)")
+    yield _any("points within 1.2 m of their wheel", far, "front and rear exchanged, or a point in another unit?")
+    advice = "check y: the point is further out than the middle of the tyre"
+    yield _any("points not outside the middle of the wheel", outside, advice)
+
+
+_KINDS: Final = {
+    "body": (mujoco.mjtObj.mjOBJ_BODY, "nbody"),
+    "joint": (mujoco.mjtObj.mjOBJ_JOINT, "njnt"),
+    "site": (mujoco.mjtObj.mjOBJ_SITE, "nsite"),
+    "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
+    "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nu"),
+    "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, "nsensor"),
+}
+
+
+def _each(*parts: str) -> tuple[str, ...]:
+    return tuple(f"{corner}_{part}" for part in parts for corner in CORNERS)
+
+
+_NEEDED: Final = {
+    "body": ("chassis", "rack", *_each("knuckle", "wheel")),
+    "joint": ("root", "rack", "steering_wheel", "superposition", "rl_steer", "rr_steer", *_each("spin")),
+    "site": ("origin", "cg", "front_axle", *_each("wheel_centre")),
+    "tendon": ("steering_column", *_each("damper", "spring")),
+    "actuator": (
+        "steering_wheel", "superposition", "rl_steer", "rr_steer",
+        *_each("drive", "brake", "slip_x", "slip_y", "slip_z"),
+    ),
+    "sensor": (
+        "cg_accelerometer", "cg_gyro", "cg_velocimeter", "cg_position", "chassis_orientation", "cg_velocity",
+        "front_axle_position", "steering_wheel_angle", "superposition_angle", "rack_travel", "rl_steer_angle",
+        "rr_steer_angle", *_each("wheel_speed", "wheel_position", "wheel_axis"),
+    ),
+}  # fmt: skip
+"""Parts that loader, callback, recorder and rig look up."""
+
+
+def missing_parts(model: mujoco.MjModel) -> Iterator[Finding]:
+    """Return one error for each missing part, or one line if none is missing."""
+    complete = True
+    for word, (kind, count) in _KINDS.items():
+        there = [mujoco.mj_id2name(model, kind, index) or "" for index in range(getattr(model, count))]
+        for name in _NEEDED[word]:
+            if name not in there:
+                complete = False
+                words = nearest_names(name, [other for other in there if other and other not in _NEEDED[word]])
+                yield Finding("parts", f"{word} {name}", "error", "missing", "", f"add it to the MJCF; {words}")
+    if complete:
+        total = sum(len(names) for names in _NEEDED.values())
+        yield Finding("parts", "bodies, joints, sites, tendons, actuators, sensors", "ok", f"all {total} there")
+
+
+_STEPS: Final = 500
+_STILL_MPS: Final = 0.01
+
+
+def _standing(vehicle: Vehicle, car: CarSpec) -> Iterator[Finding]:
+    """Yield all findings about the car at rest."""
+    model, data = vehicle.model, vehicle.data
+    load_N = fb.wheel_outputs(data, 4)["fz_N"].copy()
+    body, design = mass_properties(model), mujoco.MjData(model)
+    mujoco.mj_kinematics(model, design)
+    yield Finding("standing", "static equilibrium", "ok", "found")
+    yield judged("mass", body.mass_kg)
+    yield judged("front_share", 100.0 * load_N[:2].sum() / load_N.sum())
+    for axle, left, right in (("front", 0, 1), ("rear", 2, 3)):
+        difference = 100.0 * abs(load_N[left] - load_N[right]) / load_N[left : right + 1].mean()
+        yield judged("wheel_load_difference", difference, axle=axle)
+    yield from _height(vehicle, design)
+    wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
+    y_m, height_m = data.xpos[wheels, 1], float(data.subtree_com[0, 2])
+    track = 0.5 * (y_m[0] - y_m[1] + y_m[2] - y_m[3])
+    yield judged("cg_height", height_m)
+    yield judged("stability_factor", track / (2.0 * height_m))
+    to_front, to_rear = design.xpos[wheels[0], 0] - body.cg_m[0], body.cg_m[0] - design.xpos[wheels[2], 0]
+    yield judged("yaw_inertia", float(body.inertia_kgm2[2, 2] / (body.mass_kg * to_front * to_rear)))
+    for axle, curve in (("front", car.config.dampers.front), ("rear", car.config.dampers.rear)):
+        pushes = [force * speed < 0.0 for speed, force in zip(curve.velocity_mps, curve.force_N, strict=True)]
+        good = not any(pushes) and float(np.interp(0.0, curve.velocity_mps, curve.force_N)) == 0.0
+        yield checked(
+            "standing", f"{axle} damper resists its motion", good, "yes" if good else "no",
+            "force_N has the sign of velocity_mps, both positive in compression, and is 0 at rest",
+        )  # fmt: skip
+        slope = np.abs(np.diff(curve.force_N) / np.diff(curve.velocity_mps)).max()
+        yield judged("damper_slope", float(slope), axle=axle)
+    brakes, radius = car.config.brakes, data.xpos[wheels[0], 2]
+    maximum = 2.0 * (brakes.front_torque_Nm + brakes.rear_torque_Nm) / radius / (body.mass_kg * GRAVITY_MPS2)
+    yield judged("deceleration", float(maximum))
+    track, yaw = car.config.single_track, float(body.inertia_kgm2[2, 2])
+    for what, known, real in (("mass", track.mass_kg, body.mass_kg), ("yaw inertia", track.yaw_inertia_kgm2, yaw)):
+        yield judged("known", 100.0 * (known / real - 1.0), what=what)
+    yield _stays(vehicle)
+    for axle, tyre, load in zip(
+        ("front", "rear"), car.tyres, (load_N[:2].mean(), load_N[2:].mean()), strict=True
+    ):  # fmt: skip
+        yield judged("tyre_load", float(load) / float(tyre["FNOMIN"]), axle=axle)
+        yield judged("tyre_reserve", float(tyre["FZMAX"]) / float(load), axle=axle)
+
+
+def _height(vehicle: Vehicle, design: mujoco.MjData) -> Iterator[Finding]:
+    """Check the distance of the wheels from their design position."""
+    model, data = vehicle.model, vehicle.data
+    chassis = model.body("chassis").id
+    turn = data.xmat[chassis].reshape(3, 3).T
+    for axle, corners in (("front", CORNERS[:2]), ("rear", CORNERS[2:])):
+        travel = 0.0
+        for corner in corners:
+            wheel = model.body(f"{corner}_wheel").id
+            now = (turn @ (data.xpos[wheel] - data.xpos[chassis]))[2]
+            travel += 500.0 * float(now - (design.xpos[wheel, 2] - design.xpos[chassis, 2]))
+        yield judged("wheel_travel", travel, axle=axle)
+    w, x, y, z = data.qpos[3:7]
+    pitch = math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))))
+    roll = math.degrees(2.0 * math.atan2(x, w))
+    yield judged("pitch", pitch)
+    yield judged("roll", roll)
+
+
+def _stays(vehicle: Vehicle) -> Finding:
+    """Check the stability during half a second at rest."""
+    try:
+        with engine_warnings_held():
+            for _ in range(_STEPS):
+                vehicle.step(DriverCommand(), ActuatorCommand())
+        speed = float(np.abs(vehicle.data.qvel[:6]).max())
+        warned = int(sum(warning.number for warning in vehicle.data.warning))
+    except SimulationDiverged:
+        speed, warned = math.inf, 0
+    good = math.isfinite(speed) and speed < _STILL_MPS and not warned
+    words = "yes" if good else f"no: {speed:.3g} m/s, rad/s"
+    advice = "look for a part without stiffness or damping, or with a stiffness too large for the time step"
+    return checked("standing", "stands still for 0.5 s", good, words, advice)

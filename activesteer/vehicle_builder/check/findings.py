@@ -38,6 +38,11 @@ class Finding:
     advice: str = ""
 
 
+def checked(topic: str, what: str, good: bool, value: str, advice: str) -> Finding:
+    """Return the finding about a property that a car must have, with the advice if it has not."""
+    return Finding(topic, what, "ok" if good else "error", value, "", "" if good else advice)
+
+
 @dataclass(frozen=True)
 class CheckReport:
     """All findings of a car.

@@ -25,9 +25,9 @@ def test_what_no_test_moves_is_stiff_but_not_faster_than_a_step_can_tell() -> No
         Load(name, np.eye(5)[COORDINATES.index(name)], 0.1 * force, moved, np.zeros((5, 5)))
         for name in ("caster", "toe")
     ]
-    elastic = fitted([pushed, *turned])
+    elastic, _ = fitted([pushed, *turned])
     matrix = np.zeros((5, 5))
-    matrix[np.triu_indices(5)] = elastic.stiffness
+    matrix[np.triu_indices(5)] = elastic["stiffness"]
     stiffness = matrix + np.triu(matrix, 1).T
     frequencies_Hz = np.sqrt(eigh(stiffness, INERTIA, eigvals_only=True)) / (2.0 * np.pi)
     assert 250.0 < frequencies_Hz.max() < 330.0
