@@ -99,7 +99,9 @@ ROOMS: Final = {
         "unit/studies/engine/test_study.py unit/studies/engine/test_tuning.py",
     ),
     "simulation": Room(
-        "simulation/*.py", "unit/simulation", "physics/test_determinism.py physics/test_step_steer.py unit/scenario"
+        "simulation/*.py",
+        "unit/simulation",
+        "physics/test_determinism.py physics/test_step_steer.py physics/test_own_cars.py unit/scenario",
     ),
     "road": Room("road/*.py", "unit/road", "unit/driver physics/test_road.py physics/test_uneven_road.py"),
     "analysis/harm": Room("analysis/harm.py", "unit/analysis/test_harm.py", "physics/test_harm.py"),

@@ -64,7 +64,7 @@ def test_a_saved_file_is_named_after_the_clock_was_set_back(tmp_path, monkeypatc
     monkeypatch.setattr(time, "time_ns", lambda now_ns=time.time_ns: now_ns() - 10**9 * set_back_s)
     for name, age_s in (("new.json", set_back_s), ("old.json", 3 * set_back_s)):
         (tmp_path / name).touch()
-        os.utime(tmp_path / name, 2 * (time.time() - age_s,))
+        os.utime(tmp_path / name, (time.time() - age_s, time.time() - age_s))
     assert stop._saved(in_order=True) == f"saved: {tmp_path / 'new.json'}"
 
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from activesteer.analysis.harm import changes, harms, severity, track_harm_m
+from activesteer.analysis.harm import changes, harms, kept, losses, severity, track_harm_m
 
 LANE = {
     "lane_overstep_m": 0.12, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.05, "heading_end_rad": 0.01,
@@ -31,6 +31,7 @@ def test_a_car_that_leaves_its_lane_further_is_harmed_and_one_that_moves_within_
         ("cones_hit", 3.0, []),  # one cone, not more than one
         ("cones_hit", 4.0, ["cones"]),
         ("heading_end_rad", -math.radians(3.0), ["heading"]),
+        ("yaw_rate_after_gates_rms_radps", 0.02 + math.radians(0.9), []),
         ("yaw_rate_after_gates_rms_radps", 0.02 + math.radians(1.1), ["yaw_rate"]),
         ("steering_wheel_rms_rad", 5.0, []),  # reported, not counted
         ("sideslip_peak_abs_rad", 0.4, ["lost"]),
@@ -40,6 +41,23 @@ def test_a_car_that_leaves_its_lane_further_is_harmed_and_one_that_moves_within_
 def test_each_measure_has_its_size(key: str, value: float, harmed: list[str]):
     assert harms(changes(LANE, LANE | {key: value})) == harmed
     assert harms(changes(LANE | {key: value}, LANE)) == []
+
+
+@pytest.mark.parametrize(
+    ("metrics", "lost", "met"),
+    [
+        ({"stays_in_lanes": 0.0, "lane_overstep_m": 0.3}, ["leaves the lane by 0.30 m"], []),
+        ({"stays_in_lanes": 0.0, "lane_overstep_m": math.nan}, ["does not get through the lanes"], []),
+        ({"stays_in_lanes": 1.0, "lane_overstep_m": -0.1}, [], ["stays in the lanes"]),
+        ({"cones_hit": 0.0}, [], ["hits no cone"]),
+        ({"cones_hit": 2.0}, ["hits 2 cones"], []),
+        ({"cones_missed": 0.0}, [], ["passes all cones"]),
+        ({"cones_missed": 1.0, "cones_hit": 0.0}, ["misses 1 cone"], ["hits no cone"]),
+    ],
+)
+def test_a_verdict_says_what_failed_and_what_was_met(metrics: dict[str, float], lost: list[str], met: list[str]):
+    assert list(losses(metrics)) == lost
+    assert list(kept(metrics)) == met
 
 
 def test_a_run_that_fails_is_harm_and_two_that_fail_are_none():

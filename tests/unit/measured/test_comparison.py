@@ -146,6 +146,19 @@ def test_a_slow_signal_is_compared_without_a_filter_and_the_reason_is_said():
     assert "10.1 Hz" in found.unfiltered[0]
 
 
+def test_the_filters_of_the_law_cut_off_the_steering_wheel_and_the_motion_at_their_frequencies():
+    law = FILTERS["fmvss126"]
+    assert law is not None
+    assert [law.of(name) for name in ("steering_wheel_rad", "yaw_rate_radps", "ay_mps2")] == [10.0, 6.0, 6.0]
+
+
+@pytest.mark.parametrize(("share", "inside"), [(0.99, True), (1.01, False)])
+def test_the_corridor_of_the_speed_is_1_kmh_and_1_percent(share, inside):
+    constant_mps = 20.0 + 0.0 * TIME_S
+    found = plain([run(speed_mps=constant_mps + share * (1.0 / 3.6 + 0.2))], run(speed_mps=constant_mps))
+    assert found.inside is inside
+
+
 def test_the_filter_of_iso_15037_has_the_width_that_the_standard_requires():
     for frequency_Hz, low, high in ((5.0, 0.995, 1.0), (9.0, 0.707, 0.75), (20.0, 0.0, 0.01)):
         time_s = np.arange(0.0, 10.0, 0.001)
