@@ -10,6 +10,16 @@ actuator is at its limit or too slow, the other one keeps the moment rather than
 force slides outwards, a car that lacks the moment spins. One axle takes over from the other one with the lag of the
 actuators, so that the noise of the feedback beyond a limit does not reach it.
 
+The state feedback counts on straight axle curves. With a large sideslip angle these make a large moment that turns the
+car back, so the feedback asks the front wheels to cancel it; but an axle that slides does not make it. So the moment
+that the feedback expects, with straight curves about the slip angles of the desired turn,
+
+    M_l = l_V C_V (alpha_V - alpha_V* + F_V*/C_V) - l_H C_H (alpha_H - alpha_H* + F_H*/C_H)
+
+is compared with the moment M of the curved axles. If the front force turns the car more than wanted, the front wheels
+give up the share s = (M - M_l) / (l_V F_V) of their force, at most all of it, and go by s towards the slip angle of
+what is left. Within the straight part of the curves M = M_l, and the angles stay as they are.
+
 No angle is larger than its actuator removes in the time in which the car answers: an angle that stays after the driver
 has steered back turns the car further in.
 
@@ -19,12 +29,15 @@ Source: T. A. Johansen and T. I. Fossen, Control allocation - A survey, Automati
 from __future__ import annotations
 
 import math
+from typing import Final
 
-from activesteer.controllers.axle_slopes import AxleSlopes, slopes
+from activesteer.controllers.axle_slopes import AxleSlopes, axle_forces, excess, front_slip, slopes
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.native_records import NativeBlock
 from activesteer.shared_laws import shared
 from activesteer.signals import Estimate
+
+_FRICTION: Final = Estimate._fields.index("friction")
 
 
 class Allocation(NativeBlock):
@@ -33,6 +46,7 @@ class Allocation(NativeBlock):
     _curves: AxleSlopes
     _front_Nprad: float
     _rear_Nprad: float
+    _axle_kgm: float
     _to_front_m: float
     _to_rear_m: float
     _per_moment2: float
@@ -53,6 +67,8 @@ class Allocation(NativeBlock):
         self._curves = AxleSlopes(setup)
         self._front_Nprad, self._rear_Nprad = car.front_stiffness_Nprad, car.rear_stiffness_Nprad
         self._to_front_m, self._to_rear_m = car.cg_to_front_m, car.cg_to_rear_m
+        # Mass on an axle times its distance from the CG, the same for both.
+        self._axle_kgm = car.mass_kg * car.cg_to_front_m * car.cg_to_rear_m / car.wheelbase_m
         self._per_moment2, self._per_force2 = p.moment_scale_Nm**-2, p.force_scale_N**-2
         self._front_stay, self._rear_stay = p.superposition_scale_rad**-2, p.rear_scale_rad**-2
         front_radps, rear_radps = servos.superposition_rate_radps, servos.rear_rate_radps
@@ -77,6 +93,8 @@ def allocated(
     demand_rad: tuple[float, float],
     against_rad: float,
     works: tuple[bool, bool],
+    ay_mps2: float,
+    authority: float,
 ) -> tuple[float, float, float]:
     """Allocate the demands of the state feedback.
 
@@ -88,6 +106,8 @@ def allocated(
         demand_rad: Angles that the state feedback demands, without limits.
         against_rad: Limit of the superposition against the driver's angle.
         works: Whether superposition and rear steering work.
+        ay_mps2: Lateral acceleration of the desired turn [m/s2].
+        authority: Factor on the demands of the state feedback, 0 to 1 [-].
 
     Returns:
         Superposition angle and rear angle [rad]; change of the yaw moment that they make [Nm].
@@ -130,7 +150,39 @@ def allocated(
     block._rear_shift_rad += block._fraction * (rear - kept_rear - block._rear_shift_rad)
     front = min(max(kept_front + block._front_shift_rad, least_front), most_front)
     rear = min(max(kept_rear + block._rear_shift_rad, least_rear), most_rear)
-    return front, rear, front_Nm * (front - at_rad[0]) + rear_Nm * (rear - at_rad[1])
+    front = (
+        authority * _relieved(block, now, driver_rad, demand_rad, (front, rear), ay_mps2) + (1.0 - authority) * front
+    )
+    front = min(max(front, least_front), most_front)
+    _, _, front_now, rear_now = axle_forces(block._curves, now, driver_rad + at_rad[0], at_rad[1])
+    _, _, front_then, rear_then = axle_forces(block._curves, now, driver_rad + front, rear)
+    return front, rear, block._axle_kgm * ((front_then - front_now) - (rear_then - rear_now))
+
+
+@shared
+def _relieved(
+    block: Allocation,
+    now: Estimate,
+    driver_rad: float,
+    demand_rad: tuple[float, float],
+    angle_rad: tuple[float, float],
+    ay_mps2: float,
+) -> float:
+    """Return the superposition angle that relieves front wheels whose force turns the car more than wanted [rad]."""
+    front_slip_rad, rear_slip_rad, front, rear = axle_forces(
+        block._curves, now, driver_rad + angle_rad[0], angle_rad[1]
+    )
+    front_more, rear_more = excess(block._curves, ay_mps2, now[_FRICTION])
+    wanted_front_N = block._front_Nprad * (front_slip_rad + demand_rad[0] - angle_rad[0] - front_more)
+    wanted_rear_N = block._rear_Nprad * (rear_slip_rad + demand_rad[1] - angle_rad[1] - rear_more)
+    wanted_Nm = block._to_front_m * wanted_front_N - block._to_rear_m * wanted_rear_N
+    front_Nm = block._axle_kgm * front
+    missing_Nm = wanted_Nm - block._axle_kgm * (front - rear)
+    if missing_Nm * front_Nm >= 0.0:
+        return angle_rad[0]
+    share = min(-missing_Nm / front_Nm, 1.0)
+    less_rad = front_slip(block._curves, (1.0 - share) * front, now[_FRICTION]) - front_slip_rad
+    return angle_rad[0] + share * less_rad
 
 
 @shared

@@ -42,6 +42,8 @@ class AxleSlopes(NativeBlock):
 
     _front_excess_rad: Table
     _rear_excess_rad: Table
+    _front_slip_rad: Table
+    _rear_slip_rad: Table
     _front_curve: Table
     _rear_curve: Table
     _step_rad: float
@@ -71,6 +73,13 @@ class AxleSlopes(NativeBlock):
         self._front_excess_rad, self._rear_excess_rad = (
             array("d", _excesses(tyre, load_N, shift_kg))
             for tyre, load_N, shift_kg in zip(known.tyres, self.loads_N, shifts_kg, strict=True)
+        )
+        stiffness_Nprad = self._car.front_stiffness_Nprad, self._car.rear_stiffness_Nprad
+        self._front_slip_rad, self._rear_slip_rad = (
+            array("d", (2.0 * load_N / GRAVITY_MPS2 * _AY_STEP_MPS2 / each * np.arange(len(more)) + more).tolist())
+            for load_N, each, more in zip(
+                self.loads_N, stiffness_Nprad, (self._front_excess_rad, self._rear_excess_rad), strict=True
+            )
         )
 
     def at(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
@@ -160,6 +169,48 @@ def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, f
     place = abs(ay_mps2) / friction / _AY_STEP_MPS2
     size = math.copysign(friction, ay_mps2)
     return size * _between(table(block._front_excess_rad), place), size * _between(table(block._rear_excess_rad), place)
+
+
+@shared
+def axle_forces(
+    block: AxleSlopes, now: Estimate, front_rad: float, rear_rad: float
+) -> tuple[float, float, float, float]:
+    """Return slip angles of front and rear axle [rad], and their side forces per mass on the axle [m/s2].
+
+    Beyond the tabulated part a force keeps its last value, as a sliding tyre keeps most of its force.
+    """
+    speed, sideslip, turning, friction = now[_SPEED], now[_SIDESLIP], now[_YAW_RATE], now[_FRICTION]
+    front = front_rad - sideslip - block._cg_to_front_m * turning / speed
+    rear = rear_rad - sideslip + block._cg_to_rear_m * turning / speed
+    return (
+        front,
+        rear,
+        _borne_mps2(table(block._front_slip_rad), front, friction),
+        _borne_mps2(table(block._rear_slip_rad), rear, friction),
+    )
+
+
+@shared
+def front_slip(block: AxleSlopes, force_mps2: float, friction: float) -> float:
+    """Return the slip angle of the front axle for a side force per mass on it [rad]."""
+    slip = _between(table(block._front_slip_rad), abs(force_mps2) / friction / _AY_STEP_MPS2)
+    return math.copysign(friction * slip, force_mps2)
+
+
+@shared
+def _borne_mps2(slips: Table, slip_angle_rad: float, friction: float) -> float:
+    """Return the side force of an axle per mass on it at a slip angle [m/s2]."""
+    wanted, low, high = abs(slip_angle_rad) / friction, 0, len(slips) - 1
+    if wanted >= slips[high]:
+        return math.copysign(friction * _AY_STEP_MPS2 * high, slip_angle_rad)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if slips[middle] <= wanted:
+            low = middle
+        else:
+            high = middle
+    part = (wanted - slips[low]) / (slips[high] - slips[low])
+    return math.copysign(friction * _AY_STEP_MPS2 * (low + part), slip_angle_rad)
 
 
 @shared

@@ -230,6 +230,7 @@ class Lqr(NativeBlock):
         return allocated(
             self._allocation, turn.estimate, command.front_steer_demand_rad,
             (measurement.superposition_rad, measurement.rear_steer_rad), turn.demand_rad, turn.against_rad, works,
+            turn.desired_radps * turn.estimate.speed_mps, self.authority,
         )  # fmt: skip
 
     @property
@@ -269,8 +270,9 @@ def regulated(
     fade = min((speed - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
     front_demand, rear_demand = fade * front_demand, fade * rear_demand
     added, rear, _ = allocated(
-        block._allocation, now, driver_rad, (superposition_rad, rear_rad), (front_demand, rear_demand), against, BOTH
-    )
+        block._allocation, now, driver_rad, (superposition_rad, rear_rad), (front_demand, rear_demand), against, BOTH,
+        desired * speed, fade * block._confidence._authority,
+    )  # fmt: skip
     block._superposition_before_rad, block._rear_before_rad = added, rear
     off = max(abs(added - front_demand), abs(rear - rear_demand))
     return rear, added, desired, steady, rear - steady, off > _SAME_RAD

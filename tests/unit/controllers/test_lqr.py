@@ -225,12 +225,44 @@ def test_superposition_is_not_against_the_driver_while_the_car_turns_less_than_d
     assert limit_rad(desired - 1.1 * band).against_rad == 0.0
 
 
-def test_angles_follow_the_demand_exactly_within_limits_and_rates(known):
+def test_angles_follow_the_demand_within_limits_and_rates(known):
     allocation = Allocation(known)
-    now = Estimate(25.0, 0.0, 0.0, 0.1, 0.9, *[0.0] * 5)
-    demand = 0.011, -0.007
-    found = allocated(allocation, now, 0.02, (0.0, 0.0), demand, 0.05, BOTH)
-    assert found[:2] == pytest.approx(demand, rel=1e-9)
+    now = Estimate(25.0, 0.0, 0.0, 0.02, 0.9, *[0.0] * 5)
+    demand = 0.005, -0.004
+    found = allocated(allocation, now, 0.002, (0.0, 0.0), demand, 0.05, BOTH, 0.5, 1.0)
+    assert found[:2] == pytest.approx(demand, rel=1e-3)
+
+
+SLIDING = Estimate(16.0, 0.0, math.radians(2.0), math.radians(-16.0), 0.23, *[0.0] * 5)
+"""A turn to the right on packed snow: the rear axle slides outwards, and the car turns in."""
+
+
+def mirrored(now, side):
+    return now._replace(sideslip_rad=side * now.sideslip_rad, yaw_rate_radps=side * now.yaw_rate_radps)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_front_wheels_steer_back_while_the_rear_axle_slides(known, side):
+    """The feedback counts on the moment of straight axle curves; a sliding rear axle does not make it."""
+    car, desired_mps2 = known.single_track, -2.1 * side
+    now, driver, at = mirrored(SLIDING, side), math.radians(-3.0 * side), (0.0, math.radians(-1.4 * side))
+    demand = math.radians(-1.5 * side), at[1]
+
+    def added(ay_mps2, authority, estimate=now):
+        return allocated(Allocation(known), estimate, driver, at, demand, 0.06, BOTH, ay_mps2, authority)
+
+    front, rear, moment_Nm = added(desired_mps2, 1.0)
+    assert rear == pytest.approx(demand[1])
+    assert side * front > math.radians(0.5)
+    # At most all of the side force that the front axle has on this road.
+    most_Nm = now.friction * 9.81 * car.mass_kg * car.cg_to_rear_m / car.wheelbase_m * car.cg_to_front_m
+    assert 0.1 * most_Nm < side * moment_Nm < most_Nm
+    # A feedback without authority, a car that turns too little, and a straight curve leave the demand.
+    assert added(desired_mps2, 0.0)[0] == pytest.approx(demand[0])
+    slow = now._replace(yaw_rate_radps=-0.05 * side, sideslip_rad=0.0)
+    assert added(desired_mps2, 1.0, slow)[0] == pytest.approx(demand[0])
+    grips = SLIDING._replace(friction=30.0)
+    assert added(desired_mps2, 1.0, mirrored(grips, side))[0] == pytest.approx(demand[0], abs=1e-4)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -242,7 +274,7 @@ def test_front_wheels_keep_the_moment_when_the_rear_wheels_are_too_slow(known, s
     allocation = Allocation(replace(known, gains=replace(known.gains, servos=slow)))
     # One axle takes over with the lag of the actuators.
     front, rear, moment_Nm = [
-        allocated(allocation, now, 0.0, (0.0, 0.0), demand, 0.05, BOTH)
+        allocated(allocation, now, 0.0, (0.0, 0.0), demand, 0.05, BOTH, 0.0, 1.0)
         for _ in range(round(10.0 * slow.lag_s / INTERVAL_S))
     ][-1]
     assert abs(rear) == pytest.approx(min(known.gains.lqr.ahead_s * slow.rear_rate_radps, abs(demand[1])))
