@@ -6,7 +6,17 @@ import math
 
 import pytest
 
-from activesteer.analysis.harm import changes, harms, kept, losses, severity, track_harm_m
+from activesteer.analysis.harm import (
+    changes,
+    harms,
+    has_spun,
+    is_controlled,
+    kept,
+    losses,
+    severity,
+    shown,
+    track_harm_m,
+)
 
 LANE = {
     "lane_overstep_m": 0.12, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.05, "heading_end_rad": 0.01,
@@ -58,6 +68,31 @@ def test_each_measure_has_its_size(key: str, value: float, harmed: list[str]):
 def test_a_verdict_says_what_failed_and_what_was_met(metrics: dict[str, float], lost: list[str], met: list[str]):
     assert list(losses(metrics)) == lost
     assert list(kept(metrics)) == met
+
+
+@pytest.mark.parametrize(("sideslip_deg", "spun"), [(19.5, False), (20.5, True)])
+def test_a_car_spins_beyond_20_deg_of_sideslip(sideslip_deg: float, spun: bool):
+    metrics = {"sideslip_peak_abs_rad": math.radians(sideslip_deg)}
+    assert has_spun(metrics) is spun
+    assert is_controlled(metrics) is not spun
+
+
+def test_a_car_is_controlled_unless_a_metric_tells_otherwise():
+    assert is_controlled({"stopping_distance_m": 40.0})
+    assert not is_controlled({"stays_in_lanes": 0.0})
+    assert not is_controlled({"cones_missed": 1.0})
+
+
+@pytest.mark.parametrize(("sideslip_deg", "text"), [(89.0, "3.2"), (91.0, "lost")])
+def test_metrics_of_a_car_that_has_turned_round_say_nothing(sideslip_deg: float, text: str):
+    metrics = {"sideslip_peak_abs_rad": math.radians(sideslip_deg), "track_deviation_max_m": 3.2}
+    assert shown("track_deviation_max_m", metrics, "3.2") == text
+
+
+def test_cones_that_are_hit_and_missed_add_up():
+    slalom = {"cones_hit": 1.0, "cones_missed": 1.0, "sideslip_peak_abs_rad": 0.05}
+    assert changes(slalom, slalom | {"cones_hit": 2.0, "cones_missed": 3.0})["cones"] == 3.0
+    assert harms(changes(slalom, slalom | {"cones_missed": 3.0})) == ["cones"]
 
 
 def test_a_run_that_fails_is_harm_and_two_that_fail_are_none():

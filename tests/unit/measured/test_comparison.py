@@ -100,7 +100,9 @@ def test_cross_plots_know_no_time():
     flat = run(ay_mps2=ay, sideslip_rad=0.0 * ay)
     for size, inside in ((0.95, True), (1.2, False)):
         off = size * TOLERANCES["sideslip_rad"].offset
-        assert plain([run(ay_mps2=ay, sideslip_rad=0.0 * ay + off)], flat, "iso19364").inside is inside
+        found = plain([run(ay_mps2=ay, sideslip_rad=0.0 * ay + off)], flat, "iso19364")
+        assert found.inside is inside
+        assert (found.quantities[0].x[[0, -1]] == ay[[0, -1]]).all()  # both ends are judged
 
 
 def test_runs_with_nothing_in_common_are_an_error():
@@ -149,6 +151,7 @@ def test_a_slow_signal_is_compared_without_a_filter_and_the_reason_is_said():
 def test_the_filters_of_the_law_cut_off_the_steering_wheel_and_the_motion_at_their_frequencies():
     law = FILTERS["fmvss126"]
     assert law is not None
+    assert law.poles == 12
     assert [law.of(name) for name in ("steering_wheel_rad", "yaw_rate_radps", "ay_mps2")] == [10.0, 6.0, 6.0]
 
 
