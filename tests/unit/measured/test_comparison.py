@@ -43,6 +43,8 @@ def test_a_shift_is_found_between_the_samples_and_leaves_no_residual(signal, shi
     assert found.shifts_s[0] == pytest.approx(shift_s, abs=2e-4)
     assert found.quantities[0].to_json()["rms"] < 1e-4
     assert found.inside
+    assert found.quantities[0].x[0] == pytest.approx(max(0.0, 1.0 - found.shifts_s[0]), abs=0.02)
+    assert found.quantities[0].x[-1] == pytest.approx(min(5.0, 5.0 - found.shifts_s[0]), abs=0.02)
 
 
 def test_clocks_are_compared_by_the_steering_so_that_a_lag_of_the_car_stays():
