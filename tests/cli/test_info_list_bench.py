@@ -167,6 +167,7 @@ def test_bench_has_the_promised_keys_and_ratios(call, monkeypatch):
     assert found["real_time_factor_with_file"] == pytest.approx(1000.0 / found["with_file_step_us"])
 
 
+@pytest.mark.slow
 def test_bench_s_stop_has_a_working_anti_lock_system():
     assert DrivenStop().anti_lock_fraction > 0.5
 

@@ -23,7 +23,7 @@ from activesteer.simulation.recorder import BLOCK_INTERVAL_S
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
-MORE_LIMITS = (5_000, 50_000, 100_000, 200_000, 800_000)
+MORE_LIMITS = (100, 5_000, 50_000, 100_000, 200_000, 800_000)
 MORE_STEPS = range(700, 9_700, 1_000)
 SHORT = ("--set", "duration_s=2", "--set", "settle_s=0")
 STUDY = """
@@ -75,14 +75,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 # -- the disk fills up -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "limit",
-    [
-        100,
-        500_000,
-        *(pytest.param(limit, marks=pytest.mark.slow) for limit in MORE_LIMITS),
-    ],
-)
+@pytest.mark.parametrize("limit", [500_000, *(pytest.param(limit, marks=pytest.mark.slow) for limit in MORE_LIMITS)])
 def test_a_full_disk_ends_a_run_with_one_error_and_what_was_saved(tmp_path: Path, limit: int) -> None:
     done = program(tmp_path, "run", "slalom", "-o", "run.mcap", limit=limit)
     assert_refused(done)
@@ -131,7 +124,9 @@ def test_a_full_disk_leaves_no_half_report(tmp_path: Path, recording: Path, limi
 # -- folders, homes and languages --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", ["run", "study", "report"])
+@pytest.mark.parametrize(
+    "command", ["run", *(pytest.param(name, marks=pytest.mark.slow) for name in ("study", "report"))]
+)
 def test_a_folder_that_may_not_be_written_is_one_error(tmp_path: Path, recording: Path, command: str) -> None:
     (tmp_path / "grip.toml").write_text(STUDY)
     closed = tmp_path / "closed"
@@ -197,9 +192,8 @@ JUST_BEFORE_A_BLOCK = 1_198
 """One block is almost full and the one before it may still be in the writer's hands, so that most is lost."""
 
 
-@pytest.mark.parametrize(
-    "step", [JUST_BEFORE_A_BLOCK, *(pytest.param(step, marks=pytest.mark.slow) for step in MORE_STEPS)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [JUST_BEFORE_A_BLOCK, *MORE_STEPS])
 def test_a_killed_run_loses_less_than_two_blocks(call, controller, tmp_path: Path, step: int) -> None:
     body = f"if self.steps > {step}:\n    import os\n    os.kill(os.getpid(), 9)\nreturn ActuatorCommand()"
     words = ("run", "slalom", "-c", controller(body), "--set", "settle_s=0", "-o", "run.mcap")

@@ -151,12 +151,6 @@ def test_setting_of_a_controller_needs_one_that_reads_it(call, tmp_path):
     assert call(*words, "-c", "ars").status == 0
 
 
-def test_value_given_twice_is_refused(call, tmp_path):
-    told = call("run", "straight_line", *SHORT, "--set", "road.mu=0.4", "--set", "road.mu=0.6", "-o", "run.mcap")
-    assert (told.status, told.err) == (1, "activesteer: override road.mu: is given twice; leave one out\n")
-    assert not (tmp_path / "run.mcap").exists()
-
-
 def test_maneuver_and_vehicle_may_be_files(call, tmp_path):
     (tmp_path / "roll.toml").write_text('kind = "open_loop"\nspeed_kmh = 30\nduration_s = 0.2\nsettle_s = 0\n')
     shipped = find_vehicle("compact").read_text()

@@ -27,7 +27,7 @@ FIRST_FILE = {"run": "runs/slalom-none.mcap", "reproduce": "runs/step_steer-none
 QUICK = [
     (RUN, signal.SIGINT, 0.2),  # while modules are imported
     (RUN, signal.SIGTERM, None),
-    (("reproduce", "--jobs", "2"), signal.SIGINT, None),
+    pytest.param(("reproduce", "--jobs", "2"), signal.SIGINT, None, marks=pytest.mark.slow),
 ]
 COMMANDS = (
     ("run", "slalom", "-c", "none", "-c", "ars"),

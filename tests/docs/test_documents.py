@@ -6,7 +6,6 @@ import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -15,7 +14,7 @@ from tests.docs.blocks import Block, blocks
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-QUICK = {"README.md", "docs/index.md", "docs/commands.md", "docs/stepping.md"}
+QUICK = {"README.md", "docs/index.md", "docs/stepping.md"}
 """Pages whose commands and code the quick tests run; the slow tests run all."""
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 
@@ -34,21 +33,6 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("examples", "tools"):
         (tmp_path / name).symlink_to(ROOT / name)
-
-
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make pictures, but leave their files empty: the tests of each picture draw it. Pages need theirs."""
-    figure = pytest.importorskip("matplotlib.figure").Figure
-    drawn = figure.savefig
-
-    def save(self: Any, target: Any, **how: Any) -> None:
-        if isinstance(target, Path):
-            target.touch()
-        else:
-            drawn(self, target, **how)
-
-    monkeypatch.setattr(figure, "savefig", save)
 
 
 def with_slow_commands() -> list[Path]:
@@ -83,7 +67,7 @@ def _do(block: Block, namespace: dict[str, object], *, slow: bool) -> None:
                 act(command)
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("figures")
 @pytest.mark.parametrize(
     "page",
     [pytest.param(page, marks=[] if name(page) in QUICK else pytest.mark.slow) for page in with_blocks()],

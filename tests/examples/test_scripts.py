@@ -24,6 +24,8 @@ EXAMPLES = ROOT / "examples"
 NEED_MORE = {"train_rear_steer.py", "udp_client.py"}
 """Scripts that need arguments, minutes of training or another process; tests of learning and of UDP use them."""
 SLOW = {"cosimulation.py"}
+DRIVEN = {"own_controller.py", "own_mpc.py", "own_manoeuvre.toml"}
+"""Files whose command drives what a test below drives; the slow tests run it."""
 SHOWN = {f"own_{name}.py" for name in ("car", "controller", "driver", "loop", "manoeuvre", "mpc", "study")}
 """Scripts with a test of their own below, which drives once and gives the result to the part that prints."""
 SCRIPTS = [
@@ -71,14 +73,14 @@ def test_script_runs_and_prints(
 
 
 COMMANDS = [
-    (path.name, line.strip())
+    pytest.param(path.name, line.strip(), id=path.name, marks=[pytest.mark.slow] if path.name in DRIVEN else [])
     for path in sorted(EXAMPLES.iterdir())
     if path.suffix in {".py", ".toml"} and path.name not in NEED_MORE
     for line in re.findall(r"^(?:#| )\s+(activesteer .*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
 ]
 
 
-@pytest.mark.parametrize(("name", "command"), COMMANDS, ids=[name for name, _ in COMMANDS])
+@pytest.mark.parametrize(("name", "command"), COMMANDS)
 def test_command_in_an_example_runs(
     name: str, command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import activesteer
 from activesteer import Simulation
+from activesteer.analysis.metrics import EVALUATIONS
 from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.recording import Recording
 from activesteer.scenario import Scenario, resolve
@@ -81,6 +82,12 @@ def assert_goes_on_from_its_state(simulation: ClosedLoop, steps: int, other: Clo
     restored = simulation if other is None else other
     restored.restore_state(state)
     np.testing.assert_array_equal(go_on(restored, steps), uninterrupted)
+
+
+def assert_has_key_metrics(recording: Recording) -> None:
+    """The key metrics of the manoeuvre's kind are metrics of its run."""
+    names = {metric.name for metric in EVALUATIONS[recording.metadata["maneuver"]["kind"]].key_metrics}
+    assert names <= recording.metrics.keys()
 
 
 def car(maneuver: str = "standstill") -> Vehicle:

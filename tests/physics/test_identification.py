@@ -19,7 +19,7 @@ from activesteer.studies.linear.identification import (
     Identification,
     identify,
 )
-from tests.physics.runs import run
+from tests.physics.runs import assert_has_key_metrics, run
 
 DEGPG = math.degrees(9.81)
 PARAMETERS = [field.name for field in dataclasses.fields(SingleTrackParameters) if field.name != "source"]
@@ -55,6 +55,7 @@ def test_heavier_car_is_seen_by_the_identification():
 
 def test_circle_is_held_while_the_car_is_far_from_its_limit():
     recording = run("constant_radius", duration_s=40.0)
+    assert_has_key_metrics(recording)
     driven = (recording.time_s > 10.0) & (np.abs(recording["ay_mps2"]) < 4.0)
     curvature = recording["yaw_rate_radps"][driven] / recording["vx_mps"][driven]
     assert curvature == pytest.approx(0.01, rel=0.02)
@@ -70,6 +71,7 @@ def test_reference_angle_of_fmvss_126_is_that_of_the_hand_calculation():
         run("slowly_increasing_steer", steer__rate_degps=rate, steer__end_deg=60.0, duration_s=length_s, road__mu=0.9)
         for rate, length_s in ((13.5, 6.0), (6.75, 9.0))
     )
+    assert_has_key_metrics(quick)
     quick_rad, slow_rad = (each.metrics["steering_wheel_at_0_3g_rad"] for each in (quick, slow))
     # Half the rate, half the lag: what is left at no rate is steady. Dry friction and the column's twist are not in the
     # formula: 0.3 deg by the compact's file.

@@ -25,7 +25,7 @@ from activesteer.studies.linear.linearisation import (
     linear_cars,
     linear_response,
 )
-from tests.physics.runs import go_on, last, run
+from tests.physics.runs import assert_has_key_metrics, go_on, last, run
 from tests.raising import raises
 
 SPEED_MPS = 80.0 / 3.6
@@ -46,6 +46,7 @@ def system() -> control.StateSpace:
 def test_frequency_response_is_that_of_a_sine_sweep_of_the_full_car(row):
     """ISO 7401, 0.2 to 4 Hz, about 0.1 g: within 5 % and 5 deg, with all dry friction."""
     sweep = run("sine_sweep")
+    assert_has_key_metrics(sweep)
     assert np.abs(sweep["ay_mps2"]).max() == pytest.approx(TENTH_G_MPS2, rel=0.1)
     found = frequency_response(sweep, OUTPUTS[row], np.geomspace(0.2, 4.0, 40))
     expected = system()(2j * math.pi * found.frequency_Hz)[row, INPUTS.index("steering_wheel_rad")]

@@ -22,7 +22,6 @@ from tools.comparison import (
 )
 from tools.population_results import STEERING_EFFORT, Population, SystemEffect, comparison_study, summarise
 
-NAMES = ("none", "ars", "afs", "esc", "lqr")
 SPIN_RAD = 1.0
 
 
@@ -154,12 +153,12 @@ def test_what_is_stored_is_what_was_found():
 
 
 def test_every_sample_drives_one_manoeuvre_around_the_limit_of_its_road():
-    planned = comparison_study(NAMES, 14)
+    planned = comparison_study(("none", "lqr"), 7)
     plan = Plan(planned)
     cars = len(planned.vehicles)
-    assert len(plan) == cars * 14 * len(NAMES)
-    runs = [plan.request(run) for run in range(0, len(plan), len(NAMES))]
-    assert sorted(run.maneuver for run in runs) == sorted([*range(7)] * 2 * cars)
+    assert len(plan) == cars * 7 * 2
+    runs = [plan.request(run) for run in range(0, len(plan), 2)]
+    assert sorted(run.maneuver for run in runs) == sorted([*range(7)] * cars)
     preset, voltage = "rear_actuator.preset", "rear_actuator.supply_voltage_V"
     assert all((voltage in run.overrides) == (run.overrides[preset] != "hinge") for run in runs)
     assert all(plan.request(run.run + 1).overrides == run.overrides for run in runs)  # the next controller

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -40,16 +39,6 @@ def result(word: str) -> Validation:
     return Validation(reference, rows, curves, {}, {})
 
 
-def test_names_of_controller_and_manoeuvre_in_a_report_stay_text():
-    plain, evil = (
-        report_page({word: recording_of(step_steer(), f"my.py:{word}", {"name": word, "title": word})})
-        for word in ("plain", EVIL)
-    )
-    assert scripts(evil) == scripts(plain)
-    assert "<img" not in evil
-    assert "{{ version }}" in evil
-
-
 def test_names_in_a_validation_stay_text():
     studies = {EVIL: [Response(EVIL, *([1.0] * 6))]}
     evil = render_page(validation_page(result(EVIL), studies))
@@ -80,14 +69,6 @@ def test_every_text_can_be_read_on_every_page():
     inks = ("ink", "quiet", "link", "passed", "failed", "known")
     pairs = [(ink, paper) for ink in inks for paper in ("paper", "shade", "differs")] + [("ink", "outside")]
     assert min(contrast(colours[ink], colours[paper]) for colours in modes for ink, paper in pairs) >= 4.5
-
-
-def test_json_in_a_page_comes_back_and_opens_nothing():
-    data = report_page({"a": recording_of(step_steer(), EVIL)})
-    found = re.search(r'id="data">(.*?)</script>', data, re.DOTALL)
-    assert found
-    assert "<" not in found[1]
-    assert json.loads(found[1])[0]["runs"][0]["name"] == EVIL.rpartition(":")[2]
 
 
 def test_what_a_template_needs_must_be_given():

@@ -58,6 +58,7 @@ def sines():
     return {"none": sine_with_dwell(), "ars": sine_with_dwell(rear_rad=0.02), "afs": sine_with_dwell()}
 
 
+@pytest.mark.usefixtures("figures")
 def test_only_the_figures_that_there_are_runs_for_are_drawn(tmp_path):
     paths = draw_all({"step_steer": {"ars": step_steer()}, "parking": {"none": step_steer()}}, tmp_path)
     assert [path.name[:9] for path in paths[::3]] == ["figure_07", "figure_09", "figure_11"]
@@ -206,14 +207,15 @@ def test_curves_of_long_runs_are_thinned():
 
 
 @pytest.mark.parametrize("kind", ["step_steer", "sine_with_dwell", "lane_change", "slalom", "follow_path", "parking"])
-def test_every_kind_has_a_figure(kind, tmp_path):
+def test_every_kind_has_a_figure(kind, figures, tmp_path):
     runs = {"none": sine_with_dwell()} if kind in {"sine_with_dwell", "parking"} else lane_changes()
     if kind == "step_steer":
         runs = {"none": step_steer()}
-    path = figure_for(kind)(runs, tmp_path / "figure.png")
-    assert path.stat().st_size > 5000
+    assert figure_for(kind)(runs, tmp_path / "figure.png").exists()
+    assert all(axis.get_lines() for axis in figures[0].get_axes())
 
 
+@pytest.mark.usefixtures("figures")
 def test_a_path_without_gates_can_be_drawn(tmp_path):
     run = along_path(kind="follow_path", lanes=(), last_gate_m=None)
     assert figure_for("follow_path")({"none": run}, tmp_path / "figure.png").exists()

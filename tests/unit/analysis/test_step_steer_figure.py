@@ -25,24 +25,17 @@ def three():
 
 
 @pytest.fixture
-def saved(monkeypatch, tmp_path):
+def saved(figures, tmp_path):
     """Return the saved Figure, to check its curves."""
-    figure_module = pytest.importorskip("matplotlib.figure")
-    figures = []
-    save = figure_module.Figure.savefig
-
-    def keep(self, *args, **words):
-        figures.append(self)
-        return save(self, *args, **words)
-
-    monkeypatch.setattr(figure_module.Figure, "savefig", keep)
     step_steer_figure(three(), tmp_path / "figure.png")
     return figures[0]
 
 
-def test_figure_is_a_png_of_readable_size(tmp_path):
+def test_figure_is_a_png_of_readable_size_and_pyplot_is_left_alone(tmp_path):
     image = pytest.importorskip("matplotlib.image")
+    before = "matplotlib.pyplot" in sys.modules
     path = step_steer_figure(three(), tmp_path / "figure.png")
+    assert ("matplotlib.pyplot" in sys.modules) == before
     pixels = image.imread(path)
     assert pixels.shape[0] > 1000
     assert pixels.shape[1] > 800
@@ -77,12 +70,6 @@ def test_the_same_run_keeps_its_colour_when_others_are_left_out(figures, tmp_pat
 def test_a_users_controller_is_drawn_under_its_own_name(figures, tmp_path):
     step_steer_figure({"my_controller.py:Mine": step_steer(rear_rad=-0.02)}, tmp_path / "a.png")
     assert figures[0].legends[0].get_texts()[0].get_text() == "my_controller.py:Mine"
-
-
-def test_pyplot_is_left_alone(tmp_path):
-    before = "matplotlib.pyplot" in sys.modules
-    step_steer_figure(three(), tmp_path / "figure.png")
-    assert ("matplotlib.pyplot" in sys.modules) == before
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):

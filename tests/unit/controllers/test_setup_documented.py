@@ -19,7 +19,9 @@ OF_CONTROLLERS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(("page", "kinds"), [("controller.md", OF_CONTROLLERS), ("driver.md", (DriverSetup,))])
+@pytest.mark.parametrize(
+    ("page", "kinds"), [("reference/controllers.md", OF_CONTROLLERS), ("driver.md", (DriverSetup,))]
+)
 def test_guide_names_every_attribute_of_setup(page, kinds):
     table = (DOCS / page).read_text(encoding="utf-8").partition("| attribute of `setup` |")[2].partition("\n\n")[0]
     named = set(re.findall(r"\w+", " ".join(re.findall(r"`[^`]+`", table))))

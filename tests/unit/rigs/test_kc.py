@@ -103,8 +103,8 @@ def test_a_car_without_targets_has_no_bands() -> None:
     assert load_targets("no_such_car") == {}
 
 
+@pytest.mark.usefixtures("figures")
 def test_a_car_without_bands_gets_no_chart_and_no_count_of_bands(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     metrics = tuple(replace(entry, band=None, inside=None) for entry in compact().metrics)
     result = replace(compact(), metrics=metrics)
     paths = draw(result, tmp_path)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from activesteer.compilation import compiled
 from activesteer.config import Source, build
 from activesteer.sensors import SensorBlock, Sensors
 from activesteer.sensors.block import measured
@@ -28,7 +28,7 @@ PLACES: Final = {
 """Columns of what is shown and said; the wheels have four each."""
 
 
-@njit
+@compiled
 def _shown(chains, memory, wheel_radii_m, timestep_s, truth, said):
     for row in range(len(truth)):
         t = truth[row]

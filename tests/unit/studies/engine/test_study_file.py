@@ -16,7 +16,7 @@ from tests.raising import raises
 STEP = {"maneuvers": ["step_steer"], "factors": {"road.mu": {"grid": [0.8, 1.0]}}}
 
 
-LARGE = {"comparison", "match_paper", "population"}
+LARGE = {"around_paper_setting_wide", "comparison", "match_paper", "population"}
 """Studies of thousands of runs, each of which is checked. `no_harm` is as large; it stays among the quick tests."""
 STUDIES = [
     pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem in LARGE else [])
