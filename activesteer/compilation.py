@@ -171,8 +171,9 @@ class _ContentCache(FunctionCache):
         # A full disk is no reason not to run what is already compiled.
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
-            kept = sorted(Path(self._cache_path).glob(f"{self._stem}-*.nbi"), key=lambda index: index.stat().st_mtime)
-            for index in kept[:-_KEPT]:
+            own = Path(self._cache_file._index_path)  # kept also where a clock that was set back dates it before others
+            others = {index for index in Path(self._cache_path).glob(f"{self._stem}-*.nbi") if index != own}
+            for index in sorted(others, key=lambda index: index.stat().st_mtime)[: 1 - _KEPT]:
                 for file in index.parent.glob(f"{index.stem}.*"):
                     file.unlink(missing_ok=True)
 

@@ -68,7 +68,8 @@ def temporary_file(part: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # where it cannot be deleted, the error of the writing itself says why
+            part.unlink(missing_ok=True)
         _passing.discard(part)
 
 

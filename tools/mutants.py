@@ -76,7 +76,7 @@ ROOMS: Final = {
         "driver/*.py", "unit/driver physics/test_step_steer.py", "unit/scenario physics/test_driver_loop.py"
     ),
     "sensors": Room("sensors/*.py", "unit/sensors physics/test_sensors.py"),
-    "faults": Room("faults/*.py", "unit/faults physics/test_faults.py"),
+    "faults": Room("faults.py vehicle/faults.py", "unit/faults physics/test_faults.py"),
     "tyre/kernels": Room(
         "tyre/kernels/*.py",
         "unit/tyre/kernels reference/test_tyre_against_mfeval.py",
@@ -98,6 +98,16 @@ ROOMS: Final = {
         " ".join(f"unit/studies/engine/test_{name}.py" for name in _STUDIES.split()),
         "unit/studies/engine/test_study.py unit/studies/engine/test_tuning.py",
     ),
+    "simulation": Room(
+        "simulation/*.py",
+        "unit/simulation",
+        "physics/test_determinism.py physics/test_step_steer.py physics/test_own_cars.py unit/scenario",
+    ),
+    "road": Room("road/*.py", "unit/road", "unit/driver physics/test_road.py physics/test_uneven_road.py"),
+    "analysis/harm": Room("analysis/harm.py", "unit/analysis/test_harm.py", "physics/test_harm.py"),
+    "measured/comparison": Room(
+        "measured/comparison.py", "unit/measured/test_comparison.py", "cli/test_measured.py unit/measured"
+    ),
 }
 
 OTHER_NAMES: Final = {
@@ -105,6 +115,17 @@ OTHER_NAMES: Final = {
     "native_screws": "toe_link_screw",
     "find": "plugins",
     "advance": "filter_parts",
+    "two_track_model": "filter_parts",
+    "crg": "uneven",
+    "surface": "uneven",
+    "obstacles": "uneven",
+    "native_path": "path_coordinates",
+    "closed_loop": "simulation",
+    "native_cars": "batch",
+    "native_loop": "batch",
+    "pacing": "by_the_clock",
+    "preparation": "amplitude_search",
+    "two_track_search": "amplitude_search",
 }
 """File -> name of its tests, if the name differs."""
 
@@ -179,18 +200,26 @@ def mutants_of(room: str, path: Path) -> Iterator[Mutant]:
             yield Mutant(f"{text} {same[text]}", room, str(path.relative_to(ROOT)), f"core/{name}", occurrence)
 
 
-def draw(count: int, seed: int) -> dict[str, list[Mutant]]:
-    """Draw mutants in proportion to the possible changes of each room, and at least `LEAST_PER_ROOM`."""
+def draw(count: int, seed: int, only: list[str]) -> dict[str, list[Mutant]]:
+    """Draw mutants in proportion to the possible changes of each room, and a least number in each room.
+
+    `only` lists patterns of files, such as `road/*.py`. An empty list draws among the files of all rooms.
+    """
+    chosen = {file for one in only for file in (ROOT / "activesteer").glob(one)}
     possible: dict[str, list[Mutant]] = {}
     for room, about in ROOMS.items():
         files = sorted(file for one in about.files.split() for file in (ROOT / "activesteer").glob(one))
-        possible[room] = [mutant for file in files for mutant in mutants_of(room, file)]
-        possible[room].sort(key=lambda mutant: hashlib.sha256(f"{seed} {mutant.identity}".encode()).digest())
-    share = count / sum(map(len, possible.values()))
-    sizes = {room: max(LEAST_PER_ROOM, round(share * len(of_room))) for room, of_room in possible.items()}
+        found = [mutant for file in files if not only or file in chosen for mutant in mutants_of(room, file)]
+        if found:
+            found.sort(key=lambda mutant: hashlib.sha256(f"{seed} {mutant.identity}".encode()).digest())
+            possible[room] = found
+    if not possible:
+        sys.exit(f"no room of mutants.py has a file that matches {' '.join(only)}")
+    share, least = count / sum(map(len, possible.values())), min(LEAST_PER_ROOM, count // (2 * len(possible)))
+    sizes = {room: max(least, round(share * len(of_room))) for room, of_room in possible.items()}
     while sum(sizes.values()) > count:
         sizes[max(sizes, key=lambda room: sizes[room])] -= 1
-    return {room: possible[room][: sizes[room]] for room in ROOMS}
+    return {room: of_room[: sizes[room]] for room, of_room in possible.items()}
 
 
 def copy_tree(tree: Path) -> None:
@@ -271,12 +300,17 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300, help="mutants to draw")
     parser.add_argument("--seed", type=int, default=26, help="seed of the draw")
     parser.add_argument("--room", choices=ROOMS, action="append", help="only this room (may be repeated)")
+    parser.add_argument(
+        "--file", action="append", help="draw only in these files, such as 'road/*.py' (may be repeated)"
+    )
     parser.add_argument("--near", action="store_true", help="leave out the wide tests")
     parser.add_argument("--again", action="store_true", help="run the survivors of earlier runs again")
     parser.add_argument("--list", action="store_true", help="run nothing, only report")
     options = parser.parse_args()
     drawn = {
-        room: found for room, found in draw(options.count, options.seed).items() if room in (options.room or ROOMS)
+        room: found
+        for room, found in draw(options.count, options.seed, options.file or []).items()
+        if room in (options.room or ROOMS)
     }
     kept = PLACE / "results.json"
     results = json.loads(kept.read_text()) if kept.exists() else {}

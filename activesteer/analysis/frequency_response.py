@@ -63,7 +63,6 @@ def frequency_response(
     recording: RecordingLike,
     output: str,
     frequency_Hz: NDArray[np.float64],
-    input_channel: str = INPUT,
 ) -> FrequencyResponse:
     """Return the response of a channel to the steering.
 
@@ -71,7 +70,6 @@ def frequency_response(
         recording: A run that begins and ends straight, with all frequencies in its steering.
         output: Channel.
         frequency_Hz: Frequencies [Hz]; the nearest lines of the spectrum are returned.
-        input_channel: Input of the response.
 
     Returns:
         Response and coherence at these lines.
@@ -81,7 +79,7 @@ def frequency_response(
     """
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     step_s = timestep(time_s)
-    u = np.fft.rfft(np.asarray(recording[input_channel], dtype=np.float64))
+    u = np.fft.rfft(np.asarray(recording[INPUT], dtype=np.float64))
     y = np.fft.rfft(np.asarray(recording[output], dtype=np.float64))
     lines_Hz = np.asarray(np.fft.rfftfreq(len(time_s), step_s), dtype=np.float64)
     asked = np.atleast_1d(np.asarray(frequency_Hz, dtype=np.float64))
@@ -96,7 +94,7 @@ def frequency_response(
     power_u = (np.abs(u[band]) ** 2).sum(axis=1)
     power_y = (np.abs(y[band]) ** 2).sum(axis=1)
     cross = (u[band].conj() * y[band]).sum(axis=1)
-    return response_of(lines_Hz[places], power_u, power_y, cross, input_channel, float((np.abs(u) ** 2).max()))
+    return response_of(lines_Hz[places], power_u, power_y, cross, float((np.abs(u) ** 2).max()))
 
 
 def response_of(
@@ -104,7 +102,6 @@ def response_of(
     power_u: NDArray[np.float64],
     power_y: NDArray[np.float64],
     cross: NDArray[np.complex128],
-    input_channel: str,
     largest: float,
 ) -> FrequencyResponse:
     """Return the estimate H1 and the coherence.
@@ -114,7 +111,6 @@ def response_of(
         power_u: Power of the input there, shape (n,).
         power_y: Power of the output, in the same measure, shape (n,).
         cross: Cross spectrum, the conjugate input times the output, shape (n,).
-        input_channel: Name of the input, for the error.
         largest: Largest power of the input at any frequency.
 
     Raises:
@@ -123,7 +119,7 @@ def response_of(
     missing = ~(power_u > MIN_SPECTRUM**2 * largest)
     if missing.any():
         raise RecordingError(
-            f"the steering ({input_channel}) does not contain {frequency_Hz[missing][0]:.3g} Hz: "
+            f"the steering ({INPUT}) does not contain {frequency_Hz[missing][0]:.3g} Hz: "
             "no response can be evaluated there",
             value=float(frequency_Hz[missing][0]),
         )
@@ -199,7 +195,7 @@ class RandomResponse(NamedTuple):
 
 
 def random_response(
-    recordings: Sequence[RecordingLike], output: str, lowest_Hz: float, highest_Hz: float, input_channel: str = INPUT
+    recordings: Sequence[RecordingLike], output: str, lowest_Hz: float, highest_Hz: float
 ) -> RandomResponse:
     """Return the response of a channel to random steering, at all lines of a range.
 
@@ -211,7 +207,6 @@ def random_response(
         output: Channel.
         lowest_Hz: Least frequency [Hz].
         highest_Hz: Greatest frequency [Hz].
-        input_channel: Input of the response.
     """
     if not recordings:
         raise RecordingError("there is no run with random steering")
@@ -221,7 +216,7 @@ def random_response(
     length = round(SEGMENT_S / step_s)
     spectra, counts = [], []
     for recording in recordings:
-        u, y = (np.asarray(recording[name], dtype=np.float64) for name in (input_channel, output))
+        u, y = (np.asarray(recording[name], dtype=np.float64) for name in (INPUT, output))
         if len(u) < length:
             raise RecordingError(
                 f"a run of {len(u) * step_s:.3g} s is too short for an average; {SEGMENT_S:g} s are needed",
@@ -235,7 +230,7 @@ def random_response(
     lines_Hz = np.asarray(np.fft.rfftfreq(length, step_s), dtype=np.float64)
     inside = (lines_Hz >= lowest_Hz - 1e-9) & (lines_Hz <= highest_Hz + 1e-9)
     largest = float(power_u.max())
-    found = response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], input_channel, largest)
+    found = response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], largest)
     with np.errstate(divide="ignore"):
         error = np.sqrt(0.5 * np.maximum(1.0 / found.coherence - 1.0, 0.0) / averages)
     return RandomResponse(found, error, averages)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -52,36 +52,8 @@ SLALOM_KEY_METRICS: Final = (
 """Key metrics of a slalom, the most telling first."""
 
 
-class PathFollowing(NamedTuple):
-    """Metrics of one run along a path.
-
-    Attributes:
-        values: Metric name, ending in its unit, to value.
-        notes: Reasons for values that are nan, one sentence each.
-    """
-
-    values: dict[str, float]
-    notes: tuple[str, ...]
-
-
-class Windows(NamedTuple):
-    """Samples of a run.
-
-    Attributes:
-        approach: From the beginning of the run to the last gate.
-        gates: From the first gate to the last.
-        after: The 3 s after the last gate.
-        notes: Reasons for an empty window, one sentence each.
-    """
-
-    approach: slice
-    gates: slice
-    after: slice
-    notes: tuple[str, ...]
-
-
-def evaluate(recording: RecordingLike) -> PathFollowing:
-    """Return the metrics of a run along a path, with the reasons for those that could not be evaluated.
+def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Return the metrics of a run along a path. A metric that cannot be evaluated is nan.
 
     - Sizes: `<name>_peak_abs_<unit>`, `<name>_rms_<unit>` of yaw rate, sideslip, lateral acceleration (`ay`) and roll
       over the whole run, sideslip above 10 km/h. `<name>_gates_rms_<unit>` and `<name>_after_gates_rms_<unit>` of the
@@ -106,14 +78,14 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
         recording: A run along a path.
 
     Returns:
-        Values and notes.
+        Metric name, ending in its unit, to value.
 
     Raises:
         RecordingError: a channel is missing, or the metadata hold no course or no sizes of the car.
     """
     course = read_course(recording)
     step_s = timestep(recording.time_s)
-    windows = find_windows(recording, course)
+    approach, gates, after = _windows(recording, course)
     values: dict[str, float] = {}
     for name, unit in SIGNALS:
         channel = counted_sideslip(recording) if name == "sideslip" else recording[f"{name}_{unit}"]
@@ -121,14 +93,14 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
         values[f"{name}_rms_{unit}"] = rms(channel)
     if course.last_gate_x_m is not None:
         for name, unit in OSCILLATING:
-            for key, part in (("gates", windows.gates), ("after_gates", windows.after)):
+            for key, part in (("gates", gates), ("after_gates", after)):
                 is_angle = name == "sideslip"
                 channel = counted_sideslip(recording, part) if is_angle else recording[f"{name}_{unit}"][part]
                 values[f"{name}_{key}_rms_{unit}"] = rms(channel)
     wheel = recording["steering_wheel_rad"]
     for name, unit in (("yaw_rate", "radps"), ("ay", "mps2")):
-        follower = recording[f"{name}_{unit}"][windows.approach]
-        values[f"{name}_lag_s"] = lag(wheel[windows.approach], follower, step_s, LONGEST_LAG_S)
+        follower = recording[f"{name}_{unit}"][approach]
+        values[f"{name}_lag_s"] = lag(wheel[approach], follower, step_s, LONGEST_LAG_S)
     values |= _steering_effort(wheel, step_s)
     values |= _places(recording, course)
     if course.last_gate_x_m is None:
@@ -140,35 +112,27 @@ def evaluate(recording: RecordingLike) -> PathFollowing:
     speed = recording["speed_mps"]
     values["speed_loss_mps"] = float(speed[0] - speed.min())
     values["speed_end_mps"] = float(speed[-1])
-    return PathFollowing(values, windows.notes)
+    return values
 
 
-def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the values of `evaluate` alone."""
-    return evaluate(recording).values
-
-
-def find_windows(recording: RecordingLike, course: Course) -> Windows:
-    """Return the samples of the gates and of the time after them.
+def _windows(recording: RecordingLike, course: Course) -> tuple[slice, slice, slice]:
+    """Return the samples up to the last gate, from the first to the last gate, and of the 3 s after the last gate.
 
     A path without gates is all approach.
     """
     nothing = slice(0, 0)
     if course.last_gate_x_m is None:
-        return Windows(slice(None), nothing, nothing, ())
+        return slice(None), nothing, nothing
     first, last = (lanes.first_at(recording, x) for x in (course.first_gate_x_m, course.last_gate_x_m))
     if first is None or last is None:
-        furthest_m = float(lanes.front_axle(recording)[0].max())
-        note = f"the car gets to x = {furthest_m:.1f} m, the last gate ends at {course.last_gate_x_m:.1f} m"
-        return Windows(nothing, nothing, nothing, (note,))
+        return nothing, nothing, nothing
     time_s = recording.time_s
     rest_s = float(time_s[-1] - time_s[last])
     # Half a step of tolerance: the last sample lies one step before the end of the run.
     if rest_s < AFTER_S - 1.5 * timestep(time_s):
-        note = f"the recording ends {rest_s:.2f} s after the last gate, {AFTER_S:g} s are needed"
-        return Windows(slice(0, last), slice(first, last), nothing, (note,))
+        return slice(0, last), slice(first, last), nothing
     end = int(np.searchsorted(time_s, time_s[last] + AFTER_S))
-    return Windows(slice(0, last), slice(first, last), slice(last, end), ())
+    return slice(0, last), slice(first, last), slice(last, end)
 
 
 def _steering_effort(wheel: Array, step_s: float) -> dict[str, float]:

@@ -44,7 +44,6 @@ class StepResponse(NamedTuple):
         peak: Largest value in the direction of the steady-state value.
         peak_time_s: Time of the peak [s].
         overshoot: (peak - steady state)/steady state.
-        notes: Reasons for values that are nan, one sentence each.
     """
 
     steady_state: float
@@ -52,7 +51,6 @@ class StepResponse(NamedTuple):
     peak: float
     peak_time_s: float
     overshoot: float
-    notes: tuple[str, ...]
 
 
 def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
@@ -174,19 +172,14 @@ def step_response(time_s: Array, values: Array, step_time_s: float, window_s: fl
     top = int(np.argmax(moving))
     peak = direction * float(moving[top])
     if abs(steady_state) < minimum:
-        note = f"the steady-state value {steady_state:.3g} is too small to refer to (below {minimum:.3g})"
-        return StepResponse(steady_state, math.nan, peak, math.nan, math.nan, (note,))
+        return StepResponse(steady_state, math.nan, peak, math.nan, math.nan)
 
-    notes: list[str] = []
     response_time_s = crossing_time(moving_s, moving, 0.9 * abs(steady_state)) - step_time_s
-    if math.isnan(response_time_s):
-        notes.append("90 % of the steady-state value is not passed after the step")
     overshoot = (peak - steady_state) / steady_state
     peak_time_s = float(moving_s[top]) - step_time_s
     if overshoot < PEAK_MARGIN or moving_s[top] >= time_s[-1] - window_s:
         peak_time_s = math.nan
-        notes.append(f"no peak stands out: the largest value is {100.0 * overshoot:.2g} % above the steady-state value")
-    return StepResponse(steady_state, response_time_s, peak, peak_time_s, overshoot, tuple(notes))
+    return StepResponse(steady_state, response_time_s, peak, peak_time_s, overshoot)
 
 
 _ENDS_PERIODS: Final = 6.0

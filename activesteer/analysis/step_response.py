@@ -66,20 +66,8 @@ STEADY_CHANNELS: Final = (
 """Channels of which only the steady-state value is given: channel name and unit suffix."""
 
 
-class StepSteer(NamedTuple):
-    """Metrics of one step steer.
-
-    Attributes:
-        values: Metric name, ending in its unit, to value.
-        notes: Name of the signal -> reasons for its values that are nan.
-    """
-
-    values: dict[str, float]
-    notes: dict[str, tuple[str, ...]]
-
-
-def evaluate(recording: RecordingLike) -> StepSteer:
-    """Return the metrics of a step steer, with the reasons for those that could not be evaluated.
+def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Return the metrics of a step steer. A metric that cannot be evaluated is nan.
 
     For yaw rate, lateral acceleration (`ay`), roll and sideslip: `<name>_steady_state_<unit>`, `<name>_response_time_s`
     (90 %), `<name>_peak_<unit>` and `<name>_peak_time_s` in the direction of the steady-state value, and
@@ -90,7 +78,8 @@ def evaluate(recording: RecordingLike) -> StepSteer:
         recording: A run with one step of the steering wheel, to either side, and at least two seconds after it.
 
     Returns:
-        Values and notes. Times count from t = 0 [s], but `step_time_s` from the beginning of the run.
+        Metric name, ending in its unit, to value. Times count from t = 0 [s], but `step_time_s` from the beginning of
+        the run.
 
     Raises:
         RecordingError: there is no step, it has no beginning, the run ends too early after it, or a channel is missing.
@@ -100,7 +89,6 @@ def evaluate(recording: RecordingLike) -> StepSteer:
     step_time_s = _step_time(time_s, steering_rad)
 
     values: dict[str, float] = {"step_time_s": step_time_s}
-    notes: dict[str, tuple[str, ...]] = {}
     for signal in SIGNALS:
         channel = np.asarray(recording[f"{signal.name}_{signal.unit}"], dtype=np.float64)
         response = step_response(time_s, channel, step_time_s, STEADY_WINDOW_S, signal.minimum)
@@ -109,8 +97,6 @@ def evaluate(recording: RecordingLike) -> StepSteer:
         values[f"{signal.name}_peak_{signal.unit}"] = response.peak
         values[f"{signal.name}_peak_time_s"] = response.peak_time_s
         values[f"{signal.name}_overshoot"] = response.overshoot
-        if response.notes:
-            notes[signal.name] = response.notes
     values["tb_srad"] = values["yaw_rate_peak_time_s"] * abs(values["sideslip_steady_state_rad"])
 
     settled = time_s >= time_s[-1] - STEADY_WINDOW_S
@@ -118,12 +104,7 @@ def evaluate(recording: RecordingLike) -> StepSteer:
     for name, unit in STEADY_CHANNELS:
         values[f"{name}_steady_state_{unit}"] = float(np.mean(recording[f"{name}_{unit}"][settled]))
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
-    return StepSteer(values, notes)
-
-
-def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the values of `evaluate` alone."""
-    return evaluate(recording).values
+    return values
 
 
 def _step_time(time_s: np.ndarray, steering_rad: np.ndarray) -> float:

@@ -41,6 +41,7 @@ class StopSignals:
         self.options: argparse.Namespace | None = None
         self.finished = False  # only the interpreter has to end
         self._begun_ns = time.time_ns() - _CLOCK_STEP_NS
+        self._clock_ns = time.time_ns() - time.monotonic_ns()
         self._watching = self._raised = False
         self._ending = threading.Lock()
 
@@ -120,7 +121,9 @@ class StopSignals:
         output: Path | None = getattr(self.options, "output", None)
         own: list[Path] | None = getattr(self.options, "saved", None)
         if own is None:
-            files = [path for path in _files(output) if path.stat().st_mtime_ns >= self._begun_ns]
+            # Where the clock was set back meanwhile, files written since have earlier times.
+            set_back_ns = max(0, self._clock_ns - (time.time_ns() - time.monotonic_ns()))
+            files = [path for path in _files(output) if path.stat().st_mtime_ns >= self._begun_ns - set_back_ns]
         else:
             files = [path for path in own if path.is_file()]
         if not files:

@@ -224,6 +224,8 @@ def _fit(options: argparse.Namespace) -> bool:
     from activesteer.measured.fitting import fit
     from activesteer.measured.folder_file import is_measured
 
+    if options.output is not None:  # a fit takes minutes, and a folder that cannot be made is no surprise after it
+        make_folder(options.output, ParameterError)
     if is_measured(options.study):
         page = None if options.output is None else options.output / "page.html"
         return judge(options.study, options, page=page, fitted=True)

@@ -80,15 +80,16 @@ def keep(key: str, value: float) -> None:
     with contextlib.suppress(OSError, RuntimeError):
         place = folder()
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        part = place / f"{key}-{secrets.token_hex(4)}{_SUFFIX}"
+        own, part = place / f"{key}{_SUFFIX}", place / f"{key}-{secrets.token_hex(4)}{_SUFFIX}"
         try:
             part.write_text(_line(key, value), encoding="ascii")
             # Not `files.atomic_write`, which follows links: a link here may point to any file of the user.
-            part.replace(place / f"{key}{_SUFFIX}")
+            part.replace(own)
         finally:
             part.unlink(missing_ok=True)
-        kept = sorted(place.glob(f"*{_SUFFIX}"), key=lambda file: file.lstat().st_mtime)
-        for file in kept[:-MAX_KEPT]:
+        # The newest one is kept also where a clock that was set back dates it before others.
+        others = {file for file in place.glob(f"*{_SUFFIX}") if file != own}
+        for file in sorted(others, key=lambda file: file.lstat().st_mtime)[: 1 - MAX_KEPT]:
             with contextlib.suppress(OSError):
                 file.unlink()
 

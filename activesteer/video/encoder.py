@@ -6,18 +6,17 @@ import importlib
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, Protocol, Self
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from activesteer.errors import ParameterError, PlaybackError, not_installed
-from activesteer.files import temporary_file, writing
+from activesteer.files import atomic_write
 
 Pixels = NDArray[np.uint8]
 
@@ -27,22 +26,6 @@ FORMATS: Final = (".mp4", ".gif")
 _GIF_TICKS_HZ: Final = 100.0
 _COLOURS: Final = 128
 _SIDE_LIMIT: Final = 8192
-
-
-class Encoder(Protocol):
-    """Writer of frames. The file appears when the context ends without an error. Otherwise nothing is left."""
-
-    def write(self, pixels: Pixels) -> None:
-        """Append one frame, shape (height, width, 3)."""
-        ...
-
-    def __enter__(self) -> Self:
-        """Open the file."""
-        ...
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        """Complete the file, or delete the part written so far after an error."""
-        ...
 
 
 def frame_rate(path: Path, wanted_hz: float) -> float:
@@ -70,11 +53,16 @@ def check(path: Path, size: tuple[int, int]) -> None:
         ffmpeg()
 
 
-def encoder(path: Path, size: tuple[int, int], rate_hz: float, samples: Iterable[Pixels]) -> Encoder:
-    """Return the writer for a file name."""
+def encoder(
+    path: Path, size: tuple[int, int], rate_hz: float, samples: Iterable[Pixels]
+) -> AbstractContextManager[Callable[[Pixels], None]]:
+    """Context that yields a function to append a frame of shape (height, width, 3).
+
+    The file appears when the context ends without an error. Otherwise nothing is left.
+    """
     if path.suffix.lower() == ".gif":
-        return _Gif(path, rate_hz, samples)
-    return _Mp4(path, size, rate_hz)
+        return _gif(path, rate_hz, samples)
+    return _mp4(path, size, rate_hz)
 
 
 def ffmpeg() -> str:
@@ -87,81 +75,56 @@ def ffmpeg() -> str:
     raise not_installed(PlaybackError, what, "imageio-ffmpeg", "video")
 
 
-class _Mp4:
-    def __init__(self, path: Path, size: tuple[int, int], rate_hz: float) -> None:
-        self._path, self._part = path, path.with_name(f".{path.name}.part")
-        self._command = [
+@contextmanager
+def _mp4(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Callable[[Pixels], None]]:
+    with atomic_write(path, PlaybackError) as part, tempfile.TemporaryFile() as log:
+        part.open("wb").close()  # a folder that cannot be written is an error before anything is drawn
+        command = [
             ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
             "-r", f"{rate_hz:.6g}", "-i", "-", "-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20",
             # Every player and browser supports this, and can start before the whole file has arrived.
-            "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(self._part),
+            "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(part),
         ]  # fmt: skip
-
-    def __enter__(self) -> Self:
-        with ExitStack() as stack:
-            self._log = stack.enter_context(tempfile.TemporaryFile())
-            stack.enter_context(temporary_file(self._part))
-            try:
-                self._process: Any = subprocess.Popen(self._command, stdin=subprocess.PIPE, stderr=self._log)
-            except OSError as reason:
-                raise PlaybackError(f"{self._command[0]} does not start: {reason.strerror or reason}") from None
-            self._leaving = stack.pop_all()
-        return self
-
-    def write(self, pixels: Pixels) -> None:
         try:
-            self._process.stdin.write(np.ascontiguousarray(pixels).data)
-        except OSError:
-            self._process.wait()
-            raise self._failure() from None
+            process: Any = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=log)
+        except OSError as reason:
+            raise PlaybackError(f"{command[0]} does not start: {reason.strerror or reason}") from None
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        if kind is not None:
-            self._process.kill()
-        with suppress(OSError):
-            self._process.stdin.close()
-        status = self._process.wait()
-        with self._leaving:
-            if kind is None and status != 0:
-                raise self._failure()
-            if kind is None:
-                with writing(self._path, PlaybackError):
-                    self._part.replace(self._path)
+        def failure() -> PlaybackError:
+            log.seek(0)
+            said = (log.read().decode(errors="replace").strip().splitlines() or ["nothing"])[-1]
+            return PlaybackError(f"cannot write {path}: ffmpeg says: {said}", value=said)
 
-    def _failure(self) -> PlaybackError:
-        self._log.seek(0)
-        said = (self._log.read().decode(errors="replace").strip().splitlines() or ["nothing"])[-1]
-        return PlaybackError(f"cannot write {self._path}: ffmpeg says: {said}", value=said)
+        def write(pixels: Pixels) -> None:
+            try:
+                process.stdin.write(np.ascontiguousarray(pixels).data)
+            except OSError:
+                process.wait()
+                raise failure() from None
+
+        try:
+            yield write
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            with suppress(OSError):
+                process.stdin.close()
+            status = process.wait()
+        if status != 0:
+            raise failure()
 
 
-class _Gif:
-    def __init__(self, path: Path, rate_hz: float, samples: Iterable[Pixels]) -> None:
-        self._path, self._part = path, path.with_name(f".{path.name}.part")
-        self._duration_ms = round(1000.0 / rate_hz)
-        # All frames share one palette; with a palette for each frame, the colours of still objects would flicker.
-        mosaic = Image.fromarray(np.concatenate(list(samples)))
-        self._palette = mosaic.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
-        self._pictures: list[Image.Image] = []
-
-    def __enter__(self) -> Self:
-        with ExitStack() as stack:
-            stack.enter_context(temporary_file(self._part))
-            with writing(self._path, PlaybackError):
-                self._part.open("wb").close()
-            self._leaving = stack.pop_all()
-        return self
-
-    def write(self, pixels: Pixels) -> None:
-        picture = Image.fromarray(np.ascontiguousarray(pixels))
-        self._pictures.append(picture.quantize(palette=self._palette, dither=Image.Dither.NONE))
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
-        with self._leaving:
-            if kind is None and self._pictures:
-                first, *others = self._pictures
-                with writing(self._path, PlaybackError):
-                    first.save(
-                        self._part, "GIF", save_all=True, append_images=others, duration=self._duration_ms, loop=0,
-                        optimize=False,
-                    )  # fmt: skip
-                    self._part.replace(self._path)
+@contextmanager
+def _gif(path: Path, rate_hz: float, samples: Iterable[Pixels]) -> Iterator[Callable[[Pixels], None]]:
+    # All frames share one palette; with a palette for each frame, the colours of still objects would flicker.
+    palette = Image.fromarray(np.concatenate(list(samples))).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
+    pictures: list[Image.Image] = []
+    with atomic_write(path, PlaybackError) as part:
+        part.open("wb").close()  # a folder that cannot be written is an error before anything is drawn
+        yield lambda pixels: pictures.append(
+            Image.fromarray(np.ascontiguousarray(pixels)).quantize(palette=palette, dither=Image.Dither.NONE)
+        )
+        first, *others = pictures
+        duration_ms = round(1000.0 / rate_hz)
+        first.save(part, "GIF", save_all=True, append_images=others, duration=duration_ms, loop=0, optimize=False)

@@ -239,9 +239,9 @@ def make_film(
     with Film(recordings, settings) as film:
         times = film.times(rate)
         samples = film.pictures(times[:: max(1, len(times) // _SAMPLES)])
-        with encoder(path, settings.size, rate, samples) as file:
+        with encoder(path, settings.size, rate, samples) as write:
             for number, pixels in enumerate(film.pictures(times), start=1):
-                file.write(pixels)
+                write(pixels)
                 if progress is not None:
                     progress(number / len(times))
     return FilmInfo(len(times), rate)

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from http.client import HTTPConnection
 from pathlib import Path
@@ -103,6 +104,27 @@ class Page:
             header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
             if header["kind"] == kind:
                 return header
+
+
+def test_hundreds_of_connections_leave_neither_memory_nor_files_open(url: str) -> None:
+    address, origin = url.replace("http:", "ws:") + "socket", url.rpartition("/")[0].rpartition("/")[0]
+    server = psutil.Process(SERVER[0])
+
+    def connect(number: int) -> None:
+        if number % 2:
+            with pytest.raises(websockets.InvalidStatus), websockets.connect(address, origin="http://evil.example"):
+                pass
+        else:
+            with websockets.connect(address, origin=origin):
+                assert status(url, urlsplit(url).path, host="evil.example")[0] == 400
+
+    with ThreadPoolExecutor(50) as pool:
+        list(pool.map(connect, range(100)))
+        before_bytes, before = server.memory_info().rss, server.num_fds()
+        list(pool.map(connect, range(200)))
+    assert status(url, urlsplit(url).path)[0] == 200
+    assert server.num_fds() < before + 20
+    assert server.memory_info().rss < before_bytes + 50e6
 
 
 def test_wrong_messages_get_an_answer_and_the_page_goes_on(url: str) -> None:

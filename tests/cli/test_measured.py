@@ -91,6 +91,12 @@ def test_what_cannot_be_compared_or_imported_is_answered(call, truth, tmp_path):
     assert "steering_wheel_rad or rack_m is needed" in call("run", "a.mcap").err
 
 
+def test_a_folder_that_cannot_be_made_is_an_error_before_the_fit(call):
+    told = call("fit", "tesla_model_s", "-o", "/proc/found")  # also for root
+    assert told.status == 1
+    assert told.err.startswith("activesteer: cannot make the folder /proc/found: ")
+
+
 def test_what_was_fitted_is_printed_and_drives_the_car(call, truth, tmp_path):
     rows = slice(None, None, 10)
     noise = 0.002 * np.random.default_rng(1).standard_normal(len(truth.time_s[rows]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
 import signal
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from activesteer import Recording
+from activesteer.commands.stopping import StopSignals
 
 ROOT = Path(__file__).resolve().parents[2]
 MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
@@ -53,6 +55,17 @@ def test_signal_ends_a_command_and_one_true_line_says_what_is_saved(tmp_path, wo
 @pytest.mark.parametrize(("words", "number", "after_s"), MANY)
 def test_signal_ends_every_command_at_any_moment(tmp_path, words, number, after_s):
     stopped(tmp_path, words, number, after_s)
+
+
+def test_a_saved_file_is_named_after_the_clock_was_set_back(tmp_path, monkeypatch):
+    stop = StopSignals()
+    stop.options = argparse.Namespace(output=tmp_path)
+    set_back_s = 3600
+    monkeypatch.setattr(time, "time_ns", lambda now_ns=time.time_ns: now_ns() - 10**9 * set_back_s)
+    for name, age_s in (("new.json", set_back_s), ("old.json", 3 * set_back_s)):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (time.time() - age_s, time.time() - age_s))
+    assert stop._saved(in_order=True) == f"saved: {tmp_path / 'new.json'}"
 
 
 @pytest.mark.parametrize("swallowed", ["while True: pass", pytest.param("time.sleep(60.0)", marks=pytest.mark.slow)])

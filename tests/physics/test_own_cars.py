@@ -17,7 +17,7 @@ from activesteer.errors import ControllerError
 from activesteer.resources import find_vehicle, models_dir
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import run_scenario
-from activesteer.simulation.two_track_search import _roll, two_track_of
+from activesteer.simulation.two_track_search import _roll, two_track_lines, two_track_of
 from activesteer.standards.examination import examine
 from activesteer.studies.linear.margins import loop_margins
 from tests.raising import raises
@@ -89,6 +89,9 @@ def test_two_track_properties_are_those_of_earlier_tests():
     assert found.roll_arm_m == pytest.approx(known.roll_arm_m, rel=0.1)
     assert found.pitch_gradient_radpmps2 == pytest.approx(known.pitch_gradient_radpmps2, rel=0.2)
     assert found.wheel_inertia_kgm2 == pytest.approx(known.wheel_inertia_kgm2, rel=0.01)
+    # The written table rounds to 1 mm and to 1e-5 rad/(m/s2), 0.3 % of the gradients.
+    for key, text in two_track_lines(found).items():
+        assert float(text) == pytest.approx(vars(found)[key], abs=0.6e-5 if "gradient" in key else 0.6e-3), key
 
 
 def test_frequency_and_damping_of_a_known_roll_are_found():

@@ -155,6 +155,13 @@ def test_only_some_states_of_a_function_are_kept(package: Path, tmp_path: Path) 
     assert kept[0] < kept[1]
     assert not kept[0] & kept[2], "the oldest goes"
     assert len(list(tmp_path.rglob("outer.outer-*.nbc"))) == 2
+    for file in tmp_path.rglob("outer.outer-*.nbi"):  # the clock is set back
+        os.utime(file, (2e9, 2e9))
+    (package / "numbers.py").write_text("FACTOR = 3.0\n")
+    _run(call, package.parent, NUMBA_CACHE_DIR=str(tmp_path / "kept"))
+    last = {file.name for file in tmp_path.rglob("outer.outer-*.nbi")}
+    assert len(last) == 2
+    assert last - kept[2], "the newest stays"
 
 
 def test_compiling_needs_no_linear_algebra_and_leaves_it_to_those_who_do() -> None:

@@ -60,6 +60,15 @@ def test_half_files_can_be_deleted_from_elsewhere(tmp_path: Path) -> None:
     assert path.read_text() == "before"
 
 
+def test_a_half_file_that_cannot_be_deleted_does_not_hide_the_reason(tmp_path: Path, monkeypatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with raises(PlaybackError, problem="no picture"), atomic_write(tmp_path / "a.mp4", PlaybackError):
+        raise PlaybackError("no picture")
+
+
 def test_link_stays_a_link_and_its_file_is_replaced(tmp_path: Path) -> None:
     real, link = tmp_path / "real.txt", tmp_path / "link.txt"
     real.write_text("before")

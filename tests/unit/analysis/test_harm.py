@@ -6,7 +6,17 @@ import math
 
 import pytest
 
-from activesteer.analysis.harm import changes, harms, severity, track_harm_m
+from activesteer.analysis.harm import (
+    changes,
+    harms,
+    has_spun,
+    is_controlled,
+    kept,
+    losses,
+    severity,
+    shown,
+    track_harm_m,
+)
 
 LANE = {
     "lane_overstep_m": 0.12, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.05, "heading_end_rad": 0.01,
@@ -31,6 +41,7 @@ def test_a_car_that_leaves_its_lane_further_is_harmed_and_one_that_moves_within_
         ("cones_hit", 3.0, []),  # one cone, not more than one
         ("cones_hit", 4.0, ["cones"]),
         ("heading_end_rad", -math.radians(3.0), ["heading"]),
+        ("yaw_rate_after_gates_rms_radps", 0.02 + math.radians(0.9), []),
         ("yaw_rate_after_gates_rms_radps", 0.02 + math.radians(1.1), ["yaw_rate"]),
         ("steering_wheel_rms_rad", 5.0, []),  # reported, not counted
         ("sideslip_peak_abs_rad", 0.4, ["lost"]),
@@ -40,6 +51,48 @@ def test_a_car_that_leaves_its_lane_further_is_harmed_and_one_that_moves_within_
 def test_each_measure_has_its_size(key: str, value: float, harmed: list[str]):
     assert harms(changes(LANE, LANE | {key: value})) == harmed
     assert harms(changes(LANE | {key: value}, LANE)) == []
+
+
+@pytest.mark.parametrize(
+    ("metrics", "lost", "met"),
+    [
+        ({"stays_in_lanes": 0.0, "lane_overstep_m": 0.3}, ["leaves the lane by 0.30 m"], []),
+        ({"stays_in_lanes": 0.0, "lane_overstep_m": math.nan}, ["does not get through the lanes"], []),
+        ({"stays_in_lanes": 1.0, "lane_overstep_m": -0.1}, [], ["stays in the lanes"]),
+        ({"cones_hit": 0.0}, [], ["hits no cone"]),
+        ({"cones_hit": 2.0}, ["hits 2 cones"], []),
+        ({"cones_missed": 0.0}, [], ["passes all cones"]),
+        ({"cones_missed": 1.0, "cones_hit": 0.0}, ["misses 1 cone"], ["hits no cone"]),
+    ],
+)
+def test_a_verdict_says_what_failed_and_what_was_met(metrics: dict[str, float], lost: list[str], met: list[str]):
+    assert list(losses(metrics)) == lost
+    assert list(kept(metrics)) == met
+
+
+@pytest.mark.parametrize(("sideslip_deg", "spun"), [(19.5, False), (20.5, True)])
+def test_a_car_spins_beyond_20_deg_of_sideslip(sideslip_deg: float, spun: bool):
+    metrics = {"sideslip_peak_abs_rad": math.radians(sideslip_deg)}
+    assert has_spun(metrics) is spun
+    assert is_controlled(metrics) is not spun
+
+
+def test_a_car_is_controlled_unless_a_metric_tells_otherwise():
+    assert is_controlled({"stopping_distance_m": 40.0})
+    assert not is_controlled({"stays_in_lanes": 0.0})
+    assert not is_controlled({"cones_missed": 1.0})
+
+
+@pytest.mark.parametrize(("sideslip_deg", "text"), [(89.0, "3.2"), (91.0, "lost")])
+def test_metrics_of_a_car_that_has_turned_round_say_nothing(sideslip_deg: float, text: str):
+    metrics = {"sideslip_peak_abs_rad": math.radians(sideslip_deg), "track_deviation_max_m": 3.2}
+    assert shown("track_deviation_max_m", metrics, "3.2") == text
+
+
+def test_cones_that_are_hit_and_missed_add_up():
+    slalom = {"cones_hit": 1.0, "cones_missed": 1.0, "sideslip_peak_abs_rad": 0.05}
+    assert changes(slalom, slalom | {"cones_hit": 2.0, "cones_missed": 3.0})["cones"] == 3.0
+    assert harms(changes(slalom, slalom | {"cones_missed": 3.0})) == ["cones"]
 
 
 def test_a_run_that_fails_is_harm_and_two_that_fail_are_none():

@@ -28,7 +28,7 @@ from activesteer.estimation.records import (
 )
 from activesteer.estimation.setup import GRID
 from activesteer.estimation.speed_filter import brush_slip
-from activesteer.estimation.two_track_model import follow, follow_roll
+from activesteer.estimation.two_track_model import follow, follow_roll, forces_of
 from activesteer.estimation.wheels import read_wheels
 from activesteer.scenario import resolve
 from tests.unit.estimation.drives import estimates, rolling
@@ -96,6 +96,23 @@ def test_a_steady_turn_has_the_identified_stiffness_with_any_roll_steer(setup):
         rear_rad = known.rear_compliance_radpN * rear_N + known.rear_roll_steer * rolled_rad
         taken_rad.append((front_rad, rear_rad))
     assert taken_rad[1] == pytest.approx(taken_rad[0])
+
+
+@pytest.mark.parametrize(
+    ("place", "least", "largest"), [(FRICTION, 0.05, 1.5), (FRONT_STIFFNESS, 0.3, 2.0), (REAR_STIFFNESS, 0.3, 2.0)]
+)
+def test_friction_and_stiffness_beyond_their_bounds_count_as_the_bounds(setup, known, place, least, largest):
+    tyres, memory = np.array([tyre.force_N for tyre in setup.estimation.tyres]), np.zeros(1, MEMORY)[0]
+    state = np.zeros(N_STATES)
+    state[[FRONT_SLIP, REAR_SLIP]] = 0.06
+    state[[FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS]] = 1.0
+
+    def force(value: float) -> float:
+        state[place] = value
+        return float(sum(forces_of(known, tyres, memory, state)))
+
+    assert force(0.5 * least) == force(least) < force(1.01 * least)
+    assert force(2.0 * largest) == force(largest) != force(0.99 * largest)
 
 
 def test_the_front_axle_of_a_rolled_car_has_less_slip_angle(setup):

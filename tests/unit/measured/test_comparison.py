@@ -43,6 +43,8 @@ def test_a_shift_is_found_between_the_samples_and_leaves_no_residual(signal, shi
     assert found.shifts_s[0] == pytest.approx(shift_s, abs=2e-4)
     assert found.quantities[0].to_json()["rms"] < 1e-4
     assert found.inside
+    assert found.quantities[0].x[0] == pytest.approx(max(0.0, 1.0 - found.shifts_s[0]), abs=0.02)
+    assert found.quantities[0].x[-1] == pytest.approx(min(5.0, 5.0 - found.shifts_s[0]), abs=0.02)
 
 
 def test_clocks_are_compared_by_the_steering_so_that_a_lag_of_the_car_stays():
@@ -100,7 +102,9 @@ def test_cross_plots_know_no_time():
     flat = run(ay_mps2=ay, sideslip_rad=0.0 * ay)
     for size, inside in ((0.95, True), (1.2, False)):
         off = size * TOLERANCES["sideslip_rad"].offset
-        assert plain([run(ay_mps2=ay, sideslip_rad=0.0 * ay + off)], flat, "iso19364").inside is inside
+        found = plain([run(ay_mps2=ay, sideslip_rad=0.0 * ay + off)], flat, "iso19364")
+        assert found.inside is inside
+        assert (found.quantities[0].x[[0, -1]] == ay[[0, -1]]).all()  # both ends are judged
 
 
 def test_runs_with_nothing_in_common_are_an_error():
@@ -144,6 +148,20 @@ def test_a_slow_signal_is_compared_without_a_filter_and_the_reason_is_said():
     found = compare([run(time_s, ay_mps2=values)], run(time_s, ay_mps2=values))
     assert found.inside
     assert "10.1 Hz" in found.unfiltered[0]
+
+
+def test_the_filters_of_the_law_cut_off_the_steering_wheel_and_the_motion_at_their_frequencies():
+    law = FILTERS["fmvss126"]
+    assert law is not None
+    assert law.poles == 12
+    assert [law.of(name) for name in ("steering_wheel_rad", "yaw_rate_radps", "ay_mps2")] == [10.0, 6.0, 6.0]
+
+
+@pytest.mark.parametrize(("share", "inside"), [(0.99, True), (1.01, False)])
+def test_the_corridor_of_the_speed_is_1_kmh_and_1_percent(share, inside):
+    constant_mps = 20.0 + 0.0 * TIME_S
+    found = plain([run(speed_mps=constant_mps + share * (1.0 / 3.6 + 0.2))], run(speed_mps=constant_mps))
+    assert found.inside is inside
 
 
 def test_the_filter_of_iso_15037_has_the_width_that_the_standard_requires():

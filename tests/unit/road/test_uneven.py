@@ -17,7 +17,7 @@ from activesteer.road.crg import CrgRoad, packed, read_crg, referenced, unpacked
 from activesteer.road.drawn import DrawnSurface, places_to_draw
 from activesteer.road.obstacles import CLASSES, STEP_M, Obstacle, Roughness
 from activesteer.road.road import BankingTable, LaidRoad, Road
-from activesteer.road.surface import Surface, surface_of
+from activesteer.road.surface import Surface, level_at, near_obstacles, surface_of
 from activesteer.scenario import resolve
 
 
@@ -81,6 +81,12 @@ def test_slopes_are_the_derivatives_of_the_height() -> None:
         # A few of 400 places lie within 1e-7 m of an edge.
         assert np.quantile(np.abs(numeric - at[:, column]), 0.99) < 1e-5
     assert road.at(np.array([0.0, 1.9]), np.zeros(2)) == pytest.approx(0.0)
+    # The tyres take most heights without slopes.
+    levels = [
+        level_at(road.head[0], road.numbers, road.obstacles, *near_obstacles(road.obstacles, *place)[:2], *place)
+        for place in zip(s, d, strict=True)
+    ]
+    assert at[:, 0] == pytest.approx(np.array(levels))
 
 
 def test_an_edge_rises_before_the_middle_of_an_obstacle_and_falls_behind_it() -> None:
@@ -143,6 +149,17 @@ def test_a_crg_file_gives_grid_banking_and_reference_line(form: str) -> None:
     assert road.line is not None
     # A curve of 0.02 rad per 0.5 m, 25 m radius, from heading 0 in the first step.
     assert (road.line.x_m[-1], road.line.y_m[-1]) == pytest.approx((3.99, 0.28), abs=0.01)
+
+
+def test_a_crg_file_of_a_straight_road_has_no_line() -> None:
+    data = rows()
+    data[1:, 0] = 0.0
+    assert crg(data).line is None
+
+
+def test_a_crg_file_with_one_row_is_no_surface() -> None:
+    with pytest.raises(ManeuverError, match="1 rows; at least 2"):
+        crg(rows()[:1])
 
 
 def test_scales_and_missing_heights_follow_the_file() -> None:
@@ -268,8 +285,16 @@ def test_the_share_beyond_the_known_surface_follows_the_path() -> None:
     assert road.extended_share(*places) == pytest.approx(0.4)
 
 
-def test_a_skew_kerb_is_drawn_without_teeth() -> None:
-    kerb = Obstacle(kind="kerb", start_m=8.0, height_m=0.06, edge_m=0.02, angle_rad=math.radians(-70.0))
+def test_both_ends_of_each_edge_are_drawn() -> None:
+    kerb = Obstacle("kerb", 18.0, 4.0, 0.12, left_m=1.0, right_m=-0.7, edge_m=0.23)
+    along, across = places_to_draw(Road(obstacle=(kerb,)), 30.0)
+    assert np.isin(np.round([-0.7 - 0.001, -0.7 + 0.23, 1.0 - 0.23, 1.0 + 0.001], 4), across).all()
+    assert np.isin(np.round([18.0 - 0.001, 18.0 + 0.23, 22.0 - 0.23, 22.0 + 0.001], 4), along).all()
+
+
+@pytest.mark.parametrize("angle_deg", [-70.0, 70.0])
+def test_a_skew_kerb_is_drawn_without_teeth(angle_deg: float) -> None:
+    kerb = Obstacle(kind="kerb", start_m=8.0, height_m=0.06, edge_m=0.02, angle_rad=math.radians(angle_deg))
     road = Road(obstacle=(kerb,))
     along, across = places_to_draw(road, 30.0)
     s, d = np.meshgrid(along, across, indexing="ij")

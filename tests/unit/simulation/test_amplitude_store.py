@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from typing import Any
 
@@ -77,3 +78,14 @@ def test_concurrent_writers_leave_whole_files_and_only_so_many(folder, monkeypat
     for number in range(9):
         preparation.keep(f"{number + 9:064x}", ANGLE_RAD)
     assert len(list(folder.iterdir())) == 5
+
+
+def test_the_angle_just_found_is_kept_after_the_clock_was_set_back(folder, monkeypatch):
+    monkeypatch.setattr(preparation, "MAX_KEPT", 2)
+    for number in range(2):
+        preparation.keep(f"{number:064x}", ANGLE_RAD)
+    for file in folder.iterdir():
+        os.utime(file, (2e9, 2e9))
+    preparation.keep(KEY, ANGLE_RAD)
+    assert len(list(folder.iterdir())) == 2
+    assert (folder / f"{KEY}.amplitude").is_file()

@@ -71,3 +71,12 @@ def test_solids_belong_to_bodies_and_come_before_the_links(model: mujoco.MjModel
     solids = primitives_of(model)
     assert {solid.body for solid in solids} <= {model.body(index).name for index in range(1, model.nbody)}
     assert scene_of(model) == (*solids, *links_of(model))
+
+
+def test_solids_behind_a_plane_of_the_world_are_drawn() -> None:
+    model = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom type='plane' size='9 9 1'/><body name='cube'><geom type='box' size='1 2 3'/></body>"
+        "</worldbody></mujoco>"
+    )
+    (cube,) = primitives_of(model)
+    assert (cube.body, cube.size_m) == ("cube", (2.0, 4.0, 6.0))

@@ -22,9 +22,9 @@ def picture(colour: tuple[int, int, int]) -> np.ndarray:
 
 def write(path: Path, rate_hz: float = 20.0) -> Path:
     pictures = [picture(colour) for colour in COLOURS]
-    with encoder(path, SIZE, rate_hz, pictures) as file:
+    with encoder(path, SIZE, rate_hz, pictures) as append:
         for pixels in pictures:
-            file.write(pixels)
+            append(pixels)
     return path
 
 
@@ -57,8 +57,8 @@ def test_failure_on_the_way_leaves_the_file_of_before(tmp_path, name):
     path.write_text("before")
 
     def fail() -> None:
-        with encoder(path, SIZE, 20.0, [picture(COLOURS[0])]) as file:
-            file.write(picture(COLOURS[0]))
+        with encoder(path, SIZE, 20.0, [picture(COLOURS[0])]) as append:
+            append(picture(COLOURS[0]))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -75,6 +75,15 @@ def test_folder_in_the_way_is_an_error(tmp_path, name):
     with raises(PlaybackError, cause=IsADirectoryError, value=tmp_path / name):
         write(tmp_path / name)
     assert [entry.name for entry in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif"])
+def test_a_folder_that_cannot_be_written_is_one_error_before_anything_is_drawn(name):
+    path = Path("/proc/self", name)  # also for root
+    begun = False
+    with raises(PlaybackError, cause=OSError, value=path), encoder(path, SIZE, 20.0, [picture(COLOURS[0])]):
+        begun = True
+    assert not begun
 
 
 def test_what_ffmpeg_says_is_told(tmp_path, monkeypatch):
