@@ -18,7 +18,6 @@ import time
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterator
     from pathlib import Path
     from types import FrameType
     from typing import Final
@@ -136,16 +135,11 @@ class StopSignals:
         return f"saved: {', '.join(words)}"
 
 
-def _files(output: Path | None) -> Iterator[Path]:
-    """Yield the file, or the visible files of a folder and of its subfolders."""
-    if output is None or not output.exists():
-        return
-    if not output.is_dir():
-        yield output
-        return
-    for path in sorted(output.iterdir()):
-        if not path.name.startswith("."):
-            yield from (file for file in ((path,) if not path.is_dir() else sorted(path.iterdir())) if file.is_file())
+def _files(output: Path | None) -> list[Path]:
+    """Return the file, or the visible files of a folder and of its subfolders."""
+    if output is None or not output.is_dir():
+        return [output] if output is not None and output.exists() else []
+    return sorted(path for pattern in ("[!.]*", "[!.]*/*") for path in output.glob(pattern) if path.is_file())
 
 
 def _part(path: Path, *, in_order: bool) -> str:
