@@ -35,9 +35,7 @@ from activesteer.estimation.wheels import read_wheels
 _SHORTEST_S: Final = 0.004
 """Shortest time between two steps of the filters, and step of the model on its way to the present [s]."""
 _USED_FRACTION: Final = 0.85
-"""Lower bound of the friction, as a fraction of the acceleration in g. Its inverse is an upper bound beyond the assumed
-friction: only forces that need a higher friction show one. Without it, front wheels that reach snow before the rear
-ones were explained by more friction."""
+"""Lower bound of the friction, as a fraction of the acceleration in g."""
 _USED_S: Final = 0.2
 """Time constant of this acceleration: a car rocks when it stops [s]."""
 
@@ -77,8 +75,7 @@ def _filter(known, tyres, memory, said, line):
     memory.innovation = correct(known, tyres, memory, said[SAID_RATE], said[SAID_AY], duration_s)
     used = math.hypot(memory.ax_mps2, memory.loading_mps2) / GRAVITY_MPS2
     memory.friction_used += duration_s / (duration_s + _USED_S) * (used - memory.friction_used)
-    most = max(known.friction, memory.friction_used / _USED_FRACTION)
-    state[FRICTION] = min(max(state[FRICTION], _USED_FRACTION * memory.friction_used), most)
+    state[FRICTION] = max(state[FRICTION], _USED_FRACTION * memory.friction_used)
     memory.left_out = correct_speed(known, memory, duration_s)
 
 
