@@ -1,7 +1,7 @@
-"""Metrics of braking straight ahead and in a turn.
+"""Metrics of braking straight ahead (ISO 21994, ISO 14512) and in a turn (ISO 7975).
 
-The reference is the circle of the steady state before the brake. Its radius is speed over yaw rate. Its centre lies
-across the track of the centre of gravity at the beginning of braking.
+In a turn the reference is the circle of the steady state before the brake. Its radius is speed over yaw rate. Its
+centre lies across the track of the centre of gravity at the beginning of braking.
 
 Source: ISO 7975, Passenger cars - Braking in a turn - Open-loop test method.
 """

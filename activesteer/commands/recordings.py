@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import re
 import sys
@@ -164,7 +165,11 @@ def _compare(options: argparse.Namespace) -> bool:
     names = [file.stem for file in options.files]
     page = comparison_page(found, names[:-1], names[-1])
     written = [] if options.output is None else [write_page(page, options.output)]
-    terminal.tell(options, found.to_json(), (*page.lines(), *assumptions(found)), written, "page")
+    shifts = []
+    for name, shift_s in zip(names[:-1], found.shifts_s, strict=True):
+        later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"
+        shifts.append(f"time shift of {name}: {later}")
+    terminal.tell(options, found.to_json(), (*page.lines(), *shifts, *assumptions(found)), written, "page")
     return not found.inside
 
 

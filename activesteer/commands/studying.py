@@ -224,7 +224,8 @@ def _fit(options: argparse.Namespace) -> bool:
     from activesteer.measured.fitting import fit
     from activesteer.measured.folder_file import is_measured
 
-    if options.output is not None:  # a fit takes minutes, and a folder that cannot be made is no surprise after it
+    # A fit takes minutes: a folder that cannot be made is an error before it.
+    if options.output is not None:
         make_folder(options.output, ParameterError)
     if is_measured(options.study):
         page = None if options.output is None else options.output / "page.html"
@@ -239,7 +240,6 @@ def _fit(options: argparse.Namespace) -> bool:
         found = fit(options.study, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
     name = Path(options.study).stem
     files = [] if options.output is None else write_fit(found, name, options.output)
-    terminal.print_notes(found.notes)
     terminal.tell(options, found.to_json(), fit_page(found, name).lines(), files, "written")
     return False
 

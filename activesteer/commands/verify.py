@@ -42,6 +42,7 @@ def _setting(name: str) -> str:
 def _reproduce(options: argparse.Namespace) -> int:
     """Drive the 15 runs in every setting asked for, and tell the verdicts."""
     from activesteer.studies.reproduction import draw_figures, write_page
+    from activesteer.theory.proportions import percent
 
     settings = list(dict.fromkeys(options.settings or ["literature"]))
     folders = {name: options.output / name if len(settings) > 1 else options.output for name in settings}
@@ -66,6 +67,13 @@ def _reproduce(options: argparse.Namespace) -> int:
         lines.append(f"report: {report}")
     if figures:
         lines.append(f"figures: {len(figures)} files in {options.output / 'figures'}")
+    if "paper" in settings:
+        lines.append(
+            "The paper's setting was selected by the verdicts: the claims can hold together. It is no evidence."
+        )
+    shares = [item.proportion.share for item in results[settings[-1]].scorecard.judged if item.proportion is not None]
+    if shares:
+        lines.append(f"In the stored population {percent(sum(shares) / len(shares))} % of the claims hold on average.")
     if not options.all:
         lines.append("--all prints every claim with its numbers")
     if "paper" not in settings and options.vehicle == "compact":

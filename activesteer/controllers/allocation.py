@@ -95,7 +95,7 @@ def allocated(
     works: tuple[bool, bool],
     ay_mps2: float,
     authority: float,
-) -> tuple[float, float, float]:
+) -> tuple[float, float]:
     """Allocate the demands of the state feedback.
 
     Args:
@@ -110,7 +110,7 @@ def allocated(
         authority: Factor on the demands of the state feedback, 0 to 1 [-].
 
     Returns:
-        Superposition angle and rear angle [rad]; change of the yaw moment that they make [Nm].
+        Superposition angle and rear angle [rad].
     """
     front_slope, rear_slope = slopes(block._curves, now, driver_rad + at_rad[0], at_rad[1])
     front_N, rear_N = abs(front_slope) * block._front_Nprad, abs(rear_slope) * block._rear_Nprad
@@ -150,13 +150,19 @@ def allocated(
     block._rear_shift_rad += block._fraction * (rear - kept_rear - block._rear_shift_rad)
     front = min(max(kept_front + block._front_shift_rad, least_front), most_front)
     rear = min(max(kept_rear + block._rear_shift_rad, least_rear), most_rear)
-    front = (
-        authority * _relieved(block, now, driver_rad, demand_rad, (front, rear), ay_mps2) + (1.0 - authority) * front
-    )
-    front = min(max(front, least_front), most_front)
+    relieved = _relieved(block, now, driver_rad, demand_rad, (front, rear), ay_mps2)
+    front = authority * relieved + (1.0 - authority) * front
+    return min(max(front, least_front), most_front), rear
+
+
+@shared
+def moment_change(
+    block: Allocation, now: Estimate, driver_rad: float, at_rad: tuple[float, float], angle_rad: tuple[float, float]
+) -> float:
+    """Return how much the yaw moment of the axle curves changes on the way from measured to allocated angles [Nm]."""
     _, _, front_now, rear_now = axle_forces(block._curves, now, driver_rad + at_rad[0], at_rad[1])
-    _, _, front_then, rear_then = axle_forces(block._curves, now, driver_rad + front, rear)
-    return front, rear, block._axle_kgm * ((front_then - front_now) - (rear_then - rear_now))
+    _, _, front_then, rear_then = axle_forces(block._curves, now, driver_rad + angle_rad[0], angle_rad[1])
+    return block._axle_kgm * ((front_then - front_now) - (rear_then - rear_now))
 
 
 @shared

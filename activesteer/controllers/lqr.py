@@ -46,7 +46,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.controllers.allocation import Allocation, allocated
+from activesteer.controllers.allocation import Allocation, allocated, moment_change
 from activesteer.controllers.axle_slopes import AxleSlopes, excess
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.esc import brake_levers
@@ -227,11 +227,13 @@ class Lqr(NativeBlock):
             measurement: Measurement of the car's sensors.
             works: Whether superposition and rear steering work.
         """
-        return allocated(
-            self._allocation, turn.estimate, command.front_steer_demand_rad,
-            (measurement.superposition_rad, measurement.rear_steer_rad), turn.demand_rad, turn.against_rad, works,
-            turn.desired_radps * turn.estimate.speed_mps, self.authority,
+        now, driver_rad = turn.estimate, command.front_steer_demand_rad
+        at_rad = measurement.superposition_rad, measurement.rear_steer_rad
+        angles_rad = allocated(
+            self._allocation, now, driver_rad, at_rad, turn.demand_rad, turn.against_rad, works,
+            turn.desired_radps * now.speed_mps, self.authority,
         )  # fmt: skip
+        return *angles_rad, moment_change(self._allocation, now, driver_rad, at_rad, angles_rad)
 
     @property
     def authority(self) -> float:
@@ -269,7 +271,7 @@ def regulated(
         return 0.0, 0.0, 0.0, 0.0, 0.0, False
     fade = min((speed - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
     front_demand, rear_demand = fade * front_demand, fade * rear_demand
-    added, rear, _ = allocated(
+    added, rear = allocated(
         block._allocation, now, driver_rad, (superposition_rad, rear_rad), (front_demand, rear_demand), against, BOTH,
         desired * speed, fade * block._confidence._authority,
     )  # fmt: skip

@@ -2,9 +2,9 @@
 
     delta_H = prediction - correction(desired - actual yaw rate) - k beta
 
-The paper has the first two terms. The rear axle has the force C_H (delta_H - beta + l_H r / v), so the third
-term makes it stiffer against sideslip by the fraction k. If the car slides outwards (beta < 0 in a left turn), the rear
-wheels turn in the direction of the front wheels. Yaw rate, speed and sideslip come from the estimator.
+The paper (Dorsch 2012, Fig. 8) has the first two terms. The rear axle has the force C_H (delta_H - beta + l_H r / v),
+so the third term makes it stiffer against sideslip by the fraction k. If the car slides outwards (beta < 0 in a left
+turn), the rear wheels turn in the direction of the front wheels. Yaw rate, speed and sideslip come from the estimator.
 """
 
 from __future__ import annotations
