@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from activesteer import simulate
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS
 from activesteer.analysis.general import METRICS as ENERGIES
 from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.report.tables import Change, significance

@@ -20,8 +20,7 @@ import pyarrow.parquet as pq
 
 from activesteer.analysis.bands import FILE as BANDS
 from activesteer.analysis.bands import TRACK, Band
-from activesteer.analysis.claims.judge import SYSTEMS, Claim, Kind
-from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, SYSTEMS, Claim, Kind
 from activesteer.analysis.claims.stored import PAPER, SUMMARY, read_setting
 from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.harm import TRACK as TRACK_MEASURES

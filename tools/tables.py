@@ -18,8 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer import simulate
-from activesteer.analysis.claims.judge import Kind
-from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, Kind
 from activesteer.analysis.claims.stored import PAPER, not_reproduced, read_setting, stored_population
 from activesteer.analysis.claims.stored import Population as StoredPopulation
 from activesteer.config import Range, dataclass_in, element_of, spellings

@@ -103,8 +103,8 @@ def _driven(options: argparse.Namespace, folders: Mapping[str, Path]) -> dict[st
 
 def _scenarios(result: Reproduction) -> Iterator[str]:
     """Yield how many claims are reproduced, by scenario and in all, with the texts of the others."""
+    from activesteer.analysis.claims.judge import SCENARIO_OF
     from activesteer.analysis.claims.scorecard import Verdict
-    from activesteer.analysis.claims.statements import SCENARIO_OF
 
     words = {Verdict.FAILED: "FAILED", Verdict.NOT_REPRODUCED: "not reproduced"}
     width = max(map(len, result.paths), default=0)

@@ -23,8 +23,7 @@ from typing import Any, Final, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.analysis.claims.judge import SYSTEMS
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
 from activesteer.brakes.brake_control_unit import step_brakes
 from activesteer.compilation import compiled

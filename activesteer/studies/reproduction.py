@@ -13,9 +13,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from activesteer.analysis.claims.judge import SYSTEMS, Claim
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
 from activesteer.analysis.claims.scorecard import Scorecard, scorecard
-from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.analysis.claims.stored import LITERATURE, PAPER, VEHICLE, read_setting
 from activesteer.analysis.figures import FORMATS, figure_2
 from activesteer.analysis.figures import draw_all as draw_runs

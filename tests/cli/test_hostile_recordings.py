@@ -16,8 +16,7 @@ from mcap.records import Channel as Topic
 from mcap.records import Metadata
 
 from activesteer import simulate
-from activesteer.analysis.claims.judge import SYSTEMS
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.claims.stored import claims_for
 from activesteer.analysis.metrics import EVALUATIONS, metrics
 from activesteer.analysis.report import report_page

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from activesteer.analysis.claims.statements import STATEMENTS
+from activesteer.analysis.claims.judge import STATEMENTS
 from tools.tables import CLAIMS_PAGE, claims_page
 
 TEXT = CLAIMS_PAGE.read_text(encoding="utf-8")

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer import ActuatorCommand, simulate
-from activesteer.analysis.claims.judge import SYSTEMS, Claim
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
 from activesteer.controllers import load_controller
 from activesteer.metric_table import STEER_RAD
 from activesteer.recording import Recording

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from activesteer import simulate
-from activesteer.analysis.claims.judge import SYSTEMS
-from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, SYSTEMS
 from activesteer.analysis.claims.stored import PAPER, read_setting
 from activesteer.recording import Recording
 from activesteer.studies.engine.study_file import read_study

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from activesteer import simulate
-from activesteer.analysis.claims.judge import SYSTEMS, Claim
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
 from activesteer.conventions import CORNERS
 from activesteer.metric_table import STEER_RAD
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.analysis.claims.judge import SYSTEMS
-from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, SYSTEMS
 from activesteer.analysis.claims.stored import not_reproduced
 from activesteer.analysis.figures import BY_SCENARIO, OF_ANY_RUN
 from activesteer.cli import main

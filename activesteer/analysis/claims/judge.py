@@ -1,9 +1,9 @@
-"""A claim of the paper: its statement, its criterion, and the one judge of all claims.
+"""The paper's claims, and the one judge of all of them.
 
-A statement is a row: its text, its criterion in words, the values that decide, and its conditions. A condition is a
-requirement (`analysis.requirement`) on metrics of the runs none, ars and afs. The limits come from the words of the
-statement and from what a driver or a sensor can notice (`metric_table`). `tests/fakes.py` names the fakes on which each
-statement must not pass.
+`statements.toml` has a row for each statement: its text, its criterion in words, the values that decide, and its
+conditions. A condition is a requirement (`analysis.requirement`) on metrics of the runs none, ars and afs. The limits
+come from the words of the statement and from what a driver or a sensor can notice (`metric_table`). The tests have
+fakes on which each statement must not pass.
 """
 
 from __future__ import annotations
@@ -11,26 +11,39 @@ from __future__ import annotations
 import functools
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import combinations
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from activesteer.analysis import lanes, path_following, sine_with_dwell, step_response
+from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, distance
-from activesteer.analysis.series import Array, timestep
-from activesteer.analysis.source import Evaluable, RecordingLike
-from activesteer.config import Source
+from activesteer.analysis.series import Array, crossing_time, rms, smooth, timestep
+from activesteer.analysis.source import Evaluable, RecordingLike, read_course
+from activesteer.config import Source, build, read_toml
 from activesteer.errors import ParameterError, RecordingError
-from activesteer.metric_table import STEER_RAD
+from activesteer.metric_table import (
+    CONES_HIT,
+    LANE_OVERSTEP,
+    SETTLED_SIDESLIP_RAD,
+    SIDESLIP_RAD,
+    STAYS_IN_LANES,
+    STEER_RAD,
+    STEERING_WHEEL_RAD,
+    TIME_S,
+    TRACK_M,
+    YAW_RATE_RADPS,
+)
 
 SYSTEMS: Final = ("none", "ars", "afs")
 """Names of the compared runs: no control, active rear steering, active front superposition."""
 SYSTEMS_WITH_CONTROL: Final = SYSTEMS[1:]
-ALL: Final = "none ars afs"
-"""Key of values that are given for every system."""
 TOGETHER: Final = "together"
 """Name in place of a system for values that several runs have together."""
 MEAN_S: Final = 0.2
@@ -56,21 +69,18 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Statement:
-    """A statement of the paper, and its criterion.
-
-    Attributes:
-        id: Its number.
-        text: Its words.
-        criterion: Condition for it to pass, besides the conditions of all statements (`obstacle_of`).
-        values: Values to show: names of systems -> names of metrics.
-        conditions: Requirements that must all hold.
-    """
+    """A statement of the paper, and its criterion."""
 
     id: str
+    """Its number."""
     text: str
+    """Its words."""
     criterion: str
-    values: Mapping[str, Iterable[str]]
-    conditions: Sequence[str]
+    """Condition for it to pass, besides the conditions of all statements (`obstacle_of`)."""
+    values: dict[str, tuple[str, ...]]
+    """Values to show: names of systems -> names of metrics."""
+    conditions: tuple[str, ...]
+    """Requirements that must all hold."""
 
     @functools.cached_property
     def requirements(self) -> list[Requirement]:
@@ -113,13 +123,8 @@ class Claim:
 class Scenario:
     """A manoeuvre of the paper: call it with recordings to check its statements.
 
-    Attributes:
-        what: Its name in errors.
-        kind: Subject of its statements.
-        statements: Its statements, in order.
-        metrics: Function that evaluates a run.
-        compared: Function that returns further metrics, by system or `together`, of all runs and their metrics. It is
-            told whether the three runs are whole.
+    `metrics` evaluates a run. `compared` returns further metrics, by system or `together`, of all runs and their
+    metrics; it is told whether the three runs are whole.
     """
 
     what: str
@@ -235,3 +240,154 @@ def mean_straight_ahead(recording: RecordingLike, channel: str) -> float:
     """Return the mean of a channel straight ahead, in its unit, or 0 if no part of the run is straight ahead."""
     ahead = recording[channel][straight_ahead(recording)]
     return float(np.mean(ahead)) if len(ahead) else 0.0
+
+
+LEVEL: Final = 0.9
+"""Fraction of the steady-state value of none at which the delays of the step steer are compared."""
+MIN_ANGLE_RAD: Final = math.radians(0.1)
+"""Least size of two added angles that are compared [rad]."""
+END_S: Final = 3.0
+"""Length of the end of the slippery run, which the paper's figures show [s]."""
+COMMON_DELAYS: Final = {"yaw_rate_delay_s": ("yaw_rate", "radps"), "ay_delay_s": ("ay", "mps2")}
+"""Times at which signals reach a common level, 90 % of the steady-state value of none. Name and unit of the signals."""
+TURNED: Final = (("rear_steer", "rad"), ("superposition", "rad"), ("sideslip", "rad"))
+"""Settled angles that count from straight ahead, where the offset of a sensor also turns wheels."""
+ADDED: Final = ("rear_steer_steady_state_rad", "superposition_steady_state_rad")
+"""Angles that count without the give of the hinges, which the car without control has too."""
+
+
+def _step_metrics(recording: RecordingLike) -> dict[str, float]:
+    values = step_response.step_response_metrics(recording)
+    for name, unit in TURNED:
+        values[f"{name}_steady_state_{unit}"] -= mean_straight_ahead(recording, f"{name}_{unit}")
+    return values | {"yaw_rate_peak_abs_radps": float(np.abs(recording["yaw_rate_radps"]).max())}
+
+
+def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics, whole: bool) -> RunMetrics:
+    """Return the added angles, and the times at which the signals reach the common level, from half the steering angle.
+
+    A time is nan if its run is incomplete or stays below the level.
+    """
+    found: RunMetrics = {}
+    for system in SYSTEMS:
+        own = metrics[system]
+        values = {f"added_{name}": own[name] - metrics["none"][name] for name in ADDED}
+        for delay, (name, unit) in COMMON_DELAYS.items():
+            values[delay] = math.nan
+            if whole:
+                steady, begin_s = metrics["none"][f"{name}_steady_state_{unit}"], own["step_time_s"]
+                time_s = np.asarray(recordings[system].time_s, dtype=np.float64)
+                moving = math.copysign(1.0, steady) * smooth(recordings[system][f"{name}_{unit}"], timestep(time_s))
+                after = time_s >= begin_s
+                values[delay] = crossing_time(time_s[after], moving[after], LEVEL * abs(steady)) - begin_s
+        found[system] = values
+    return found
+
+
+def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool) -> RunMetrics:
+    """Compare the demanded rear and superposed angle, without the give of the hinges, since the beginning of steer."""
+    if not whole:
+        return {TOGETHER: {"added_angles_common_s": 0.0}}
+    ars, afs = recordings["ars"], recordings["afs"]
+    times = sine_with_dwell.steering(ars)
+    later_s = sine_with_dwell.steering(afs).begin_s - times.begin_s
+    time_s = np.asarray(ars.time_s, dtype=np.float64)
+    wanted = (time_s >= times.reversal_s) & (time_s <= times.completion_s + sine_with_dwell.INSTANTS_S[-1])
+    rear = np.asarray(ars["rear_steer_demand_rad"], dtype=np.float64)[wanted]
+    front = np.interp(time_s[wanted] + later_s, afs.time_s, afs["superposition_demand_rad"])
+    both = (np.abs(rear) > MIN_ANGLE_RAD) & (np.abs(front) > MIN_ANGLE_RAD)
+    scale = float(np.sqrt(np.sum(rear**2) * np.sum(front**2)))
+    return {
+        TOGETHER: {
+            "added_angles_correlation": float(np.sum(rear * front)) / scale if scale > 0.0 else math.nan,
+            "added_angles_opposite_share": float(np.mean(rear[both] * front[both] < 0.0)) if both.any() else math.nan,
+            "added_angles_common_s": float(np.count_nonzero(both)) * float(time_s[1] - time_s[0]),
+        }
+    }
+
+
+def _lane_metrics(recording: RecordingLike) -> dict[str, float]:
+    return {CONES_HIT: math.nan} | path_following.path_following_metrics(recording)
+
+
+def _tracks(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool) -> RunMetrics:
+    course = read_course(recordings["none"])
+    first_m, last_m = course.first_gate_x_m, course.last_gate_x_m
+    if last_m is None or not whole:
+        return {}
+    return {
+        TOGETHER: {
+            f"track_difference_{one}_{other}_m": lanes.largest_difference(
+                recordings[one], recordings[other], first_m, last_m
+            )
+            for one, other in combinations(SYSTEMS, 2)
+        }
+    }
+
+
+def _slippery_metrics(recording: RecordingLike) -> dict[str, float]:
+    # A course without lanes has no track to stay on.
+    without = dict.fromkeys((LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT), math.nan)
+    last = recording.time_s >= recording.time_s[-1] - END_S
+    end = {
+        "yaw_rate_end_rms_radps": rms(recording["yaw_rate_radps"][last]),
+        "sideslip_end_rms_rad": rms(recording["sideslip_rad"][last]),
+    }
+    return without | path_following.path_following_metrics(recording) | end
+
+
+class _Limit(float):
+    """Number of a criterion. `{:%}` writes a share with its percent sign apart."""
+
+    def __format__(self, spec: str) -> str:
+        return f"{100.0 * self:.0f} %" if spec == "%" else f"{float(self):g}"
+
+
+def _statements() -> dict[str, tuple[Statement, ...]]:
+    """Return the rows of `statements.toml`, by manoeuvre, with their limits."""
+    table, source = read_toml(Path(__file__).with_name("statements.toml"), ParameterError)
+    angles = {
+        "steer_deg": STEER_RAD, "settled_deg": SETTLED_SIDESLIP_RAD, "sideslip_deg": SIDESLIP_RAD,
+        "yaw_rate_degps": YAW_RATE_RADPS, "wheel_deg": STEERING_WHEEL_RAD, "lost_deg": LOST_SIDESLIP_RAD,
+    }  # fmt: skip
+    numbers = {name: math.degrees(angle) for name, angle in angles.items()} | table.pop("limits")
+    numbers |= {"time_s": TIME_S, "time_ms": 1000.0 * TIME_S, "track_m": TRACK_M}
+    limits = {name: _Limit(number) for name, number in numbers.items()}
+    words = {name: text.format(**limits) for name, text in table.pop("words").items()}
+    found: dict[str, tuple[Statement, ...]] = {}
+    for scenario, rows in table.items():
+        for place, row in enumerate(rows):
+            one = build(Statement, row, source, (scenario, str(place)))
+            conditions = [
+                condition.format(x=system, **limits)
+                for condition in one.conditions
+                for system in (SYSTEMS_WITH_CONTROL if "{x}" in condition else ("",))
+            ]
+            one = replace(one, criterion=one.criterion.format(**limits, **words), conditions=tuple(conditions))
+            found[scenario] = (*found.get(scenario, ()), one)
+    return found
+
+
+_ROWS: Final = _statements()
+SCENARIOS: Final[dict[str, Scenario]] = {
+    "step_steer": Scenario("step steer", Kind.SYSTEMS, _ROWS["step_steer"], _step_metrics, _step_compared),
+    "sine_with_dwell": Scenario(
+        "sine with dwell",
+        Kind.SYSTEMS,
+        _ROWS["sine_with_dwell"],
+        sine_with_dwell.sine_with_dwell_metrics,
+        _added_angles,
+    ),
+    "double_lane_change": Scenario(
+        "double lane change", Kind.DRIVER, _ROWS["double_lane_change"], _lane_metrics, _tracks
+    ),
+    "slalom": Scenario("slalom", Kind.DRIVER, _ROWS["slalom"], path_following.path_following_metrics),
+    "double_lane_change_low_mu": Scenario(
+        "slippery double lane change", Kind.DRIVER, _ROWS["double_lane_change_low_mu"], _slippery_metrics
+    ),
+}
+"""Name of the manoeuvre -> its claims, in the order of the paper's sections."""
+STATEMENTS: Final = {row.id: row for scenario in SCENARIOS.values() for row in scenario.statements}
+"""Number -> statement, in the same order."""
+SCENARIO_OF: Final = {row.id: name for name, scenario in SCENARIOS.items() for row in scenario.statements}
+"""Number of a statement -> name of its manoeuvre."""

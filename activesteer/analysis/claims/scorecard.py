@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from activesteer.analysis.claims.judge import SYSTEMS, Claim
-from activesteer.analysis.claims.statements import SCENARIO_OF, SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, SYSTEMS, Claim
 from activesteer.analysis.claims.stored import (
     LITERATURE,
     NOT_REPRODUCED,

@@ -18,8 +18,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.analysis.claims.judge import Scenario
-from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, Scenario
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Source, build, read_toml
 from activesteer.errors import ParameterError, StudyError, nearest_names

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.claims.scorecard import Scorecard, scorecard
-from activesteer.analysis.claims.statements import SCENARIOS
 from activesteer.analysis.claims.stored import LITERATURE, PAPER, SETTINGS, claims_for, setting_of
 from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError

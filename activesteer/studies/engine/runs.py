@@ -25,7 +25,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 import activesteer
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS
 from activesteer.config import toml_value
 from activesteer.controllers import controller_spec, is_variant, read_variant
 from activesteer.conventions import CURVE_STEP_S

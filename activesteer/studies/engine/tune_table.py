@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated, Any, Final, Literal, NamedTuple
 
-from activesteer.analysis.claims.statements import SCENARIO_OF
+from activesteer.analysis.claims.judge import SCENARIO_OF
 from activesteer.analysis.requirement import ANY, EvaluatedRun, Expression, Names, Requirement, Runs, distance
 from activesteer.config import Range, build
 from activesteer.errors import nearest_names, shown

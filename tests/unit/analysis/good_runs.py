@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from activesteer.analysis.claims.judge import Claim
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS, Claim
 from tests.unit.analysis import synthetic
 from tests.unit.analysis.synthetic import SyntheticRun, offset_track, second_order
 

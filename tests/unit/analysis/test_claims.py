@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
+from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.stored import claims_for
 from activesteer.errors import ParameterError, RecordingError
 from tests.raising import raises

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from activesteer.analysis.claims.judge import SYSTEMS, largest_action
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, largest_action
 from activesteer.metric_table import STEER_RAD
 from tests.fakes import Fake, rejected
 from tests.unit.analysis.good_runs import good, runs_of

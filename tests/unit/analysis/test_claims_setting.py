@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from activesteer.analysis.claims.judge import Claim
+from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, Claim
 from activesteer.analysis.claims.scorecard import Verdict, scorecard
-from activesteer.analysis.claims.statements import SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.stored import LITERATURE, PAPER, claims_for, read_setting, setting_of
 from activesteer.errors import ParameterError
 from activesteer.scenario import resolve, value_of

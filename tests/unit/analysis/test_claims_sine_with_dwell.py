@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.analysis.claims.judge import Claim
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS, Claim
 from tests.unit.analysis.good_runs import check, failing, good, runs_of
 from tests.unit.analysis.synthetic import COMPLETION_S, REVERSAL_S
 
