@@ -22,17 +22,11 @@ FILE: Final = "bands.parquet"
 
 
 class Band(NamedTuple):
-    """A band of one channel.
+    """A band of one channel."""
 
-    Attributes:
-        at: Time [s], or x of the front axle centre [m], shape (n,).
-        low: Lower edge, shape (n,).
-        high: Upper edge, shape (n,).
-    """
-
-    at: Array
-    low: Array
-    high: Array
+    at: Array  # time [s], or x of the front axle centre [m], shape (n,)
+    low: Array  # lower edge, shape (n,)
+    high: Array  # upper edge, shape (n,)
 
 
 def bands_of(recording: RecordingLike) -> Mapping[str, Band]:

@@ -122,19 +122,13 @@ TRACK: Final = ("lane", "path")
 
 
 class Measure(NamedTuple):
-    """A measure of a run that shall not grow.
+    """A measure of a run that shall not grow."""
 
-    Attributes:
-        words: Meaning.
-        unit: Unit for display.
-        size: Growth above which it is harm [SI]; None if it is not counted.
-        value: Function from the metrics of a run to the measure [SI]: None if the manoeuvre has none, nan if the run
-            does not define it.
-    """
-
-    words: str
-    unit: DisplayUnit
-    size: float | None
+    words: str  # meaning
+    unit: DisplayUnit  # unit for display
+    size: float | None  # growth above which it is harm [SI]; None if it is not counted
+    # function from the metrics of a run to the measure [SI]: None if the manoeuvre has none, nan if the run does not
+    # define it
     value: Callable[[Metrics], float | None]
 
 

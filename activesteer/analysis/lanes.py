@@ -204,19 +204,12 @@ BESIDE_M: Final = 2.0
 
 
 class CourseView(NamedTuple):
-    """A course as it is drawn.
+    """A course as it is drawn."""
 
-    Attributes:
-        x_m: Limits of x [m].
-        y_m: Limits of y [m].
-        path_x_m: World x of the path, extended straight to the ends of the picture [m], shape (n,).
-        path_y_m: World y of the path [m], shape (n,).
-    """
-
-    x_m: tuple[float, float]
-    y_m: tuple[float, float]
-    path_x_m: Array
-    path_y_m: Array
+    x_m: tuple[float, float]  # limits of x [m]
+    y_m: tuple[float, float]  # limits of y [m]
+    path_x_m: Array  # world x of the path, extended straight to the ends of the picture [m], shape (n,)
+    path_y_m: Array  # world y of the path [m], shape (n,)
 
 
 def view_of(course: Course) -> CourseView:

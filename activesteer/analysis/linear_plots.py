@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.frequency_response import OUTPUTS, frequency_response
-from activesteer.analysis.source import RecordingLike
+from activesteer.analysis.frequency_response import OUTPUTS
 from activesteer.conventions import RUN_COLOURS, Array, run_looks
-from activesteer.errors import ParameterError
 from activesteer.plotting import Curve, Panel, Picture, draw, save
 from activesteer.units import quantity_of
 
@@ -35,51 +33,21 @@ _GAIN_UNITS: Final = {
 }  # fmt: skip
 
 
-def draw_bode(
-    systems: Mapping[str, control.StateSpace],
-    path: str | os.PathLike[str],
-    input_name: str = "steering_wheel_rad",
-    recording: RecordingLike | None = None,
-) -> Path:
-    """Draw gain and phase of yaw rate, lateral acceleration, roll and sideslip over frequency, and save them."""
-    if not systems:
-        raise ParameterError("there is no linear car to draw, at least one is needed")
-    responses = {label: _responses(label, system, input_name) for label, system in systems.items()}
+def draw_bode(label: str, system: control.StateSpace, path: str | os.PathLike[str]) -> Path:
+    """Draw gain and phase of a linear car over frequency, from the steering wheel to its outputs, and save them."""
     frequency_Hz = np.geomspace(*BODE_RANGE_Hz, 300)
-    points = np.geomspace(0.2, 4.0, 25)
+    found = system(2j * math.pi * frequency_Hz, squeeze=False)
     panels = []
     for output in OUTPUTS:
-        gain, phase = [], []
-        for label, colour in zip(systems, RUN_COLOURS[1:] * len(systems), strict=False):
-            if output in responses[label]:
-                values = responses[label][output]
-                gain.append(Curve(frequency_Hz, np.abs(values), label, colour, "-", 1.5))
-                phase.append(Curve(frequency_Hz, _phase_deg(values), label, colour, "-", 1.5))
-        if recording is not None:
-            found = frequency_response(recording, output, points)
-            for curves, values in ((gain, np.abs(found.response)), (phase, _phase_deg(found.response))):
-                curves.append(Curve(found.frequency_Hz, values, "sweep", RUN_COLOURS[0], "", marker="o", size=3.5))
+        values = found[system.output_labels.index(output), system.input_labels.index("steering_wheel_rad")]
+        gain = Curve(frequency_Hz, np.abs(values), label, RUN_COLOURS[1], "-", 1.5)
+        phase = Curve(frequency_Hz, _phase_deg(values), label, RUN_COLOURS[1], "-", 1.5)
         below = "frequency [Hz]" if output == OUTPUTS[-1] else ""
         y_label = f"{quantity_of(output).short}\n[{_GAIN_UNITS[output]}]"
-        panels.append(Panel(below, y_label, gain, log="xy", x_range=BODE_RANGE_Hz))
-        panels.append(Panel(below, "phase [deg]", phase, log="x", x_range=BODE_RANGE_Hz))
+        panels.append(Panel(below, y_label, [gain], log="xy", x_range=BODE_RANGE_Hz))
+        panels.append(Panel(below, "phase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
     picture = Picture("", panels, columns=2, width_in=7.5, height_in=9.0, shared_legend=True)
     return save(draw(picture), Path(path))
-
-
-def _responses(label: str, system: control.StateSpace, input_name: str) -> dict[str, NDArray[np.complexfloating]]:
-    """Return the frequency responses of a linear car by output, over `BODE_RANGE_Hz`."""
-    if input_name not in system.input_labels:
-        raise ParameterError(
-            f"{label}: there is no input {input_name!r}; its inputs are {system.input_labels}",
-            value=input_name,
-            allowed=system.input_labels,
-        )
-    found = system(2j * math.pi * np.geomspace(*BODE_RANGE_Hz, 300), squeeze=False)
-    place = system.input_labels.index(input_name)
-    return {
-        output: found[system.output_labels.index(output), place] for output in OUTPUTS if output in system.output_labels
-    }
 
 
 def _phase_deg(response: NDArray[np.complexfloating]) -> Array:
@@ -132,11 +100,6 @@ def draw_root_locus(
     systems: Sequence[control.StateSpace], speeds_mps: Sequence[float], path: str | os.PathLike[str]
 ) -> Path:
     """Draw the poles of a car over its speed, with rays of equal damping, and save the picture."""
-    if not systems or len(systems) != len(speeds_mps):
-        raise ParameterError(
-            f"{len(systems)} linear cars and {len(speeds_mps)} speeds given; as many of each are needed",
-            value=(len(systems), len(speeds_mps)),
-        )
     limit, angle = 2.0 * math.pi * LOCUS_LIMIT_Hz, np.linspace(math.pi / 2.0, math.pi, 60)
     curves, notes = [], []
     for frequency_Hz in range(1, math.ceil(LOCUS_LIMIT_Hz)):

@@ -20,14 +20,10 @@ from activesteer.metric_table import Metric, metric
 
 
 class Evaluation(NamedTuple):
-    """Evaluation of the runs of one kind of manoeuvre.
+    """Evaluation of the runs of one kind of manoeuvre."""
 
-    Attributes:
-        metrics: Function from a run to its metrics.
-        key_metrics: The metrics that are printed first and held against the baseline, the most telling first.
-    """
-
-    metrics: Callable[[RecordingLike], dict[str, float]]
+    metrics: Callable[[RecordingLike], dict[str, float]]  # function from a run to its metrics
+    # the metrics that are printed first and held against the baseline, the most telling first
     key_metrics: tuple[Metric, ...]
 
 

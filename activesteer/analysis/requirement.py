@@ -65,19 +65,12 @@ Runs = Mapping[EvaluatedRun, Mapping[str, float | None]]
 
 
 class Names(NamedTuple):
-    """Names that an expression may use.
+    """Names that an expression may use."""
 
-    Attributes:
-        controllers: Controllers of the runs; None for any.
-        maneuvers: Manoeuvres of the runs.
-        examined: Controller for which `controller` stands; empty if it stands for none.
-        claims: Statement of the paper -> metric of its distance, and its manoeuvre.
-    """
-
-    controllers: Sequence[str] | None
-    maneuvers: Sequence[str]
-    examined: str = ""
-    claims: Mapping[str, tuple[str, str]] = {}
+    controllers: Sequence[str] | None  # controllers of the runs; None for any
+    maneuvers: Sequence[str]  # manoeuvres of the runs
+    examined: str = ""  # controller for which `controller` stands; empty if it stands for none
+    claims: Mapping[str, tuple[str, str]] = {}  # statement of the paper -> metric of its distance, and its manoeuvre
 
 
 _Number = Callable[[Runs], float]

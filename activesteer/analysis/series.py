@@ -36,21 +36,13 @@ PEAK_MARGIN: Final = 0.005
 
 
 class StepResponse(NamedTuple):
-    """Response of a signal to a step. Times count from the step. Undefined values are nan.
+    """Response of a signal to a step. Times count from the step. Undefined values are nan."""
 
-    Attributes:
-        steady_state: Value at the end.
-        response_time_s: Time to 90 % of the steady-state value [s].
-        peak: Largest value in the direction of the steady-state value.
-        peak_time_s: Time of the peak [s].
-        overshoot: (peak - steady state)/steady state.
-    """
-
-    steady_state: float
-    response_time_s: float
-    peak: float
-    peak_time_s: float
-    overshoot: float
+    steady_state: float  # value at the end
+    response_time_s: float  # time to 90 % of the steady-state value [s]
+    peak: float  # largest value in the direction of the steady-state value
+    peak_time_s: float  # time of the peak [s]
+    overshoot: float  # (peak - steady state)/steady state
 
 
 def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
@@ -149,19 +141,9 @@ def step_response(time_s: Array, values: Array, step_time_s: float, window_s: fl
     """Evaluate the response of one signal to a step.
 
     The signal is at zero before the step and may move either way. `smooth` reduces its noise for crossings and maxima;
-    the steady-state value is the mean of the samples themselves.
-
-    Args:
-        time_s: Time [s], equidistant, shape (n,).
-        values: Signal, shape (n,).
-        step_time_s: Time of the step [s].
-        window_s: Length of the window at the end whose mean is the steady-state value [s].
-        minimum: Smallest steady-state value for times and overshoot, in the unit of the signal.
-
-    Returns:
-        The response. Its response time is nan if the signal never passes 90 %. Its peak time is nan if the signal only
-        settles: its largest value lies in the window at the end, or exceeds the steady-state value by less than
-        `PEAK_MARGIN`.
+    the steady-state value is the mean of the samples of a window at the end. The response time is nan if the signal
+    never passes 90 %, and all times are nan below the minimum. The peak time is nan if the signal only settles: its
+    largest value lies in the window, or exceeds the steady-state value by less than `PEAK_MARGIN`.
 
     Source: ISO 7401, step input: response time, peak response time, overshoot.
     """
@@ -189,21 +171,9 @@ _ENDS_PERIODS: Final = 6.0
 def low_pass(
     values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float, poles: int = 12
 ) -> NDArray[np.float64]:
-    """Apply a Butterworth filter without phase: half of its poles forwards, the same backwards.
+    """Apply a Butterworth filter without phase: half of its even number of poles forwards, the same backwards.
 
     Both passes have the given cut-off frequency; together they halve a sine of this frequency.
-
-    Args:
-        values: Samples at equal distances, shape (n,).
-        timestep_s: Interval between the samples [s].
-        cut_off_Hz: Cut-off frequency [Hz], below half the sampling frequency.
-        poles: Number of poles of both passes together, even.
-
-    Returns:
-        Filtered samples, shape (n,).
-
-    Raises:
-        RecordingError: the signal is sampled too slowly or too short to be filtered.
 
     Source: 49 CFR 571.126 (FMVSS 126), S7.11; UN Regulation 140: 12-pole phaseless Butterworth.
     """
@@ -269,17 +239,11 @@ AROUND: Final = 0.2
 
 
 class Loop(NamedTuple):
-    """Properties of a loop at its passages through zero, means of all periods.
+    """Properties of a loop at its passages through zero, means of all periods."""
 
-    Attributes:
-        gradient: Slope of the ordinate over the abscissa around abscissa zero, mean of both branches.
-        ordinate_dead_band: Height of the loop at abscissa zero; positive if the ordinate lags behind the abscissa.
-        abscissa_dead_band: Width of the loop at ordinate zero, with the same sign.
-    """
-
-    gradient: float
-    ordinate_dead_band: float
-    abscissa_dead_band: float
+    gradient: float  # slope of the ordinate over the abscissa around abscissa zero, mean of both branches
+    ordinate_dead_band: float  # height of the loop at abscissa zero; positive if the ordinate lags behind the abscissa
+    abscissa_dead_band: float  # width of the loop at ordinate zero, with the same sign
 
 
 def loop(x: Array, y: Array) -> Loop:

@@ -352,7 +352,7 @@ def _modes(options: argparse.Namespace) -> None:
         speeds = [speed / 3.6 for speed in _LOCUS_KMH]
         systems = [each.state_space() for each in linear_cars(options.vehicle, speeds, overrides)]
         figures = [
-            draw_bode({label: car.state_space()}, options.output / "bode.png"),
+            draw_bode(label, car.state_space(), options.output / "bode.png"),
             draw_root_locus(systems, speeds, options.output / "root_locus.png"),
         ]
     values = {

@@ -35,33 +35,22 @@ _RISE_MPS2: Final = 0.15
 
 @dataclass(frozen=True)
 class CircleValidation:
-    """Result of the comparison with a measured circle; angles of the steering wheel [deg].
+    """Result of the comparison with a measured circle; angles of the steering wheel [deg]."""
 
-    Attributes:
-        file: The checked file.
-        measured_deg: Measured angles, shape (n,).
-        nominal_deg: Main prediction, without the effects of assumed steps.
-        assumed_deg: Second prediction, with all effects.
-        effects: Effect -> second prediction without it.
-        decisions: Open decision -> second prediction with it reversed.
-        steps: Name, origin and angle of each step from geometry to the second prediction.
-        ends: Name and source of each interval, and the second prediction at its ends, the smaller angle first.
-        samples_deg: Main prediction for samples of the values that vary from lap to lap, shape (m,).
-        lower_deg: Second prediction for samples, with all intervals at the ends with the smaller angles, shape (m/2,).
-        upper_deg: The same at the other ends.
-    """
-
-    file: MeasuredFile
-    measured_deg: Array
-    nominal_deg: float
-    assumed_deg: float
-    effects: dict[str, float]
-    decisions: dict[str, float]
+    file: MeasuredFile  # the checked file
+    measured_deg: Array  # measured angles, shape (n,)
+    nominal_deg: float  # main prediction, without the effects of assumed steps
+    assumed_deg: float  # second prediction, with all effects
+    effects: dict[str, float]  # effect -> second prediction without it
+    decisions: dict[str, float]  # open decision -> second prediction with it reversed
+    # name, origin and angle of each step from geometry to the second prediction
     steps: tuple[tuple[str, str, float], ...]
+    # name and source of each interval, and the second prediction at its ends, the smaller angle first
     ends: tuple[tuple[str, str, float, float], ...]
-    samples_deg: Array
+    samples_deg: Array  # main prediction for samples of the values that vary from lap to lap, shape (m,)
+    # second prediction for samples, with all intervals at the ends with the smaller angles, shape (m/2,)
     lower_deg: Array
-    upper_deg: Array
+    upper_deg: Array  # the same at the other ends
 
     @property
     def assumptions(self) -> tuple[str, ...]:

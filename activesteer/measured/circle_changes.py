@@ -49,19 +49,13 @@ class ChangeTable:
 
 
 class Case(NamedTuple):
-    """A car on a circle.
+    """A car on a circle."""
 
-    Attributes:
-        vehicle: Name or path of the car.
-        circle: `radius_m` of the centre of gravity, measured `ay_mps2`, `zero_deg` and `body_roll`; see `ChangeTable`.
-        overrides: Overrides of the car.
-        stiff_column: Whether the angle is that of a column that does not twist.
-    """
-
-    vehicle: str
+    vehicle: str  # name or path of the car
+    # `radius_m` of the centre of gravity, measured `ay_mps2`, `zero_deg` and `body_roll`; see `ChangeTable`
     circle: dict[str, float]
-    overrides: dict[str, Any]
-    stiff_column: bool = False
+    overrides: dict[str, Any]  # overrides of the car
+    stiff_column: bool = False  # whether the angle is that of a column that does not twist
 
     def changed_by(self, change: ChangeTable, curves: Mapping[str, Any]) -> Case:
         """Return the case with a change, whose effects have been removed already."""

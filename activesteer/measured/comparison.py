@@ -106,17 +106,11 @@ _TWO_SIDED_95: Final = 1.96
 
 
 class Filter(NamedTuple):
-    """A low-pass filter without phase.
+    """A low-pass filter without phase."""
 
-    Attributes:
-        poles: Poles of both passes together.
-        cut_off_Hz: Cut-off frequency of the steering wheel angle, and of all other channels [Hz].
-        source: Standard.
-    """
-
-    poles: int
-    cut_off_Hz: tuple[float, float]
-    source: str
+    poles: int  # poles of both passes together
+    cut_off_Hz: tuple[float, float]  # cut-off frequency of the steering wheel angle, and of all other channels [Hz]
+    source: str  # standard
 
     def of(self, channel: str) -> float:
         """Return the cut-off frequency of a channel [Hz]."""
@@ -127,6 +121,11 @@ class Filter(NamedTuple):
         wheel, others = self.cut_off_Hz
         cut = f"{others:g} Hz" if wheel == others else f"{others:g} Hz, steering wheel {wheel:g} Hz"
         return f"Butterworth, {self.poles} poles, zero phase, {cut} ({self.source})"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values."""
+        wheel, others = self.cut_off_Hz
+        return {"poles": self.poles, "steering_cut_off_Hz": wheel, "cut_off_Hz": others, "source": self.source}
 
 
 FILTERS: Final[dict[str, Filter | None]] = {
@@ -139,17 +138,11 @@ FILTERS: Final[dict[str, Filter | None]] = {
 
 
 class Smooth(NamedTuple):
-    """A filtered channel.
+    """A filtered channel."""
 
-    Attributes:
-        values: Filtered values; the given ones if they cannot be filtered.
-        noise: Standard deviation of the noise that remains in them.
-        problem: Reason for which they are not filtered; empty if they are.
-    """
-
-    values: Array
-    noise: float
-    problem: str = ""
+    values: Array  # filtered values; the given ones if they cannot be filtered
+    noise: float  # standard deviation of the noise that remains in them
+    problem: str = ""  # reason for which they are not filtered; empty if they are
 
 
 def smooth(recording: Recording, channel: str, chosen: Filter | None) -> Smooth:
@@ -181,21 +174,6 @@ def allowance(noises: list[float]) -> float:
     return _TWO_SIDED_95 * math.sqrt(sum(noise**2 for noise in noises)) / len(noises)
 
 
-def filter_table(name: str) -> dict[str, Any]:
-    """Return a filter of `FILTERS` as JSON values."""
-    chosen = FILTERS[name]
-    if chosen is None:
-        return {"name": name}
-    wheel, others = chosen.cut_off_Hz
-    return {
-        "name": name,
-        "poles": chosen.poles,
-        "steering_cut_off_Hz": wheel,
-        "cut_off_Hz": others,
-        "source": chosen.source,
-    }
-
-
 STANDARDS: Final = {
     "iso19364": "ISO 19364: cross plots over the lateral acceleration",
     "iso19365": "ISO 19365: over time",
@@ -212,17 +190,11 @@ _CROSS_POINTS: Final = 1500
 
 
 class Tolerance(NamedTuple):
-    """Allowed difference from a simulated value: offset + gain x size of the value.
+    """Allowed difference from a simulated value: offset + gain x size of the value."""
 
-    Attributes:
-        offset: Constant part, SI.
-        gain: Fraction of the simulated value.
-        source: Source of the tolerance.
-    """
-
-    offset: float
-    gain: float
-    source: str
+    offset: float  # constant part, SI
+    gain: float  # fraction of the simulated value
+    source: str  # source of the tolerance
 
     def width(self, values: Array) -> Array:
         """Return half the width of the corridor around values."""
@@ -241,31 +213,19 @@ TOLERANCES: Final = {
 
 
 class Compared(NamedTuple):
-    """Comparison of one channel.
+    """Comparison of one channel."""
 
-    Attributes:
-        channel: Name of the channel.
-        tolerance: Allowed difference.
-        x: Instants [s] in the simulation's time or, in a cross plot, measured lateral accelerations [m/s2], shape (n,).
-        measured: Measured values, the mean of several runs, shape (n,).
-        confidence: Half of the 95 % interval of the mean, shape (n,); zero for one run.
-        simulated: Simulated values, shape (n,); in a cross plot, values of the nearest point.
-        low: Lower edge of the corridor at x; in a cross plot, of the curve of the simulation.
-        high: Upper edge.
-        within: Which samples lie in the corridor, shape (n,).
-        noise: Allowance for the noise of the measurement, by which the corridor is wider; 0 if none was made.
-    """
-
-    channel: str
-    tolerance: Tolerance
+    channel: str  # name of the channel
+    tolerance: Tolerance  # allowed difference
+    # instants [s] in the simulation's time or, in a cross plot, measured lateral accelerations [m/s2], shape (n,)
     x: Array
-    measured: Array
-    confidence: Array
-    simulated: Array
-    low: Array
-    high: Array
-    within: NDArray[np.bool_]
-    noise: float = 0.0
+    measured: Array  # measured values, the mean of several runs, shape (n,)
+    confidence: Array  # half of the 95 % interval of the mean, shape (n,); zero for one run
+    simulated: Array  # simulated values, shape (n,); in a cross plot, values of the nearest point
+    low: Array  # lower edge of the corridor at x; in a cross plot, of the curve of the simulation
+    high: Array  # upper edge
+    within: NDArray[np.bool_]  # which samples lie in the corridor, shape (n,)
+    noise: float = 0.0  # allowance for the noise of the measurement, by which the corridor is wider; 0 if none was made
 
     @property
     def residual(self) -> Array:
@@ -298,21 +258,13 @@ class Compared(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Result of a comparison.
+    """Result of a comparison."""
 
-    Attributes:
-        standard: Key of `STANDARDS`.
-        shifts_s: Delay of each measured run [s]; nan if unknown, and then not corrected.
-        quantities: Channels that all runs have.
-        filtered: Key of `FILTERS`.
-        unfiltered: Channels that could not be filtered, and the reasons.
-    """
-
-    standard: str
-    shifts_s: tuple[float, ...]
-    quantities: tuple[Compared, ...]
-    filtered: str = "none"
-    unfiltered: tuple[str, ...] = ()
+    standard: str  # key of `STANDARDS`
+    shifts_s: tuple[float, ...]  # delay of each measured run [s]; nan if unknown, and then not corrected
+    quantities: tuple[Compared, ...]  # channels that all runs have
+    filtered: str = "none"  # key of `FILTERS`
+    unfiltered: tuple[str, ...] = ()  # channels that could not be filtered, and the reasons
 
     @property
     def inside(self) -> bool:
@@ -325,7 +277,7 @@ class Comparison(NamedTuple):
             "standard": self.standard,
             "time_shift_s": float(np.mean(self.shifts_s)),
             "time_shifts_s": list(self.shifts_s),
-            "filter": filter_table(self.filtered),
+            "filter": {"name": self.filtered} | (chosen.to_json() if (chosen := FILTERS[self.filtered]) else {}),
             "unfiltered": list(self.unfiltered),
             "quantities": [quantity.to_json() for quantity in self.quantities],
             "inside": self.inside,
@@ -377,37 +329,16 @@ def compare(
         ])  # fmt: skip
         return values.mean(axis=0), _confidence(values)
 
-    def simulated_of(name: str) -> Array:
-        return smoothed[name][-1].values
-
-    if standard == "iso19364":
-        across = mean_of(_ACROSS)[0]
-        found = [
-            _crossed(
-                name,
-                tolerances,
-                across,
-                *mean_of(name),
-                simulated_of(_ACROSS),
-                simulated_of(name),
-                allowed[_ACROSS],
-                allowed[name],
-            )
-            for name in names
-            if name not in (_ACROSS, "speed_mps")
-        ]
-    else:
-        found = [
-            _timed(
-                name,
-                tolerances[name],
-                time_s,
-                *mean_of(name),
-                np.interp(time_s, simulated.time_s, simulated_of(name)),
-                allowed[name],
-            )
-            for name in names
-        ]
+    simulated_of = {name: sides[-1].values for name, sides in smoothed.items()}
+    found = []
+    for name in names:
+        if standard == "iso19365":
+            values = np.interp(time_s, simulated.time_s, simulated_of[name])
+            found.append(_timed(name, tolerances[name], time_s, *mean_of(name), values, allowed[name]))
+        elif name not in (_ACROSS, "speed_mps"):
+            width = tolerances[_ACROSS].width(simulated_of[_ACROSS]) + allowed[_ACROSS]
+            curve = simulated_of[_ACROSS], width, simulated_of[name]
+            found.append(_crossed(name, tolerances[name], mean_of(_ACROSS)[0], *mean_of(name), curve, allowed[name]))
     return Comparison(standard, shifts, tuple(found), filtered, tuple(problems))
 
 
@@ -430,38 +361,21 @@ def _timed(
 
 
 def _crossed(
-    name: str,
-    tolerances: Mapping[str, Tolerance],
-    across: Array,
-    measured: Array,
-    confidence: Array,
-    sim_across: Array,
-    sim_values: Array,
-    noise_across: float,
-    noise: float,
-) -> Compared:
+    name: str, tolerance: Tolerance, across: Array, measured: Array, confidence: Array,
+    curve: tuple[Array, Array, Array], noise: float,
+) -> Compared:  # fmt: skip
     """Compare in a cross plot: inside is a point in the ellipse of both tolerances around a point of the curve."""
-    tolerance = tolerances[name]
-    rows = np.unique(np.linspace(0, len(across) - 1, min(len(across), _CROSS_POINTS)).astype(int))
-    curve = np.unique(np.linspace(0, len(sim_across) - 1, min(len(sim_across), _CROSS_POINTS)).astype(int))
-    x, y, px, py = across[rows], measured[rows], sim_across[curve], sim_values[curve]
-    width_x, width_y = tolerances[_ACROSS].width(px) + noise_across, tolerance.width(py) + noise
+    rows, places = (
+        np.unique(np.linspace(0, count - 1, min(count, _CROSS_POINTS)).astype(int))
+        for count in (len(across), len(curve[0]))
+    )
+    x, y, (px, width_x, py) = across[rows], measured[rows], (values[places] for values in curve)
+    width_y = tolerance.width(py) + noise
     distance = ((x[:, None] - px) / width_x) ** 2 + ((y[:, None] - py) / width_y) ** 2
     nearest = distance.argmin(axis=1)
     within = distance[np.arange(len(x)), nearest] <= 1.0
-    beside = py[nearest]
-    return Compared(
-        name,
-        tolerance,
-        x,
-        y,
-        confidence[rows],
-        beside,
-        beside - width_y[nearest],
-        beside + width_y[nearest],
-        within,
-        noise,
-    )
+    beside, width = py[nearest], width_y[nearest]
+    return Compared(name, tolerance, x, y, confidence[rows], beside, beside - width, beside + width, within, noise)
 
 
 def words(found: Compared) -> tuple[str, str, str, str, str]:

@@ -36,19 +36,12 @@ standard deviation would be twice the range."""
 
 
 class Intervals(NamedTuple):
-    """Uncertainty of the parameters, relative to their ranges.
+    """Uncertainty of the parameters, relative to their ranges."""
 
-    Attributes:
-        half_widths: Half of each interval, shape (p,); nan for a parameter at an end of its range.
-        correlations: Correlations of the errors, shape (p, p); nan likewise.
-        independent: Number of independent samples of each series.
-        freedom: Degrees of freedom of the t distribution; infinite for stated noise.
-    """
-
-    half_widths: Array
-    correlations: Array
-    independent: tuple[float, ...]
-    freedom: float
+    half_widths: Array  # half of each interval, shape (p,); nan for a parameter at an end of its range
+    correlations: Array  # correlations of the errors, shape (p, p); nan likewise
+    independent: tuple[float, ...]  # number of independent samples of each series
+    freedom: float  # degrees of freedom of the t distribution; infinite for stated noise
 
 
 def autocorrelation_time(values: Array) -> float:
@@ -56,12 +49,6 @@ def autocorrelation_time(values: Array) -> float:
 
     The time is one plus twice the sum of the autocorrelations, as far as these exceed their own noise. The mean is not
     subtracted: an offset is no noise.
-
-    Args:
-        values: Differences at equal distances, shape (n,).
-
-    Returns:
-        1 to n.
 
     Source: A. Sokal, Monte Carlo methods in statistical mechanics, 1997, eq. 3.19: a window of five times the result.
     """
@@ -135,23 +122,14 @@ has 2 at 100 Hz."""
 
 
 class Parameter(NamedTuple):
-    """Factor with its fitted value.
+    """Factor with its fitted value."""
 
-    Attributes:
-        key: Key of the factor.
-        value: Value in the unit of the key; relative if the factor is relative.
-        half_width: Half of the 95 % interval; nan at an end of the range.
-        start: Start of the search.
-        low: Lower end of the range.
-        high: Upper end of the range.
-    """
-
-    key: str
-    value: float
-    half_width: float
-    start: float
-    low: float
-    high: float
+    key: str  # key of the factor
+    value: float  # value in the unit of the key; relative if the factor is relative
+    half_width: float  # half of the 95 % interval; nan at an end of the range
+    start: float  # start of the search
+    low: float  # lower end of the range
+    high: float  # upper end of the range
 
     @property
     def at_end(self) -> bool:
@@ -174,27 +152,16 @@ class Parameter(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """Channel of a recording compared with the runs.
+    """Channel of a recording compared with the runs."""
 
-    Attributes:
-        recording: Name of the recording.
-        channel: Name of the channel.
-        noise: Stated standard deviation of its noise, SI.
-        time_s: Times of the recording [s], shape (n,).
-        measured: Measured values, SI, shape (n,).
-        before: Simulated minus measured values at the start of the search, relative to the noise, shape (n,).
-        after: The same at its end.
-        independent: Number of independent samples.
-    """
-
-    recording: str
-    channel: str
-    noise: float
-    time_s: Array
-    measured: Array
-    before: Array
-    after: Array
-    independent: float
+    recording: str  # name of the recording
+    channel: str  # name of the channel
+    noise: float  # stated standard deviation of its noise, SI
+    time_s: Array  # times of the recording [s], shape (n,)
+    measured: Array  # measured values, SI, shape (n,)
+    before: Array  # simulated minus measured values at the start of the search, relative to the noise, shape (n,)
+    after: Array  # the same at its end
+    independent: float  # number of independent samples
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values, SI."""
@@ -219,35 +186,20 @@ class Compared(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """Result of a fit.
+    """Result of a fit."""
 
-    Attributes:
-        parameters: Fitted factors.
-        correlations: Correlations of the parameters' errors, shape (p, p); nan at an end of a range.
-        compared: All channels of all recordings.
-        basis: Basis of the intervals: `residuals` or `noise`.
-        freedom: Degrees of freedom of the t distribution; infinite with `noise`.
-        misfit: Rms of the residuals relative to the noise; 1 if the car explains everything but the noise.
-        rounds: Number of parameter sets tried, each with its derivatives.
-        runs: Number of runs.
-        settled: Whether the search converged.
-        overrides: Key -> value that drives the fitted car in every recording.
-        own: Recording -> additional values for that recording.
-        notes: Warnings, one sentence each.
-    """
-
-    parameters: tuple[Parameter, ...]
-    correlations: Array
-    compared: tuple[Compared, ...]
-    basis: str
-    freedom: float
-    misfit: float
-    rounds: int
-    runs: int
-    settled: bool
-    overrides: dict[str, Any]
-    own: dict[str, dict[str, Any]]
-    notes: tuple[str, ...] = ()
+    parameters: tuple[Parameter, ...]  # fitted factors
+    correlations: Array  # correlations of the parameters' errors, shape (p, p); nan at an end of a range
+    compared: tuple[Compared, ...]  # all channels of all recordings
+    basis: str  # basis of the intervals: `residuals` or `noise`
+    freedom: float  # degrees of freedom of the t distribution; infinite with `noise`
+    misfit: float  # rms of the residuals relative to the noise; 1 if the car explains everything but the noise
+    rounds: int  # number of parameter sets tried, each with its derivatives
+    runs: int  # number of runs
+    settled: bool  # whether the search converged
+    overrides: dict[str, Any]  # key -> value that drives the fitted car in every recording
+    own: dict[str, dict[str, Any]]  # recording -> additional values for that recording
+    notes: tuple[str, ...] = ()  # warnings, one sentence each
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""

@@ -85,19 +85,12 @@ _FEWEST: Final = 20
 
 
 class Measured(NamedTuple):
-    """Recording in the time of its manoeuvre.
+    """Recording in the time of its manoeuvre."""
 
-    Attributes:
-        name: Name of its file.
-        begin_s: Time of the recording at which the manoeuvre starts [s].
-        time_s: Times at which channels are compared [s], shape (n,).
-        channels: Measured values there, SI; not finite where missing.
-    """
-
-    name: str
-    begin_s: float
-    time_s: Array
-    channels: dict[str, Array]
+    name: str  # name of its file
+    begin_s: float  # time of the recording at which the manoeuvre starts [s]
+    time_s: Array  # times at which channels are compared [s], shape (n,)
+    channels: dict[str, Array]  # measured values there, SI; not finite where missing
 
 
 def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[str, float]:
@@ -164,23 +157,14 @@ Answer = list[Array] | str
 
 
 class Found(NamedTuple):
-    """End of the search.
+    """End of the search."""
 
-    Attributes:
-        place: Parameters, shape (p,).
-        before: Differences at the start, a series per channel and recording.
-        after: Differences at the end.
-        slopes: Derivatives at the end, shape (n, p) each.
-        rounds: Number of parameter sets tried.
-        settled: Whether the search converged.
-    """
-
-    place: Array
-    before: list[Array]
-    after: list[Array]
-    slopes: list[Array]
-    rounds: int
-    settled: bool
+    place: Array  # parameters, shape (p,)
+    before: list[Array]  # differences at the start, a series per channel and recording
+    after: list[Array]  # differences at the end
+    slopes: list[Array]  # derivatives at the end, shape (n, p) each
+    rounds: int  # number of parameter sets tried
+    settled: bool  # whether the search converged
 
 
 def search(
@@ -251,19 +235,12 @@ would attribute to the car."""
 
 
 class FitProgress(NamedTuple):
-    """Progress of a fit.
+    """Progress of a fit."""
 
-    Attributes:
-        round: Number of the parameter set that is tried with its derivatives.
-        done: Finished runs of this round.
-        total: Runs of this round.
-        misfit: Rms of all differences relative to their noise, of the best set so far; nan before the first.
-    """
-
-    round: int
-    done: int
-    total: int
-    misfit: float
+    round: int  # number of the parameter set that is tried with its derivatives
+    done: int  # finished runs of this round
+    total: int  # runs of this round
+    misfit: float  # rms of all differences relative to their noise, of the best set so far; nan before the first
 
 
 def fit(

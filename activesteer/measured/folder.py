@@ -34,19 +34,12 @@ _LEAST_SAMPLES: Final = 10
 
 
 class Part(NamedTuple):
-    """Comparison of one channel in one window.
+    """Comparison of one channel in one window."""
 
-    Attributes:
-        run: Name of the run.
-        part: One of `PARTS`.
-        stage: `predicted` or `fitted`.
-        compared: The comparison.
-    """
-
-    run: str
-    part: str
-    stage: str
-    compared: Compared
+    run: str  # name of the run
+    part: str  # one of `PARTS`
+    stage: str  # `predicted` or `fitted`
+    compared: Compared  # the comparison
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values, SI."""
@@ -54,35 +47,21 @@ class Part(NamedTuple):
 
 
 class End(NamedTuple):
-    """Effect of an interval.
+    """Effect of an interval."""
 
-    Attributes:
-        key: Key of the value.
-        source: Where its ends come from.
-        ends: The ends.
-        found: Values of the free factors of the prediction at either end.
-        effect: Channel -> rms of its change in the check windows at the end that changes it more, SI.
-    """
-
-    key: str
-    source: str
-    ends: tuple[float, ...]
-    found: tuple[dict[str, float], ...]
-    effect: dict[str, float]
+    key: str  # key of the value
+    source: str  # where its ends come from
+    ends: tuple[float, ...]  # the ends
+    found: tuple[dict[str, float], ...]  # values of the free factors of the prediction at either end
+    effect: dict[str, float]  # channel -> rms of its change in the check windows at the end that changes it more, SI
 
 
 class Band(NamedTuple):
-    """Band around the prediction in a check window.
+    """Band around the prediction in a check window."""
 
-    Attributes:
-        part: The prediction.
-        low: Lower edge, without the tolerance, shape (n,).
-        high: Upper edge.
-    """
-
-    part: Part
-    low: Array
-    high: Array
+    part: Part  # the prediction
+    low: Array  # lower edge, without the tolerance, shape (n,)
+    high: Array  # upper edge
 
     @property
     def share_inside(self) -> float:
@@ -103,27 +82,16 @@ class Band(NamedTuple):
 
 @dataclass(frozen=True)
 class MeasuredValidation:
-    """Result of a validation against measured runs.
+    """Result of a validation against measured runs."""
 
-    Attributes:
-        file: The checked file.
-        predicted: Fit of the free factors of the prediction; None if nothing is free.
-        fitted: Fit of all factors; None without further factors.
-        parts: The comparisons.
-        bands: Bands around the prediction; empty without intervals.
-        ends: Effect of each interval.
-        notes: What the import noted, by run.
-        assumptions: What was assumed, by the file and by the method.
-    """
-
-    file: MeasuredFile
-    predicted: Fit | None
-    fitted: Fit | None
-    parts: tuple[Part, ...]
-    bands: tuple[Band, ...]
-    ends: tuple[End, ...]
-    notes: tuple[str, ...]
-    assumptions: tuple[str, ...]
+    file: MeasuredFile  # the checked file
+    predicted: Fit | None  # fit of the free factors of the prediction; None if nothing is free
+    fitted: Fit | None  # fit of all factors; None without further factors
+    parts: tuple[Part, ...]  # the comparisons
+    bands: tuple[Band, ...]  # bands around the prediction; empty without intervals
+    ends: tuple[End, ...]  # effect of each interval
+    notes: tuple[str, ...]  # what the import noted, by run
+    assumptions: tuple[str, ...]  # what was assumed, by the file and by the method
 
     @property
     def judged(self) -> list[Part]:

@@ -150,30 +150,19 @@ class MeasuredTable:
 
 @dataclass(frozen=True)
 class MeasuredFile:
-    """A checked file.
+    """A checked file."""
 
-    Attributes:
-        table: Its table.
-        folder: Its folder.
-        vehicle: Name or path of the car.
-        factors: The factors.
-        tolerances: Channel -> tolerance, SI.
-        noise: Channel -> standard deviation, SI.
-        predict_channels: Channels that determine the free factors of the prediction.
-        source: For error messages.
-        curves: Axle -> its curves in the vehicle file; empty if its axles have links.
-        nominal: Key of the car that varies from lap to lap -> its value in the file.
-    """
-
-    table: MeasuredTable
-    folder: Path
-    vehicle: str
-    factors: tuple[Factor, ...]
-    tolerances: dict[str, Tolerance]
-    noise: dict[str, float]
-    predict_channels: tuple[str, ...]
-    source: Source
+    table: MeasuredTable  # its table
+    folder: Path  # its folder
+    vehicle: str  # name or path of the car
+    factors: tuple[Factor, ...]  # the factors
+    tolerances: dict[str, Tolerance]  # channel -> tolerance, SI
+    noise: dict[str, float]  # channel -> standard deviation, SI
+    predict_channels: tuple[str, ...]  # channels that determine the free factors of the prediction
+    source: Source  # for error messages
+    # axle -> its curves in the vehicle file; empty if its axles have links
     curves: dict[str, Any] = field(default_factory=dict)
+    # key of the car that varies from lap to lap -> its value in the file
     nominal: dict[str, float] = field(default_factory=dict)
 
     @property

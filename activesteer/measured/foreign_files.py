@@ -21,16 +21,11 @@ from activesteer.files import shown_path
 
 
 class Column(NamedTuple):
-    """Column or signal of a file.
+    """Column or signal of a file."""
 
-    Attributes:
-        name: Name in the file.
-        unit: Unit in the file; empty if the file states none.
-        read: Function that returns the values, shape (n,), and their own times [s]; None for a shared time column.
-    """
-
-    name: str
-    unit: str
+    name: str  # name in the file
+    unit: str  # unit in the file; empty if the file states none
+    # function that returns the values, shape (n,), and their own times [s]; None for a shared time column
     read: Callable[[], tuple[Array, Array | None]]
 
 
@@ -60,13 +55,6 @@ def numbers(values: Any, name: str, path: Path) -> Array:
         return np.asarray(array, np.float64)
     except (TypeError, ValueError, IndexError) as reason:
         raise RecordingError(f"column {shown(name)} holds no numbers: {reason}", file=path.name) from None
-
-
-_MAT_HEADER: Final = 128
-"""Length of the header of a MATLAB file of version 5 [bytes]."""
-_MAT_COMPRESSED: Final = 15
-"""Type of a compressed element of a MATLAB file."""
-_PIECE_BYTES: Final = 2**20
 
 
 def make_answerer() -> Callable[[bytes], bytes]:

@@ -100,17 +100,11 @@ _MOST_REPEATED: Final = 5
 
 
 class Import(NamedTuple):
-    """Result of an import.
+    """Result of an import."""
 
-    Attributes:
-        recording: The recording.
-        taken: Channel -> column and unit that it comes from.
-        notes: Assumptions that the file does not state, and suspicious values.
-    """
-
-    recording: Recording
-    taken: dict[str, str]
-    notes: tuple[str, ...]
+    recording: Recording  # the recording
+    taken: dict[str, str]  # channel -> column and unit that it comes from
+    notes: tuple[str, ...]  # assumptions that the file does not state, and suspicious values
 
 
 class _Source(NamedTuple):

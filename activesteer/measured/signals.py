@@ -29,19 +29,12 @@ forward, y right, z down): all except those along or about x."""
 
 
 class Known(NamedTuple):
-    """Meaning of a column.
+    """Meaning of a column."""
 
-    Attributes:
-        channel: Channel that the column fills.
-        unit: Unit, if the file states none.
-        sign: -1 if the exporter uses the sign opposite to ISO 8855.
-        sure: Whether the unit is the exporter's; otherwise SI is assumed.
-    """
-
-    channel: str
-    unit: str = ""
-    sign: float = 1.0
-    sure: bool = True
+    channel: str  # channel that the column fills
+    unit: str = ""  # unit, if the file states none
+    sign: float = 1.0  # -1 if the exporter uses the sign opposite to ISO 8855
+    sure: bool = True  # whether the unit is the exporter's; otherwise SI is assumed
 
 
 _WORDS: Final = {
@@ -256,15 +249,10 @@ def _alike(one: Array, other: Array) -> float:
 
 
 class Samples(NamedTuple):
-    """Signal as measured.
+    """Signal as measured."""
 
-    Attributes:
-        time_s: Times [s], increasing, shape (n,).
-        values: Values, finite, shape (n,).
-    """
-
-    time_s: Array
-    values: Array
+    time_s: Array  # times [s], increasing, shape (n,)
+    values: Array  # values, finite, shape (n,)
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:

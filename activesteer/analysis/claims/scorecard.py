@@ -36,34 +36,22 @@ class Verdict(StrEnum):
 
 
 class Judged(NamedTuple):
-    """A claim with its verdict.
+    """A claim with its verdict."""
 
-    Attributes:
-        claim: The claim.
-        verdict: Its verdict.
-        reason: Why it is not reproduced; empty for a claim that is not listed.
-        proportion: Proportion of the stored population in which it holds; None without a population.
-    """
-
-    claim: Claim
-    verdict: Verdict
-    reason: str
+    claim: Claim  # the claim
+    verdict: Verdict  # its verdict
+    reason: str  # why it is not reproduced; empty for a claim that is not listed
+    # proportion of the stored population in which it holds; None without a population
     proportion: ClaimProportion | None = None
 
 
 @dataclass(frozen=True)
 class Scorecard:
-    """Claims with their verdicts.
+    """Claims with their verdicts."""
 
-    Attributes:
-        judged: All of them, in the order given.
-        population: The stored population of the car; None without one.
-        setting: Setting of the runs; see `stored`.
-    """
-
-    judged: tuple[Judged, ...]
-    population: Population | None = None
-    setting: str = LITERATURE
+    judged: tuple[Judged, ...]  # all of them, in the order given
+    population: Population | None = None  # the stored population of the car; None without one
+    setting: str = LITERATURE  # setting of the runs; see `stored`
 
     @property
     def exit_status(self) -> int:

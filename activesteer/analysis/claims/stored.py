@@ -141,31 +141,19 @@ def _check_reasons(reasons: object, source: Source, name: str) -> None:
 
 @dataclass(frozen=True)
 class ClaimProportion:
-    """Proportion of a population in which a claim holds.
+    """Proportion of a population in which a claim holds."""
 
-    Attributes:
-        id: Number of the claim.
-        passed: Whether the claim holds with the nominal car, road and driver.
-        number: Number of samples in which the claim could be judged.
-        share: Proportion of these samples in which it holds; nan for no samples.
-        low: Lower end of the 95 % interval.
-        high: Upper end.
-        depends_on: Key of the factor with the largest influence; `none` if no factor is significant.
-        explained: Proportion of the variance that this factor explains.
-        direction: 1 if the claim holds more often with more of the factor, -1 with less, 0 in the middle or at the
-            ends.
-        at: Value of a choice, such as `sensors.preset = ideal` -> proportion of the samples with this value.
-    """
-
-    id: str
-    passed: bool
-    number: int
-    share: float
-    low: float
-    high: float
-    depends_on: str = NO_FACTOR
-    explained: float = 0.0
+    id: str  # number of the claim
+    passed: bool  # whether the claim holds with the nominal car, road and driver
+    number: int  # number of samples in which the claim could be judged
+    share: float  # proportion of these samples in which it holds; nan for no samples
+    low: float  # lower end of the 95 % interval
+    high: float  # upper end
+    depends_on: str = NO_FACTOR  # key of the factor with the largest influence; `none` if no factor is significant
+    explained: float = 0.0  # proportion of the variance that this factor explains
+    # 1 if the claim holds more often with more of the factor, -1 with less, 0 in the middle or at the ends
     direction: int = 0
+    # value of a choice, such as `sensors.preset = ideal` -> proportion of the samples with this value
     at: Mapping[str, float] = field(default_factory=dict)
 
     @property

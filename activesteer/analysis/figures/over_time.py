@@ -237,9 +237,6 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     From the top, over one time axis: yaw rate (dotted: desired by the controller), steering angles (front wheels thin,
     added angles of rear wheels or front superposition thick), lateral acceleration, sideslip and roll.
 
-    Args:
-        recordings: Runs by label; `none`, `ars` and `afs` get the paper's names and numbers, others keep their own.
-
     Source: V. Dorsch, Mecatronics-REM 2012, figure 11.
     """
     curves = style.curves(recordings)

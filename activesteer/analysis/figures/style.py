@@ -48,16 +48,11 @@ MAX_POINTS: Final = 5000
 
 
 class DrawnRun(NamedTuple):
-    """A run as it is drawn.
+    """A run as it is drawn."""
 
-    Attributes:
-        recording: The run.
-        look: Label, colour and dashes.
-        bands: Bands of the population, by channel; empty if no population belongs to the run.
-    """
-
-    recording: RecordingLike
-    look: RunLook
+    recording: RecordingLike  # the run
+    look: RunLook  # label, colour and dashes
+    # bands of the population, by channel; empty if no population belongs to the run
     bands: Mapping[str, Band] = MappingProxyType({})
 
     @property

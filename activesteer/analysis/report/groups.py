@@ -17,15 +17,10 @@ from activesteer.recording.recording import run_names
 
 
 class Judgement(NamedTuple):
-    """The claims about a group of runs.
+    """The claims about a group of runs."""
 
-    Attributes:
-        scorecard: Claims with their verdicts; empty if there are no claims, or if they cannot be judged.
-        obstacle: Why the claims cannot be judged; empty if they are, or if there are none.
-    """
-
-    scorecard: Scorecard
-    obstacle: str = ""
+    scorecard: Scorecard  # claims with their verdicts; empty if there are no claims, or if they cannot be judged
+    obstacle: str = ""  # why the claims cannot be judged; empty if they are, or if there are none
 
 
 def judge(group: Group) -> Judgement:
@@ -63,19 +58,12 @@ MAX_RUNS: Final = 60
 
 
 class ReportedRun(NamedTuple):
-    """A recording in a report.
+    """A recording in a report."""
 
-    Attributes:
-        source: Its origin, such as the name of its file.
-        recording: The recording.
-        name: Short name of its column (`ars`).
-        look: Label, colour and dashes of its curves.
-    """
-
-    source: str
-    recording: Recording
-    name: str
-    look: RunLook
+    source: str  # its origin, such as the name of its file
+    recording: Recording  # the recording
+    name: str  # short name of its column (`ars`)
+    look: RunLook  # label, colour and dashes of its curves
 
     @property
     def problem(self) -> str:
@@ -85,17 +73,11 @@ class ReportedRun(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Runs of one manoeuvre, in the paper's order.
+    """Runs of one manoeuvre, in the paper's order."""
 
-    Attributes:
-        name: Name of the manoeuvre.
-        title: Its name in words.
-        runs: The runs, at least one.
-    """
-
-    name: str
-    title: str
-    runs: tuple[ReportedRun, ...]
+    name: str  # name of the manoeuvre
+    title: str  # its name in words
+    runs: tuple[ReportedRun, ...]  # the runs, at least one
 
     def by_name(self) -> dict[str, Recording]:
         """Return the recordings by name of the run."""

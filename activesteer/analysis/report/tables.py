@@ -45,15 +45,10 @@ def is_near(name: str, value: float, first: float) -> bool:
 
 
 class Row(NamedTuple):
-    """A parameter.
+    """A parameter."""
 
-    Attributes:
-        key: Its name, with the names of its tables.
-        values: Its value in each run; a single value if all runs have the same.
-    """
-
-    key: str
-    values: tuple[str, ...]
+    key: str  # its name, with the names of its tables
+    values: tuple[str, ...]  # its value in each run; a single value if all runs have the same
 
     @property
     def differs(self) -> bool:
@@ -100,45 +95,27 @@ MAX_FIGURES: Final = 6
 
 
 class KeyFigure(NamedTuple):
-    """A key figure of runs.
+    """A key figure of runs."""
 
-    Attributes:
-        title: Its name.
-        metrics: Names of metrics; the first one that a run has is shown.
-    """
-
-    title: str
-    metrics: tuple[str, ...]
+    title: str  # its name
+    metrics: tuple[str, ...]  # names of metrics; the first one that a run has is shown
 
 
 class Figure(NamedTuple):
-    """A key figure of a run, as text.
+    """A key figure of a run, as text."""
 
-    Attributes:
-        text: Its value.
-        difference: Difference from the first run; empty for the first run and without a difference.
-        change: Significance of the difference.
-    """
-
-    text: str
-    difference: str = ""
-    change: Change = Change.OTHER
+    text: str  # its value
+    difference: str = ""  # difference from the first run; empty for the first run and without a difference
+    change: Change = Change.OTHER  # significance of the difference
 
 
 class Result(NamedTuple):
-    """Result of a run.
+    """Result of a run."""
 
-    Attributes:
-        run: The run.
-        losses: Its failures, in words.
-        kept: The requirements that it met, in words.
-        figures: Its key figures.
-    """
-
-    run: ReportedRun
-    losses: tuple[str, ...]
-    kept: tuple[str, ...]
-    figures: tuple[Figure, ...]
+    run: ReportedRun  # the run
+    losses: tuple[str, ...]  # its failures, in words
+    kept: tuple[str, ...]  # the requirements that it met, in words
+    figures: tuple[Figure, ...]  # its key figures
 
 
 KEY_FIGURES: Final = (
@@ -237,17 +214,11 @@ class Cell(NamedTuple):
 
 
 class MetricRow(NamedTuple):
-    """A metric of all runs of a group.
+    """A metric of all runs of a group."""
 
-    Attributes:
-        name: Its name in words.
-        unit: Unit of the numbers.
-        cells: Value of the first run, then value and difference from the first run of each other run.
-    """
-
-    name: str
-    unit: str
-    cells: tuple[Cell, ...]
+    name: str  # its name in words
+    unit: str  # unit of the numbers
+    cells: tuple[Cell, ...]  # value of the first run, then value and difference from the first run of each other run
 
 
 def verdict_counts(scorecards: Iterable[Scorecard]) -> dict[Verdict, int]:
