@@ -9,6 +9,7 @@ import json
 import os
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -63,25 +64,21 @@ def csv_columns(path: Path) -> list[Column]:
         column = table.column(place)
         if pa.types.is_time(column.type):
             column = column.cast(pa.string())
-        if pa.types.is_string(column.type):
-            if (times_s := _clock_s(column.to_pylist())) is not None:
-                return times_s
-            text = next(str(item) for item in column if not _NUMBER.fullmatch(str(item).strip()) and item.is_valid)
-            raise ValueError(f"{shown(text)} is no number")
-        return column.to_numpy(zero_copy_only=False)
+        if not pa.types.is_string(column.type):
+            return column.to_numpy(zero_copy_only=False)
+        if (times_s := _clock_s(column.to_pylist())) is not None:
+            return times_s
+        text = next(str(item) for item in column if not _NUMBER.fullmatch(str(item).strip()) and item.is_valid)
+        raise ValueError(f"{shown(text)} is no number")
 
-    def lazy(place: str, name: str) -> Callable[[], tuple[Array, None]]:
-        def read() -> tuple[Array, None]:
-            try:
-                return numbers(values(place), name, path), None
-            except (ValueError, StopIteration) as reason:
-                raise RecordingError(f"column {shown(name)} holds no numbers: {reason}", file=path.name) from None
+    def read(place: str, name: str) -> tuple[Array, None]:
+        try:
+            return numbers(values(place), name, path), None
+        except (ValueError, StopIteration) as reason:
+            raise RecordingError(f"column {shown(name)} holds no numbers: {reason}", file=path.name) from None
 
-        return read
-
-    return [
-        Column(name, unit, lazy(place, name)) for place, name, unit in zip(places, names, units, strict=True) if name
-    ]
+    columns = zip(places, names, units, strict=True)
+    return [Column(name, unit, partial(read, place, name)) for place, name, unit in columns if name]
 
 
 def _text(data: bytes) -> str:
@@ -167,9 +164,8 @@ def read_columns(path: Path) -> list[Column]:
         raise RecordingError(f"cannot read {shown_path(path)}: it {why_no_file(path)}", value=path)
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        raise RecordingError(
-            f"{shown_path(path)}: files of measured data end in {', '.join(_READERS)}", value=path.suffix
-        )
+        problem = f"{shown_path(path)}: files of measured data end in {', '.join(_READERS)}"
+        raise RecordingError(problem, value=path.suffix)
     return _numbered(reader(path))
 
 
@@ -213,17 +209,14 @@ def _in_child(path: Path) -> list[Column]:
             raise RecordingError(problem, **attributes)
         return about, content
 
-    def lazy(index: int, name: str) -> Callable[[], tuple[Array, Array | None]]:
-        def read() -> tuple[Array, Array | None]:
-            about, content = asked(index, f"reading column {shown(name)}")
-            found = np.frombuffer(content, np.float64)
-            values, times = np.split(found, 2) if about["timed"] else (found, None)
-            return values.copy(), None if times is None else times.copy()
-
-        return read
+    def read(index: int, name: str) -> tuple[Array, Array | None]:
+        about, content = asked(index, f"reading column {shown(name)}")
+        found = np.frombuffer(content, np.float64)
+        values, times = np.split(found, 2) if about["timed"] else (found, None)
+        return values.copy(), None if times is None else times.copy()
 
     about, _ = asked(os.fspath(path), "opening the file")
-    return [Column(name, unit, lazy(index, name)) for index, (name, unit) in enumerate(about["columns"])]
+    return [Column(name, unit, partial(read, index, name)) for index, (name, unit) in enumerate(about["columns"])]
 
 
 _READERS: Final[dict[str, Callable[[Path], list[Column]]]] = {

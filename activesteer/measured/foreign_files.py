@@ -9,6 +9,7 @@ import json
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -83,13 +84,6 @@ def make_answerer() -> Callable[[bytes], bytes]:
     return answer
 
 
-def _in_memory(name: str, unit: str, values: Any, path: Path) -> Column:
-    def read() -> tuple[Array, None]:
-        return numbers(values, name, path), None
-
-    return Column(name, unit, read)
-
-
 def _parquet(path: Path) -> list[Column]:
     import pyarrow as pa  # noqa: PLC0415 - slow to import
     from pyarrow import parquet  # noqa: PLC0415
@@ -99,26 +93,19 @@ def _parquet(path: Path) -> list[Column]:
         check_rows(file.metadata.num_rows, path)
         fields = list(file.schema_arrow)
 
-    def lazy(name: str, kind: Any) -> Callable[[], tuple[Array, None]]:
+    def read(name: str, kind: Any) -> tuple[Array, None]:
         kind = kind.value_type if pa.types.is_dictionary(kind) else kind
+        # A text or a list may be of any length, so that the number of rows would limit nothing.
+        if not (pa.types.is_primitive(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind)):
+            raise RecordingError(f"column {shown(name)} holds no numbers: its type is {kind}", file=path.name)
+        with understood(path, "Parquet file"):
+            column = file.read(columns=[name]).column(0).to_numpy()
+        return numbers(column, name, path), None
 
-        def read() -> tuple[Array, None]:
-            # A text or a list may be of any length, so that the number of rows would limit nothing.
-            if not (pa.types.is_primitive(kind) or pa.types.is_decimal(kind) or pa.types.is_null(kind)):
-                raise RecordingError(f"column {shown(name)} holds no numbers: its type is {kind}", file=path.name)
-            with understood(path, "Parquet file"):
-                column = file.read(columns=[name]).column(0).to_numpy()
-            return numbers(column, name, path), None
-
-        return read
-
+    units = [(field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace") for field in fields]
     return [
-        Column(
-            field.name,
-            (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace"),
-            lazy(field.name, field.type),
-        )
-        for field in fields
+        Column(field.name, unit, partial(read, field.name, field.type))
+        for field, unit in zip(fields, units, strict=True)
     ]
 
 
@@ -135,10 +122,14 @@ def _mat(path: Path) -> list[Column]:
                 f"{shown_path(path)} is a MATLAB file of version 7.3; save it with `save(..., '-v7')`", value=path
             ) from None
         raise
+
+    def read(name: str, values: Any) -> tuple[Array, None]:
+        return numbers(values, name, path), None
+
     units = variables.get("units")
     given = units if isinstance(units, Mapping) else {}
     return [
-        _in_memory(name, str(given.get(name, "")), values, path)
+        Column(name, str(given.get(name, "")), partial(read, name, values))
         for name, values in _flat(variables)
         if not name.startswith(("__", "units.", "metrics.", "meanings."))
     ]
@@ -168,16 +159,13 @@ def _mdf(path: Path) -> list[Column]:
             if index != file.masters_db.get(group)
         ]
 
-    def lazy(name: str, group: int, index: int) -> Callable[[], tuple[Array, Array]]:
-        def read() -> tuple[Array, Array]:
-            with understood(path, "MDF file"):
-                signal = file.get(name, group=group, index=index)
-                times, samples = np.asarray(signal.timestamps, np.float64), signal.samples
-            return numbers(samples, name, path), times
+    def read(name: str, group: int, index: int) -> tuple[Array, Array]:
+        with understood(path, "MDF file"):
+            signal = file.get(name, group=group, index=index)
+            times, samples = np.asarray(signal.timestamps, np.float64), signal.samples
+        return numbers(samples, name, path), times
 
-        return read
-
-    return [Column(name, unit, lazy(name, group, index)) for name, group, index, unit in places]
+    return [Column(name, unit, partial(read, name, group, index)) for name, group, index, unit in places]
 
 
 READERS: Final[dict[str, Callable[[Path], list[Column]]]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple
@@ -20,8 +20,7 @@ from activesteer.measured.signals import (
     TURNED_IN_SAE,
     Known,
     Samples,
-    before_bracket,
-    gaps,
+    bracketed,
     is_time,
     known_column,
     moved_car,
@@ -87,14 +86,6 @@ class MeasurementMap:
     """Kind of the driven manoeuvre, such as `step_steer`, which decides its metrics."""
 
 
-def read_map(path: Path | None) -> MeasurementMap:
-    """Read a map. Return an empty map without a file."""
-    if path is None:
-        return MeasurementMap()
-    table, source = read_toml(path, RecordingError)
-    return build(MeasurementMap, table, source)
-
-
 _MOST_REPEATED: Final = 5
 """Number of repeated column names that are listed."""
 
@@ -122,15 +113,16 @@ _Files = Mapping[Path, list[Column]]
 
 def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehicle: str = "compact") -> Import:
     """Read one or several files of measured data of one run."""
-    chosen = read_map(map_path)
+    chosen = MeasurementMap() if map_path is None else build(MeasurementMap, *read_toml(map_path, RecordingError))
     paths = [path] if isinstance(path, Path) else list(path)
     path = paths[0]
     files = {file: read_columns(file) for file in paths}
-    _check_shifts(chosen, paths)
+    for name in chosen.shift_s:
+        if name not in (names := [file.name for file in paths]):
+            raise RecordingError(f"is no imported file; {nearest_names(name, names)}", key=f"shift_s.{name}")
     every = [{column.name for column in columns} for columns in files.values()]
     repeated = [name for names in every for name in names if second_of(name) in names]
-    car = load_car(vehicle)
-    model = car.on(Road())
+    model = load_car(vehicle).on(Road())
     table = {channel.name: channel for channel in model.channels.channels}
     notes = [
         f"several columns are named {shown(name)}: the first is used; a map can name {shown(second_of(name))}"
@@ -140,19 +132,19 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
         notes.append(f"{len(repeated) - _MOST_REPEATED} more names stand over several columns each")
     sources = _mapped(chosen, files, table) if chosen.channels else _by_name(files, table, notes)
     shared = _shared_times(files, chosen, sources)
-    signals = {
-        name: _signal(name, _si_unit(name, table), source, shared[source.file], chosen)
-        for name, source in sources.items()
-    }
+    signals = {name: _signal(name, source, shared[source.file], chosen) for name, source in sources.items()}
     grid_s, step_s = _grid(signals, chosen, path)
     start_s = float(grid_s[0])
     if start_s != 0.0:
         notes.append(f"the time begins at {start_s:.12g} s in the file and at 0 here")
     values = {}
     for name, signal in signals.items():
-        bridged = gaps(signal, _bridge_s(chosen, signal), float(grid_s[0]), float(grid_s[-1]))
-        if bridged:
-            begin, end = bridged[0]
+        # A slow signal has long steps between its samples.
+        longest_s = max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal.time_s))))
+        before_s, after_s = signal.time_s[:-1], signal.time_s[1:]
+        wide = np.flatnonzero((after_s - before_s > longest_s) & (after_s > grid_s[0]) & (before_s < grid_s[-1]))
+        if wide.size:
+            begin, end = float(before_s[wide[0]]), float(after_s[wide[0]])
             raise RecordingError(
                 f"has no samples from {begin:.3f} to {end:.3f} s; allow it with max_gap_s in a map, or cut "
                 "it off with start_s and end_s",
@@ -161,7 +153,10 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
         values[name] = resampled(signal, grid_s)
         if chosen.axes == "sae_j670" and name in TURNED_IN_SAE:
             values[name] = -values[name]
-    taken = {name: _words(source) for name, source in sources.items()}
+    taken = {}
+    for name, source in sources.items():  # many names contain the unit
+        column, unit = source.column.name, source.known.unit or "-"
+        taken[name] = column if split_unit(column)[1] == unit else f"{column} [{unit}]"
     notes += suspicions(values, step_s)
     time_s: Array = np.arange(len(grid_s), dtype=np.float64) * step_s
     derived = with_motion(time_s, values)
@@ -189,20 +184,6 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
     return Import(recording, taken, tuple(notes))
 
 
-def _words(source: _Source) -> str:
-    """Return column and unit. Many names contain the unit."""
-    name, unit = source.column.name, source.known.unit or "-"
-    return name if split_unit(name)[1] == unit else f"{name} [{unit}]"
-
-
-def _check_shifts(chosen: MeasurementMap, paths: Sequence[Path]) -> None:
-    """Refuse a time shift of a file that is not imported."""
-    names = [path.name for path in paths]
-    for name in chosen.shift_s:
-        if name not in names:
-            raise RecordingError(f"is no imported file; {nearest_names(name, names)}", key=f"shift_s.{name}")
-
-
 def _found(name: str, files: _Files) -> tuple[Column, Path]:
     """Return the column with a name, and its file."""
     having = [path for path, columns in files.items() if any(column.name == name for column in columns)]
@@ -212,22 +193,20 @@ def _found(name: str, files: _Files) -> tuple[Column, Path]:
     return find(files[file] if having else [each for columns in files.values() for each in columns], name, file), file
 
 
-def _mapped(chosen: MeasurementMap, files: _Files, table: Mapping[str, Channel]) -> dict[str, _Source]:
+def _mapped(chosen: MeasurementMap, files: _Files, table: Collection[str]) -> dict[str, _Source]:
     """Return the sources of channels by the map."""
     sources = {}
     for name, given in chosen.channels.items():
-        if name not in table and field_in_unit(name, table)[0] is not None:
-            raise RecordingError(
-                f"is a channel in another unit; name it {field_in_unit(name, table)[0]} and give `unit`",
-                key=f"channels.{name}",
-            )
+        if name not in table and (channel := field_in_unit(name, table)[0]) is not None:
+            problem = f"is a channel in another unit; name it {channel} and give `unit`"
+            raise RecordingError(problem, key=f"channels.{name}")
         column, file = _found(given.column, files)
-        known = Known(name, given.unit or column.unit or _si_unit(name, table), given.sign * given.factor)
+        known = Known(name, given.unit or column.unit or unit_of(name), given.sign * given.factor)
         sources[name] = _Source(column, known, given, file)
     return sources
 
 
-def _by_name(files: _Files, table: Mapping[str, Channel], notes: list[str]) -> dict[str, _Source]:
+def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[str, _Source]:
     """Return the sources of channels by the names of columns."""
     every = [(path, column) for path, columns in files.items() for column in columns]
     names = {column.name for _, column in every}
@@ -236,46 +215,29 @@ def _by_name(files: _Files, table: Mapping[str, Channel], notes: list[str]) -> d
     for path, column in every:
         known = known_column(column.name, names, channels)
         if known is None:
-            if (base := before_bracket(column.name)) and known_column(base, names, channels) is not None:
+            if (base := bracketed(column.name)[0]) != column.name and known_column(base, names, channels) is not None:
                 known_units = ", ".join(UNIT_NAMES)
                 notes.append(f"{shown(column.name)} is left out: its unit is unknown; known are {known_units}")
             continue
         if known.channel in sources:
-            first = sources[known.channel].column.name
-            raise RecordingError(
-                f"{shown(first)} and {shown(column.name)} are both {known.channel}; choose one in a map",
-                file=path.name,
-            )
-        unit = column.unit or known.unit
-        if not unit:
-            unit = _si_unit(known.channel, table)
-            if unit and not known.sure:
-                notes.append(f"{column.name} has no unit; {unit} is assumed (a map can set another)")
+            both = f"{shown(sources[known.channel].column.name)} and {shown(column.name)}"
+            raise RecordingError(f"{both} are both {known.channel}; choose one in a map", file=path.name)
+        unit = column.unit or known.unit or unit_of(known.channel)
+        if unit and not known.sure and not (column.unit or known.unit):
+            notes.append(f"{column.name} has no unit; {unit} is assumed (a map can set another)")
         sources[known.channel] = _Source(column, known._replace(unit=unit), None, path)
     if not sources:
         some = ", ".join(shown(name) for name in sorted(names)[:8])
+        problem = f"no column has a known name and unit (there are {some})"
         raise RecordingError(
-            "; ".join(
-                (f"no column has a known name and unit (there are {some})", *notes, "describe them in a map: --map")
-            ),
-            file=", ".join(path.name for path in files),
+            "; ".join((problem, *notes, "describe them in a map: --map")), file=", ".join(path.name for path in files)
         )
     return sources
 
 
-def _si_unit(name: str, table: Mapping[str, Channel]) -> str:
-    if name in table:
-        return table[name].unit
-    return unit_of(name)
-
-
-def _own_time(source: _Source) -> Array | None:
-    return source.column.read()[1]
-
-
 def _shared_times(files: _Files, chosen: MeasurementMap, sources: Mapping[str, _Source]) -> dict[Path, Array | None]:
     """Return the times that the columns of each file without own times share [s]."""
-    needing = {source.file for source in sources.values() if _own_time(source) is None}
+    needing = {source.file for source in sources.values() if source.column.read()[1] is None}
     if chosen.time and not needing:
         raise RecordingError("every column has its own time; leave this key out", key="time", value=chosen.time)
     named = [path for path in needing if any(column.name == chosen.time for column in files[path])]
@@ -309,18 +271,16 @@ def known_time_unit(name: str) -> str:
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 
 
-def _signal(name: str, wanted: str, source: _Source, shared: Array | None, chosen: MeasurementMap) -> Samples:
+def _signal(name: str, source: _Source, shared: Array | None, chosen: MeasurementMap) -> Samples:
     """Return the samples of a channel, in SI units and with the signs of ISO 8855."""
     column, known, given, path = source
-    found = written_unit(known.unit)
+    found, wanted = written_unit(known.unit), unit_of(name)
     if found is None or not alike(found, find_unit(wanted)):
         raise RecordingError(
             f"{name} is in {wanted or 'pure numbers'}, and {shown(column.name)} in {shown(known.unit)}; "
             f"known units are {', '.join(UNIT_NAMES)}",
-            file=path.name,
-            value=known.unit,
-            allowed=UNIT_NAMES,
-        )
+            file=path.name, value=known.unit, allowed=UNIT_NAMES,
+        )  # fmt: skip
     values, own = column.read()
     time_s = own if own is not None else shared
     assert time_s is not None
@@ -352,11 +312,6 @@ def _plausible(values: Array, column: str, path: Path) -> Array:
     return values
 
 
-def _bridge_s(chosen: MeasurementMap, signal: Samples) -> float:
-    """Return the longest allowed gap. A slow signal has long steps between its samples."""
-    return max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal.time_s))))
-
-
 def _grid(signals: Mapping[str, Samples], chosen: MeasurementMap, path: Path) -> tuple[Array, float]:
     """Return times of the file at which all signals exist, and their step: that of the fastest signal."""
     start = max(float(signal.time_s[0]) for signal in signals.values())
@@ -378,4 +333,4 @@ def _channel(name: str, table: Mapping[str, Channel], taken: Mapping[str, str]) 
     meaning = f"measured: {taken[name]}" if name in taken else "derived from measured channels"
     if name in table:
         return table[name]._replace(meaning=f"{table[name].meaning}; {meaning}", single=False)
-    return Channel(name, _si_unit(name, table), meaning, "measured", single=False)
+    return Channel(name, unit_of(name), meaning, "measured", single=False)

@@ -14,7 +14,7 @@ from activesteer.config import field_in_unit
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.recording import Poses, Recording
-from activesteer.units import Unit, find_unit, known_unit
+from activesteer.units import Unit, find_unit, known_unit, unit_of
 from activesteer.vehicle import Vehicle
 
 TIME_WORDS: Final = frozenset({"time", "times", "t", "zeit", "timestamp", "timestamps", "tstamp", "tstart"})
@@ -56,31 +56,27 @@ _WORDS: Final = {
 }  # fmt: skip
 _BY_WORD: Final = {word: channel for channel, words in _WORDS.items() for word in words.split()}
 
-_EXPORTERS: Final[tuple[tuple[str, dict[str, Known]], ...]] = (
+_EXPORTERS: Final[tuple[tuple[str, dict[str, str]], ...]] = (
     # IPG CarMaker writes SI and ISO 8855.
     ("Car.YawRate", {
-        "Steer.WhlAng": Known("steering_wheel_rad", "rad"), "Driver.Steer.Ang": Known("steering_wheel_rad", "rad"),
-        "Car.YawRate": Known("yaw_rate_radps", "rad/s"), "Car.ay": Known("ay_mps2", "m/s2"),
-        "Car.ax": Known("ax_mps2", "m/s2"), "Car.v": Known("speed_mps", "m/s"), "Car.Roll": Known("roll_rad", "rad"),
-        "Car.Pitch": Known("pitch_rad", "rad"), "Car.Yaw": Known("yaw_rad", "rad"),
-        "Car.SideSlipAngle": Known("sideslip_rad", "rad"), "Car.tx": Known("x_m", "m"), "Car.ty": Known("y_m", "m"),
+        "Steer.WhlAng": "steering_wheel_rad", "Driver.Steer.Ang": "steering_wheel_rad", "Car.YawRate": "yaw_rate_radps",
+        "Car.ay": "ay_mps2", "Car.ax": "ax_mps2", "Car.v": "speed_mps", "Car.Roll": "roll_rad",
+        "Car.Pitch": "pitch_rad", "Car.Yaw": "yaw_rad", "Car.SideSlipAngle": "sideslip_rad", "Car.tx": "x_m",
+        "Car.ty": "y_m",
     }),
     # Mechanical Simulation CarSim: degrees, km/h and g, ISO 8855.
     ("AVz", {
-        "Steer_SW": Known("steering_wheel_rad", "deg"), "AVz": Known("yaw_rate_radps", "deg/s"),
-        "Ay": Known("ay_mps2", "g"), "Ax": Known("ax_mps2", "g"), "Vx": Known("vx_mps", "km/h"),
-        "Vy": Known("vy_mps", "km/h"), "Beta": Known("sideslip_rad", "deg"), "Roll": Known("roll_rad", "deg"),
-        "Pitch": Known("pitch_rad", "deg"), "Yaw": Known("yaw_rad", "deg"), "Xcg_TM": Known("x_m", "m"),
-        "Ycg_TM": Known("y_m", "m"),
+        "Steer_SW": "steering_wheel_deg", "AVz": "yaw_rate_degps", "Ay": "ay_g", "Ax": "ax_g", "Vx": "vx_kmh",
+        "Vy": "vy_kmh", "Beta": "sideslip_deg", "Roll": "roll_deg", "Pitch": "pitch_deg", "Yaw": "yaw_deg",
+        "Xcg_TM": "x_m", "Ycg_TM": "y_m",
     }),
-    # Runs of Project Chrono, as `tools/validate.py` compares them: SI, and a rack that steers right.
-    ("delta_FL", {"rack": Known("rack_m", "m", -1.0), "vx": Known("vx_mps", "m/s"), "vy": Known("vy_mps", "m/s"),
-        "r": Known("yaw_rate_radps", "rad/s"), "ax": Known("ax_mps2", "m/s2"), "ay": Known("ay_mps2", "m/s2"),
-        "beta": Known("sideslip_rad", "rad"), "roll": Known("roll_rad", "rad"), "pitch": Known("pitch_rad", "rad"),
-        "x": Known("x_m", "m"), "y": Known("y_m", "m"), "psi": Known("yaw_rad", "rad"),
+    # Runs of Project Chrono, as the tests compare them: SI, and a rack that steers right.
+    ("delta_FL", {
+        "rack": "-rack_m", "vx": "vx_mps", "vy": "vy_mps", "r": "yaw_rate_radps", "ax": "ax_mps2", "ay": "ay_mps2",
+        "beta": "sideslip_rad", "roll": "roll_rad", "pitch": "pitch_rad", "x": "x_m", "y": "y_m", "psi": "yaw_rad",
     }),
 )  # fmt: skip
-"""Name that identifies an exporter, and the names that it writes."""
+"""Name that identifies an exporter, and its names: the channel of each with its unit, and a minus if it is turned."""
 
 
 def written_unit(unit: str) -> Unit | None:
@@ -88,16 +84,16 @@ def written_unit(unit: str) -> Unit | None:
     return find_unit(unit.strip().strip("[]()").strip().replace("**", "^"), any_case=True)
 
 
+def bracketed(name: str) -> tuple[str, str]:
+    """Split a name and the text in brackets behind it, or return an empty text without brackets."""
+    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
+    return (found[1], found[2]) if found else (name, "")
+
+
 def split_unit(name: str) -> tuple[str, str]:
     """Split a name and the unit in brackets behind it."""
-    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
-    return (found[1], found[2]) if found and written_unit(found[2]) else (name, "")
-
-
-def before_bracket(name: str) -> str:
-    """Return the part of a column's name before a bracket at its end, or empty if there is none."""
-    found = re.fullmatch(r"(.*?)\s*[\[(][^\])]*[\])]\s*", name)
-    return found[1] if found else ""
+    words, unit = bracketed(name)
+    return (words, unit) if unit and written_unit(unit) else (name, "")
 
 
 def is_time(name: str) -> bool:
@@ -109,7 +105,10 @@ def known_column(name: str, columns: Collection[str], channels: Collection[str])
     """Return the meaning of a column by its name, the names of all columns and the channels of a car, or None."""
     for mark, names in _EXPORTERS:
         if mark in columns and name in names:
-            return names[name]
+            key = names[name].lstrip("-")
+            channel = field_in_unit(key, channels)[0]
+            assert channel is not None
+            return Known(channel, unit_of(key), -1.0 if names[name] != key else 1.0)
     if name in channels:
         return Known(name)
     channel, _ = field_in_unit(name, channels)
@@ -222,24 +221,20 @@ def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:
     if abs(_alike(product, rate)) < _ALIKE:
         return []
     gain = abs(float(product @ rate / (product @ product)))
+    looks = ""
     if gain < _STEER_RANGE[0]:
-        return [
-            f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
-            "steering_wheel_rad looks like deg that were taken as rad"
-        ]
-    if gain > 1.0 / _SHORTEST_M:
-        return [
-            f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
-            "steering_wheel_rad is too small even for the angle of the road wheels (0.1 to 0.4); it looks like rad "
-            "that were taken as deg (0.2 to 1.7), or has a scale of its own: give its `factor` in a map, or fit "
-            "steering.factor"
-        ]
-    if gain > _STEER_RANGE[1]:
-        return [
-            f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
-            "steering_wheel_rad looks like the angle of the road wheels, or rad that were taken as deg"
-        ]
-    return []
+        looks = "looks like deg that were taken as rad"
+    elif gain > 1.0 / _SHORTEST_M:
+        looks = (
+            "is too small even for the angle of the road wheels (0.1 to 0.4); it looks like rad that were taken as deg "
+            "(0.2 to 1.7), or has a scale of its own: give its `factor` in a map, or fit steering.factor"
+        )
+    elif gain > _STEER_RANGE[1]:
+        looks = "looks like the angle of the road wheels, or rad that were taken as deg"
+    return [
+        f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
+        f"steering_wheel_rad {looks}"
+    ] if looks else []  # fmt: skip
 
 
 def _alike(one: Array, other: Array) -> float:
@@ -275,13 +270,6 @@ def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
     if np.count_nonzero(last) < 2:
         raise RecordingError(f"{name} has fewer than two samples that are numbers", file=file)
     return Samples(time_s[last], values[last])
-
-
-def gaps(signal: Samples, longest_s: float, start_s: float, end_s: float) -> list[tuple[float, float]]:
-    """Return gaps between samples that are longer than `longest_s`, from start to end."""
-    inside = (signal.time_s[1:] > start_s) & (signal.time_s[:-1] < end_s)
-    wide = inside & (np.diff(signal.time_s) > longest_s)
-    return [(float(signal.time_s[row]), float(signal.time_s[row + 1])) for row in np.flatnonzero(wide)]
 
 
 def resampled(signal: Samples, grid_s: Array) -> Array:
