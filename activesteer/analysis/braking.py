@@ -25,13 +25,6 @@ FROM_FRACTION, TO_FRACTION = 0.8, 0.1
 SLIPS_FROM_MPS: Final = 15.0 / 3.6
 """Speed above which no wheel shall lock [m/s]. UN R13-H, annex 6 has the same speed."""
 
-STRAIGHT_BRAKING_KEY_METRICS: Final = (
-    "stopping_distance_m", "mean_deceleration_mps2", "braking_efficiency", "wheel_slip_max",
-    "brake_pressure_peak_Pa", "yaw_rate_peak_abs_radps", "lateral_deviation_max_m", "steering_wheel_peak_abs_rad",
-    "speed_begin_mps", "braking_begin_time_s",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
-
 
 def straight_braking_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of braking straight ahead.
@@ -133,13 +126,6 @@ END_SPEED_MPS: Final = 1.0
 """Speed at which braking ends [m/s]."""
 MIN_YAW_RATE_RADPS: Final = math.radians(0.5)
 """Smallest yaw rate before the brake of a car that turns [rad/s]."""
-
-BRAKE_IN_TURN_KEY_METRICS: Final = (
-    "yaw_rate_deviation_after_1000ms_radps", "path_deviation_after_1000ms_m", "yaw_rate_after_1000ms_radps",
-    "yaw_rate_peak_abs_radps", "sideslip_peak_abs_rad", "mean_deceleration_mps2", "ay_begin_mps2", "radius_begin_m",
-    "speed_begin_mps", "speed_end_mps",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
 
 
 def brake_in_turn_metrics(recording: RecordingLike) -> dict[str, float]:

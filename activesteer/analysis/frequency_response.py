@@ -37,13 +37,6 @@ LOWEST_Hz: Final = 0.2
 HIGHEST_Hz: Final = 4.0
 """Range of the metrics [Hz]."""
 
-KEY_METRICS: Final = (
-    "yaw_rate_gain_1ps", "yaw_rate_phase_at_1Hz_rad", "yaw_rate_peak_gain_ratio", "yaw_rate_peak_gain_Hz",
-    "yaw_rate_45deg_Hz", "yaw_rate_bandwidth_Hz", "ay_gain_mps2prad", "ay_phase_at_1Hz_rad", "roll_gain_radprad",
-    "roll_phase_at_1Hz_rad",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
-
 
 class FrequencyResponse(NamedTuple):
     """Response of one output to the input.

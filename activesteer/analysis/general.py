@@ -22,20 +22,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.series import counted_sideslip
+from activesteer.analysis.series import sizes
 from activesteer.analysis.source import RecordingLike
 from activesteer.conventions import CORNERS, Array
 from activesteer.errors import RecordingError
 from activesteer.road.road import road_of
 
-SIGNALS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"))
-"""Channels that are evaluated: name and unit suffix."""
-
-KEY_METRICS: Final = (
-    "yaw_rate_peak_abs_radps", "yaw_rate_rms_radps", "ay_peak_abs_mps2", "ay_rms_mps2", "sideslip_peak_abs_rad",
-    "sideslip_rms_rad", "roll_peak_abs_rad", "roll_rms_rad", "steering_wheel_peak_abs_rad", "speed_end_mps",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
+SIGNALS: Final = ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad")
+"""Channels that are evaluated."""
 
 
 def general_metrics(recording: RecordingLike) -> dict[str, float]:
@@ -50,8 +44,8 @@ def general_metrics(recording: RecordingLike) -> dict[str, float]:
         RecordingError: a channel is missing.
     """
     values: dict[str, float] = {}
-    for name, unit in SIGNALS:
-        values |= _size(recording, name, unit)
+    for channel in SIGNALS:
+        values |= sizes(recording, channel)
     values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
     values["friction_utilisation_max"] = max(
         float(recording[f"{corner}_friction_utilisation"].max()) for corner in CORNERS
@@ -63,22 +57,14 @@ def general_metrics(recording: RecordingLike) -> dict[str, float]:
 def measured_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics whose channels were measured. A car on a proving ground has no sensors of tyre forces."""
     values: dict[str, float] = {}
-    for name, unit in SIGNALS:
+    for channel in SIGNALS:
         with suppress(RecordingError):
-            values |= _size(recording, name, unit)
+            values |= sizes(recording, channel)
     with suppress(RecordingError):
         values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
     with suppress(RecordingError):
         values["speed_end_mps"] = float(recording["speed_mps"][-1])
     return values
-
-
-def _size(recording: RecordingLike, name: str, unit: str) -> dict[str, float]:
-    channel = counted_sideslip(recording) if name == "sideslip" else np.asarray(recording[f"{name}_{unit}"], np.float64)
-    return {
-        f"{name}_peak_abs_{unit}": float(np.abs(channel).max()),
-        f"{name}_rms_{unit}": float(np.sqrt(np.mean(channel**2))),
-    }
 
 
 METRICS: Final = ("battery_energy_J", "steering_energy_J", "brake_energy_J")
@@ -192,12 +178,6 @@ def weighting(frequency_Hz: Array) -> NDArray[np.complex128]:
 
 LIFTED_N: Final = 1.0
 """Vertical load below which a wheel is lifted [N]."""
-ROLLOVER_KEY_METRICS: Final = (
-    "two_wheel_lift_time_s", "wheel_load_min_N", "roll_peak_abs_rad", "ay_peak_abs_mps2", "sideslip_peak_abs_rad",
-    "yaw_rate_peak_abs_radps", "yaw_rate_rms_radps", "friction_utilisation_max", "steering_wheel_peak_abs_rad",
-    "speed_end_mps",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
 
 
 def rollover_metrics(recording: RecordingLike) -> dict[str, float]:

@@ -36,13 +36,6 @@ SMOOTHING_S: Final = 0.5
 MIN_SPEED_MPS: Final = 1.0
 """Least speed at which curvature is evaluated [m/s]."""
 
-KEY_METRICS: Final = (
-    "understeer_gradient_radpmps2", "characteristic_speed_mps", "steer_gradient_radpmps2",
-    "ackermann_gradient_radpmps2", "roll_gradient_radpmps2", "sideslip_gradient_radpmps2",
-    "front_slip_gradient_radpmps2", "rear_slip_gradient_radpmps2", "linear_range_mps2", "limit_acceleration_mps2",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
-
 
 class CarGeometry(NamedTuple):
     """Geometry of the car that the evaluation needs.

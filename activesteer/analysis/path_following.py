@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from activesteer.analysis import lanes
-from activesteer.analysis.series import Array, counted_sideslip, lag, largest_rate, rate_rms, rms, timestep
+from activesteer.analysis.series import counted, lag, largest_rate, rate_rms, rms, sizes, timestep
 from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
 from activesteer.conventions import CORNERS
 from activesteer.road.course import Course
@@ -25,31 +25,10 @@ LONGEST_LAG_S: Final = 0.6
 """Longest lag [s]: a quarter of the period of a slalom of 36 m at 100 km/h."""
 _LAP_STEP_S: Final = 0.01
 """Interval at which the car's place along a path is looked for [s]."""
-SIGNALS: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("roll", "rad"))
-"""Channels that are evaluated: name and unit suffix."""
-OSCILLATING: Final = (("yaw_rate", "radps"), ("sideslip", "rad"), ("ay", "mps2"), ("steering_wheel", "rad"))
+SIGNALS: Final = ("yaw_rate_radps", "sideslip_rad", "ay_mps2", "roll_rad")
+"""Channels that are evaluated."""
+OSCILLATING: Final = ("yaw_rate_radps", "sideslip_rad", "ay_mps2", "steering_wheel_rad")
 """Channels whose root mean squares within and after the gates are metrics."""
-
-PATH_KEY_METRICS: Final = (
-    "lap_time_s", "track_deviation_max_m", "track_deviation_rms_m", "sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps",
-    "ay_peak_abs_mps2", "roll_peak_abs_rad", "steering_wheel_peak_abs_rad", "friction_utilisation_max",
-    "speed_loss_mps",
-)  # fmt: skip
-"""Key metrics of a path without gates, the most telling first."""
-
-LANE_CHANGE_KEY_METRICS: Final = (
-    "lane_overstep_m", "cones_hit", "track_deviation_max_m", "sideslip_peak_abs_rad", "yaw_rate_peak_abs_radps",
-    "ay_peak_abs_mps2", "yaw_rate_after_gates_rms_radps", "sideslip_after_gates_rms_rad",
-    "steering_wheel_peak_abs_rad", "speed_loss_mps",
-)  # fmt: skip
-"""Key metrics of a lane change, the most telling first."""
-
-SLALOM_KEY_METRICS: Final = (
-    "track_amplitude_m", "cone_distance_mean_m", "cones_hit", "cones_missed", "sideslip_peak_abs_rad",
-    "yaw_rate_peak_abs_radps", "ay_peak_abs_mps2", "yaw_rate_after_gates_rms_radps", "steering_wheel_peak_abs_rad",
-    "speed_loss_mps",
-)  # fmt: skip
-"""Key metrics of a slalom, the most telling first."""
 
 
 def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
@@ -87,21 +66,18 @@ def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
     step_s = timestep(recording.time_s)
     approach, gates, after = _windows(recording, course)
     values: dict[str, float] = {}
-    for name, unit in SIGNALS:
-        channel = counted_sideslip(recording) if name == "sideslip" else recording[f"{name}_{unit}"]
-        values[f"{name}_peak_abs_{unit}"] = float(np.abs(channel).max())
-        values[f"{name}_rms_{unit}"] = rms(channel)
+    for channel in SIGNALS:
+        values |= sizes(recording, channel)
     if course.last_gate_x_m is not None:
-        for name, unit in OSCILLATING:
+        for name, _, unit in (channel.rpartition("_") for channel in OSCILLATING):
             for key, part in (("gates", gates), ("after_gates", after)):
-                is_angle = name == "sideslip"
-                channel = counted_sideslip(recording, part) if is_angle else recording[f"{name}_{unit}"][part]
-                values[f"{name}_{key}_rms_{unit}"] = rms(channel)
+                values[f"{name}_{key}_rms_{unit}"] = rms(counted(recording, f"{name}_{unit}", part))
     wheel = recording["steering_wheel_rad"]
-    for name, unit in (("yaw_rate", "radps"), ("ay", "mps2")):
-        follower = recording[f"{name}_{unit}"][approach]
-        values[f"{name}_lag_s"] = lag(wheel[approach], follower, step_s, LONGEST_LAG_S)
-    values |= _steering_effort(wheel, step_s)
+    for name, channel in (("yaw_rate", "yaw_rate_radps"), ("ay", "ay_mps2")):
+        values[f"{name}_lag_s"] = lag(wheel[approach], recording[channel][approach], step_s, LONGEST_LAG_S)
+    values |= sizes(recording, "steering_wheel_rad")
+    values["steering_wheel_rate_peak_radps"] = largest_rate(wheel, step_s)
+    values["steering_wheel_rate_rms_radps"] = rate_rms(wheel, step_s)
     values |= _places(recording, course)
     if course.last_gate_x_m is None:
         values |= _lap(recording, course)
@@ -133,15 +109,6 @@ def _windows(recording: RecordingLike, course: Course) -> tuple[slice, slice, sl
         return slice(0, last), slice(first, last), nothing
     end = int(np.searchsorted(time_s, time_s[last] + AFTER_S))
     return slice(0, last), slice(first, last), slice(last, end)
-
-
-def _steering_effort(wheel: Array, step_s: float) -> dict[str, float]:
-    return {
-        "steering_wheel_peak_abs_rad": float(np.abs(wheel).max()),
-        "steering_wheel_rms_rad": rms(wheel),
-        "steering_wheel_rate_peak_radps": largest_rate(wheel, step_s),
-        "steering_wheel_rate_rms_radps": rate_rms(wheel, step_s),
-    }
 
 
 def _places(recording: RecordingLike, course: Course) -> dict[str, float]:

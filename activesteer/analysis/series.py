@@ -58,6 +58,17 @@ def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
     return np.zeros(1) if slow.size and slow.all() else sideslip_rad[~slow]
 
 
+def counted(recording: RecordingLike, channel: str, part: slice = _ALL) -> Array:
+    """Return the samples of a channel that count in metrics: all, and of the sideslip those of `counted_sideslip`."""
+    return counted_sideslip(recording, part) if channel == "sideslip_rad" else recording[channel][part]
+
+
+def sizes(recording: RecordingLike, channel: str) -> dict[str, float]:
+    """Return the metrics of the peak and the root mean square of a channel."""
+    values, (name, _, unit) = counted(recording, channel), channel.rpartition("_")
+    return {f"{name}_peak_abs_{unit}": float(np.abs(values).max()), f"{name}_rms_{unit}": rms(values)}
+
+
 def smooth(values: Array, timestep_s: float) -> Array:
     """Smooth a signal without delay, by a cubic fitted around every sample (Savitzky and Golay, 1964)."""
     half = round(SMOOTHING_S / timestep_s / 2.0)

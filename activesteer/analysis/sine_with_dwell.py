@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.series import (
     THRESHOLD_RAD,
-    counted_sideslip,
+    counted,
     crossing_time,
     low_pass,
     offset,
@@ -50,15 +50,8 @@ car up to 3500 kg, from 5 A on."""
 RATIO_LIMITS: Final = (0.35, 0.20)
 """Largest allowed ratios at `INSTANTS_S`."""
 
-PEAKS: Final = (("yaw_rate", "radps"), ("ay", "mps2"), ("sideslip", "rad"), ("roll", "rad"), ("steering_wheel", "rad"))
-"""Channels whose largest magnitude is a metric: name and unit suffix."""
-
-KEY_METRICS: Final = (
-    "yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", "lateral_displacement_m", "sideslip_peak_abs_rad",
-    "yaw_rate_peak_abs_radps", "yaw_rate_reversal_peak_radps", "ay_peak_abs_mps2", "roll_peak_abs_rad",
-    "steering_wheel_peak_abs_rad", "speed_end_mps",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
+PEAKS: Final = ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad", "steering_wheel_rad")
+"""Channels whose largest magnitude is a metric."""
 
 
 class Steering(NamedTuple):
@@ -152,9 +145,8 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
         values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / peak
     values["lateral_displacement_m"] = _displacement(recording, times)
     values["lateral_displacement_by_ay_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
-    for name, unit in PEAKS:
-        channel = counted_sideslip(recording) if name == "sideslip" else recording[f"{name}_{unit}"]
-        values[f"{name}_peak_abs_{unit}"] = float(np.abs(channel).max())
+    for name, _, unit in (channel.rpartition("_") for channel in PEAKS):
+        values[f"{name}_peak_abs_{unit}"] = float(np.abs(counted(recording, f"{name}_{unit}")).max())
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     values["heading_end_rad"] = float(recording["yaw_rad"][-1] - recording["yaw_rad"][0])
     return values

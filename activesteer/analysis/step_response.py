@@ -11,7 +11,7 @@ Source: 49 CFR 571.126 (FMVSS 126), S7.6 and S7.11; NHTSA TP-126, which gives th
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -28,42 +28,11 @@ STEADY_WINDOW_S: Final = 1.0
 MIN_STEP_RAD: Final = math.radians(0.5)
 """Smallest final steering wheel angle that counts as a step [rad]."""
 
-KEY_METRICS: Final = (
-    "yaw_rate_response_time_s", "yaw_rate_peak_radps", "yaw_rate_overshoot", "yaw_rate_steady_state_radps",
-    "ay_response_time_s", "ay_overshoot", "sideslip_peak_rad", "sideslip_steady_state_rad", "roll_peak_rad",
-    "tb_srad",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
 
-
-class Signal(NamedTuple):
-    """A signal and its metrics.
-
-    Attributes:
-        name: First part of the names of its metrics.
-        unit: Unit suffix.
-        minimum: Smallest steady-state value for times and overshoot; below it the run says nothing about them.
-    """
-
-    name: str
-    unit: str
-    minimum: float
-
-
-SIGNALS: Final = (
-    Signal("yaw_rate", "radps", 1e-3),
-    Signal("ay", "mps2", 1e-2),
-    Signal("roll", "rad", 1e-4),
-    Signal("sideslip", "rad", 1e-4),
-)
-
-STEADY_CHANNELS: Final = (
-    ("steering_wheel", "rad"),
-    ("front_steer", "rad"),
-    ("rear_steer", "rad"),
-    ("superposition", "rad"),
-)
-"""Channels of which only the steady-state value is given: channel name and unit suffix."""
+SIGNALS: Final = {"yaw_rate_radps": 1e-3, "ay_mps2": 1e-2, "roll_rad": 1e-4, "sideslip_rad": 1e-4}
+"""Channel -> smallest steady-state value for times and overshoot; below it the run says nothing about them."""
+STEADY_CHANNELS: Final = ("steering_wheel_rad", "front_steer_rad", "rear_steer_rad", "superposition_rad")
+"""Channels of which only the steady-state value is given."""
 
 
 def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
@@ -89,19 +58,20 @@ def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
     step_time_s = _step_time(time_s, steering_rad)
 
     values: dict[str, float] = {"step_time_s": step_time_s}
-    for signal in SIGNALS:
-        channel = np.asarray(recording[f"{signal.name}_{signal.unit}"], dtype=np.float64)
-        response = step_response(time_s, channel, step_time_s, STEADY_WINDOW_S, signal.minimum)
-        values[f"{signal.name}_steady_state_{signal.unit}"] = response.steady_state
-        values[f"{signal.name}_response_time_s"] = response.response_time_s
-        values[f"{signal.name}_peak_{signal.unit}"] = response.peak
-        values[f"{signal.name}_peak_time_s"] = response.peak_time_s
-        values[f"{signal.name}_overshoot"] = response.overshoot
+    for channel, minimum in SIGNALS.items():
+        signal = np.asarray(recording[channel], dtype=np.float64)
+        response = step_response(time_s, signal, step_time_s, STEADY_WINDOW_S, minimum)
+        name, _, unit = channel.rpartition("_")
+        values[f"{name}_steady_state_{unit}"] = response.steady_state
+        values[f"{name}_response_time_s"] = response.response_time_s
+        values[f"{name}_peak_{unit}"] = response.peak
+        values[f"{name}_peak_time_s"] = response.peak_time_s
+        values[f"{name}_overshoot"] = response.overshoot
     values["tb_srad"] = values["yaw_rate_peak_time_s"] * abs(values["sideslip_steady_state_rad"])
 
     settled = time_s >= time_s[-1] - STEADY_WINDOW_S
     values["steering_wheel_max_rate_radps"] = largest_rate(steering_rad, timestep(time_s))
-    for name, unit in STEADY_CHANNELS:
+    for name, _, unit in (channel.rpartition("_") for channel in STEADY_CHANNELS):
         values[f"{name}_steady_state_{unit}"] = float(np.mean(recording[f"{name}_{unit}"][settled]))
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     return values
@@ -137,13 +107,6 @@ REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
 """Lateral acceleration at which the angle is A [m/s2]."""
 FIT: Final = (1.0 / 3.0, 1.25)
 """Range of the line, in fractions of the wanted acceleration: 0.1 to 0.375 g for 0.3 g."""
-
-SLOW_RAMP_KEY_METRICS: Final = (
-    "steering_wheel_at_0_3g_rad", "understeer_gradient_radpmps2", "characteristic_speed_mps", "yaw_rate_gain_1ps",
-    "steering_wheel_gain_mps2prad", "steer_gradient_radpmps2", "roll_gradient_radpmps2",
-    "sideslip_gradient_radpmps2", "linear_range_mps2", "limit_acceleration_mps2",
-)  # fmt: skip
-"""Key metrics, the most telling first."""
 
 
 def slow_ramp_metrics(recording: RecordingLike) -> dict[str, float]:
