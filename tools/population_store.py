@@ -18,10 +18,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from activesteer.analysis.bands import FILE as BANDS
-from activesteer.analysis.bands import TRACK, Band
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, SYSTEMS, Claim, Kind
-from activesteer.analysis.claims.stored import PAPER, SUMMARY, read_setting
+from activesteer.analysis.claims.stored import BANDS, PAPER, SUMMARY, TRACK, Band, read_setting
 from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.harm import TRACK as TRACK_MEASURES
 from activesteer.commands.terminal import Progress

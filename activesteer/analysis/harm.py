@@ -12,7 +12,7 @@ controller that keeps it in its lane stops it on the split.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 from activesteer.metric_table import (
@@ -42,16 +42,12 @@ def has_spun(metrics: Metrics) -> bool:
     Where the manoeuvre has no peak of the sideslip, as in straight braking, the heading at the end counts.
     """
     names = SIDESLIP_PEAKS if any(name in metrics for name in SIDESLIP_PEAKS) else ("heading_end_rad",)
-    peaks = [abs(_number(metrics, name)) for name in names if metrics.get(name) is not None]
-    return not peaks or not peaks[0] <= LOST_SIDESLIP_RAD
+    peak = next((abs(value) for name in names if (value := metrics.get(name)) is not None), math.nan)
+    return not peak <= LOST_SIDESLIP_RAD
 
 
 def is_lost(metrics: Metrics) -> bool:
-    """Return whether the car was lost, by the metrics of its run.
-
-    A car is lost if it spins, if it does not keep to the lanes of its course, or if it passes a cone of a slalom on the
-    wrong side or not at all. A cone that is touched does not count.
-    """
+    """Return whether the car was lost: it spins, leaves its lanes, or misses a cone of a slalom. A touch is none."""
     return has_spun(metrics) or _leaves_course(metrics)
 
 
@@ -62,9 +58,7 @@ def is_controlled(metrics: Metrics) -> bool:
 
 
 def _leaves_course(metrics: Metrics) -> bool:
-    if STAYS_IN_LANES in metrics and _number(metrics, STAYS_IN_LANES) != 1.0:
-        return True
-    return CONES_MISSED in metrics and _number(metrics, CONES_MISSED) != 0.0
+    return metrics.get(STAYS_IN_LANES, 1.0) != 1.0 or metrics.get(CONES_MISSED, 0.0) != 0.0
 
 
 def losses(metrics: Mapping[str, float]) -> Iterator[str]:
@@ -105,17 +99,11 @@ def _cones(count: float) -> str:
     return "some cones" if math.isnan(count) else f"{count:.0f} cone{'s' if count != 1.0 else ''}"
 
 
-def _number(metrics: Metrics, name: str) -> float:
-    value = metrics[name]
-    return math.nan if value is None else float(value)
-
-
 FREE_SIDE_M: Final = 0.6
 """Path error that is no harm, where no lanes limit the path [m]: a car 1.8 m wide in a lane of 3.0 m. Chosen."""
 NEEDED_DISPLACEMENT_M: Final = 1.83
 """Displacement of a sine with dwell below which a car turns too little [m]; FMVSS 126, S5.2.3."""
 _DEGREE: Final = math.pi / 180.0
-_STEERING: Final = "steering_wheel_rms_rad"
 _DWELL: Final = "yaw_rate_after_1750ms_share"
 TRACK: Final = ("lane", "path")
 """Measures of the track, for the worst harm in metres."""
@@ -127,101 +115,70 @@ class Measure(NamedTuple):
     words: str  # meaning
     unit: DisplayUnit  # unit for display
     size: float | None  # growth above which it is harm [SI]; None if it is not counted
-    # function from the metrics of a run to the measure [SI]: None if the manoeuvre has none, nan if the run does not
-    # define it
-    value: Callable[[Metrics], float | None]
-
-
-def _of(metrics: Metrics, name: str) -> float | None:
-    """Return a metric: None if the manoeuvre has none, nan if the run does not define it."""
-    if name not in metrics:
-        return None
-    value = metrics[name]
-    return math.nan if value is None else float(value)
-
-
-def _size(name: str) -> Callable[[Metrics], float | None]:
-    return lambda metrics: None if (value := _of(metrics, name)) is None else abs(value)
-
-
-def _beyond(value: float | None, limit: float) -> float | None:
-    # max(nan, 0) is nan, max(0, nan) is not.
-    return None if value is None else max(value - limit, 0.0)
-
-
-def _path(metrics: Metrics) -> float | None:
-    if LANE_OVERSTEP in metrics or CONES_MISSED in metrics:
-        return None
-    names = "track_deviation_max_m", "lateral_deviation_max_m", "path_deviation_after_1000ms_m"
-    return next((_beyond(abs(found), FREE_SIDE_M) for name in names if (found := _of(metrics, name)) is not None), None)
-
-
-def _cones_harm(metrics: Metrics) -> float | None:
-    hit = _of(metrics, CONES_HIT)
-    return None if hit is None else hit + (_of(metrics, CONES_MISSED) or 0.0)
-
-
-def _heading(metrics: Metrics) -> float | None:
-    return None if _DWELL in metrics else _size("heading_end_rad")(metrics)
-
-
-def _heading_open_loop(metrics: Metrics) -> float | None:
-    return _size("heading_end_rad")(metrics) if _DWELL in metrics else None
-
-
-def _yaw_rate_left(metrics: Metrics) -> float | None:
-    share, peak = _of(metrics, _DWELL), _of(metrics, "yaw_rate_reversal_peak_radps")
-    if share is not None and peak is not None:
-        return abs(share * peak)
-    return _of(metrics, "yaw_rate_after_gates_rms_radps")
-
-
-def _displacement(metrics: Metrics) -> float | None:
-    value = _of(metrics, "lateral_displacement_m")
-    return None if value is None else _beyond(NEEDED_DISPLACEMENT_M - value, 0.0)
-
-
-def _lost(metrics: Metrics) -> float:
-    """Return 1 for a car that spins, does not get through its course, misses a cone or does not stop."""
-    ends = (_of(metrics, LANE_OVERSTEP), _of(metrics, "stopping_distance_m"))
-    undefined = any(value is not None and math.isnan(value) for value in ends)
-    return float(has_spun(metrics) or undefined or (_of(metrics, CONES_MISSED) or 0.0) != 0.0)
 
 
 _M, _DEG, _DEGPS = display_unit("path_m"), display_unit("heading_rad"), display_unit("yaw_rate_radps")
 _COUNT: Final = DisplayUnit("", 1.0)
-MEASURES: Final[dict[str, Measure]] = {
-    "lane": Measure(
-        "largest distance of the body beyond its lane", _M, 0.05, lambda m: _beyond(_of(m, LANE_OVERSTEP), 0.0)
-    ),
-    "path": Measure("largest path error beyond the free side of a lane", _M, 0.05, _path),
-    "cones": Measure("cones hit or missed", _COUNT, 1.0, _cones_harm),
-    "stopping": Measure("stopping distance", _M, 0.5, lambda m: _of(m, "stopping_distance_m")),
+MEASURES: Final = {
+    "lane": Measure("largest distance of the body beyond its lane", _M, 0.05),
+    "path": Measure("largest path error beyond the free side of a lane", _M, 0.05),
+    "cones": Measure("cones hit or missed", _COUNT, 1.0),
+    "stopping": Measure("stopping distance", _M, 0.5),
     "stopping_elsewhere": Measure(
-        "stopping distance, where the car without control leaves the free side of its lane", _M, None, lambda _: None
+        "stopping distance, where the car without control leaves the free side of its lane", _M, None
     ),
-    "heading": Measure("heading at the end against path or straight line", _DEG, 2.0 * _DEGREE, _heading),
-    "yaw_rate": Measure("yaw rate left at the end", _DEGPS, 1.0 * _DEGREE, _yaw_rate_left),
-    "displacement": Measure("lateral displacement that FMVSS 126 misses", _M, 0.10, _displacement),
-    "lost": Measure("car lost", _COUNT, 0.5, _lost),
-    "heading_open_loop": Measure("heading at the end of a sine with dwell", _DEG, None, _heading_open_loop),
-    "steering": Measure("steering wheel, root mean square", _DEG, None, _size(_STEERING)),
+    "heading": Measure("heading at the end against path or straight line", _DEG, 2.0 * _DEGREE),
+    "yaw_rate": Measure("yaw rate left at the end", _DEGPS, 1.0 * _DEGREE),
+    "displacement": Measure("lateral displacement that FMVSS 126 misses", _M, 0.10),
+    "lost": Measure("car lost", _COUNT, 0.5),
+    "heading_open_loop": Measure("heading at the end of a sine with dwell", _DEG, None),
+    "steering": Measure("steering wheel, root mean square", _DEG, None),
 }
 """Name -> measure. Sizes of heading and displacement: 2 deg are 0.8 m/s of drift at 80 km/h; 0.10 m is 5 % of the
 displacement that the law asks for."""
 
 
+def measured(metrics: Metrics) -> dict[str, float]:
+    """Return the measures that the manoeuvre of a run has [SI], infinite where the run does not define one."""
+    known = {name: math.nan if value is None else value for name, value in metrics.items()}
+    missed = known.get(CONES_MISSED, 0.0)
+    found = {"lost": float(has_spun(metrics) or missed != 0.0)}
+    # max(nan, 0) is nan, max(0, nan) is not.
+    if LANE_OVERSTEP in known:
+        found["lane"] = max(known[LANE_OVERSTEP], 0.0)
+    names = "track_deviation_max_m", "lateral_deviation_max_m", "path_deviation_after_1000ms_m"
+    errors = [abs(known[name]) for name in names if name in known]
+    if errors and LANE_OVERSTEP not in known and CONES_MISSED not in known:
+        found["path"] = max(errors[0] - FREE_SIDE_M, 0.0)
+    if CONES_HIT in known:
+        found["cones"] = known[CONES_HIT] + missed
+    if "stopping_distance_m" in known:
+        found["stopping"] = known["stopping_distance_m"]
+    if any(math.isnan(found.get(name, 0.0)) for name in ("lane", "stopping")):  # does not get there, or does not stop
+        found["lost"] = 1.0
+    if "heading_end_rad" in known:
+        found["heading_open_loop" if _DWELL in known else "heading"] = abs(known["heading_end_rad"])
+    if _DWELL in known and "yaw_rate_reversal_peak_radps" in known:
+        found["yaw_rate"] = abs(known[_DWELL] * known["yaw_rate_reversal_peak_radps"])
+    elif "yaw_rate_after_gates_rms_radps" in known:
+        found["yaw_rate"] = known["yaw_rate_after_gates_rms_radps"]
+    if "lateral_displacement_m" in known:
+        found["displacement"] = max(NEEDED_DISPLACEMENT_M - known["lateral_displacement_m"], 0.0)
+    if "steering_wheel_rms_rad" in known:
+        found["steering"] = abs(known["steering_wheel_rms_rad"])
+    return {name: math.inf if math.isnan(value) else value for name, value in found.items()}
+
+
 def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
     """Return the growth of each measure by a controller [SI], for the measures that the manoeuvre has."""
-    found = {}
-    for name, measure in MEASURES.items():
-        before, after = measure.value(without), measure.value(controlled)
-        if before is None and after is None:
+    found, all_before, all_after = {}, measured(without), measured(controlled)
+    for name in MEASURES:
+        if name not in all_before and name not in all_after:
             continue
-        before, after = (math.inf if value is None or math.isnan(value) else value for value in (before, after))
-        if name == "stopping" and (_path(without) or 0.0) > 0.0:
-            name = "stopping_elsewhere"  # noqa: PLW2901 - the same value, not counted
-        found[name] = 0.0 if before == after else after - before
+        before, after = (values.get(name, math.inf) for values in (all_before, all_after))
+        # Where the car without control leaves the free side, the same value is not counted.
+        elsewhere = name == "stopping" and 0.0 < all_before.get("path", 0.0) < math.inf
+        found["stopping_elsewhere" if elsewhere else name] = 0.0 if before == after else after - before
     return found
 
 

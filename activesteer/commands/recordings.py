@@ -198,7 +198,7 @@ def _replay(options: argparse.Namespace) -> None:
         from activesteer.playback import Showing, runs_of, save, serve, show
     except ImportError as error:
         raise PlaybackError("replay needs the viewer rerun: pip install rerun-sdk") from error
-    from activesteer.analysis.verdict import verdict
+    from activesteer.analysis.report.groups import verdict
 
     if options.compare and len(options.files) < 2:
         raise ParameterError(f"--compare needs at least two files, and {options.files[0]} is one")

@@ -6,7 +6,8 @@ match_paper`), within ranges that were written down before: it shows under which
 together, and is no evidence for them.
 
 A population holds the proportions in which the claims hold for other cars, roads and drivers, which `activesteer study
-population` drives. A nominal verdict is printed with the proportion.
+population` drives. A nominal verdict is printed with the proportion. Its bands, from 10 to 90 % of the runs, are drawn
+behind a nominal curve.
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, Scenario
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Source, build, read_toml
+from activesteer.conventions import Array
 from activesteer.errors import ParameterError, StudyError, nearest_names
 from activesteer.files import reading
-from activesteer.resources import studies_dir
+from activesteer.resources import DEFAULT_DRIVER, studies_dir
 from activesteer.theory.proportions import ProportionVerdict, proportion_verdict
 
 LITERATURE: Final = "literature"
@@ -215,3 +219,48 @@ def stored_population(vehicle: str) -> Population | None:
     if table is None or table.get("vehicle") != vehicle:
         return None
     return Population(table["samples"], table["seed"], vehicle, read_claims(table))
+
+
+TRACK: Final = ("front_axle_x_m", "front_axle_y_m")
+"""Channels of the band across the course, y over x."""
+BANDS: Final = "bands.parquet"
+
+
+class Band(NamedTuple):
+    """A band of one channel."""
+
+    at: Array  # time [s], or x of the front axle centre [m], shape (n,)
+    low: Array  # lower edge, shape (n,)
+    high: Array  # upper edge, shape (n,)
+
+
+def bands_of(recording: RecordingLike) -> Mapping[str, Band]:
+    """Return the population's bands for a run."""
+    maneuver, vehicle, driver = (_name_of(recording, part) for part in ("maneuver", "vehicle", "driver"))
+    if claims_for(recording) is None or recording.metadata.get("overrides") or driver != DEFAULT_DRIVER:
+        return {}
+    return _stored_bands(vehicle).get((maneuver, str(recording.metadata.get("controller"))), {})
+
+
+def _name_of(recording: RecordingLike, part: str) -> str:
+    table = recording.metadata.get(part)
+    return str(table.get("name")) if isinstance(table, Mapping) else ""
+
+
+@functools.cache
+def _stored_bands(vehicle: str) -> dict[tuple[str, str], dict[str, Band]]:
+    path = studies_dir() / "population" / BANDS
+    if not path.is_file():
+        return {}
+    import pyarrow.parquet as pq  # noqa: PLC0415 - slow to import
+
+    with reading(path, StudyError):
+        table = pq.read_table(path)
+    found: dict[tuple[str, str], dict[str, Band]] = {}
+    if (table.schema.metadata or {}).get(b"vehicle", b"").decode() != vehicle:
+        return found
+    for row in table.to_pylist():
+        low, high = (np.array(row[edge], dtype=np.float64) for edge in ("low", "high"))
+        band = Band(row["start"] + row["step"] * np.arange(len(low)), low, high)
+        found.setdefault((row["maneuver"], row["controller"]), {})[row["channel"]] = band
+    return found

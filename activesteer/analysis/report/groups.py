@@ -10,8 +10,10 @@ from typing import Any, Final, NamedTuple
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.claims.scorecard import Scorecard, scorecard
 from activesteer.analysis.claims.stored import LITERATURE, PAPER, SETTINGS, claims_for, setting_of
+from activesteer.analysis.harm import kept, losses
 from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
+from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.recording import Recording
 from activesteer.recording.recording import run_names
 
@@ -120,3 +122,29 @@ def _group(name: str, recordings: Mapping[str, Recording], *, paper: bool) -> Gr
     runs = tuple(ReportedRun(*named[run], run, look) for run, look in run_looks(named).items())
     title = entry(runs[0].recording, "maneuver", "title") or name
     return Group(name, f"{title}: {SETTINGS[PAPER]}" if paper else title, runs)
+
+
+_ALSO: Final = ("yaw_rate_steady_state_radps", "stopping_distance_m", "steering_wheel_rms_rad")
+"""Metrics that the outcome names if a manoeuvre has them."""
+
+
+def outcome(recording: Recording) -> str:
+    """Describe failures, met requirements and key figures of a run, in the words of the report."""
+    metadata, metrics = recording.metadata, recording.metrics
+    if not metadata.get("complete", True):
+        return f"the run did not end properly: {metadata.get('error', 'no reason is recorded')}"
+    said = [*losses(metrics), *kept(metrics)]
+    peaks = [name for name in SIDESLIP_PEAKS if name in metrics]
+    for name in (*peaks[:1], *_ALSO):
+        if name in metrics:
+            shown = metric(name)
+            said.append(f"{shown.label.removesuffix(' abs')} {shown.text(metrics[name])} {shown.unit.name}")
+    return ", ".join(said)
+
+
+def verdict(recordings: Mapping[str, Recording]) -> list[str]:
+    """Return a line for each run, then a line for each claim of the paper about them."""
+    lines = [f"{name}: {outcome(recording)}" for name, recording in recordings.items()]
+    groups = groups_of({f"{name}.mcap": recording for name, recording in recordings.items()})
+    judged = judge(groups[0]).scorecard.judged if len(groups) == 1 else ()
+    return lines + [f"{item.claim.id} {item.verdict.value}: {item.claim.text}" for item in judged]

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import math
 
-from activesteer.analysis.verdict import outcome, verdict
+from activesteer.analysis.report.groups import outcome, verdict
 from activesteer.recording import Recording
 from tests.unit.playback.synthetic import circle
 
