@@ -22,8 +22,8 @@ from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIOS
 from activesteer.analysis.general import METRICS as ENERGIES
 from activesteer.analysis.harm import MEASURES
-from activesteer.analysis.report.tables import Change, significance
 from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, Runs
+from activesteer.analysis.tables import Change, significance
 from activesteer.config import Source
 from activesteer.controllers import controller_spec
 from activesteer.errors import ParameterError, SimulationDiverged

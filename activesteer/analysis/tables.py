@@ -1,13 +1,16 @@
-"""Metrics of several runs side by side, as plain text for a terminal. Degrees and km/h, as this is for reading."""
+"""Metrics as text, in degrees and km/h: values, differences that count, and a table of runs for a terminal."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from typing import Final
+from enum import StrEnum
+from typing import Final, NamedTuple
 
 from activesteer.analysis.harm import LOST, shown
 from activesteer.metric_table import FRICTION_UTILISATION, recorded_metric
 from activesteer.text_table import text_table, wrapped_line
+from activesteer.units import typeset
 
 Paint = Callable[[str, str, float, float, str], str]
 """Function from label of a run, name of a metric, its value in this and in the first run, and its text to the text
@@ -39,3 +42,74 @@ def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
     """Return explanations of values that a reader may take for an error."""
     above = any(metrics.get(name, 0.0) > 1.0 for metrics in runs.values() for name in FRICTION_UTILISATION)
     return wrapped_line(TYRE_USE_NOTE) if above else []
+
+
+class Change(StrEnum):
+    """Significance of a difference from the first run."""
+
+    BETTER = "better"
+    WORSE = "worse"
+    SAME = "same"
+    """Neither a driver nor a sensor in a test car could tell the values apart."""
+    OTHER = "other"
+    """The values differ, and neither is better."""
+
+
+def significance(name: str, value: float, first: float) -> Change:
+    """Compare a metric with its value in the first run."""
+    metric = recorded_metric(name)
+    if metric.better is None or not math.isfinite(value - first):
+        return Change.OTHER
+    size, before = metric.cost(value), metric.cost(first)
+    if is_near(name, size, before):
+        return Change.SAME
+    return Change.BETTER if size < before else Change.WORSE
+
+
+def is_near(name: str, value: float, first: float) -> bool:
+    """Return whether neither a driver nor a sensor could tell two values [SI] apart."""
+    near = abs(value - first) <= recorded_metric(name).significance
+    return near or difference_text(name, value, first).text == "0"
+
+
+class Cell(NamedTuple):
+    """A number, or a difference with its percentage of the first run's value, if that has a meaning."""
+
+    text: str
+    percent: str = ""
+
+
+def number(name: str, value: float) -> str:
+    """Write the value of a metric [SI] for display: three decimals, fewer for large values; a dash for nan."""
+    if not math.isfinite(value):
+        return "\N{EN DASH}"
+    metric = recorded_metric(name)
+    return metric.text(value) if metric.whole else _decimal(value * metric.unit.factor)
+
+
+def difference_text(name: str, value: float, first: float) -> Cell:
+    """Write the difference of a metric [SI] from its value in the first run.
+
+    The cell has a percentage too, if the first value is significant and positive.
+    """
+    if not (math.isfinite(value) and math.isfinite(first)):
+        return Cell("\N{EN DASH}")
+    metric = recorded_metric(name)
+    difference = (value - first) * metric.unit.factor
+    if metric.whole:
+        return Cell(typeset(f"{difference:+.0f}") if difference else "0")
+    if abs(difference) < 0.0005:
+        return Cell("0")
+    text = f"{'+' if difference > 0.0 else ''}{_decimal(difference)}"
+    nearly_nothing = max(metric.significance * metric.unit.factor, 0.01)
+    if metric.unit.name == "%" or first * metric.unit.factor <= nearly_nothing:
+        return Cell(text)
+    if not 0.005 <= abs(share := (value - first) / first) < 10.0:
+        return Cell(text)
+    return Cell(text, typeset(f"{share * 100.0:+.0f}\N{NO-BREAK SPACE}%"))
+
+
+def _decimal(value: float) -> str:
+    decimals = next((decimals for top, decimals in ((10.0, 3), (100.0, 2), (1000.0, 1)) if abs(value) < top), 0)
+    text = f"{value:.{decimals}f}"
+    return typeset(text.lstrip("-") if float(text) == 0.0 else text)

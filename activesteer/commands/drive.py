@@ -222,7 +222,7 @@ def _paint(
 ) -> str:
     """Return a value in green if it is better than in the first run, in red if it is worse. Plain if a run is lost."""
     from activesteer.analysis.harm import is_controlled
-    from activesteer.analysis.report.tables import Change, significance
+    from activesteer.analysis.tables import Change, significance
 
     if not (is_controlled(metrics[run]) and is_controlled(next(iter(metrics.values())))):
         return text

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
-from activesteer.analysis.report.run_page import write_report
-from activesteer.analysis.report.tables import KEY_FIGURES
+from activesteer.analysis.report.run_page import KEY_FIGURES, write_report
 from activesteer.controllers import controller_spec
 from activesteer.conventions import run_looks
 from activesteer.drawing.panels import EXPLORE
@@ -199,12 +198,12 @@ def _plain(name: str) -> str:
 def _figures(recording: Recording) -> list[dict[str, Any]]:
     """Return the key figures of a run in display units."""
     found = []
-    for figure in KEY_FIGURES:
-        name = next((name for name in figure.metrics if name in recording.metrics), None)
+    for title, names in KEY_FIGURES.items():
+        name = next((name for name in names if name in recording.metrics), None)
         if name is not None:
             metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
             size = abs(value) if metric.better is Better.SMALLER else value
             shown = size if math.isfinite(size) else None
             digits = 0 if metric.whole else None  # by size
-            found.append({"title": figure.title, "unit": metric.unit_name, "value": shown, "digits": digits})
+            found.append({"title": title, "unit": metric.unit_name, "value": shown, "digits": digits})
     return found

@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict, number_lines
+from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
 from activesteer.analysis.report.curves import plots
-from activesteer.analysis.report.groups import Group, Judgement, entry, groups_of, judge
-from activesteer.analysis.report.tables import (
-    HEADLINE,
-    Change,
-    MetricRow,
-    Result,
-    Row,
-    changed_parameters,
-    file_rows,
-    key_titles,
-    metric_rows,
-    metric_titles,
-    results,
-    rows,
-    verdict_counts,
-)
-from activesteer.analysis.tables import notes
+from activesteer.analysis.report.groups import Group, ReportedRun, entry, groups_of, judge
+from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
+from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS, Better, recorded_metric
 from activesteer.pages import render
 from activesteer.recording import Recording
 from activesteer.recording.contents import events_of
 from activesteer.theory.proportions import percent
-from activesteer.units import typeset
+from activesteer.units import display_unit, parameter_label, typeset
 
 TITLE: Final = "activesteer report"
 _VERDICT_CLASS: Final = {
@@ -60,21 +49,6 @@ _CHANGE_MARK: Final = {
 _MOST_EVENTS: Final = 20
 
 
-class _Section(NamedTuple):
-    """Content of one manoeuvre. The template uses these names."""
-
-    anchor: str
-    group: Group
-    judgement: Judgement
-    changed: list[str]
-    key_titles: list[str]
-    results: list[Result]
-    metric_titles: list[str]
-    metrics: list[MetricRow]
-    parameters: list[Row]
-    names: list[str]
-
-
 def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[str]) -> Path:
     """Write the report of runs and return its path. An existing file is replaced.
 
@@ -97,7 +71,7 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
     runs = [run for group in groups for run in group.runs]
     every = [run.recording for run in runs]
     file_titles, files = file_rows(groups)
-    cards = [section.judgement.scorecard for section in sections]
+    cards = [section["judgement"].scorecard for section in sections]
     everything = Scorecard(
         tuple(item for card in cards for item in card.judged),
         next((card.population for card in cards if card.population is not None), None),
@@ -106,7 +80,7 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
         "report.html",
         title=TITLE if several else f"{TITLE}: {groups[0].title}",
         heading=f"Report: {len(groups)} manoeuvres" if several else groups[0].title,
-        headline=HEADLINE if any(HEADLINE in section.key_titles for section in sections) else "",
+        headline=HEADLINE if any(HEADLINE in section["key_titles"] for section in sections) else "",
         facts=_facts(groups, made or date.today()),
         runs=runs,
         sections=sections,
@@ -125,24 +99,25 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
         versions=rows(every, "versions"),
         file_titles=file_titles,
         files=files,
-        data=[{"anchor": section.anchor, **plots(section.group)} for section in sections],
+        data=[{"anchor": section["anchor"], **plots(section["group"])} for section in sections],
     )
 
 
-def _section(group: Group, anchor: str) -> _Section:
+def _section(group: Group, anchor: str) -> dict[str, Any]:
+    """Return the content of one manoeuvre, by the names of the template."""
     recordings = [run.recording for run in group.runs]
-    return _Section(
-        anchor,
-        group,
-        judge(group),
-        [*dict.fromkeys(filter(None, map(changed_parameters, group.runs))), *_events(group)],
-        key_titles(group),
-        results(group),
-        metric_titles(group),
-        metric_rows(group),
-        rows(recordings, "controller", "maneuver", "timestep_s"),
-        [run.name for run in group.runs],
-    )
+    return {
+        "anchor": anchor,
+        "group": group,
+        "judgement": judge(group),
+        "changed": [*dict.fromkeys(filter(None, map(changed_parameters, group.runs))), *_events(group)],
+        "key_titles": list(key_figures(group)),
+        "results": results(group),
+        "metric_titles": metric_titles(group),
+        "metrics": metric_rows(group),
+        "parameters": rows(recordings, "controller", "maneuver", "timestep_s"),
+        "names": [run.name for run in group.runs],
+    }
 
 
 def _events(group: Group) -> list[str]:
@@ -172,3 +147,213 @@ def _facts(groups: Sequence[Group], made: date) -> list[str]:
     ):
         facts += [f"{word} {value}"] if value else []
     return facts
+
+
+class Row(NamedTuple):
+    """A parameter."""
+
+    key: str  # its name, with the names of its tables
+    values: tuple[str, ...]  # its value in each run; a single value if all runs have the same
+
+    @property
+    def differs(self) -> bool:
+        """True if the runs differ in this parameter."""
+        return len(self.values) > 1
+
+
+def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
+    """Return the entries of tables of the metadata: those of the first run in its order, then those of later runs."""
+    flat = [dict(_flat(_chosen(run.metadata, tables))) for run in recordings]
+    found = []
+    for key in dict.fromkeys(key for entries in flat for key in entries):
+        values = tuple(entries.get(key, "") for entries in flat)
+        found.append(Row(key, values if len(set(values)) > 1 else values[:1]))
+    return found
+
+
+def _chosen(metadata: Mapping[str, Any], tables: Sequence[str]) -> Mapping[str, Any]:
+    if len(tables) == 1:
+        table = metadata.get(tables[0], {})
+        return table if isinstance(table, Mapping) else {tables[0]: table}
+    return {key: metadata[key] for key in tables if key in metadata}
+
+
+def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", _text(key, value)
+
+
+def _text(key: str, value: Any) -> str:
+    if isinstance(value, bool) or value is None:
+        return str(value).lower() if value is not None else "none"
+    if isinstance(value, int | float):
+        unit, factor = display_unit(key)
+        return typeset(f"{value:.6g}" if factor == 1.0 else f"{value:.6g} ({value * factor:.4g} {unit})")
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+
+
+MAX_FIGURES: Final = 6
+"""Most key figures that can be read at a glance."""
+
+
+class Figure(NamedTuple):
+    """A key figure of a run, as text."""
+
+    text: str  # its value
+    difference: str = ""  # difference from the first run; empty for the first run and without a difference
+    change: Change = Change.OTHER  # significance of the difference
+
+
+class Result(NamedTuple):
+    """Result of a run."""
+
+    run: ReportedRun  # the run
+    losses: tuple[str, ...]  # its failures, in words
+    kept: tuple[str, ...]  # the requirements that it met, in words
+    figures: tuple[Figure, ...]  # its key figures
+
+
+KEY_FIGURES: Final[dict[str, tuple[str, ...]]] = {
+    "Cones hit": (CONES_HIT,),
+    "Cones missed": (CONES_MISSED,),
+    "Beyond the lane": (LANE_OVERSTEP,),
+    "Stopping distance": ("stopping_distance_m",),
+    "Peak sideslip": SIDESLIP_PEAKS,
+    "Settled yaw rate": ("yaw_rate_steady_state_radps",),
+    "Yaw rate overshoot": ("yaw_rate_overshoot",),
+    "Yaw rate response time": ("yaw_rate_response_time_s",),
+    "Yaw rate left at 1.75 s": ("yaw_rate_after_1750ms_share",),
+    "Yaw rate error at 1 s": ("yaw_rate_deviation_after_1000ms_radps",),
+    "Peak yaw rate": ("yaw_rate_peak_abs_radps", "yaw_rate_peak_radps"),
+    "Mean deceleration": ("mean_deceleration_mps2",),
+    "Off the path": ("track_deviation_max_m",),
+    "Steering effort, rms rate": ("steering_wheel_rate_rms_radps",),
+    "Seat acceleration rms": ("seat_acceleration_rms_mps2",),
+    "Heading at the end": ("heading_end_rad",),
+    "Delay of the yaw rate": ("yaw_rate_delay_s",),
+    "Delay of the lateral acceleration": ("ay_delay_s",),
+    "Lap time": ("lap_time_s",),
+    "Beyond the edge of the road": ("road_overstep_m",),
+    "Time on two wheels": ("two_wheel_lift_time_s",),
+    "Energy from the battery": ("battery_energy_J",),
+    "Largest wheel load variation": ("wheel_load_coefficient_max",),
+    "Share of time with a wheel lifted": ("wheel_lift_share",),
+    "Share of time beyond the known surface": ("extended_road_share",),
+    "Largest suspension travel": ("suspension_travel_max_m",),
+}
+"""Title -> names of metrics, of which the first one that a run has is shown. A manoeuvre has some of them."""
+
+
+HEADLINE: Final = "Peak sideslip [deg]"
+"""Title of the key figure that is shown where there is room for only one."""
+
+
+def results(group: Group) -> list[Result]:
+    """Return the result of each run of a group, compared with the first run."""
+    chosen = key_figures(group).values()
+    first = group.runs[0].recording.metrics
+    lost = [(*(["incomplete"] if run.problem else []), *losses(run.recording.metrics)) for run in group.runs]
+    found = []
+    for place, run in enumerate(group.runs):
+        metrics = run.recording.metrics
+        well = tuple(kept(metrics)) or (("stays under control",) if any(lost) and not lost[place] else ())
+        figures = [_figure(name, metrics, first if place else None) for name in chosen]
+        if not (_is_judged(group.runs[0]) and _is_judged(run)):
+            figures = [figure._replace(change=Change.OTHER) for figure in figures]
+        found.append(Result(run, lost[place], well, tuple(figures)))
+    return found
+
+
+def _is_judged(run: ReportedRun) -> bool:
+    """Return whether a change from or to this run can be good or bad: it is complete, and the car is controlled."""
+    return not run.problem and is_controlled(run.recording.metrics)
+
+
+def key_figures(group: Group) -> dict[str, str]:
+    """Return the titles of the columns of key figures, with their units, and the metrics that any run has of them."""
+    names = {name for run in group.runs for name in run.recording.metrics}
+    found = {}
+    for title, metrics in KEY_FIGURES.items():
+        if name := next(filter(names.__contains__, metrics), ""):
+            unit = recorded_metric(name).unit_name
+            found[f"{title} [{unit}]" if unit else title] = name
+    return dict(list(found.items())[:MAX_FIGURES])
+
+
+def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> Figure:
+    sizes = abs if recorded_metric(name).better is Better.SMALLER else float
+    value = sizes(metrics.get(name, math.nan))
+    text = shown(name, metrics, number(name, value))
+    if LOST in (text, shown(name, first or {}, "")):
+        return Figure(text)
+    before = math.nan if first is None else sizes(first.get(name, math.nan))
+    if not math.isfinite(value - before):
+        return Figure(text)
+    difference = difference_text(name, value, before)
+    if is_near(name, value, before):
+        return Figure(text, difference.text, Change.SAME)
+    return Figure(text, difference.percent or difference.text, significance(name, value, before))
+
+
+class MetricRow(NamedTuple):
+    """A metric of all runs of a group."""
+
+    name: str  # its name in words
+    unit: str  # unit of the numbers
+    cells: tuple[Cell, ...]  # value of the first run, then value and difference from the first run of each other run
+
+
+def verdict_counts(scorecards: Iterable[Scorecard]) -> dict[Verdict, int]:
+    """Return the number of claims by verdict, without verdicts of no claim."""
+    verdicts = [item.verdict for card in scorecards for item in card.judged]
+    return {verdict: verdicts.count(verdict) for verdict in Verdict if verdict in verdicts}
+
+
+def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
+    """Return the titles of the table of files, and a row for each run."""
+    runs = [(group, run) for group in groups for run in group.runs]
+    changed = [changed_parameters(run) for _, run in runs]
+    titles = ["File", "Manoeuvre", "Controller", "Vehicle", "Duration", *(["Changed"] if any(changed) else [])]
+    rows = []
+    for (group, run), overrides in zip(runs, changed, strict=True):
+        span_s = float(run.recording.time_s[-1] - run.recording.time_s[0])
+        controller = str(run.recording.metadata.get("controller", ""))
+        vehicle = entry(run.recording, "vehicle", "name")
+        rows.append([run.source, group.name, controller, vehicle, f"{span_s:.3f} s", overrides][: len(titles)])
+    return titles, rows
+
+
+def changed_parameters(run: ReportedRun) -> str:
+    """Describe the overrides of a run, with their values and keys, or empty without overrides."""
+    changed: Any = run.recording.metadata.get("overrides")
+    return ", ".join(_told(*one) for one in changed.items()) if isinstance(changed, Mapping) else ""
+
+
+def _told(key: str, value: Any) -> str:
+    words, unit = parameter_label(key)
+    return f"{words} {value} {unit}".rstrip() + f" ({key})"
+
+
+def metric_titles(group: Group) -> list[str]:
+    """Return the titles of the columns of `metric_rows`."""
+    first, *others = (run.name for run in group.runs)
+    return ["Metric", "Unit", first, *(title for name in others for title in (name, f"{name} against {first}"))]
+
+
+def metric_rows(group: Group) -> list[MetricRow]:
+    """Return the metrics, with their differences from the first run."""
+    values = [run.recording.metrics for run in group.runs]
+    rows = []
+    for name in dict.fromkeys(name for metrics in values for name in metrics):
+        metric = recorded_metric(name)
+        first, *others = (metrics.get(name, math.nan) for metrics in values)
+        texts = [shown(name, run, number(name, run.get(name, math.nan))) for run in values]
+        cells = [Cell(texts[0])]
+        for value, text in zip(others, texts[1:], strict=True):
+            compared = difference_text(name, value, first) if LOST not in (text, texts[0]) else Cell("\N{EN DASH}")
+            cells += [Cell(text), compared]
+        rows.append(MetricRow(metric.label, metric.unit_name, tuple(cells)))
+    return rows

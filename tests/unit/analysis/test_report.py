@@ -14,7 +14,8 @@ import pytest
 from activesteer.analysis.report import open_all, report_page, write_report
 from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
 from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of, judge
-from activesteer.analysis.report.tables import Change, Result, difference_text, number, results, rows
+from activesteer.analysis.report.run_page import Result, results, rows
+from activesteer.analysis.tables import Change, difference_text, number
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.metric_table import recorded_metric
 from activesteer.recording import Recording
