@@ -85,10 +85,8 @@ def _below(speed: Array, begin: int, level_mps: float) -> int | None:
 
 
 def _allowed(recording: RecordingLike, way: Array, first: int, last: int) -> float:
-    """Return the mean over the distance of the deceleration that the tyres' peak friction allows [m/s2].
-
-    The peak force of a tyre is its force over the fraction of its friction that it uses.
-    """
+    """Return the mean over the distance of the deceleration that the tyres' peak friction allows [m/s2]."""
+    # The peak force of a tyre is its force over the fraction of its friction that it uses.
     part = slice(first, last + 1)
     peaks, loads = np.zeros(last + 1 - first), np.zeros(last + 1 - first)
     for corner in CORNERS:
@@ -103,10 +101,8 @@ def _allowed(recording: RecordingLike, way: Array, first: int, last: int) -> flo
 
 
 def _largest_slip(recording: RecordingLike, speed: Array, braked: slice) -> float:
-    """Return the largest relative slip of a wheel above `SLIPS_FROM_MPS`.
-
-    The rolling radius of each wheel is its radius before the brake.
-    """
+    """Return the largest relative slip of a wheel above `SLIPS_FROM_MPS`."""
+    # The rolling radius of each wheel is its radius before the brake.
     fast = speed[braked] > SLIPS_FROM_MPS
     if not fast.any():
         return math.nan

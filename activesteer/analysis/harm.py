@@ -37,10 +37,8 @@ LOST: Final = "lost"
 
 
 def has_spun(metrics: Metrics) -> bool:
-    """Return whether the sideslip exceeded `LOST_SIDESLIP_RAD`, or whether the run ended too early to tell.
-
-    Where the manoeuvre has no peak of the sideslip, as in straight braking, the heading at the end counts.
-    """
+    """Return whether the sideslip exceeded `LOST_SIDESLIP_RAD`, or whether the run ended too early to tell."""
+    # Where the manoeuvre has no peak of the sideslip, as in straight braking, the heading at the end counts.
     names = SIDESLIP_PEAKS if any(name in metrics for name in SIDESLIP_PEAKS) else ("heading_end_rad",)
     peak = next((abs(value) for name in names if (value := metrics.get(name)) is not None), math.nan)
     return not peak <= LOST_SIDESLIP_RAD
@@ -86,10 +84,8 @@ def kept(metrics: Mapping[str, float]) -> Iterator[str]:
 
 
 def shown(name: str, metrics: Mapping[str, float], text: str) -> str:
-    """Return the text of a metric, or `lost` if it says nothing because the car has turned round.
-
-    The driver's steering, counts and verdicts remain.
-    """
+    """Return the text of a metric, or `lost` if it says nothing because the car has turned round."""
+    # The driver's steering, counts and verdicts remain.
     turned = any(abs(metrics.get(peak, 0.0)) > TURNED_ROUND_RAD for peak in SIDESLIP_PEAKS)
     remains = recorded_metric(name).whole or name.startswith("steering_wheel") or name not in metrics
     return text if remains or not turned else LOST

@@ -21,11 +21,9 @@ from activesteer.road.path import Path
 
 
 def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> float:
-    """Return the largest distance of the body beyond the side of a lane.
-
-    A corner of the body counts while it is between the two ends of a lane. The end of a side always counts, since a
-    body that turns there covers it while its corners are elsewhere.
-    """
+    """Return the largest distance of the body beyond the side of a lane."""
+    # A corner of the body counts while it is between the two ends of a lane. The end of a side always counts, since a
+    # body that turns there covers it while its corners are elsewhere.
     oversteps = [math.nan]
     for x, y in corners(recording, car):
         for lane in course.lanes:
@@ -39,10 +37,8 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> f
 
 
 def stays_in_lanes(recording: RecordingLike, course: Course, car: Footprint) -> bool:
-    """Return whether the whole body passes every lane to its end and never crosses a side.
-
-    A car that turns round before the last lane crosses no side there, but it does not keep to the lanes.
-    """
+    """Return whether the whole body passes every lane to its end and never crosses a side."""
+    # A car that turns round before the last lane crosses no side there, but it does not keep to the lanes.
     for x, _ in corners(recording, car):
         for lane in course.lanes:
             if not ((x >= lane.start_x_m) & (x <= lane.end_x_m)).any() or not (x > lane.end_x_m).any():
@@ -51,11 +47,9 @@ def stays_in_lanes(recording: RecordingLike, course: Course, car: Footprint) -> 
 
 
 def cone_distances(recording: RecordingLike, course: Course, car: Footprint) -> Array:
-    """Return the smallest distance between each cone and the body of the car.
-
-    A cone is a disc of `CONE_RADIUS_M` around its point. A cone on the side of a lane is the point itself, since the
-    width of a lane is measured between the sides of its cones.
-    """
+    """Return the smallest distance between each cone and the body of the car."""
+    # A cone is a disc of `CONE_RADIUS_M` around its point. A cone on the side of a lane is the point itself, since the
+    # width of a lane is measured between the sides of its cones.
     radius_m = np.where(course.on_lane_side(), 0.0, CONE_RADIUS_M)
     return _distances(recording, course.cones_m, car) - radius_m
 
@@ -77,10 +71,8 @@ def _distances(recording: RecordingLike, points_m: Array, car: Footprint) -> Arr
 
 
 def struck_cones(recordings: Iterable[RecordingLike], course: Course) -> NDArray[np.bool_]:
-    """Return which cones of a course at least one of the cars hits, shape (number of cones,).
-
-    A run without the place or the size of its car hits none.
-    """
+    """Return which cones of a course at least one of the cars hits, shape (number of cones,)."""
+    # A run without the place or the size of its car hits none.
     struck = np.zeros(len(course.cones_m), dtype=bool)
     for recording in recordings:
         with suppress(RecordingError):
@@ -153,10 +145,8 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
 
 
 def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -> float:
-    """Return the heading of the car at the end of a run against the nearest piece of a path, -pi to pi [rad].
-
-    A car that turned around several times has its whole turns left out.
-    """
+    """Return the heading of the car at the end of a run against the nearest piece of a path, -pi to pi [rad]."""
+    # A car that turned around several times has its whole turns left out.
     x, y = (channel[-1] for channel in front_axle(recording))
     nearest = int(np.argmin(np.hypot(path_x_m - x, path_y_m - y)))
     begin = min(nearest, len(path_x_m) - 2)
@@ -180,10 +170,8 @@ def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
 
 
 def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
-    """Return world y of the front axle centre at its first passage of each x, interpolated [m], shape (n,).
-
-    The values of x ascend; y is nan where the run never gets there.
-    """
+    """Return world y of the front axle centre at its first passage of each x, interpolated [m], shape (n,)."""
+    # The values of x ascend; y is nan where the run never gets there.
     x, y = front_axle(recording)
     # A car that spins may go back: only samples ahead of all earlier ones count.
     ahead = np.concatenate([[True], x[1:] > np.maximum.accumulate(x)[:-1]])

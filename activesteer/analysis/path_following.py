@@ -92,10 +92,8 @@ def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _windows(recording: RecordingLike, course: Course) -> tuple[slice, slice, slice]:
-    """Return the samples up to the last gate, from the first to the last gate, and of the 3 s after the last gate.
-
-    A path without gates is all approach.
-    """
+    """Return the samples up to the last gate, from the first to the last gate, and of the 3 s after the last gate."""
+    # A path without gates is all approach.
     nothing = slice(0, 0)
     if course.last_gate_x_m is None:
         return slice(None), nothing, nothing

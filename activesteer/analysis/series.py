@@ -46,10 +46,8 @@ class StepResponse(NamedTuple):
 
 
 def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
-    """Return the sideslip angles [rad] in a part of a run, while the car is faster than `ANGLES_COUNT_ABOVE_MPS`.
-
-    Without a speed, as in measured data, all samples count. If none counts, there is one sample of 0.
-    """
+    """Return the sideslip angles [rad] in a part of a run, while the car is faster than `ANGLES_COUNT_ABOVE_MPS`."""
+    # Without a speed, as in measured data, all samples count. If none counts, there is one sample of 0.
     sideslip_rad = np.asarray(recording["sideslip_rad"], dtype=np.float64)[part]
     try:
         slow = recording["speed_mps"][part] <= ANGLES_COUNT_ABOVE_MPS
@@ -94,10 +92,8 @@ def crossing_time(time_s: Array, values: Array, level: float) -> float:
 
 
 def largest_rate(values: Array, timestep_s: float) -> float:
-    """Return the largest rate of change over `RATE_SPAN_S`.
-
-    Unlike the slope of a smoothed signal it does not overshoot.
-    """
+    """Return the largest rate of change over `RATE_SPAN_S`."""
+    # Unlike the slope of a smoothed signal it does not overshoot.
     span = max(1, round(RATE_SPAN_S / timestep_s))
     if len(values) <= span:
         return math.nan
@@ -238,10 +234,8 @@ def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
 
 
 def offset(values: Array, samples: slice) -> float:
-    """Return the mean of a signal over some samples, or 0 for no samples.
-
-    The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
-    """
+    """Return the mean of a signal over some samples, or 0 for no samples."""
+    # The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
     return float(np.mean(values[samples], dtype=np.float64)) if samples.stop > samples.start else 0.0
 
 

@@ -88,10 +88,8 @@ def number(name: str, value: float) -> str:
 
 
 def difference_text(name: str, value: float, first: float) -> Cell:
-    """Write the difference of a metric [SI] from its value in the first run.
-
-    The cell has a percentage too, if the first value is significant and positive.
-    """
+    """Write the difference of a metric [SI] from its value in the first run."""
+    # The cell has a percentage too, if the first value is significant and positive.
     if not (math.isfinite(value) and math.isfinite(first)):
         return Cell("\N{EN DASH}")
     metric = recorded_metric(name)

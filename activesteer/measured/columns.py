@@ -111,10 +111,8 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _first_numbers(lines: list[str], path: Path) -> tuple[int, str]:
-    """Return the number of the first line of numbers, and the separator of its cells.
-
-    In such a line, every other cell may be a word, such as a gear, and one a date or a time of day.
-    """
+    """Return the number of the first line of numbers, and the separator of its cells."""
+    # In such a line, every other cell may be a word, such as a gear, and one a date or a time of day.
     for number, line in enumerate(lines):
         for separator in ";\t|, ":
             cells = _cells(line, separator)

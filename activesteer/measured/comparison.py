@@ -31,11 +31,9 @@ _NEARLY: Final = 0.01
 
 
 def time_shift(measured: Recording, simulated: Recording) -> float:
-    """Return the delay of the measured run [s]: measured(t) is simulated(t - shift).
-
-    The search maximises the normalised cross-correlation over all shifts at which the runs overlap by half of the
-    shorter run. Between the steps of the search, the mean square of the difference is minimised.
-    """
+    """Return the delay of the measured run [s]: measured(t) is simulated(t - shift)."""
+    # The search maximises the normalised cross-correlation over all shifts at which the runs overlap by half of the
+    # shorter run. Between the steps of the search, the mean square of the difference is minimised.
     pairs = _pairs(measured, simulated, INPUTS) or _pairs(measured, simulated, RESPONSES)
     if not pairs:
         return math.nan
@@ -146,12 +144,10 @@ class Smooth(NamedTuple):
 
 
 def smooth(recording: Recording, channel: str, chosen: Filter | None) -> Smooth:
-    """Filter a channel, and estimate the noise that remains.
-
-    What a low-pass filter at a quarter of the sampling rate or lower removes is taken for noise: its median absolute
-    deviation, which the short edges of a manoeuvre do not move. The noise is assumed white: below the cut-off frequency
-    it is as dense as above. A signal that the logger has filtered already shows no noise.
-    """
+    """Filter a channel, and estimate the noise that remains."""
+    # What a low-pass filter at a quarter of the sampling rate or lower removes is taken for noise: its median absolute
+    # deviation, which the short edges of a manoeuvre do not move. The noise is assumed white: below the cut-off
+    # frequency it is as dense as above. A signal that the logger has filtered already shows no noise.
     values = np.asarray(recording[channel], np.float64)
     step_s = float(np.median(np.diff(recording.time_s)))
     nyquist_Hz = 0.5 / step_s

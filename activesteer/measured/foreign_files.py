@@ -59,11 +59,9 @@ def numbers(values: Any, name: str, path: Path) -> Array:
 
 
 def make_answerer() -> Callable[[bytes], bytes]:
-    """Return a function that answers the requests of `columns.py`.
-
-    A request is JSON: the path of a file that is opened, or the number of a column that is read. An answer is a line of
-    JSON, then values and times of a column as 64-bit floating-point numbers.
-    """
+    """Return a function that answers the requests of `columns.py`."""
+    # A request is JSON: the path of a file that is opened, or the number of a column that is read. An answer is a line
+    # of JSON, then values and times of a column as 64-bit floating-point numbers.
     opened: list[Column] = []
 
     def answer(request: bytes) -> bytes:

@@ -273,10 +273,8 @@ def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
 
 
 def resampled(signal: Samples, grid_s: Array) -> Array:
-    """Resample a signal to a uniform grid, with straight lines between samples.
-
-    If the samples are closer than the grid, their mean over a grid step is taken, which prevents aliasing.
-    """
+    """Resample a signal to a uniform grid, with straight lines between samples."""
+    # If the samples are closer than the grid, their mean over a grid step is taken, which prevents aliasing.
     step_s = float(grid_s[1] - grid_s[0])
     if float(np.median(np.diff(signal.time_s))) > 0.75 * step_s:
         return np.interp(grid_s, signal.time_s, signal.values)
@@ -296,11 +294,9 @@ _MOVING_MPS: Final = 1.0
 
 
 def with_motion(time_s: Array, channels: Mapping[str, Array]) -> dict[str, Array]:
-    """Add derived channels: speed, sideslip angle, yaw angle and path.
-
-    Without a position, the path starts at the origin along x. Its direction is the yaw angle, plus the sideslip angle
-    if measured.
-    """
+    """Add derived channels: speed, sideslip angle, yaw angle and path."""
+    # Without a position, the path starts at the origin along x. Its direction is the yaw angle, plus the sideslip angle
+    # if measured.
     from scipy.integrate import cumulative_trapezoid  # noqa: PLC0415 - slow to import
 
     found = dict(channels)
@@ -322,11 +318,9 @@ def _sideslip(vx: Array, vy: Array) -> Array:
 
 
 def at_sensor(run: Recording) -> Recording:
-    """Return the run with the motion of the point that `sensor_ahead_m` of its manoeuvre names.
-
-    The point is on the centre line of a rigid body, ahead of the centre of gravity by x: v_y + x r, a_y + x dr/dt,
-    a_x - x r^2 with the yaw rate r.
-    """
+    """Return the run with the motion of the point that `sensor_ahead_m` of its manoeuvre names."""
+    # The point is on the centre line of a rigid body, ahead of the centre of gravity by x: v_y + x r, a_y + x dr/dt,
+    # a_x - x r^2 with the yaw rate r.
     ahead_m = run.metadata.get("maneuver", {}).get("sensor_ahead_m", 0.0)
     if ahead_m == 0.0:
         return run

@@ -220,11 +220,10 @@ def straight_ahead(recording: RecordingLike) -> slice:
 
 
 def largest_action(recording: RecordingLike, demand: str) -> float:
-    """Return by how much more a system turns wheels in a manoeuvre than straight ahead before it [rad].
-
-    A controller responds to noise and offsets of its sensors too. Noise of an instant moves no car, and an offset acts
-    the same straight ahead. Both angles are therefore largest magnitudes of the demanded angle's mean over `MEAN_S`.
-    """
+    """Return by how much more a system turns wheels in a manoeuvre than straight ahead before it [rad]."""
+    # A controller responds to noise and offsets of its sensors too. Noise of an instant moves no car, and an offset
+    # acts the same straight ahead. Both angles are therefore largest magnitudes of the demanded angle's mean over
+    # `MEAN_S`.
     step_s, values = timestep(recording.time_s), recording[demand]
     ahead = np.abs(_means(values[straight_ahead(recording)], step_s))
     return float(np.abs(_means(values, step_s)).max() - ahead.max(initial=0.0))

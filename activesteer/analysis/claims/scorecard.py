@@ -132,11 +132,9 @@ def scorecard(
     population: Population | None = None,
     setting: str = LITERATURE,
 ) -> Scorecard:
-    """Judge claims with the vehicle's list of claims that are not reproduced, and its stored population.
-
-    `known`, number -> reason, replaces the list, and `population` the stored one. The paper's setting has a list of its
-    own and no population.
-    """
+    """Judge claims with the vehicle's list of claims that are not reproduced, and its stored population."""
+    # `known`, number -> reason, replaces the list, and `population` the stored one. The paper's setting has a list of
+    # its own and no population.
     if setting == PAPER:
         known, vehicle = read_setting(PAPER).fails, ""
     reasons = not_reproduced(vehicle) if known is None else known

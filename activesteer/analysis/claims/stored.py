@@ -107,12 +107,10 @@ def setting_of(recording: RecordingLike) -> str:
 
 
 def claims_for(recording: RecordingLike) -> Scenario | None:
-    """Return the scenario that checks the paper's claims about the manoeuvre of a run, or None if it has none.
-
-    The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a user's step steer is a step
-    steer. The paper has no claims about a manoeuvre with other settings, except those of `setting_of`; any car and any
-    duration are judged.
-    """
+    """Return the scenario that checks the paper's claims about the manoeuvre of a run, or None if it has none."""
+    # The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a user's step steer is a
+    # step steer. The paper has no claims about a manoeuvre with other settings, except those of `setting_of`; any car
+    # and any duration are judged.
     maneuver, vehicle = recording.metadata.get("maneuver"), recording.metadata.get("vehicle")
     if not isinstance(maneuver, Mapping):
         return None

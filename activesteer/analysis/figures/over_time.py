@@ -93,10 +93,8 @@ def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
 
 
 def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> None:
-    """Keep the scale of the cars that do not spin, and draw all cars over the whole time in an inset.
-
-    The inset stands in the corner that the curves leave free.
-    """
+    """Keep the scale of the cars that do not spin, and draw all cars over the whole time in an inset."""
+    # The inset stands in the corner that the curves leave free.
     kept = [curve for curve in drawn if not curve.lost]
     if len(kept) in (0, len(drawn)) or panel is PANELS["added"]:
         return
@@ -141,10 +139,8 @@ def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> Non
 
 
 def mark_phases(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Draw the borders of the manoeuvre's phases, with their names above the first axis.
-
-    Runs that reach a border at different times have their own lines. The figure is as wide as a column.
-    """
+    """Draw the borders of the manoeuvre's phases, with their names above the first axis."""
+    # Runs that reach a border at different times have their own lines. The figure is as wide as a column.
     listed = [[e for e in events_of(curve.recording.metadata) if e.kind == "phase"] for curve in drawn]
     left, right = axes[0].get_xlim()
     for curve, events in zip(drawn, listed, strict=True):

@@ -148,10 +148,8 @@ def plain(axis: Axes, title: str = "") -> None:
 
 
 def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, LineStyle]] = ()) -> None:
-    """Draw the legend of the runs above all axes, with further kinds of line by text, width and style.
-
-    Angles added in front, places with another friction and bands of the population get an entry if they are drawn.
-    """
+    """Draw the legend of the runs above all axes, with further kinds of line by text, width and style."""
+    # Angles added in front, places with another friction and bands of the population get an entry if they are drawn.
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Patch  # noqa: PLC0415
 

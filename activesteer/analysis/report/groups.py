@@ -26,10 +26,8 @@ class Judgement(NamedTuple):
 
 
 def judge(group: Group) -> Judgement:
-    """Check the paper's claims about the runs of a group.
-
-    The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
-    """
+    """Check the paper's claims about the runs of a group."""
+    # The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
     nothing = scorecard([], known={})
     recordings = group.by_name()
     check = claims_for(group.runs[0].recording)
