@@ -47,15 +47,15 @@ class FrequencyResponse(NamedTuple):
         coherence: Coherence, 0 to 1, shape (n,).
     """
 
-    frequency_Hz: NDArray[np.float64]
+    frequency_Hz: Array
     response: NDArray[np.complex128]
-    coherence: NDArray[np.float64]
+    coherence: Array
 
 
 def frequency_response(
     recording: RecordingLike,
     output: str,
-    frequency_Hz: NDArray[np.float64],
+    frequency_Hz: Array,
 ) -> FrequencyResponse:
     """Return the response of a channel to the steering.
 
@@ -87,28 +87,13 @@ def frequency_response(
     power_u = (np.abs(u[band]) ** 2).sum(axis=1)
     power_y = (np.abs(y[band]) ** 2).sum(axis=1)
     cross = (u[band].conj() * y[band]).sum(axis=1)
-    return response_of(lines_Hz[places], power_u, power_y, cross, float((np.abs(u) ** 2).max()))
+    return _response_of(lines_Hz[places], power_u, power_y, cross, float((np.abs(u) ** 2).max()))
 
 
-def response_of(
-    frequency_Hz: NDArray[np.float64],
-    power_u: NDArray[np.float64],
-    power_y: NDArray[np.float64],
-    cross: NDArray[np.complex128],
-    largest: float,
+def _response_of(
+    frequency_Hz: Array, power_u: Array, power_y: Array, cross: NDArray[np.complex128], largest: float
 ) -> FrequencyResponse:
-    """Return the estimate H1 and the coherence.
-
-    Args:
-        frequency_Hz: Frequencies [Hz], shape (n,).
-        power_u: Power of the input there, shape (n,).
-        power_y: Power of the output, in the same measure, shape (n,).
-        cross: Cross spectrum, the conjugate input times the output, shape (n,).
-        largest: Largest power of the input at any frequency.
-
-    Raises:
-        RecordingError: the input does not contain a frequency.
-    """
+    """Return the estimate H1 and the coherence from powers of input and output and their cross spectrum."""
     missing = ~(power_u > MIN_SPECTRUM**2 * largest)
     if missing.any():
         raise RecordingError(
@@ -157,7 +142,7 @@ def frequency_response_metrics(recording: RecordingLike) -> dict[str, float]:
     return values
 
 
-def _falls_to(x: NDArray[np.float64], y: NDArray[np.float64], level: float) -> float:
+def _falls_to(x: Array, y: Array, level: float) -> float:
     """Return the first abscissa at which y falls to a level, interpolated, or nan if it never does."""
     below = np.flatnonzero((y[1:] <= level) & (y[:-1] > level))
     if below.size == 0:
@@ -223,7 +208,7 @@ def random_response(
     lines_Hz = np.asarray(np.fft.rfftfreq(length, step_s), dtype=np.float64)
     inside = (lines_Hz >= lowest_Hz - 1e-9) & (lines_Hz <= highest_Hz + 1e-9)
     largest = float(power_u.max())
-    found = response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], largest)
+    found = _response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], largest)
     with np.errstate(divide="ignore"):
         error = np.sqrt(0.5 * np.maximum(1.0 / found.coherence - 1.0, 0.0) / averages)
     return RandomResponse(found, error, averages)

@@ -15,22 +15,8 @@ from activesteer.analysis.metrics import metrics
 from activesteer.config import Range, build, field_in_unit, read_toml
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError, nearest_names, shown
+from activesteer.measured import signals
 from activesteer.measured.columns import Column, find, read_columns, second_of
-from activesteer.measured.signals import (
-    TURNED_IN_SAE,
-    Known,
-    Samples,
-    bracketed,
-    is_time,
-    known_column,
-    moved_car,
-    resampled,
-    samples,
-    split_unit,
-    suspicions,
-    with_motion,
-    written_unit,
-)
 from activesteer.recording import Recording
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
@@ -102,7 +88,7 @@ class _Source(NamedTuple):
     """Source of a channel."""
 
     column: Column
-    known: Known
+    known: signals.Known
     given: ChannelMap | None
     file: Path
 
@@ -132,13 +118,13 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
         notes.append(f"{len(repeated) - _MOST_REPEATED} more names stand over several columns each")
     sources = _mapped(chosen, files, table) if chosen.channels else _by_name(files, table, notes)
     shared = _shared_times(files, chosen, sources)
-    signals = {name: _signal(name, source, shared[source.file], chosen) for name, source in sources.items()}
-    grid_s, step_s = _grid(signals, chosen, path)
+    sampled = {name: _signal(name, source, shared[source.file], chosen) for name, source in sources.items()}
+    grid_s, step_s = _grid(sampled, chosen, path)
     start_s = float(grid_s[0])
     if start_s != 0.0:
         notes.append(f"the time begins at {start_s:.12g} s in the file and at 0 here")
     values = {}
-    for name, signal in signals.items():
+    for name, signal in sampled.items():
         # A slow signal has long steps between its samples.
         longest_s = max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal.time_s))))
         before_s, after_s = signal.time_s[:-1], signal.time_s[1:]
@@ -150,16 +136,16 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
                 "it off with start_s and end_s",
                 file=path.name, key=name, value=(begin, end),
             )  # fmt: skip
-        values[name] = resampled(signal, grid_s)
-        if chosen.axes == "sae_j670" and name in TURNED_IN_SAE:
+        values[name] = signals.resampled(signal, grid_s)
+        if chosen.axes == "sae_j670" and name in signals.TURNED_IN_SAE:
             values[name] = -values[name]
     taken = {}
     for name, source in sources.items():  # many names contain the unit
         column, unit = source.column.name, source.known.unit or "-"
-        taken[name] = column if split_unit(column)[1] == unit else f"{column} [{unit}]"
-    notes += suspicions(values, step_s)
+        taken[name] = column if signals.split_unit(column)[1] == unit else f"{column} [{unit}]"
+    notes += signals.suspicions(values, step_s)
     time_s: Array = np.arange(len(grid_s), dtype=np.float64) * step_s
-    derived = with_motion(time_s, values)
+    derived = signals.with_motion(time_s, values)
     channels = [_channel(name, table, taken) for name in derived]
     metadata: dict[str, Any] = {
         "maneuver": {"name": path.stem, "kind": chosen.kind, "title": chosen.title or f"measured: {path.name}"},
@@ -174,7 +160,7 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
     attachments = {} if map_path is None else {map_path.name: map_path.read_bytes()}
     recording = Recording(
         channels, time_s, np.column_stack(list(derived.values())), metadata=metadata, attachments=attachments,
-        poses=moved_car(model, time_s, derived), scene=scene_of(model.model),
+        poses=signals.moved_car(model, time_s, derived), scene=scene_of(model.model),
     )  # fmt: skip
     try:
         recording.metrics.update(metrics(recording))
@@ -201,7 +187,7 @@ def _mapped(chosen: MeasurementMap, files: _Files, table: Collection[str]) -> di
             problem = f"is a channel in another unit; name it {channel} and give `unit`"
             raise RecordingError(problem, key=f"channels.{name}")
         column, file = _found(given.column, files)
-        known = Known(name, given.unit or column.unit or unit_of(name), given.sign * given.factor)
+        known = signals.Known(name, given.unit or column.unit or unit_of(name), given.sign * given.factor)
         sources[name] = _Source(column, known, given, file)
     return sources
 
@@ -213,9 +199,10 @@ def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[st
     channels = [*table, "brake_pedal"]
     sources: dict[str, _Source] = {}
     for path, column in every:
-        known = known_column(column.name, names, channels)
+        known = signals.known_column(column.name, names, channels)
         if known is None:
-            if (base := bracketed(column.name)[0]) != column.name and known_column(base, names, channels) is not None:
+            base = signals.bracketed(column.name)[0]
+            if base != column.name and signals.known_column(base, names, channels) is not None:
                 known_units = ", ".join(UNIT_NAMES)
                 notes.append(f"{shown(column.name)} is left out: its unit is unknown; known are {known_units}")
             continue
@@ -252,14 +239,14 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
     if chosen.time and named:
         column = find(columns, chosen.time, path)
     else:
-        times = [column for column in columns if is_time(column.name)]
+        times = [column for column in columns if signals.is_time(column.name)]
         if len(times) != 1:
             what = "no column is named like a time" if not times else "several columns are named like times"
             words = nearest_names("time", [column.name for column in columns])
             raise RecordingError(f"{what}: {words}; name it in a map: time = NAME", file=path.name)
         column = times[0]
     unit = chosen.time_unit or column.unit or known_time_unit(column.name)
-    found = written_unit(unit)
+    found = signals.written_unit(unit)
     if found is None or not alike(found, find_unit("s")):
         raise RecordingError(f"the time has the unit {shown(unit)}; known are s, ms, us", file=path.name, value=unit)
     return _plausible(column.read()[0] * found.factor, column.name, path)
@@ -271,10 +258,10 @@ def known_time_unit(name: str) -> str:
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 
 
-def _signal(name: str, source: _Source, shared: Array | None, chosen: MeasurementMap) -> Samples:
+def _signal(name: str, source: _Source, shared: Array | None, chosen: MeasurementMap) -> signals.Samples:
     """Return the samples of a channel, in SI units and with the signs of ISO 8855."""
     column, known, given, path = source
-    found, wanted = written_unit(known.unit), unit_of(name)
+    found, wanted = signals.written_unit(known.unit), unit_of(name)
     if found is None or not alike(found, find_unit(wanted)):
         raise RecordingError(
             f"{name} is in {wanted or 'pure numbers'}, and {shown(column.name)} in {shown(known.unit)}; "
@@ -285,7 +272,7 @@ def _signal(name: str, source: _Source, shared: Array | None, chosen: Measuremen
     time_s = own if own is not None else shared
     assert time_s is not None
     shift_s = chosen.shift_s.get(path.name, 0.0)
-    signal = samples(column.name, np.asarray(time_s, np.float64) + shift_s, values, path.name)
+    signal = signals.samples(column.name, np.asarray(time_s, np.float64) + shift_s, values, path.name)
     inside = np.ones(len(signal.time_s), bool)
     if chosen.start_s is not None:
         inside &= signal.time_s >= chosen.start_s
@@ -303,7 +290,7 @@ def _signal(name: str, source: _Source, shared: Array | None, chosen: Measuremen
                     f"{column.name} starts at {time_s[0]:g} s, after zero_until_s", key=f"channels.{name}.zero_until_s"
                 )
             values = values - values[early].mean()
-    return Samples(time_s, _plausible(values * (known.sign * found.factor), column.name, path))
+    return signals.Samples(time_s, _plausible(values * (known.sign * found.factor), column.name, path))
 
 
 def _plausible(values: Array, column: str, path: Path) -> Array:
@@ -312,11 +299,11 @@ def _plausible(values: Array, column: str, path: Path) -> Array:
     return values
 
 
-def _grid(signals: Mapping[str, Samples], chosen: MeasurementMap, path: Path) -> tuple[Array, float]:
+def _grid(sampled: Mapping[str, signals.Samples], chosen: MeasurementMap, path: Path) -> tuple[Array, float]:
     """Return times of the file at which all signals exist, and their step: that of the fastest signal."""
-    start = max(float(signal.time_s[0]) for signal in signals.values())
-    end = min(float(signal.time_s[-1]) for signal in signals.values())
-    step = chosen.step_s or min(float(np.median(np.diff(signal.time_s))) for signal in signals.values())
+    start = max(float(signal.time_s[0]) for signal in sampled.values())
+    end = min(float(signal.time_s[-1]) for signal in sampled.values())
+    step = chosen.step_s or min(float(np.median(np.diff(signal.time_s))) for signal in sampled.values())
     # A calendar time of 1.7e9 s resolves 0.2 us; the step is rounded to what the clock resolves.
     step = round(step, min(9, math.floor(-math.log10(8.0 * np.spacing(max(abs(start), abs(end), 1e-9))))))
     if step <= 0.0 or end - start < step:
