@@ -23,6 +23,8 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from activesteer.analysis.harm import changes, severity
 from activesteer.config import Source, field_in_unit
 from activesteer.errors import nearest_names, shown
@@ -77,13 +79,7 @@ _Number = Callable[[Runs], float]
 
 
 class Expression:
-    """A number over the metrics of runs.
-
-    Attributes:
-        text: The expression as text.
-        metrics: The metrics that it reads, each with its run.
-        comparisons: Left side, sign and right side of each comparison of a requirement.
-    """
+    """A number over the metrics of runs. `metrics` has those that it reads, each with its run."""
 
     wanted = "a sum of metrics such as yaw_rate_overshoot(ars) is needed"
 
@@ -91,7 +87,6 @@ class Expression:
         """Read an expression. Errors name its place in the source."""
         self.text, self._names = text, names
         self.metrics: dict[tuple[str, EvaluatedRun], None] = {}
-        self.comparisons: list[tuple[_Number, str, _Number]] = []
         self._fail = lambda problem: source.fail(where, f"{problem} in {shown(self.text)}", text)
         if len(text) > _LONGEST:
             raise source.fail(where, f"has {len(text)} characters; at most {_LONGEST} are allowed")
@@ -190,7 +185,6 @@ class Requirement(Expression):
     def _comparison(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> _Number:
         """Return the margin. The limit is the side without a metric, or else the right one."""
         one, other = self._number(left), self._number(right)
-        self.comparisons.append((one, _SIGNS[type(sign)], other))
         less, more = (one, other) if isinstance(sign, (ast.Lt, ast.LtE)) else (other, one)
         limit = other if any(isinstance(part, ast.Call) for part in ast.walk(left)) else one
         at_limit = -_TINY if isinstance(sign, (ast.Lt, ast.Gt)) else 0.0
@@ -222,24 +216,17 @@ def _ratio(one: float, other: float) -> float:
     return math.copysign(math.inf, one) if one else math.nan
 
 
-def least(values: Sequence[float]) -> float:
-    """Return the smallest value, or nan if one is not defined."""
-    return math.nan if any(map(math.isnan, values)) else min(values)
-
-
 def _all(margins: Sequence[float]) -> float:
     """Return the smallest margin, or nan if one is not defined and no other is negative."""
     known = [margin for margin in margins if not math.isnan(margin)]
     return min(known) if len(known) == len(margins) or min(known, default=0.0) < 0.0 else math.nan
 
 
-def _largest(values: Sequence[float]) -> float:
-    return math.nan if any(map(math.isnan, values)) else max(values)
-
-
 _FUNCTIONS: Final[dict[str, Callable[[Sequence[float]], float]]] = {
-    "min": least, "max": _largest, "abs": lambda values: abs(values[0]),
+    "min": lambda values: float(np.min(values)), "max": lambda values: float(np.max(values)),
+    "abs": lambda values: abs(values[0]),
 }  # fmt: skip
+"""The smallest and the largest value are nan if one of the values is."""
 _OPERATORS: Final[dict[type, Callable[[float, float], float]]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: _ratio,
 }  # fmt: skip

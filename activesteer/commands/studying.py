@@ -17,7 +17,6 @@ from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
 
 if TYPE_CHECKING:
-    from activesteer.measured.fitting import FitProgress
     from activesteer.studies.engine.tuning import Trial, Tuning
 
 command: Final = arguments.Group("study")
@@ -233,9 +232,9 @@ def _fit(options: argparse.Namespace) -> bool:
 
     with terminal.Progress("fit", quiet=options.json) as bar:
 
-        def progress(here: FitProgress) -> None:
-            so_far = "" if math.isnan(here.misfit) else f", differences {here.misfit:.3g} times the noise"
-            bar(here.done / here.total, f"round {here.round}, {here.done}/{here.total} runs{so_far}")
+        def progress(number: int, done: int, total: int, misfit: float) -> None:
+            so_far = "" if math.isnan(misfit) else f", differences {misfit:.3g} times the noise"
+            bar(done / total, f"round {number}, {done}/{total} runs{so_far}")
 
         found = fit(options.study, jobs=options.jobs, scheduler=options.scheduler, progress=progress)
     name = Path(options.study).stem

@@ -234,13 +234,9 @@ SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1
 would attribute to the car."""
 
 
-class FitProgress(NamedTuple):
-    """Progress of a fit."""
-
-    round: int  # number of the parameter set that is tried with its derivatives
-    done: int  # finished runs of this round
-    total: int  # runs of this round
-    misfit: float  # rms of all differences relative to their noise, of the best set so far; nan before the first
+FitProgress = Callable[[int, int, int, float], None]
+"""Function that is told the number of the tried set, its finished runs and all its runs, and the least misfit so far
+(nan before the first)."""
 
 
 def fit(
@@ -248,13 +244,13 @@ def fit(
     *,
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[FitProgress], None] | None = None,
+    progress: FitProgress = lambda *_: None,
 ) -> Fit:
     """Find values of factors for which the car, driven by recorded inputs, matches recordings best."""
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, problem.settings)
-        found = search(problem.answers_by(workers, progress or (lambda _: None)), problem.start, problem.check)
+        found = search(problem.answers_by(workers, progress), problem.start, problem.check)
     return problem.result(found)
 
 
@@ -295,9 +291,7 @@ class _Problem:
         values = self._low + (self._high - self._low) * place
         return dict(zip(self._study.keys, values.tolist(), strict=True))
 
-    def answers_by(
-        self, workers: Workers, progress: Callable[[FitProgress], None]
-    ) -> Callable[[list[Array]], list[Answer]]:
+    def answers_by(self, workers: Workers, progress: FitProgress) -> Callable[[list[Array]], list[Answer]]:
         """Return a function that drives sets of parameters: each set in each recording, spread over workers."""
         rounds, best = 0, math.nan
 
@@ -315,7 +309,7 @@ class _Problem:
             for outcome in queue.outcomes():
                 driven[outcome.key] = outcome.result()
                 self.runs += 1
-                progress(FitProgress(rounds, len(driven), total, best))
+                progress(rounds, len(driven), total, best)
             found = [self._answer([driven[number, each] for each in range(len(self._measured))])
                      for number in range(len(places))]  # fmt: skip
             if not isinstance(found[0], str):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -12,8 +12,8 @@ from markupsafe import Markup
 from activesteer.conventions import RUN_COLOURS, Array
 from activesteer.measured.circle import CircleValidation
 from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
-from activesteer.measured.fit_result import Fit, correlation_table, parameter_table, rests_on
-from activesteer.measured.folder import Band, MeasuredValidation, Part
+from activesteer.measured.fit_result import correlation_table, parameter_table, rests_on
+from activesteer.measured.folder import MeasuredValidation, Part
 from activesteer.measured.folder_file import STEERING
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Area, Curve, Panel, Picture
@@ -123,63 +123,44 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
         verdict + f" quantities of the {stage} keep their tolerance in the check windows, which no fit has seen."
     ]
     sections: list[Section] = []
-    for name, found in _stages(result):
+    stages = {"predicted": result.predicted} | ({} if result.fitted is None else {"fitted": result.fitted})
+    for name, found in stages.items():
         shown = [one for one in result.parts if one.stage == name]
         outside = frozenset(number for number, one in enumerate(shown) if not one.compared.inside)
-        tables = [Table("", _HEAD, [_row(one) for one in shown], outside)]
+        tables = [Table("", _HEAD, [(one.run, one.part, *words(one.compared)) for one in shown], outside)]
         if found is not None:
             tables.append(parameter_table(found))
             if len(found.parameters) > 1:
                 tables.append(correlation_table(found))
         pictures = [_picture(result, one) for one in shown if one.part == "check"]
-        notes, points = ([], []) if found is None else ([f"! {note}" for note in found.notes], rests_on(found))
-        sections.append(Section(name.capitalize(), [_free(found), *notes], pictures, tables, points))
+        lines, points = ["no value comes from the data"], []
+        if found is not None:
+            free = f"free in the fit windows: {', '.join(one.key for one in found.parameters)}"
+            lines, points = [free, *(f"! {note}" for note in found.notes)], rests_on(found)
+        sections.append(Section(name.capitalize(), lines, pictures, tables, points))
     if result.bands:
         text = (
             "The band contains the prediction with each value at either end of its interval. Before that, the free "
             "factors of the prediction are found again. Effects of several intervals add up."
         )
-        bands = Table(
-            "", ["run", "quantity", "mean width", "measured inside"], [_band_row(one) for one in result.bands]
-        )
-        ends = Table("", ["interval", "rms change of the prediction"], _end_rows(result))
-        sections.append(Section("Band of the intervals", [text], tables=[bands, ends]))
+        widths, ends = [], []
+        for band in result.bands:
+            shown = quantity_of(band.part.compared.channel)
+            width = f"{shown.factor * band.width:.3g} {shown.unit.name} wide"
+            inside = f"{100.0 * band.share_inside:.1f} % of the measured samples inside"
+            widths.append((band.part.run, shown.label, width, inside))
+        for end in result.ends:
+            quantities = [(quantity_of(channel), value) for channel, value in end.effect.items()]
+            effects = [f"{one.label} {one.factor * value:.2g} {one.unit.name}" for one, value in quantities]
+            ends.append((f"{end.key} {end.ends[0]:g} to {end.ends[1]:g}", f"{', '.join(effects)} ({end.source})"))
+        tables = [
+            Table("", ["run", "quantity", "mean width", "measured inside"], widths),
+            Table("", ["interval", "rms change of the prediction"], ends),
+        ]
+        sections.append(Section("Band of the intervals", [text], tables=tables))
     if result.notes:
         sections.append(Section("Notes of the import", points=result.notes))
     return lead, sections
-
-
-def _stages(result: MeasuredValidation) -> Iterator[tuple[str, Fit | None]]:
-    yield "predicted", result.predicted
-    if result.fitted is not None:
-        yield "fitted", result.fitted
-
-
-def _free(found: Fit | None) -> str:
-    if found is None:
-        return "no value comes from the data"
-    return f"free in the fit windows: {', '.join(one.key for one in found.parameters)}"
-
-
-def _row(one: Part) -> tuple[str, ...]:
-    return one.run, one.part, *words(one.compared)
-
-
-def _band_row(band: Band) -> tuple[str, str, str, str]:
-    shown = quantity_of(band.part.compared.channel)
-    width = f"{shown.factor * band.width:.3g} {shown.unit.name} wide"
-    return band.part.run, shown.label, width, f"{100.0 * band.share_inside:.1f} % of the measured samples inside"
-
-
-def _end_rows(result: MeasuredValidation) -> list[tuple[str, str]]:
-    rows = []
-    for end in result.ends:
-        effects = []
-        for channel, value in end.effect.items():
-            shown = quantity_of(channel)
-            effects.append(f"{shown.label} {shown.factor * value:.2g} {shown.unit.name}")
-        rows.append((f"{end.key} {end.ends[0]:g} to {end.ends[1]:g}", f"{', '.join(effects)} ({end.source})"))
-    return rows
 
 
 def _picture(result: MeasuredValidation, one: Part) -> Picture:
