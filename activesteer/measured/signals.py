@@ -6,26 +6,21 @@ import itertools
 import math
 import re
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.config import field_in_unit
+from activesteer.config import field_in_unit, read_toml
 from activesteer.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.recording import Poses, Recording
 from activesteer.units import Unit, find_unit, known_unit, unit_of
 from activesteer.vehicle import Vehicle
 
-TIME_WORDS: Final = frozenset({"time", "times", "t", "zeit", "timestamp", "timestamps", "tstamp", "tstart"})
-
-TURNED_IN_SAE: Final = (
-    "y_m", "z_m", "yaw_rad", "pitch_rad", "vy_mps", "vz_mps", "yaw_rate_radps", "pitch_rate_radps", "ay_mps2",
-    "az_mps2", "sideslip_rad", "steering_wheel_rad", "steering_wheel_demand_rad", "hand_torque_Nm", "front_steer_rad",
-    "rear_steer_rad", "superposition_rad", "rack_m", "front_axle_y_m",
-)  # fmt: skip
-"""Channels that are positive to the left or upwards here, and to the right or downwards in the axes of SAE J670 (x
-forward, y right, z down): all except those along or about x."""
+_NAMES: Final = read_toml(Path(__file__).with_name("names.toml"), RecordingError)[0]
+TURNED_IN_SAE: Final = frozenset(_NAMES["turned_in_sae_j670"])
+_BY_WORD: Final = {word: channel for channel, words in _NAMES["words"].items() for word in words.split()}
 
 
 class Known(NamedTuple):
@@ -35,48 +30,6 @@ class Known(NamedTuple):
     unit: str = ""  # unit, if the file states none
     sign: float = 1.0  # -1 if the exporter uses the sign opposite to ISO 8855
     sure: bool = True  # whether the unit is the exporter's; otherwise SI is assumed
-
-
-_WORDS: Final = {
-    "steering_wheel_rad": "steeringwheelangle steerwheelangle swa handwheelangle lenkradwinkel lwi lws steeringangle "
-    "lenkwinkel deltah",
-    "yaw_rate_radps": "yawrate yawvelocity gierrate giergeschwindigkeit psidot psip angularratez gyroz r",
-    "ay_mps2": "lateralacceleration latacc lateralacc querbeschleunigung accy accely ay",
-    "ax_mps2": "longitudinalacceleration longacc laengsbeschleunigung längsbeschleunigung accx accelx ax",
-    "speed_mps": "speed velocity vehiclespeed vehspeed geschwindigkeit fahrgeschwindigkeit v vehv",
-    "vx_mps": "vx longitudinalvelocity velforward",
-    "vy_mps": "vy lateralvelocity vellateral",
-    "sideslip_rad": "sideslip sideslipangle schwimmwinkel beta slipangle",
-    "roll_rad": "roll rollangle wankwinkel phi",
-    "pitch_rad": "pitch pitchangle nickwinkel theta",
-    "yaw_rad": "yaw yawangle heading gierwinkel psi",
-    "x_m": "x posx positionx", "y_m": "y posy positiony",
-    "hand_torque_Nm": "steeringwheeltorque handtorque lenkmoment",
-    "brake_pedal": "brakepedal brakepedalposition bremspedal",
-}  # fmt: skip
-_BY_WORD: Final = {word: channel for channel, words in _WORDS.items() for word in words.split()}
-
-_EXPORTERS: Final[tuple[tuple[str, dict[str, str]], ...]] = (
-    # IPG CarMaker writes SI and ISO 8855.
-    ("Car.YawRate", {
-        "Steer.WhlAng": "steering_wheel_rad", "Driver.Steer.Ang": "steering_wheel_rad", "Car.YawRate": "yaw_rate_radps",
-        "Car.ay": "ay_mps2", "Car.ax": "ax_mps2", "Car.v": "speed_mps", "Car.Roll": "roll_rad",
-        "Car.Pitch": "pitch_rad", "Car.Yaw": "yaw_rad", "Car.SideSlipAngle": "sideslip_rad", "Car.tx": "x_m",
-        "Car.ty": "y_m",
-    }),
-    # Mechanical Simulation CarSim: degrees, km/h and g, ISO 8855.
-    ("AVz", {
-        "Steer_SW": "steering_wheel_deg", "AVz": "yaw_rate_degps", "Ay": "ay_g", "Ax": "ax_g", "Vx": "vx_kmh",
-        "Vy": "vy_kmh", "Beta": "sideslip_deg", "Roll": "roll_deg", "Pitch": "pitch_deg", "Yaw": "yaw_deg",
-        "Xcg_TM": "x_m", "Ycg_TM": "y_m",
-    }),
-    # Runs of Project Chrono, as the tests compare them: SI, and a rack that steers right.
-    ("delta_FL", {
-        "rack": "-rack_m", "vx": "vx_mps", "vy": "vy_mps", "r": "yaw_rate_radps", "ax": "ax_mps2", "ay": "ay_mps2",
-        "beta": "sideslip_rad", "roll": "roll_rad", "pitch": "pitch_rad", "x": "x_m", "y": "y_m", "psi": "yaw_rad",
-    }),
-)  # fmt: skip
-"""Name that identifies an exporter, and its names: the channel of each with its unit, and a minus if it is turned."""
 
 
 def written_unit(unit: str) -> Unit | None:
@@ -98,12 +51,12 @@ def split_unit(name: str) -> tuple[str, str]:
 
 def is_time(name: str) -> bool:
     """Return whether a column is named like a time."""
-    return name == "time_s" or _word(split_unit(name)[0]) in TIME_WORDS
+    return name == "time_s" or _word(split_unit(name)[0]) in _NAMES["time"].split()
 
 
 def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> Known | None:
     """Return the meaning of a column by its name, the names of all columns and the channels of a car, or None."""
-    for mark, names in _EXPORTERS:
+    for mark, names in _NAMES["exporters"].items():
         if mark in columns and name in names:
             key = names[name].lstrip("-")
             channel = field_in_unit(key, channels)[0]
