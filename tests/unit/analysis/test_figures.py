@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.analysis import figures
 from activesteer.analysis.figures import (
     BY_KIND,
     BY_SCENARIO,
@@ -16,7 +17,6 @@ from activesteer.analysis.figures import (
     figure_for,
     over_time,
     style,
-    theory,
     tracks,
 )
 from activesteer.conventions import run_looks
@@ -125,8 +125,8 @@ def test_curves_are_told_apart_in_grey_by_their_dashes(draw):
         lambda: BY_KIND["sine_with_dwell"](sines()),
         lambda: tracks.overview(lane_changes()),
         lambda: tracks.course_figure(lane_changes()),
-        lambda: theory.figure_7(step_steer()),
-        lambda: theory.figure_9(step_steer()),
+        lambda: figures.figure_7(step_steer()),
+        lambda: figures.figure_9(step_steer()),
     ],
 )
 def test_every_text_is_of_8_points_in_a_figure_as_wide_as_a_column_or_a_page(draw):
@@ -222,7 +222,7 @@ def test_a_path_without_gates_can_be_drawn(tmp_path):
 
 
 def test_figure_7_shows_the_predicted_angle_and_how_much_of_it_is_used():
-    axis = theory.figure_7(step_steer()).get_axes()[0]
+    axis = figures.figure_7(step_steer()).get_axes()[0]
     speed_kmh = np.asarray(axis.get_lines()[1].get_xdata())
     predicted, used = (np.asarray(line.get_ydata()) for line in axis.get_lines()[1:3])
     single_track = SingleTrack(SingleTrackParameters(**VEHICLE["single_track"]))
@@ -232,7 +232,7 @@ def test_figure_7_shows_the_predicted_angle_and_how_much_of_it_is_used():
 
 
 def test_figure_9_shows_the_tolerance_function_of_the_controllers():
-    line = theory.figure_9(step_steer()).get_axes()[0].get_lines()[0]
+    line = figures.figure_9(step_steer()).get_axes()[0].get_lines()[0]
     errors = np.radians(np.asarray(line.get_xdata()))
     np.testing.assert_allclose(
         np.asarray(line.get_ydata()), [tolerance(error, 0.002, 0.005) for error in errors], atol=1e-9
@@ -242,12 +242,12 @@ def test_figure_9_shows_the_tolerance_function_of_the_controllers():
 @pytest.mark.parametrize(
     ("draw", "keys", "value"),
     [
-        (theory.figure_7, ("single_track", "mass_kg"), "heavy"),
-        (theory.figure_7, ("single_track", "mass_kg"), -1.0),
-        (theory.figure_7, ("single_track", "rear_stiffness_Nprad"), 1.0),  # a car that oversteers
-        (theory.figure_7, ("controllers", "ars", "prediction_gain"), "all"),
-        (theory.figure_9, ("controllers", "afs", "corrector", "deadband_start_radps"), math.nan),
-        (theory.figure_9, ("controllers", "afs", "corrector"), [0.1, 0.2]),
+        (figures.figure_7, ("single_track", "mass_kg"), "heavy"),
+        (figures.figure_7, ("single_track", "mass_kg"), -1.0),
+        (figures.figure_7, ("single_track", "rear_stiffness_Nprad"), 1.0),  # a car that oversteers
+        (figures.figure_7, ("controllers", "ars", "prediction_gain"), "all"),
+        (figures.figure_9, ("controllers", "afs", "corrector", "deadband_start_radps"), math.nan),
+        (figures.figure_9, ("controllers", "afs", "corrector"), [0.1, 0.2]),
     ],
 )
 def test_damaged_parameters_are_refused(draw, keys, value):
@@ -262,7 +262,7 @@ def test_damaged_parameters_are_refused(draw, keys, value):
 
 
 @pytest.mark.parametrize(
-    ("draw", "key"), [(theory.figure_7, "single_track"), (theory.figure_9, "controllers.ars.corrector")]
+    ("draw", "key"), [(figures.figure_7, "single_track"), (figures.figure_9, "controllers.ars.corrector")]
 )
 def test_missing_parameters_are_named(draw, key):
     run = step_steer()
