@@ -22,8 +22,8 @@ import tempfile
 from pathlib import Path
 from typing import Any, Final
 
-from activesteer.analysis.claims import stored as setting_file
-from activesteer.analysis.claims.stored import PAPER, Number, Setting, read_setting
+from activesteer.analysis.claims import scorecard as setting_file
+from activesteer.analysis.claims.scorecard import PAPER, Number, Setting, read_setting
 from activesteer.config import toml_value
 from activesteer.resources import find_study
 from activesteer.studies.engine.factor_values import FactorValues, Prior, label_of

@@ -16,7 +16,7 @@ import numpy as np
 import pyarrow as pa
 
 from activesteer.analysis.claims.judge import Claim
-from activesteer.analysis.claims.stored import NO_FACTOR, ClaimProportion, read_claims, stored_table
+from activesteer.analysis.claims.scorecard import NO_FACTOR, ClaimProportion, read_claims, stored_table
 from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity, track_harm_m
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.conventions import Array

@@ -19,7 +19,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, SYSTEMS, Claim, Kind
-from activesteer.analysis.claims.stored import BANDS, PAPER, SUMMARY, TRACK, Band, read_setting
+from activesteer.analysis.claims.scorecard import BANDS, PAPER, SUMMARY, TRACK, Band, read_setting
 from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.harm import TRACK as TRACK_MEASURES
 from activesteer.commands.terminal import Progress

@@ -19,8 +19,8 @@ import numpy as np
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, Kind
-from activesteer.analysis.claims.stored import PAPER, not_reproduced, read_setting, stored_population
-from activesteer.analysis.claims.stored import Population as StoredPopulation
+from activesteer.analysis.claims.scorecard import PAPER, not_reproduced, read_setting, stored_population
+from activesteer.analysis.claims.scorecard import Population as StoredPopulation
 from activesteer.config import Range, dataclass_in, element_of, spellings
 from activesteer.controllers import load_controller
 from activesteer.maneuver.base import Maneuver

@@ -79,7 +79,10 @@ _Number = Callable[[Runs], float]
 
 
 class Expression:
-    """A number over the metrics of runs. `metrics` has those that it reads, each with its run."""
+    """A number over the metrics of runs. `metrics` has those that it reads, each with its run.
+
+    `comparisons` has left side, sign and right side of each comparison of a requirement.
+    """
 
     wanted = "a sum of metrics such as yaw_rate_overshoot(ars) is needed"
 
@@ -87,6 +90,7 @@ class Expression:
         """Read an expression. Errors name its place in the source."""
         self.text, self._names = text, names
         self.metrics: dict[tuple[str, EvaluatedRun], None] = {}
+        self.comparisons: list[tuple[_Number, str, _Number]] = []
         self._fail = lambda problem: source.fail(where, f"{problem} in {shown(self.text)}", text)
         if len(text) > _LONGEST:
             raise source.fail(where, f"has {len(text)} characters; at most {_LONGEST} are allowed")
@@ -185,6 +189,7 @@ class Requirement(Expression):
     def _comparison(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> _Number:
         """Return the margin. The limit is the side without a metric, or else the right one."""
         one, other = self._number(left), self._number(right)
+        self.comparisons.append((one, _SIGNS[type(sign)], other))
         less, more = (one, other) if isinstance(sign, (ast.Lt, ast.LtE)) else (other, one)
         limit = other if any(isinstance(part, ast.Call) for part in ast.walk(left)) else one
         at_limit = -_TINY if isinstance(sign, (ast.Lt, ast.Gt)) else 0.0

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
-from activesteer.analysis.claims.scorecard import Scorecard, scorecard
-from activesteer.analysis.claims.stored import LITERATURE, PAPER, VEHICLE, read_setting
+from activesteer.analysis.claims.scorecard import LITERATURE, PAPER, VEHICLE, Scorecard, read_setting, scorecard
 from activesteer.analysis.figures import FORMATS, figure_2
 from activesteer.analysis.figures import draw_all as draw_runs
 from activesteer.analysis.report import write_report
@@ -81,7 +80,7 @@ def reproduce(
 
     With more than one job, the runs are made in newly started processes: a script that calls this function needs `if
     __name__ == "__main__":`. The recordings are SCENARIO-SYSTEM.mcap in the folder. The setting is `literature` or
-    `paper`, see `activesteer.analysis.claims.stored`. A failed run stops no other run; `failures` names it.
+    `paper`, see `activesteer.analysis.claims.scorecard`. A failed run stops no other run; `failures` names it.
     """
     if setting == PAPER and vehicle != VEHICLE:
         raise ParameterError(

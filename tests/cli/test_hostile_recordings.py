@@ -17,7 +17,7 @@ from mcap.records import Metadata
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
-from activesteer.analysis.claims.stored import claims_for
+from activesteer.analysis.claims.scorecard import claims_for
 from activesteer.analysis.metrics import EVALUATIONS, metrics
 from activesteer.analysis.report import report_page
 from activesteer.cli import main

@@ -8,7 +8,7 @@ import pytest
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, SYSTEMS
-from activesteer.analysis.claims.stored import PAPER, read_setting
+from activesteer.analysis.claims.scorecard import PAPER, read_setting
 from activesteer.recording import Recording
 from activesteer.studies.engine.study_file import read_study
 from tests.fakes import Fake

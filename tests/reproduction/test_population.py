@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, SYSTEMS
-from activesteer.analysis.claims.stored import TRACK, bands_of
+from activesteer.analysis.claims.scorecard import TRACK, bands_of
 from activesteer.analysis.harm import is_lost
 from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan

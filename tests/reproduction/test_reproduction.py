@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, SYSTEMS
-from activesteer.analysis.claims.stored import not_reproduced
+from activesteer.analysis.claims.scorecard import not_reproduced
 from activesteer.analysis.figures import BY_SCENARIO, OF_ANY_RUN
 from activesteer.cli import main
 from activesteer.errors import ParameterError

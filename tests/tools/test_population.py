@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from activesteer.analysis.claims.judge import SYSTEMS, Claim
-from activesteer.analysis.claims.stored import NO_FACTOR, ClaimProportion
+from activesteer.analysis.claims.scorecard import NO_FACTOR, ClaimProportion
 from activesteer.errors import StudyError
 from activesteer.metric_table import CONES_MISSED
 from activesteer.studies.engine.plan import Plan

@@ -1,8 +1,7 @@
 """The paper's statements about the three systems, as checks on recordings.
 
-`statements.toml` has a row for each statement, `judge` checks them, `stored` reads what the package stores about them,
-and `scorecard` combines verdicts and reasons. `not_reproduced.toml` has the reasons of the claims that are known not to
-be reproduced.
+`statements.toml` has a row for each statement, `judge` checks them, and `scorecard` combines verdicts with the reasons
+of `not_reproduced.toml` and with the stored population.
 
 In: recordings of the three systems.
 Out: claims with their distances, and a scorecard.

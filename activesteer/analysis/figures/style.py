@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.claims.stored import Band, bands_of
+from activesteer.analysis.claims.scorecard import Band, bands_of
 from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis import lanes
-from activesteer.analysis.claims.stored import TRACK
+from activesteer.analysis.claims.scorecard import TRACK
 from activesteer.analysis.figures import over_time, style
 from activesteer.analysis.figures.style import DrawnRun
 from activesteer.analysis.lanes import CourseView, view_of

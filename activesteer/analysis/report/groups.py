@@ -8,8 +8,15 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
-from activesteer.analysis.claims.scorecard import Scorecard, scorecard
-from activesteer.analysis.claims.stored import LITERATURE, PAPER, SETTINGS, claims_for, setting_of
+from activesteer.analysis.claims.scorecard import (
+    LITERATURE,
+    PAPER,
+    SETTINGS,
+    Scorecard,
+    claims_for,
+    scorecard,
+    setting_of,
+)
 from activesteer.analysis.harm import kept, losses
 from activesteer.conventions import RunLook, run_looks
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -84,7 +84,7 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
         facts=_facts(groups, made or date.today()),
         runs=runs,
         sections=sections,
-        verdicts=verdict_counts(cards),
+        verdicts=everything.counts,
         verdict_class=_VERDICT_CLASS,
         verdict_mark=_VERDICT_MARK,
         change_mark=_CHANGE_MARK,
@@ -304,12 +304,6 @@ class MetricRow(NamedTuple):
     name: str  # its name in words
     unit: str  # unit of the numbers
     cells: tuple[Cell, ...]  # value of the first run, then value and difference from the first run of each other run
-
-
-def verdict_counts(scorecards: Iterable[Scorecard]) -> dict[Verdict, int]:
-    """Return the number of claims by verdict, without verdicts of no claim."""
-    verdicts = [item.verdict for card in scorecards for item in card.judged]
-    return {verdict: verdicts.count(verdict) for verdict in Verdict if verdict in verdicts}
 
 
 def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS
-from activesteer.analysis.claims.stored import claims_for
+from activesteer.analysis.claims.scorecard import claims_for
 from activesteer.errors import ParameterError, RecordingError
 from tests.raising import raises
 from tests.unit.analysis.good_runs import check, failing, good, runs_of

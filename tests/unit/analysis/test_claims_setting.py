@@ -8,8 +8,15 @@ from typing import Any
 import pytest
 
 from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, Claim
-from activesteer.analysis.claims.scorecard import Verdict, scorecard
-from activesteer.analysis.claims.stored import LITERATURE, PAPER, claims_for, read_setting, setting_of
+from activesteer.analysis.claims.scorecard import (
+    LITERATURE,
+    PAPER,
+    Verdict,
+    claims_for,
+    read_setting,
+    scorecard,
+    setting_of,
+)
 from activesteer.errors import ParameterError
 from activesteer.scenario import resolve, value_of
 from activesteer.studies.reproduction import reproduce

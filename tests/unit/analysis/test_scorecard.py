@@ -8,8 +8,7 @@ import math
 import pytest
 
 from activesteer.analysis.claims.judge import Claim, Statement
-from activesteer.analysis.claims.scorecard import Verdict, scorecard
-from activesteer.analysis.claims.stored import ClaimProportion, Population, not_reproduced
+from activesteer.analysis.claims.scorecard import ClaimProportion, Population, Verdict, not_reproduced, scorecard
 from activesteer.errors import ParameterError
 from activesteer.theory.proportions import percent
 from tests.raising import raises
