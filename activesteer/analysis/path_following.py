@@ -79,8 +79,6 @@ def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
     values["steering_wheel_rate_peak_radps"] = largest_rate(wheel, step_s)
     values["steering_wheel_rate_rms_radps"] = rate_rms(wheel, step_s)
     values |= _places(recording, course)
-    if course.last_gate_x_m is None:
-        values |= _lap(recording, course)
     if maneuver_kind(recording) == "slalom":
         values |= _slalom(recording, course)
     use = np.array([recording[f"{corner}_friction_utilisation"] for corner in CORNERS], dtype=np.float64)
@@ -110,44 +108,34 @@ def _windows(recording: RecordingLike, course: Course) -> tuple[slice, slice, sl
 
 
 def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
-    """Return the metrics of the car's distances from path, lanes and cones."""
+    """Return the metrics of the car's distances from path, lanes and cones, and of a lap on a path without gates."""
     x, y = lanes.front_axle(recording)
+    lap: dict[str, float] = {}
     if course.last_gate_x_m is None:  # such a path may cross itself
         every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
-        deviation = lanes.places_along(x[::every], y[::every], course.path)[1]
+        along, deviation = lanes.places_along(x[::every], y[::every], course.path)
+        end_m = course.path.length_m + along[0]  # the front axle starts ahead of the path's beginning
+        ended = np.flatnonzero(along >= end_m)
+        lap["lap_time_s"] = math.nan
+        if len(ended) and ended[0] > 0:
+            end = slice(ended[0] - 1, ended[0] + 1)
+            lap["lap_time_s"] = float(np.interp(end_m, along[end], recording.time_s[::every][end]))
+        if course.width_m is not None:
+            room = 0.5 * np.interp(along, course.path.s_m, course.width_m) - 0.5 * read_footprint(recording).width_m
+            lap["road_overstep_m"] = float((np.abs(deviation) - room).max())
     else:
         deviation = lanes.path_distance(x, y, course.path.x_m, course.path.y_m)
     values = {"track_deviation_max_m": float(np.abs(deviation).max()), "track_deviation_rms_m": rms(deviation)}
     values["heading_end_rad"] = lanes.heading_at_end(recording, course.path.x_m, course.path.y_m)
-    if not course.lanes and not len(course.cones_m):
-        return values
-    car = read_footprint(recording)
     if course.lanes:
+        car = read_footprint(recording)
         values["lane_overstep_m"] = lanes.lane_overstep(recording, course, car)
         values["stays_in_lanes"] = float(lanes.stays_in_lanes(recording, course, car))
     if len(course.cones_m):
-        distances = lanes.cone_distances(recording, course, car)
+        distances = lanes.cone_distances(recording, course, read_footprint(recording))
         values["cones_hit"] = float(np.count_nonzero(distances <= 0.0))
         values["cone_distance_min_m"] = float(distances.min())
-    return values
-
-
-def _lap(recording: RecordingLike, course: Course) -> dict[str, float]:
-    """Return the time to the end of a path and the largest overstep of its edges, or nan for an unfinished path."""
-    every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
-    x, y, time_s = (np.asarray(values)[::every] for values in (*lanes.front_axle(recording), recording.time_s))
-    along, beside = lanes.places_along(x, y, course.path)
-    length_m = course.path.length_m
-    end_m = length_m + along[0]  # the front axle starts ahead of the path's beginning
-    ended = np.flatnonzero(along >= end_m)
-    values = {"lap_time_s": math.nan}
-    if len(ended) and ended[0] > 0:
-        end = slice(ended[0] - 1, ended[0] + 1)
-        values["lap_time_s"] = float(np.interp(end_m, along[end], time_s[end]))
-    if course.width_m is not None:
-        room = 0.5 * np.interp(along, course.path.s_m, course.width_m) - 0.5 * read_footprint(recording).width_m
-        values["road_overstep_m"] = float((np.abs(beside) - room).max())
-    return values
+    return values | lap
 
 
 def _slalom(recording: RecordingLike, course: Course) -> dict[str, float]:

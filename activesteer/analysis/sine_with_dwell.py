@@ -205,19 +205,8 @@ def _displacement(recording: RecordingLike, times: Steering) -> float:
     return times.side * ((y1 - y0) * math.cos(yaw) - (x1 - x0) * math.sin(yaw))
 
 
-def integrated_displacement(time_s: NDArray[np.floating], ay_mps2: NDArray[np.floating], begin_s: float) -> float:
-    """Return the lateral displacement 1.07 s after the beginning of steer, integrated twice from there.
-
-    Args:
-        time_s: Time of the samples [s], equidistant, shape (n,).
-        ay_mps2: Lateral acceleration of the centre of gravity, without roll and offset [m/s2], shape (n,).
-        begin_s: Beginning of steer [s].
-
-    Returns:
-        Displacement [m], left positive; nan if the run ends before.
-
-    Source: FMVSS 126, S7.11.9.
-    """
+def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> float:
+    """Return the displacement 1.07 s after the beginning of steer, integrated twice [m]; FMVSS 126, S7.11.9."""
     end_s = begin_s + DISPLACEMENT_TIME_S
     if end_s > time_s[-1]:
         return math.nan

@@ -305,10 +305,6 @@ def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole:
     }
 
 
-def _lane_metrics(recording: RecordingLike) -> dict[str, float]:
-    return {CONES_HIT: math.nan} | path_following.path_following_metrics(recording)
-
-
 def _tracks(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool) -> RunMetrics:
     course = read_course(recordings["none"])
     first_m, last_m = course.first_gate_x_m, course.last_gate_x_m
@@ -378,7 +374,11 @@ SCENARIOS: Final[dict[str, Scenario]] = {
         _added_angles,
     ),
     "double_lane_change": Scenario(
-        "double lane change", Kind.DRIVER, _ROWS["double_lane_change"], _lane_metrics, _tracks
+        "double lane change",
+        Kind.DRIVER,
+        _ROWS["double_lane_change"],
+        lambda run: {CONES_HIT: math.nan} | path_following.path_following_metrics(run),
+        _tracks,
     ),
     "slalom": Scenario("slalom", Kind.DRIVER, _ROWS["slalom"], path_following.path_following_metrics),
     "double_lane_change_low_mu": Scenario(

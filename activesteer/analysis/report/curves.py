@@ -41,14 +41,13 @@ def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[Array]:
     for line in panel.lines_in(view):
         # A run of an older version or of another program may lack the signal.
         with suppress(RecordingError):
-            values = _from_path(recording) if line.channel == PATH_DISTANCE else line.of(recording)
+            if line.channel == PATH_DISTANCE:
+                path = read_course(recording).path
+                values = path_distance(*front_axle(recording), path.x_m, path.y_m)
+            else:
+                values = line.of(recording)
             if values is not None:
                 yield values
-
-
-def _from_path(recording: Recording) -> Array:
-    path = read_course(recording).path
-    return path_distance(*front_axle(recording), path.x_m, path.y_m)
 
 
 def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
@@ -170,18 +169,12 @@ def _track(group: Group, grid: Array) -> dict[str, Any] | None:
         tracks.append(track)
     if not tracks:
         return None
-    course = next(_courses(group), None)
+    course = None
+    for run in group.runs:
+        with suppress(RecordingError):  # an open-loop manoeuvre has no course
+            course = course or read_course(run.recording)
     table = {"lanes": [], "cones": [], "path": None, "view": None} if course is None else _course(course, group)
     return {"tracks": tracks, **table}
-
-
-def _courses(group: Group) -> Iterator[Course]:
-    for run in group.runs:
-        try:
-            yield read_course(run.recording)
-        except RecordingError:
-            # An open-loop manoeuvre has no course.
-            continue
 
 
 def _course(course: Course, group: Group) -> dict[str, Any]:
