@@ -24,7 +24,6 @@ from PIL import Image
 from activesteer import ActuatorCommand, Simulation, study
 from activesteer.analysis.figures import BY_KIND, over_time, style
 from activesteer.analysis.frequency_response import frequency_response
-from activesteer.analysis.linear_plots import driver_loops_figure
 from activesteer.drawing.panels import PANELS, Line, Panel, panel_of
 from activesteer.plotting import Heat, Picture, draw, new_figure
 from activesteer.resources import list_maneuvers, models_dir
@@ -33,7 +32,7 @@ from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.runs import CLAIM
 from activesteer.studies.engine.study_file import read_study
-from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops
+from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops, driver_loops_figure
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
 from activesteer.units import DisplayUnit, quantity_of

@@ -4,7 +4,7 @@
   `handling` (ISO 4138), `sine_with_dwell` (FMVSS 126), `braking` (ISO 7975, ISO 21994,
   ISO 14512), `path_following` (lane change, slalom, any path), `general` for others.
 - `claims`: the paper's statements about the three systems, as checks, with a scorecard.
-- `tables`, `figures`, `linear_plots`: the same to be read and looked at. The figures need matplotlib
+- `tables`, `figures`: the same to be read and looked at. The figures need matplotlib
   (`pip install 'activesteer[plot]'`).
 
 In: recordings.

@@ -346,7 +346,7 @@ def _modes(options: argparse.Namespace) -> None:
     modes, figures = car.modes(), []
     label = f"{speeds_kmh[0]:g} km/h"
     if options.output is not None:
-        from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
+        from activesteer.studies.linear.linearisation import draw_bode, draw_root_locus
 
         speeds = [speed / 3.6 for speed in _LOCUS_KMH]
         systems = [each.state_space() for each in linear_cars(options.vehicle, speeds, overrides)]
@@ -376,8 +376,8 @@ def _driver_loop(options: argparse.Namespace) -> None:
     rows = [loop.to_json() for loop in loops]
     figures = []
     if options.output is not None:
-        from activesteer.analysis.linear_plots import driver_loops_figure
         from activesteer.plotting import save
+        from activesteer.studies.linear.driver_loop import driver_loops_figure
 
         figure = driver_loops_figure(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
         figures.append(save(figure, options.output / "driver.png"))

@@ -8,7 +8,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.analysis.series import loop, slope_at_zero
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
@@ -48,8 +47,40 @@ _PLOTS: Final = (
     ("ay_mps2", "hand_torque_Nm"),
 )
 """Abscissa and ordinate of each cross-plot."""
+AROUND: Final = 0.2
+"""Range of the gradient of a loop around zero, as a fraction of the largest abscissa."""
 
 Signals = Mapping[str, Array]
+
+
+def loop(x: Array, y: Array) -> dict[str, float]:
+    """Return gradient and dead bands of a loop at its passages through zero, means of all periods."""
+    # The ordinate's dead band is the height of the loop at abscissa zero, positive if the ordinate lags behind the
+    # abscissa; the abscissa's is the width at ordinate zero, with the same sign.
+    up, down = (_crossings(x, y, sign) for sign in (1.0, -1.0))
+    right, left = (_crossings(y, x, sign) for sign in (1.0, -1.0))
+    rate = np.gradient(x)
+    near = np.abs(x) < AROUND * float(np.abs(x).max())
+    slopes = [slope(x[part], y[part]) for part in (near & (rate > 0.0), near & (rate < 0.0))]
+    return {
+        "gradient": 0.5 * sum(slopes),
+        "ordinate_dead_band": float(np.mean(down) - np.mean(up)),
+        "abscissa_dead_band": float(np.mean(right) - np.mean(left)),
+    }
+
+
+def _crossings(x: Array, y: Array, sign: float) -> Array:
+    """Return the interpolated values of y where x passes through zero, upwards (1) or downwards (-1)."""
+    places = np.flatnonzero((sign * x[:-1] < 0.0) & (sign * x[1:] >= 0.0))
+    if places.size == 0:
+        raise RecordingError("the signals make no loop: one of them does not pass through zero")
+    fraction = x[places] / (x[places] - x[places + 1])
+    return y[places] + fraction * (y[places + 1] - y[places])
+
+
+def slope(x: Array, y: Array) -> float:
+    """Return the slope of the line through points, or nan for fewer than three points."""
+    return float(np.polynomial.Polynomial.fit(x, y, 1).convert().coef[1]) if len(x) > 2 else math.nan
 
 
 def weave_loops(signals: Signals) -> list[dict[str, Any]]:
@@ -58,7 +89,7 @@ def weave_loops(signals: Signals) -> list[dict[str, Any]]:
     for abscissa, ordinate in _PLOTS:
         x, y = (quantity_of(name).factor * signals[name] for name in (abscissa, ordinate))
         try:
-            values: dict[str, float | None] = loop(x, y)._asdict()
+            values: dict[str, float | None] = {**loop(x, y)}
         except RecordingError:
             values = dict.fromkeys(("gradient", "ordinate_dead_band", "abscissa_dead_band"))
         found.append({"abscissa": axis_label(abscissa), "ordinate": axis_label(ordinate), **values})
@@ -138,11 +169,16 @@ def transition_lines(signals: Signals) -> list[dict[str, Any]]:
         x, y = (quantity_of(name).factor * signals[name] for name in (abscissa, ordinate))
         if ordinate == "hand_torque_Nm":
             line = np.polynomial.Polynomial.fit(np.abs(x[~near]), (np.sign(x) * y)[~near], 1).convert().coef
-            intercept, slope = (float(value) for value in line)
+            intercept, gradient = (float(value) for value in line)
         else:
-            intercept, slope = None, slope_at_zero(x[near], y[near], math.inf)
+            intercept, gradient = None, slope(x[near], y[near])
         found.append(
-            {"abscissa": axis_label(abscissa), "ordinate": axis_label(ordinate), "slope": slope, "intercept": intercept}
+            {
+                "abscissa": axis_label(abscissa),
+                "ordinate": axis_label(ordinate),
+                "slope": gradient,
+                "intercept": intercept,
+            }
         )
     return found
 

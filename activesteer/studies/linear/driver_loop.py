@@ -17,22 +17,26 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.controllers.linear_form import LinearController, linear_controller
-from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
+from activesteer.conventions import DEFAULT_TIMESTEP_S, RUN_COLOURS, Array, run_looks
 from activesteer.driver import DriverParameters
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
 from activesteer.errors import DriverError, StudyError
+from activesteer.plotting import Curve, Panel, Picture, draw
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, check_gains, resolve
 from activesteer.simulation.runner import simulate
 from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_cars
 from activesteer.theory.single_track import SingleTrack
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STEP_M: Final = 0.5
 """Offset of the path beside the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear, and
@@ -313,3 +317,45 @@ def driver_loops(
             run = small_step(car.speed_mps, name, vehicle, overrides, driver)
             found.append(LoopAtSpeed(3.6 * car.speed_mps, name, loop, run))
     return found
+
+
+def driver_loops_figure(
+    rows: Sequence[Mapping[str, Any]],
+    frequency_radps: NDArray[np.float64],
+    responses: Sequence[NDArray[np.complexfloating]],
+) -> Figure:
+    """Return Bode diagrams of the open loop of driver and car at the middle speed, and its damping over speed."""
+    speeds = sorted({row["speed_kmh"] for row in rows})
+    middle = speeds[len(speeds) // 2]
+    controllers = list(dict.fromkeys(row["controller"] for row in rows))
+    gain = [Curve([frequency_radps[0], 20.0], [1.0, 1.0], "", RUN_COLOURS[0], "-", 0.6)]
+    phase = [Curve([frequency_radps[0], 20.0], [-180.0, -180.0], "", RUN_COLOURS[0], "-", 0.6)]
+    damping = []
+    for place, (controller, look) in enumerate(run_looks(controllers).items()):
+        own = [row for row in rows if row["controller"] == controller]
+        shown, response = next(
+            (row, response)
+            for row, response in zip(rows, responses, strict=True)
+            if (row["controller"], row["speed_kmh"]) == (controller, middle)
+        )
+        crossover_radps, margin_deg = shown["crossover_rad_s"], shown["phase_margin_deg"]
+        label = f"{controller}: {crossover_radps:.1f} rad/s, margin {margin_deg:.0f} deg"
+        angle = np.degrees(np.unwrap(np.angle(response)))
+        angle -= 360.0 * round((angle[0] + 180.0) / 360.0)
+        for curves, values, text, low, high in (
+            (gain, np.abs(response), label, 0.05, 50.0), (phase, angle, "", -360.0, -90.0),
+        ):  # fmt: skip
+            curves.append(Curve(frequency_radps, values, text, look.colour, "-", 1.5))
+            curves.append(Curve([crossover_radps, crossover_radps], [low, high], "", look.colour, ":", 0.8))
+        speed_kmh = [row["speed_kmh"] for row in own]
+        in_runs, size = [row["damping_in_run"] for row in own], max(3.0, 9.0 - 3.0 * place)
+        damping.append(Curve(speed_kmh, [row["damping"] for row in own], "", look.colour, "-", 1.5))
+        damping.append(Curve(speed_kmh, in_runs, "", look.colour, "", marker="o", size=size))
+    lowest = min(0.0, *(row["damping_in_run"] for row in rows))
+    x_range = (frequency_radps[0], 20.0)
+    panels = [
+        Panel("", f"gain at {middle:.0f} km/h [-]", gain, log="xy", x_range=x_range, y_range=(0.05, 50.0)),
+        Panel("frequency [rad/s]", "phase [deg]", phase, log="x", x_range=x_range, y_range=(-360.0, -90.0)),
+        Panel("speed [km/h]", "damping [-]\nlines linear, dots runs", damping, y_range=(lowest, 1.1)),
+    ]
+    return draw(Picture("", panels, columns=1, width_in=7.5, height_in=8.0))

@@ -22,21 +22,25 @@ steered car slides. The friction and play of screws in the toe links are left ou
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Range
-from activesteer.conventions import Array
+from activesteer.conventions import RUN_COLOURS, Array
 from activesteer.errors import ModelError, ParameterError
+from activesteer.plotting import Curve, Panel, Picture, draw, save
 from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.text_table import text_table
+from activesteer.units import quantity_of
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.linear_state import LocalState, Mode, find_modes
 
@@ -367,3 +371,58 @@ def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> s
         width = max(len(row[place]) for row in rows)
         rows = [(*row[:place], row[place].rjust(width), *row[place + 1 :]) for row in rows]
     return "\n".join(text_table(rows, text=5))
+
+
+BODE_RANGE_Hz: Final = (0.1, 10.0)
+"""Frequencies of a Bode diagram [Hz]."""
+LOCUS_LIMIT_Hz: Final = 4.5
+"""Greatest natural frequency of the poles that are shown: body modes and tyre lag, without wheel hop [Hz]."""
+DAMPING_RAYS: Final = (0.2, 0.4, 0.6, 0.8)
+"""Damping ratios drawn as rays into a root locus."""
+
+_GREY: Final = "#cccccc"
+_GAIN_UNITS: Final = {
+    "yaw_rate_radps": "1/s", "ay_mps2": "m/s² per rad", "roll_rad": "rad/rad", "sideslip_rad": "rad/rad",
+}  # fmt: skip
+
+
+def draw_bode(label: str, system: control.StateSpace, path: str | os.PathLike[str]) -> Path:
+    """Draw gain and phase of a linear car over frequency, from the steering wheel to its outputs, and save them."""
+    frequency_Hz = np.geomspace(*BODE_RANGE_Hz, 300)
+    found = system(2j * math.pi * frequency_Hz, squeeze=False)
+    panels = []
+    for output in _GAIN_UNITS:
+        values = found[system.output_labels.index(output), system.input_labels.index("steering_wheel_rad")]
+        gain = Curve(frequency_Hz, np.abs(values), label, RUN_COLOURS[1], "-", 1.5)
+        phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), label, RUN_COLOURS[1], "-", 1.5)
+        below = "frequency [Hz]" if output == "sideslip_rad" else ""
+        y_label = f"{quantity_of(output).short}\n[{_GAIN_UNITS[output]}]"
+        panels.append(Panel(below, y_label, [gain], log="xy", x_range=BODE_RANGE_Hz))
+        panels.append(Panel(below, "phase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
+    picture = Picture("", panels, columns=2, width_in=7.5, height_in=9.0, shared_legend=True)
+    return save(draw(picture), Path(path))
+
+
+def draw_root_locus(
+    systems: Sequence[control.StateSpace], speeds_mps: Sequence[float], path: str | os.PathLike[str]
+) -> Path:
+    """Draw the poles of a car over its speed, with rays of equal damping, and save the picture."""
+    limit, angle = 2.0 * math.pi * LOCUS_LIMIT_Hz, np.linspace(math.pi / 2.0, math.pi, 60)
+    curves, notes = [], []
+    for frequency_Hz in range(1, math.ceil(LOCUS_LIMIT_Hz)):
+        radius = 2.0 * math.pi * frequency_Hz
+        curves.append(Curve(radius * np.cos(angle), radius * np.sin(angle), "", _GREY, "-", 0.7))
+        notes.append((0.0, radius, f"{frequency_Hz} Hz"))
+    for damping in DAMPING_RAYS:
+        x, y = -limit * damping, limit * math.sqrt(1.0 - damping**2)
+        curves.append(Curve([0.0, x], [0.0, y], "", _GREY, "-", 0.7))
+        notes.append((x, y, f"{damping:g}"))
+    slowest, fastest = 3.6 * min(speeds_mps), 3.6 * max(speeds_mps)
+    for system, speed_mps in zip(systems, speeds_mps, strict=True):
+        poles = np.array(system.poles(), dtype=np.complex128)
+        poles = poles[(poles.imag >= -1e-9) & (np.abs(poles) <= limit)]
+        shade = (3.6 * speed_mps - slowest) / max(fastest - slowest, 1e-9)
+        curves.append(Curve(poles.real, poles.imag, dashes="", marker="o", size=3.5, shade=shade))
+    panel = Panel("real part [1/s]", "imaginary part [1/s]", curves, notes=notes, y_range=(-1.0, 1.05 * limit))
+    scale = ("speed [km/h]", slowest, fastest)
+    return save(draw(Picture("", [panel], width_in=7.5, height_in=5.5, scale=scale)), Path(path))

@@ -8,7 +8,7 @@ import pytest
 
 from activesteer.analysis.figures import figure_2
 from activesteer.analysis.frequency_response import OUTPUTS
-from activesteer.analysis.linear_plots import draw_bode, draw_root_locus
+from activesteer.studies.linear.linearisation import draw_bode, draw_root_locus
 from tests.unit.analysis.synthetic import step_steer
 
 
