@@ -105,7 +105,8 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
 
 def _section(group: Group, anchor: str) -> dict[str, Any]:
     """Return the content of one manoeuvre, by the names of the template."""
-    recordings = [run.recording for run in group.runs]
+    recordings, first = [run.recording for run in group.runs], group.runs[0].name
+    others = [title for run in group.runs[1:] for title in (run.name, f"{run.name} against {first}")]
     return {
         "anchor": anchor,
         "group": group,
@@ -113,7 +114,7 @@ def _section(group: Group, anchor: str) -> dict[str, Any]:
         "changed": [*dict.fromkeys(filter(None, map(changed_parameters, group.runs))), *_events(group)],
         "key_titles": list(key_figures(group)),
         "results": results(group),
-        "metric_titles": metric_titles(group),
+        "metric_titles": ["Metric", "Unit", first, *others],
         "metrics": metric_rows(group),
         "parameters": rows(recordings, "controller", "maneuver", "timestep_s"),
         "names": [run.name for run in group.runs],
@@ -163,19 +164,16 @@ class Row(NamedTuple):
 
 def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
     """Return the entries of tables of the metadata: those of the first run in its order, then those of later runs."""
-    flat = [dict(_flat(_chosen(run.metadata, tables))) for run in recordings]
+    flat = []
+    for run in recordings:
+        chosen = {key: run.metadata[key] for key in tables if key in run.metadata}
+        one = chosen.get(tables[0])
+        flat.append(dict(_flat(one if len(tables) == 1 and isinstance(one, Mapping) else chosen)))
     found = []
     for key in dict.fromkeys(key for entries in flat for key in entries):
         values = tuple(entries.get(key, "") for entries in flat)
         found.append(Row(key, values if len(set(values)) > 1 else values[:1]))
     return found
-
-
-def _chosen(metadata: Mapping[str, Any], tables: Sequence[str]) -> Mapping[str, Any]:
-    if len(tables) == 1:
-        table = metadata.get(tables[0], {})
-        return table if isinstance(table, Mapping) else {tables[0]: table}
-    return {key: metadata[key] for key in tables if key in metadata}
 
 
 def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
@@ -298,14 +296,6 @@ def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] 
     return Figure(text, difference.percent or difference.text, significance(name, value, before))
 
 
-class MetricRow(NamedTuple):
-    """A metric of all runs of a group."""
-
-    name: str  # its name in words
-    unit: str  # unit of the numbers
-    cells: tuple[Cell, ...]  # value of the first run, then value and difference from the first run of each other run
-
-
 def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
     """Return the titles of the table of files, and a row for each run."""
     runs = [(group, run) for group in groups for run in group.runs]
@@ -323,21 +313,11 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
 def changed_parameters(run: ReportedRun) -> str:
     """Describe the overrides of a run, with their values and keys, or empty without overrides."""
     changed: Any = run.recording.metadata.get("overrides")
-    return ", ".join(_told(*one) for one in changed.items()) if isinstance(changed, Mapping) else ""
+    labels = {key: parameter_label(key) for key in changed} if isinstance(changed, Mapping) else {}
+    return ", ".join(f"{words} {changed[key]} {unit}".rstrip() + f" ({key})" for key, (words, unit) in labels.items())
 
 
-def _told(key: str, value: Any) -> str:
-    words, unit = parameter_label(key)
-    return f"{words} {value} {unit}".rstrip() + f" ({key})"
-
-
-def metric_titles(group: Group) -> list[str]:
-    """Return the titles of the columns of `metric_rows`."""
-    first, *others = (run.name for run in group.runs)
-    return ["Metric", "Unit", first, *(title for name in others for title in (name, f"{name} against {first}"))]
-
-
-def metric_rows(group: Group) -> list[MetricRow]:
+def metric_rows(group: Group) -> list[dict[str, Any]]:
     """Return the metrics, with their differences from the first run."""
     values = [run.recording.metrics for run in group.runs]
     rows = []
@@ -349,5 +329,5 @@ def metric_rows(group: Group) -> list[MetricRow]:
         for value, text in zip(others, texts[1:], strict=True):
             compared = difference_text(name, value, first) if LOST not in (text, texts[0]) else Cell("\N{EN DASH}")
             cells += [Cell(text), compared]
-        rows.append(MetricRow(metric.label, metric.unit_name, tuple(cells)))
+        rows.append({"name": metric.label, "unit": metric.unit_name, "cells": cells})
     return rows
