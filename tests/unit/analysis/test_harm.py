@@ -11,12 +11,14 @@ from activesteer.analysis.harm import (
     harms,
     has_spun,
     is_controlled,
+    is_lost,
     kept,
     losses,
     severity,
     shown,
     track_harm_m,
 )
+from activesteer.metric_table import CONES_MISSED, STAYS_IN_LANES
 
 LANE = {
     "lane_overstep_m": 0.12, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.05, "heading_end_rad": 0.01,
@@ -70,17 +72,42 @@ def test_a_verdict_says_what_failed_and_what_was_met(metrics: dict[str, float], 
     assert list(kept(metrics)) == met
 
 
-@pytest.mark.parametrize(("sideslip_deg", "spun"), [(19.5, False), (20.5, True)])
-def test_a_car_spins_beyond_20_deg_of_sideslip(sideslip_deg: float, spun: bool):
-    metrics = {"sideslip_peak_abs_rad": math.radians(sideslip_deg)}
-    assert has_spun(metrics) is spun
-    assert is_controlled(metrics) is not spun
+PEAK = "sideslip_peak_abs_rad"
+SMALL, LARGE = math.radians(5.0), math.radians(25.0)
 
 
-def test_a_car_is_controlled_unless_a_metric_tells_otherwise():
+@pytest.mark.parametrize(
+    ("metrics", "lost"),
+    [
+        ({PEAK: math.radians(19.5)}, False),
+        ({PEAK: math.radians(20.5)}, True),
+        ({"sideslip_peak_rad": -LARGE}, True),
+        ({"sideslip_peak_rad": -SMALL}, False),
+        ({PEAK: SMALL, STAYS_IN_LANES: 1.0}, False),
+        ({PEAK: SMALL, STAYS_IN_LANES: 0.0}, True),
+        ({PEAK: SMALL, CONES_MISSED: 0.0, "cones_hit": 3.0}, False),
+        ({PEAK: SMALL, CONES_MISSED: 1.0}, True),
+    ],
+)
+def test_a_car_is_lost_that_spins_or_leaves_its_course(metrics: dict[str, float], lost: bool) -> None:
+    assert is_lost(metrics) is lost
+    assert is_controlled(metrics) is not lost
+
+
+@pytest.mark.parametrize("missing", [None, math.nan])
+def test_a_run_that_ended_before_it_could_be_said_is_lost(missing: float | None) -> None:
+    assert is_lost({PEAK: missing})
+    assert has_spun({PEAK: missing})
+    assert is_lost({PEAK: SMALL, STAYS_IN_LANES: missing})
+    assert is_lost({PEAK: SMALL, CONES_MISSED: missing})
+    assert is_lost({})
+    assert not is_controlled({PEAK: missing})
+
+
+def test_a_run_without_a_metric_that_could_tell_counts_as_controlled() -> None:
     assert is_controlled({"stopping_distance_m": 40.0})
-    assert not is_controlled({"stays_in_lanes": 0.0})
-    assert not is_controlled({"cones_missed": 1.0})
+    assert not is_controlled({"heading_end_rad": LARGE})
+    assert not is_controlled({CONES_MISSED: 1.0})
 
 
 @pytest.mark.parametrize(("sideslip_deg", "text"), [(89.0, "3.2"), (91.0, "lost")])
