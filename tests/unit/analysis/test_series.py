@@ -1,4 +1,4 @@
-"""Smoothing, crossings and step responses of signals with solutions in closed form."""
+"""Sampled signals: smoothing, filters, offsets, crossings, and the response to a step."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from activesteer.analysis.series import (
     crossing_time,
     lag,
     largest_rate,
+    low_pass,
+    offset,
     rate_rms,
     rms,
     smooth,
     step_response,
     timestep,
+    zeroing_range,
 )
 from activesteer.errors import RecordingError
 from tests.raising import raises
@@ -179,3 +182,67 @@ def test_a_sideslip_angle_counts_while_the_car_drives_and_not_while_it_swings_to
 
 def test_without_a_speed_every_sideslip_angle_counts():
     assert counted_sideslip(SyntheticRun(TIME_S, {"sideslip_rad": 0.1 + 0.0 * TIME_S})).min() == 0.1
+
+
+STEPS_S = np.arange(10001) * 0.001
+MIDDLE = slice(3000, 7000)
+
+
+@pytest.mark.parametrize(
+    ("frequency_Hz", "gain", "tolerance"),
+    # |H|^2 of a Butterworth filter of order 6: 1/(1 + (f/fc)^12), which is half at the cut-off.
+    [(1.0, 1.0, 1e-6), (6.0, 0.5, 1e-3), (12.0, 1.0 / (1.0 + 2.0**12), 1e-4)],
+)
+def test_gain_is_that_of_twelve_poles_and_there_is_no_phase(frequency_Hz, gain, tolerance):
+    sine = np.sin(2.0 * np.pi * frequency_Hz * STEPS_S)
+    np.testing.assert_allclose(low_pass(sine, 0.001, 6.0)[MIDDLE], gain * sine[MIDDLE], atol=tolerance)
+
+
+def test_a_ramp_keeps_its_ends():
+    np.testing.assert_allclose(low_pass(STEPS_S, 0.001, 6.0), STEPS_S, atol=1e-3)
+
+
+def test_slow_sampling_is_refused():
+    with raises(RecordingError, value=0.1, allowed=0.05):
+        low_pass(np.zeros(1000), 0.1, 10.0)
+
+
+def test_a_few_samples_are_refused():
+    with raises(RecordingError, value=5):
+        low_pass(np.zeros(5), 0.001, 6.0)
+
+
+TIMES_S = np.arange(4000) * 1e-3
+RATE_RADPS = math.radians(150.0)
+
+
+def ramp(begin_s: float, length_s: float) -> np.ndarray:
+    return RATE_RADPS * np.clip(TIMES_S - begin_s, 0.0, length_s)
+
+
+def test_range_is_the_second_before_the_average_rate_passes_75_deg_per_second():
+    samples = zeroing_range(TIMES_S, ramp(2.0, 0.5))
+    # Half of a window of 0.1 s turns at 150 deg/s when its middle is where the ramp begins.
+    assert samples.stop == pytest.approx(2000, abs=2)
+    assert samples.stop - samples.start == 1000
+
+
+def test_a_jerk_of_less_than_200_ms_is_passed_over():
+    assert zeroing_range(TIMES_S, ramp(1.2, 0.02) + ramp(2.5, 0.5)).stop == pytest.approx(2500, abs=2)
+
+
+def test_range_is_as_long_as_the_run_allows():
+    samples = zeroing_range(TIMES_S, ramp(0.4, 0.5))
+    assert samples.start == 0
+    assert samples.stop == pytest.approx(400, abs=2)
+
+
+@pytest.mark.parametrize("slow", [ramp(1.0, 0.1), 0.2 * ramp(1.0, 2.0)])
+def test_a_wheel_that_never_turns_fast_leaves_signals_as_they_are(slow):
+    samples = zeroing_range(TIMES_S, slow)
+    assert samples.start == samples.stop
+    assert offset(TIMES_S, samples) == 0.0
+
+
+def test_offset_is_the_mean_over_the_range():
+    assert offset(np.where(TIMES_S < 2.0, 0.3, 1.0), slice(1500, 2500)) == pytest.approx(0.65)
