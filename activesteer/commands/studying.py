@@ -219,9 +219,9 @@ def _values(trial: Trial, indent: str = "  ") -> Iterator[str]:
     "for which the car matches the recordings best.",
 )  # fmt: skip
 def _fit(options: argparse.Namespace) -> bool:
-    from activesteer.measured.fit_result import fit_page, write_fit
     from activesteer.measured.fitting import fit
     from activesteer.measured.folder_file import is_measured
+    from activesteer.measured.pages import fit_page, write_fit
 
     # A fit takes minutes: a folder that cannot be made is an error before it.
     if options.output is not None:
