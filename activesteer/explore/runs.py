@@ -13,9 +13,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
-from activesteer.analysis.report.run_page import KEY_FIGURES, write_report
+from activesteer.analysis.report.run_page import write_report
 from activesteer.controllers import controller_spec
 from activesteer.conventions import run_looks
 from activesteer.drawing.panels import EXPLORE

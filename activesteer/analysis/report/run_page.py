@@ -12,12 +12,13 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.analysis.claims.scorecard import Scorecard, Verdict, number_lines
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
+from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import Group, ReportedRun, entry, groups_of, judge
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
 from activesteer.errors import ParameterError
 from activesteer.files import write_text
-from activesteer.metric_table import CONES_HIT, CONES_MISSED, LANE_OVERSTEP, SIDESLIP_PEAKS, Better, recorded_metric
+from activesteer.metric_table import Better, recorded_metric
 from activesteer.pages import render
 from activesteer.recording import Recording
 from activesteer.recording.contents import events_of
@@ -212,37 +213,6 @@ class Result(NamedTuple):
     losses: tuple[str, ...]  # its failures, in words
     kept: tuple[str, ...]  # the requirements that it met, in words
     figures: tuple[Figure, ...]  # its key figures
-
-
-KEY_FIGURES: Final[dict[str, tuple[str, ...]]] = {
-    "Cones hit": (CONES_HIT,),
-    "Cones missed": (CONES_MISSED,),
-    "Beyond the lane": (LANE_OVERSTEP,),
-    "Stopping distance": ("stopping_distance_m",),
-    "Peak sideslip": SIDESLIP_PEAKS,
-    "Settled yaw rate": ("yaw_rate_steady_state_radps",),
-    "Yaw rate overshoot": ("yaw_rate_overshoot",),
-    "Yaw rate response time": ("yaw_rate_response_time_s",),
-    "Yaw rate left at 1.75 s": ("yaw_rate_after_1750ms_share",),
-    "Yaw rate error at 1 s": ("yaw_rate_deviation_after_1000ms_radps",),
-    "Peak yaw rate": ("yaw_rate_peak_abs_radps", "yaw_rate_peak_radps"),
-    "Mean deceleration": ("mean_deceleration_mps2",),
-    "Off the path": ("track_deviation_max_m",),
-    "Steering effort, rms rate": ("steering_wheel_rate_rms_radps",),
-    "Seat acceleration rms": ("seat_acceleration_rms_mps2",),
-    "Heading at the end": ("heading_end_rad",),
-    "Delay of the yaw rate": ("yaw_rate_delay_s",),
-    "Delay of the lateral acceleration": ("ay_delay_s",),
-    "Lap time": ("lap_time_s",),
-    "Beyond the edge of the road": ("road_overstep_m",),
-    "Time on two wheels": ("two_wheel_lift_time_s",),
-    "Energy from the battery": ("battery_energy_J",),
-    "Largest wheel load variation": ("wheel_load_coefficient_max",),
-    "Share of time with a wheel lifted": ("wheel_lift_share",),
-    "Share of time beyond the known surface": ("extended_road_share",),
-    "Largest suspension travel": ("suspension_travel_max_m",),
-}
-"""Title -> names of metrics, of which the first one that a run has is shown. A manoeuvre has some of them."""
 
 
 HEADLINE: Final = "Peak sideslip [deg]"

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from activesteer.analysis import step_response
-from activesteer.analysis.report.run_page import KEY_FIGURES
+from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.tables import Change, comparison, significance
 from activesteer.metric_table import METRICS
 from tests.unit.analysis.synthetic import step_steer
