@@ -297,6 +297,7 @@ class Scorecard:
     judged: tuple[Judged, ...]  # all of them, in the order given
     population: Population | None = None  # the stored population of the car; None without one
     setting: str = LITERATURE  # setting of the runs; `paper`, `literature` or empty
+    obstacle: str = ""  # why claims cannot be judged; empty if they are, or if there are none
 
     @property
     def counts(self) -> dict[Verdict, int]:

@@ -25,35 +25,26 @@ from activesteer.recording import Recording
 from activesteer.recording.recording import run_names
 
 
-class Judgement(NamedTuple):
-    """The claims about a group of runs."""
-
-    scorecard: Scorecard  # claims with their verdicts; empty if there are no claims, or if they cannot be judged
-    obstacle: str = ""  # why the claims cannot be judged; empty if they are, or if there are none
-
-
-def judge(group: Group) -> Judgement:
-    """Check the paper's claims about the runs of a group."""
+def judge(group: Group) -> Scorecard:
+    """Check the paper's claims about the runs of a group. Without claims the scorecard is empty, and says why."""
     # The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
-    nothing = scorecard([], known={})
     recordings = group.by_name()
     check = claims_for(group.runs[0].recording)
     if check is None:
-        return Judgement(nothing)
-    missing = [system for system in SYSTEMS if system not in recordings]
-    if missing:
-        return Judgement(nothing, f"no run of {', '.join(missing)}, and the claims compare {', '.join(SYSTEMS)}")
+        return Scorecard(())
+    if missing := [system for system in SYSTEMS if system not in recordings]:
+        return Scorecard((), obstacle=f"no run of {', '.join(missing)}, and the claims compare {', '.join(SYSTEMS)}")
     systems = [recordings[system] for system in SYSTEMS]
     for system, recording in zip(SYSTEMS, systems, strict=True):
         if not recording.metadata.get("complete", True):
-            return Judgement(nothing, f"the run {system} is not complete")
+            return Scorecard((), obstacle=f"the run {system} is not complete")
     if not (_same(systems, "maneuver") and _same(systems, "vehicle")):
-        return Judgement(nothing, "the three runs differ in manoeuvre or vehicle; see the parameters")
+        return Scorecard((), obstacle="the three runs differ in manoeuvre or vehicle; see the parameters")
     try:
         claims, setting = check(recordings), setting_of(systems[0])
-        return Judgement(scorecard(claims, entry(systems[0], "vehicle", "name"), setting=setting or LITERATURE))
+        return scorecard(claims, entry(systems[0], "vehicle", "name"), setting=setting or LITERATURE)
     except ActiveSteerError as error:
-        return Judgement(nothing, str(error))
+        return Scorecard((), obstacle=str(error))
 
 
 def _same(recordings: list[Recording], table: str) -> bool:
@@ -151,5 +142,5 @@ def verdict(recordings: Mapping[str, Recording]) -> list[str]:
     """Return a line for each run, then a line for each claim of the paper about them."""
     lines = [f"{name}: {outcome(recording)}" for name, recording in recordings.items()]
     groups = groups_of({f"{name}.mcap": recording for name, recording in recordings.items()})
-    judged = judge(groups[0]).scorecard.judged if len(groups) == 1 else ()
+    judged = judge(groups[0]).judged if len(groups) == 1 else ()
     return lines + [f"{item.claim.id} {item.verdict.value}: {item.claim.text}" for item in judged]

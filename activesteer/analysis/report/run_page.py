@@ -72,7 +72,7 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
     runs = [run for group in groups for run in group.runs]
     every = [run.recording for run in runs]
     file_titles, files = file_rows(groups)
-    cards = [section["judgement"].scorecard for section in sections]
+    cards = [section["scorecard"] for section in sections]
     everything = Scorecard(
         tuple(item for card in cards for item in card.judged),
         next((card.population for card in cards if card.population is not None), None),
@@ -111,7 +111,7 @@ def _section(group: Group, anchor: str) -> dict[str, Any]:
     return {
         "anchor": anchor,
         "group": group,
-        "judgement": judge(group),
+        "scorecard": judge(group),
         "changed": [*dict.fromkeys(filter(None, map(changed_parameters, group.runs))), *_events(group)],
         "key_titles": list(key_figures(group)),
         "results": results(group),

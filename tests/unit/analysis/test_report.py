@@ -232,7 +232,7 @@ def test_claims_are_not_judged_of_runs_that_cannot_be_compared(change, reason):
     runs = step_steers()
     runs["runs/step-ars.mcap"].metadata.update(change)
     judgement = judge(groups_of(runs)[0])
-    assert judgement.scorecard.judged == ()
+    assert judgement.judged == ()
     assert reason in judgement.obstacle
 
 
