@@ -67,10 +67,6 @@ def measured_metrics(recording: RecordingLike) -> dict[str, float]:
     return values
 
 
-METRICS: Final = ("battery_energy_J", "steering_energy_J", "brake_energy_J")
-"""Metrics of an electric car."""
-
-
 def energy_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the energies of a run, or nothing for a car without motors."""
     vehicle = recording.metadata.get("vehicle")
@@ -80,13 +76,11 @@ def energy_metrics(recording: RecordingLike) -> dict[str, float]:
     battery_J = recording["battery_energy_J"]
     brakes_W = sum(-recording[f"{c}_brake_torque_Nm"] * recording[f"{c}_wheel_speed_radps"] for c in CORNERS)
     steering_J = sum(np.trapezoid(np.maximum(power_W, 0.0), time_s) for power_W in _steering(recording, vehicle))
-    return dict(
-        zip(
-            METRICS,
-            (float(battery_J[-1] - battery_J[0]), float(steering_J), float(np.trapezoid(brakes_W, time_s))),
-            strict=True,
-        )
-    )
+    return {
+        "battery_energy_J": float(battery_J[-1] - battery_J[0]),
+        "steering_energy_J": float(steering_J),
+        "brake_energy_J": float(np.trapezoid(brakes_W, time_s)),
+    }
 
 
 def _steering(recording: RecordingLike, vehicle: Mapping[str, Any]) -> Iterator[NDArray[np.float64]]:

@@ -63,47 +63,38 @@ class Case(NamedTuple):
             raise ParameterError(
                 f"the circle has no {unknown[0]}; {nearest_names(unknown[0], self.circle)}", value=unknown[0]
             )
-        circle = {key: value + change.add.get(key, 0.0) for key, value in self.circle.items()}
-        case = self._replace(
-            circle=circle, overrides=self.overrides | change.set, stiff_column=self.stiff_column or change.stiff_column
-        )
-        if change.hold:
-            static, values = case._over_travel(change, change.hold, curves)
-            case = case._with(change, change.hold, [static] * len(values))
-        if change.centre:
-            static, values = case._over_travel(change, change.centre, curves)
-            case = case._with(change, change.centre, list(values - static))
+        overrides = self.overrides | change.set
+        of_file = curves.get(change.axle, {})
+
+        def curve(name: str) -> Array:
+            if name not in of_file:
+                raise ParameterError(
+                    f"curves.{change.axle} of {self.vehicle} has no {name}; {nearest_names(name, of_file)}"
+                )
+            return np.array(overrides.get(f"curves.{change.axle}.{name}", of_file[name]), np.float64)
+
+        def put(name: str, values: Array) -> None:
+            overrides[f"curves.{change.axle}.{name}"] = values.tolist()
+
+        for name, held in ((change.hold, True), (change.centre, False)):
+            if name:
+                travel_m, values = curve("travel_m"), curve(name)
+                if values.shape != travel_m.shape:
+                    raise ParameterError(f"{name} is no curve over travel", value=name)
+                static = float(np.interp(0.0, travel_m, values))
+                put(name, np.full_like(values, static) if held else values - static)
         if change.steer != 1.0 or change.steer_at_lock is not None:
             end = change.steer if change.steer_at_lock is None else change.steer_at_lock
-            part = np.abs(case._curve(change, "rack_m", curves)) / change.lock_m
-            factors = change.steer + (end - change.steer) * part
-            case = case._with(change, "rack_steer_deg", list(factors * case._curve(change, "rack_steer_deg", curves)))
+            factors = change.steer + (end - change.steer) * np.abs(curve("rack_m")) / change.lock_m
+            put("rack_steer_deg", factors * curve("rack_steer_deg"))
         if change.compliance:
             matrix = np.zeros((5, 5))
-            matrix[_ENTRIES] = case._curve(change, "stiffness", curves)
+            matrix[_ENTRIES] = curve("stiffness")
             compliance = np.asarray(np.linalg.inv(matrix + np.triu(matrix, 1).T), np.float64)
             _COMPLIANCES[change.compliance](compliance)
-            stiffness = np.asarray(np.linalg.inv(compliance), np.float64)
-            case = case._with(change, "stiffness", list(upper_triangle(stiffness)))
-        return case
-
-    def _curve(self, change: ChangeTable, name: str, curves: Mapping[str, Any]) -> Array:
-        of_file = curves.get(change.axle, {})
-        if name not in of_file:
-            raise ParameterError(
-                f"curves.{change.axle} of {self.vehicle} has no {name}; {nearest_names(name, of_file)}"
-            )
-        return np.array(self.overrides.get(f"curves.{change.axle}.{name}", of_file[name]), np.float64)
-
-    def _over_travel(self, change: ChangeTable, name: str, curves: Mapping[str, Any]) -> tuple[float, Array]:
-        travel_m, values = self._curve(change, "travel_m", curves), self._curve(change, name, curves)
-        if values.shape != travel_m.shape:
-            raise ParameterError(f"{name} is no curve over travel", value=name)
-        return float(np.interp(0.0, travel_m, values)), values
-
-    def _with(self, change: ChangeTable, name: str, values: list[float]) -> Case:
-        values = [float(value) for value in values]
-        return self._replace(overrides=self.overrides | {f"curves.{change.axle}.{name}": values})
+            put("stiffness", np.array(upper_triangle(np.asarray(np.linalg.inv(compliance), np.float64))))
+        circle = {key: value + change.add.get(key, 0.0) for key, value in self.circle.items()}
+        return Case(self.vehicle, circle, overrides, self.stiff_column or change.stiff_column)
 
 
 def _no_toe_by_force(compliance: Array) -> None:

@@ -136,16 +136,13 @@ def _header(head: list[str], separator: str, count: int, path: Path) -> tuple[li
     rows = [row for line in head if len(row := _cells(line.lstrip("#"), separator)) >= count]
     rows = [row for row in rows if sum(bool(cell) for cell in row) >= 2]
     names = [len(row) for line in head if sum(map(bool, row := _cells(line.lstrip("#"), separator))) >= 2]
-    if not rows and names:
+    wrong = len(rows[-1]) if rows and any(rows[-1][count:]) else names[-1] if names and not rows else 0
+    if wrong:
         raise RecordingError(
-            f"names {names[-1]} columns and has {count}; decimal commas need another separator", file=path.name
+            f"names {wrong} columns and has {count}; decimal commas need another separator", file=path.name
         )
     if not rows:
         raise RecordingError("has no line with the names of its columns above the numbers", file=path.name, line=1)
-    if any(any(row[count:]) for row in rows[-1:]):
-        raise RecordingError(
-            f"names {len(rows[-1])} columns and has {count}; decimal commas need another separator", file=path.name
-        )
     units = [""] * count
     if len(rows) > 1 and all(re.fullmatch(r"[\[(]?[^\s]{0,8}[\])]?", cell) for cell in rows[-1]):
         units = [cell.strip("[]()") for cell in rows.pop()[:count]]

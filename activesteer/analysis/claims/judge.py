@@ -43,7 +43,6 @@ from activesteer.metric_table import (
 
 SYSTEMS: Final = ("none", "ars", "afs")
 """Names of the compared runs: no control, active rear steering, active front superposition."""
-SYSTEMS_WITH_CONTROL: Final = SYSTEMS[1:]
 TOGETHER: Final = "together"
 """Name in place of a system for values that several runs have together."""
 MEAN_S: Final = 0.2
@@ -235,12 +234,6 @@ def _means(values: Array, timestep_s: float) -> Array:
     return np.convolve(values, np.full(width, 1.0 / width), mode="same") if width else values
 
 
-def mean_straight_ahead(recording: RecordingLike, channel: str) -> float:
-    """Return the mean of a channel straight ahead, in its unit, or 0 if no part of the run is straight ahead."""
-    ahead = recording[channel][straight_ahead(recording)]
-    return float(np.mean(ahead)) if len(ahead) else 0.0
-
-
 LEVEL: Final = 0.9
 """Fraction of the steady-state value of none at which the delays of the step steer are compared."""
 MIN_ANGLE_RAD: Final = math.radians(0.1)
@@ -258,7 +251,8 @@ ADDED: Final = ("rear_steer_steady_state_rad", "superposition_steady_state_rad")
 def _step_metrics(recording: RecordingLike) -> dict[str, float]:
     values = step_response.step_response_metrics(recording)
     for name, unit in TURNED:
-        values[f"{name}_steady_state_{unit}"] -= mean_straight_ahead(recording, f"{name}_{unit}")
+        ahead = recording[f"{name}_{unit}"][straight_ahead(recording)]
+        values[f"{name}_steady_state_{unit}"] -= float(np.mean(ahead)) if len(ahead) else 0.0
     return values | {"yaw_rate_peak_abs_radps": float(np.abs(recording["yaw_rate_radps"]).max())}
 
 
@@ -356,7 +350,7 @@ def _statements() -> dict[str, tuple[Statement, ...]]:
             conditions = [
                 condition.format(x=system, **limits)
                 for condition in one.conditions
-                for system in (SYSTEMS_WITH_CONTROL if "{x}" in condition else ("",))
+                for system in (SYSTEMS[1:] if "{x}" in condition else ("",))
             ]
             one = replace(one, criterion=one.criterion.format(**limits, **words), conditions=tuple(conditions))
             found[scenario] = (*found.get(scenario, ()), one)
