@@ -20,7 +20,6 @@ import numpy as np
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIOS
-from activesteer.analysis.general import METRICS as ENERGIES
 from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, Runs
 from activesteer.analysis.tables import Change, significance
@@ -188,7 +187,7 @@ class Comparison:
         known = {(row.scenario, row.metric, row.controller): row.value for row in self.rows}
         lines = []
         for scenario in CASES:
-            for metric in (*SHOWN[scenario], *ENERGIES):
+            for metric in (*SHOWN[scenario], "battery_energy_J", "steering_energy_J", "brake_energy_J"):
                 keys = {name: (scenario, metric, name) for name in self.controllers}
                 values = {name: known[key] for name, key in keys.items() if key in known}
                 if values:

@@ -6,7 +6,7 @@ Source: 49 CFR 571.126 (FMVSS 126), S7.11.4 and S7.11.5; UN Regulation 140, 9.11
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,16 +31,6 @@ _ALL: Final = slice(None)
 
 PEAK_MARGIN: Final = 0.005
 """Fraction above the steady-state value below which a maximum is no peak."""
-
-
-class StepResponse(NamedTuple):
-    """Response of a signal to a step. Times count from the step. Undefined values are nan."""
-
-    steady_state: float  # value at the end
-    response_time_s: float  # time to 90 % of the steady-state value [s]
-    peak: float  # largest value in the direction of the steady-state value
-    peak_time_s: float  # time of the peak [s]
-    overshoot: float  # (peak - steady state)/steady state
 
 
 def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
@@ -142,8 +132,10 @@ def timestep(time_s: Array) -> float:
     return mean_s
 
 
-def step_response(time_s: Array, values: Array, step_time_s: float, window_s: float, minimum: float) -> StepResponse:
-    """Evaluate the response of one signal to a step.
+def step_response(
+    time_s: Array, values: Array, step_time_s: float, window_s: float, minimum: float
+) -> dict[str, float]:
+    """Return steady state, response time, peak, peak time and overshoot of a signal; times count from the step.
 
     The signal is at zero before the step and may move either way. `smooth` reduces its noise for crossings and maxima;
     the steady-state value is the mean of the samples of a window at the end. The response time is nan if the signal
@@ -158,15 +150,14 @@ def step_response(time_s: Array, values: Array, step_time_s: float, window_s: fl
     moving_s, moving = time_s[after], direction * smooth(values, timestep(time_s))[after]
     top = int(np.argmax(moving))
     peak = direction * float(moving[top])
+    found = {"steady_state": steady_state, "response_time_s": math.nan, "peak": peak, "peak_time_s": math.nan}
     if abs(steady_state) < minimum:
-        return StepResponse(steady_state, math.nan, peak, math.nan, math.nan)
-
-    response_time_s = crossing_time(moving_s, moving, 0.9 * abs(steady_state)) - step_time_s
-    overshoot = (peak - steady_state) / steady_state
-    peak_time_s = float(moving_s[top]) - step_time_s
-    if overshoot < PEAK_MARGIN or moving_s[top] >= time_s[-1] - window_s:
-        peak_time_s = math.nan
-    return StepResponse(steady_state, response_time_s, peak, peak_time_s, overshoot)
+        return {**found, "overshoot": math.nan}
+    found["response_time_s"] = crossing_time(moving_s, moving, 0.9 * abs(steady_state)) - step_time_s
+    found["overshoot"] = overshoot = (peak - steady_state) / steady_state
+    if overshoot >= PEAK_MARGIN and moving_s[top] < time_s[-1] - window_s:
+        found["peak_time_s"] = float(moving_s[top]) - step_time_s
+    return found
 
 
 _ENDS_PERIODS: Final = 6.0

@@ -60,13 +60,9 @@ def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
     values: dict[str, float] = {"step_time_s": step_time_s}
     for channel, minimum in SIGNALS.items():
         signal = np.asarray(recording[channel], dtype=np.float64)
-        response = step_response(time_s, signal, step_time_s, STEADY_WINDOW_S, minimum)
         name, _, unit = channel.rpartition("_")
-        values[f"{name}_steady_state_{unit}"] = response.steady_state
-        values[f"{name}_response_time_s"] = response.response_time_s
-        values[f"{name}_peak_{unit}"] = response.peak
-        values[f"{name}_peak_time_s"] = response.peak_time_s
-        values[f"{name}_overshoot"] = response.overshoot
+        for key, value in step_response(time_s, signal, step_time_s, STEADY_WINDOW_S, minimum).items():
+            values[f"{name}_{key}" + (f"_{unit}" if key in ("steady_state", "peak") else "")] = value
     values["tb_srad"] = values["yaw_rate_peak_time_s"] * abs(values["sideslip_steady_state_rad"])
 
     settled = time_s >= time_s[-1] - STEADY_WINDOW_S

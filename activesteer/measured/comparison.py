@@ -135,16 +135,8 @@ FILTERS: Final[dict[str, Filter | None]] = {
 0.5 % of error up to 5 Hz: this one has -3 dB at 9.05 Hz and 0.36 % at 5 Hz."""
 
 
-class Smooth(NamedTuple):
-    """A filtered channel."""
-
-    values: Array  # filtered values; the given ones if they cannot be filtered
-    noise: float  # standard deviation of the noise that remains in them
-    problem: str = ""  # reason for which they are not filtered; empty if they are
-
-
-def smooth(recording: Recording, channel: str, chosen: Filter | None) -> Smooth:
-    """Filter a channel, and estimate the noise that remains."""
+def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[Array, float, str]:
+    """Return a filtered channel, the standard deviation of the remaining noise, and why it is not filtered, if so."""
     # What a low-pass filter at a quarter of the sampling rate or lower removes is taken for noise: its median absolute
     # deviation, which the short edges of a manoeuvre do not move. The noise is assumed white: below the cut-off
     # frequency it is as dense as above. A signal that the logger has filtered already shows no noise.
@@ -158,11 +150,11 @@ def smooth(recording: Recording, channel: str, chosen: Filter | None) -> Smooth:
         std = _MEDIAN_TO_STD * float(np.median(np.abs(rest - np.median(rest))))
         density = std / math.sqrt(nyquist_Hz - split_Hz)
         if chosen is None:
-            return Smooth(values, density * math.sqrt(nyquist_Hz))
+            return values, density * math.sqrt(nyquist_Hz), ""
         cut_Hz = chosen.of(channel)
-        return Smooth(low_pass(values, step_s, cut_Hz, poles), density * math.sqrt(min(cut_Hz, nyquist_Hz)))
+        return low_pass(values, step_s, cut_Hz, poles), density * math.sqrt(min(cut_Hz, nyquist_Hz)), ""
     except RecordingError as reason:
-        return Smooth(values, 0.0, reason.problem if chosen else "")
+        return values, 0.0, reason.problem if chosen else ""
 
 
 def allowance(noises: list[float]) -> float:
@@ -311,21 +303,22 @@ def compare(
     chosen, problems = FILTERS[filtered], list[str]()
     smoothed = {name: [smooth(run, name, chosen) for run in (*measured, simulated)] for name in names}
     for name, sides in smoothed.items():
-        if reason := next((side.problem for side in sides if side.problem), ""):
+        if reason := next((problem for _, _, problem in sides if problem), ""):
             problems.append(f"{quantity_of(name).label}: {reason}")
             smoothed[name] = [smooth(run, name, None) for run in (*measured, simulated)]
     allowed = {
-        name: allowance([side.noise for side in sides[:-1]]) if noise else 0.0 for name, sides in smoothed.items()
+        name: allowance([remaining for _, remaining, _ in sides[:-1]]) if noise else 0.0
+        for name, sides in smoothed.items()
     }
 
     def mean_of(name: str) -> tuple[Array, Array]:
         values = np.stack([
-            np.interp(time_s + shift, run.time_s, side.values)
+            np.interp(time_s + shift, run.time_s, side[0])
             for run, side, shift in zip(measured, smoothed[name], made_up, strict=False)
         ])  # fmt: skip
         return values.mean(axis=0), _confidence(values)
 
-    simulated_of = {name: sides[-1].values for name, sides in smoothed.items()}
+    simulated_of = {name: sides[-1][0] for name, sides in smoothed.items()}
     found = []
     for name in names:
         if standard == "iso19365":

@@ -26,18 +26,13 @@ from activesteer.theory.proportions import percent
 from activesteer.units import display_unit, parameter_label, typeset
 
 TITLE: Final = "activesteer report"
-_VERDICT_CLASS: Final = {
-    Verdict.PASSED: "passed",
-    Verdict.FAILED: "failed",
-    Verdict.NOT_REPRODUCED: "known",
-    Verdict.UNEXPECTED: "passed",
+_VERDICT_LOOK: Final = {
+    Verdict.PASSED: ("passed", "\N{CHECK MARK}"),
+    Verdict.FAILED: ("failed", "\N{BALLOT X}"),
+    Verdict.NOT_REPRODUCED: ("known", "\N{NOT EQUAL TO}"),
+    Verdict.UNEXPECTED: ("passed", "\N{CHECK MARK}"),
 }
-_VERDICT_MARK: Final = {
-    Verdict.PASSED: "\N{CHECK MARK}",
-    Verdict.FAILED: "\N{BALLOT X}",
-    Verdict.NOT_REPRODUCED: "\N{NOT EQUAL TO}",
-    Verdict.UNEXPECTED: "\N{CHECK MARK}",
-}
+"""Verdict -> its class in the stylesheet, and its mark."""
 _CHANGE_MARK: Final = {
     Change.BETTER: "\N{CHECK MARK}",
     Change.WORSE: "\N{BALLOT X}",
@@ -45,8 +40,6 @@ _CHANGE_MARK: Final = {
     Change.OTHER: "",
 }
 """Marks beside the colours, for readers who cannot see these."""
-
-
 _MOST_EVENTS: Final = 20
 
 
@@ -86,8 +79,8 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
         runs=runs,
         sections=sections,
         verdicts=everything.counts,
-        verdict_class=_VERDICT_CLASS,
-        verdict_mark=_VERDICT_MARK,
+        verdict_class={verdict: look[0] for verdict, look in _VERDICT_LOOK.items()},
+        verdict_mark={verdict: look[1] for verdict, look in _VERDICT_LOOK.items()},
         change_mark=_CHANGE_MARK,
         by_proportion=everything.by_proportion(),
         population=everything.population,

@@ -61,14 +61,14 @@ def test_crossing_is_nan_for_a_signal_that_starts_above_the_level():
 
 def test_first_order_lag_takes_ln_10_time_constants_to_90_percent():
     response = step_response(TIME_S, 0.3 * first_order(TIME_S - 1.0, 0.2), 1.0, 1.0, 1e-3)
-    assert response.steady_state == pytest.approx(0.3, rel=1e-8)
-    assert response.response_time_s == pytest.approx(0.2 * math.log(10.0), abs=1e-5)
+    assert response["steady_state"] == pytest.approx(0.3, rel=1e-8)
+    assert response["response_time_s"] == pytest.approx(0.2 * math.log(10.0), abs=1e-5)
 
 
 def test_first_order_lag_has_no_peak():
     response = step_response(TIME_S, 0.3 * first_order(TIME_S - 1.0, 0.2), 1.0, 1.0, 1e-3)
-    assert math.isnan(response.peak_time_s)
-    assert response.overshoot == pytest.approx(0.0, abs=1e-6)
+    assert math.isnan(response["peak_time_s"])
+    assert response["overshoot"] == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("damping", [0.3, 0.5, 0.7])
@@ -80,14 +80,14 @@ def test_second_order_lag_peaks_where_the_closed_form_says(damping, side):
     )
     root = math.sqrt(1.0 - damping**2)
     # Half a millisecond: peaks are taken from samples. 2e-4: what is left of the oscillation in the last second.
-    assert response.peak_time_s == pytest.approx(math.pi / (natural_radps * root), abs=6e-4)
-    assert response.overshoot == pytest.approx(math.exp(-math.pi * damping / root), abs=2e-4)
-    assert response.peak == pytest.approx(side * 0.2 * (1.0 + math.exp(-math.pi * damping / root)), rel=1e-4)
+    assert response["peak_time_s"] == pytest.approx(math.pi / (natural_radps * root), abs=6e-4)
+    assert response["overshoot"] == pytest.approx(math.exp(-math.pi * damping / root), abs=2e-4)
+    assert response["peak"] == pytest.approx(side * 0.2 * (1.0 + math.exp(-math.pi * damping / root)), rel=1e-4)
 
 
 def test_response_time_of_a_second_order_lag_solves_its_equation():
     response = step_response(TIME_S, second_order(TIME_S - 1.0, 9.0, 0.7), 1.0, 1.0, 1e-3)
-    at_crossing = second_order(np.array([response.response_time_s]), 9.0, 0.7)[0]
+    at_crossing = second_order(np.array([response["response_time_s"]]), 9.0, 0.7)[0]
     assert at_crossing == pytest.approx(0.9, abs=1e-4)
 
 
@@ -95,30 +95,30 @@ def test_noise_of_one_percent_moves_the_results_little(rng):
     clean = second_order(TIME_S - 1.0, 9.0, 0.5)
     noisy = clean + 0.01 * rng.standard_normal(TIME_S.size)
     wanted, got = (step_response(TIME_S, values, 1.0, 1.0, 1e-3) for values in (clean, noisy))
-    assert got.steady_state == pytest.approx(wanted.steady_state, abs=1e-3)
-    assert got.response_time_s == pytest.approx(wanted.response_time_s, abs=2e-3)
-    assert got.overshoot == pytest.approx(wanted.overshoot, abs=8e-3)
-    assert got.peak_time_s == pytest.approx(wanted.peak_time_s, abs=30e-3)
+    assert got["steady_state"] == pytest.approx(wanted["steady_state"], abs=1e-3)
+    assert got["response_time_s"] == pytest.approx(wanted["response_time_s"], abs=2e-3)
+    assert got["overshoot"] == pytest.approx(wanted["overshoot"], abs=8e-3)
+    assert got["peak_time_s"] == pytest.approx(wanted["peak_time_s"], abs=30e-3)
 
 
 def test_response_that_first_moves_the_other_way_is_timed_by_its_final_direction():
     since_s = TIME_S - 1.0
     values = -0.02 * first_order(since_s, 0.3) + 0.015 * np.where(since_s > 0.0, np.exp(-since_s / 0.1), 0.0)
     response = step_response(TIME_S, values, 1.0, 1.0, 1e-4)
-    assert response.steady_state < 0.0
-    crossing_s = np.interp(response.response_time_s + 1.0, TIME_S, values)
-    assert crossing_s == pytest.approx(0.9 * response.steady_state, rel=1e-4)
+    assert response["steady_state"] < 0.0
+    crossing_s = np.interp(response["response_time_s"] + 1.0, TIME_S, values)
+    assert crossing_s == pytest.approx(0.9 * response["steady_state"], rel=1e-4)
 
 
 def test_response_that_is_there_before_the_step_has_no_response_time():
     response = step_response(TIME_S, np.full_like(TIME_S, 0.2), 1.0, 1.0, 1e-3)
-    assert math.isnan(response.response_time_s)
+    assert math.isnan(response["response_time_s"])
 
 
 def test_steady_state_near_zero_gives_no_times():
     response = step_response(TIME_S, 1e-6 * first_order(TIME_S - 1.0), 1.0, 1.0, 1e-3)
-    assert math.isnan(response.response_time_s)
-    assert math.isnan(response.overshoot)
+    assert math.isnan(response["response_time_s"])
+    assert math.isnan(response["overshoot"])
 
 
 def test_unequal_steps_are_refused():
