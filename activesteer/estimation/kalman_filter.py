@@ -12,7 +12,15 @@ leans with the body. Differences give the derivatives of the model. The unknowns
     forces  errors of `force_std_N` + `force_fraction` |F| for `force_s`, longitudinal errors of `along_fraction` |X|
     noise   of lateral and yaw acceleration
 
+On a road that is assumed to be dry, the slope of the forces over u is 0 at every slip angle that occurs on snow, so an
+extended filter explains their lack by soft tyres. Over the range in which u is uncertain the slope is not 0. So the
+lateral acceleration is expected from its values at u and at sqrt(3) standard deviations P to both sides:
+
+    slope = (a+ - a-) / (2 sqrt(3 P)),  mean = a + (a+ + a- - 2 a) / 6,  variance + (a+ + a- - 2 a)^2 / 18
+
 Sources:
+    Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the
+    divided-difference filter of second order with h^2 = 3.
     Simon, Optimal State Estimation, 2006, chapter 13 (extended Kalman filter), section 7.2 (coloured noise).
     Doumiati, Charara, Victorino, Lechner, Vehicle Dynamics Estimation using Kalman Filtering, 2013, chapter 5.
 """
@@ -210,6 +218,23 @@ def predict(known, tyres, memory, duration_s):
             covariance[place, place] = variance
 
 
+@compiled
+def _over_friction(known, tyres, memory, here_mps2):
+    """Return slope over the friction, and bend, of the lateral acceleration in the range of its uncertainty."""
+    state, mass = memory.state, known.mass_kg
+    kept, spread = state[FRICTION], math.sqrt(3.0 * memory.covariance[FRICTION, FRICTION])
+    high, low = min(kept + spread, LARGEST_FRICTION), max(kept - spread, LEAST_FRICTION)
+    cos_f, cos_r = math.cos(memory.front_angle_rad), math.cos(memory.rear_angle_rad)
+    state[FRICTION] = high
+    front_N, rear_N = forces_of(known, tyres, memory, state)
+    above_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
+    state[FRICTION] = low
+    front_N, rear_N = forces_of(known, tyres, memory, state)
+    below_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
+    state[FRICTION] = kept
+    return (above_mps2 - below_mps2) / (high - low), above_mps2 + below_mps2 - 2.0 * here_mps2
+
+
 @inlined
 def _take_in(state, covariance, row, error, variance):
     """Process one measured value, and return the expected variance of its error."""
@@ -257,8 +282,12 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         math.cos(memory.front_angle_rad),
         math.cos(memory.rear_angle_rad),
     )
-    for place in (FRONT_SLIP, REAR_SLIP, FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS):
-        if place >= FRICTION and _is_braked(known, memory):
+    bend_mps2 = 0.0
+    if not _is_braked(known, memory):
+        here_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
+        row[FRICTION], bend_mps2 = _over_friction(known, tyres, memory, here_mps2)
+    for place in (FRONT_SLIP, REAR_SLIP, FRONT_STIFFNESS, REAR_STIFFNESS):
+        if place > FRICTION and _is_braked(known, memory):
             continue
         kept, step = state[place], _step_of(state, place)
         state[place] += step
@@ -266,12 +295,13 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         state[place] = kept
         row[place] = ((other_front_N - front_N) * cos_f + (other_rear_N - rear_N) * cos_r) / (mass * step)
     row[AY_OFFSET] = 1.0
-    expected = (front_N * cos_f + rear_N * cos_r + memory.front_along_N * sin_f) / mass
+    expected = (front_N * cos_f + rear_N * cos_r + memory.front_along_N * sin_f) / mass + bend_mps2 / 6.0
     error = ay_mps2 - expected - GRAVITY_MPS2 * memory.roll_rad - state[AY_OFFSET]
     front, rear = _force_errors(known, front_N, rear_N)
     # A force error lasts: during this time all samples count as one measurement.
     repeated = 1.0 + 2.0 * known.force_s / duration_s
     variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
+    variance += bend_mps2 * bend_mps2 / 18.0
     innovation += error * error / _take_in(state, covariance, row, error, variance)
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     for place in (FRONT_STIFFNESS, REAR_STIFFNESS):
