@@ -6,7 +6,8 @@ leans with the body. Differences give the derivatives of the model. The unknowns
     e_i     slip angle errors: Gauss-Markov processes of the size `slip_angle_std_rad` + `slip_angle_fraction` |a_i|
     k_i     stiffness of the tyres of an axle relative to new ones, of the size `stiffness_std`, for `stiffness_s`: it
             shows at small slip angles, where the friction does not
-    b_y     offset of the sensor and inclination of the road, likewise
+    b_y     offset of the lateral accelerometer, likewise
+    g_y     gravity across an inclined road, likewise: it moves the car, and the accelerometer does not feel it
     u       friction, likewise, about its assumed value; it is observable only from forces near the limit
     b_r     offset of the yaw rate sensor, a random walk
     forces  errors of `force_std_N` + `force_fraction` |F| for `force_s`, longitudinal errors of `along_fraction` |X|
@@ -36,6 +37,7 @@ from activesteer.compilation import compiled, inlined
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation.records import (
     AY_OFFSET,
+    BANK,
     FRICTION,
     FRONT_ERROR,
     FRONT_SLIP,
@@ -60,7 +62,7 @@ from activesteer.estimation.two_track_model import (
     slip_angles,
 )
 
-_DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 0.01, 0.01, 0.01])
+_DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 1.0, 0.01, 0.01, 0.01])
 """Steps of the differences, in the units of the states."""
 _MOST_BRAKED: Final = 0.25
 """Fraction of the front axle's friction force above which lateral forces give no information on friction and stiffness:
@@ -86,7 +88,7 @@ def begin(known, memory):
     covariance[:] = 0.0
     sizes = (
         0.1, 0.02, 0.005, 0.005, known.slip_angle_std_rad, known.slip_angle_std_rad, known.rate_offset_std_radps,
-        known.ay_offset_std_mps2, known.friction_std, known.stiffness_std, known.stiffness_std,
+        known.ay_offset_std_mps2, known.bank_std_mps2, known.friction_std, known.stiffness_std, known.stiffness_std,
     )  # fmt: skip
     for place in range(N_STATES):
         covariance[place, place] = sizes[place] ** 2
@@ -141,6 +143,7 @@ def _forget(known, memory, duration_s, moved, slope, added):
         (FRONT_ERROR, 0.0, front, known.slip_angle_s),
         (REAR_ERROR, 0.0, rear, known.slip_angle_s),
         (AY_OFFSET, 0.0, known.ay_offset_std_mps2, known.ay_offset_s),
+        (BANK, 0.0, known.bank_std_mps2, known.bank_s),
         (FRICTION, known.friction, known.friction_std, known.friction_s),
         (FRONT_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
         (REAR_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
