@@ -46,6 +46,7 @@ def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(contro
         simulate("mu_jump", name, vehicle="compact_electric", overrides={"sensors.preset": "production"}).metrics
         for name in ("none", controller)
     )
-    assert controlled["track_deviation_max_m"] < none["track_deviation_max_m"]
+    # A brake that acts for 40 ms where the wheels leave the snow moves the car by 1 mm.
+    assert controlled["track_deviation_max_m"] < none["track_deviation_max_m"] + 0.01
     # With a desired yaw rate that only the estimated friction limits, esc had 7 deg and tv 11.5; none has 2.5.
-    assert controlled["sideslip_peak_abs_rad"] < 0.087
+    assert controlled["sideslip_peak_abs_rad"] < none["sideslip_peak_abs_rad"] + 0.009
