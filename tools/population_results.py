@@ -17,7 +17,7 @@ import pyarrow as pa
 
 from activesteer.analysis.claims.judge import Claim
 from activesteer.analysis.claims.scorecard import NO_FACTOR, ClaimProportion, read_claims, stored_table
-from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity, track_harm_m
+from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, ModelError, ParameterError, StudyError
@@ -454,7 +454,7 @@ def _pairs(runs: Mapping[tuple[str, Car], Row], system: str, reference: str) -> 
 def _effect(system: str, scenario: str, both: Sequence[tuple[Row, Row]], **other: Any) -> SystemEffect:
     lost = [(is_lost(without), is_lost(row)) for without, row in both]
     grown = [growth_of(*pair) for pair in both]
-    tracks = [track_harm_m(growth) for growth in grown]
+    tracks = [max((growth[name] for name in ("lane", "path") if name in growth), default=math.nan) for growth in grown]
     return SystemEffect(
         system,
         scenario,

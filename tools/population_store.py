@@ -21,7 +21,6 @@ import pyarrow.parquet as pq
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, SYSTEMS, Claim, Kind
 from activesteer.analysis.claims.scorecard import BANDS, PAPER, SUMMARY, TRACK, Band, read_setting
 from activesteer.analysis.harm import MEASURES
-from activesteer.analysis.harm import TRACK as TRACK_MEASURES
 from activesteer.commands.terminal import Progress
 from activesteer.conventions import CURVE_STEP_S, Array
 from activesteer.errors import StudyError
@@ -184,7 +183,7 @@ def _comparison(found: Population) -> list[str]:
 
 
 _WORST: Final = {
-    "worst track, m": TRACK_MEASURES,
+    "worst track, m": ("lane", "path"),
     "worst stop, m": ("stopping",),
     "worst stop without a line, m": ("stopping_elsewhere",),
     "worst heading, deg": ("heading",),

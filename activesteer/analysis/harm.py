@@ -101,8 +101,6 @@ NEEDED_DISPLACEMENT_M: Final = 1.83
 """Displacement of a sine with dwell below which a car turns too little [m]; FMVSS 126, S5.2.3."""
 _DEGREE: Final = math.pi / 180.0
 _DWELL: Final = "yaw_rate_after_1750ms_share"
-TRACK: Final = ("lane", "path")
-"""Measures of the track, for the worst harm in metres."""
 
 
 class Measure(NamedTuple):
@@ -187,8 +185,3 @@ def severity(change: Mapping[str, float]) -> float:
     """Return the largest growth of a counted measure, in multiples of its size."""
     sizes = ((growth, MEASURES[name].size) for name, growth in change.items())
     return max((growth / size for growth, size in sizes if size), default=0.0)
-
-
-def track_harm_m(change: Mapping[str, float]) -> float:
-    """Return the growth of lane overstep or path error [m], or nan if the manoeuvre has neither."""
-    return max((change[name] for name in TRACK if name in change), default=math.nan)

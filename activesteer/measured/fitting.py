@@ -124,12 +124,11 @@ def measured_of(
     begin_s = float(recording.time_s[0])
     time_s = np.asarray(recording.time_s, np.float64)
     # The last row of a run is one step before its end.
-    inside = time_s <= time_s[-1] - study.timestep_s
     from_s, until_s = table.windows.get(name, (table.from_s, table.until_s))
-    if from_s is not None:
-        inside &= time_s >= from_s
-    if until_s is not None:
-        inside &= time_s <= until_s
+    last_s = time_s[-1] - study.timestep_s
+    inside = (time_s >= (-math.inf if from_s is None else from_s)) & (
+        time_s <= min(last_s, math.inf if until_s is None else until_s)
+    )
     values = {channel: np.asarray(recording[channel], np.float64)[inside] for channel in channels}
     for channel, each in values.items():
         if np.count_nonzero(np.isfinite(each)) < _FEWEST:

@@ -273,11 +273,9 @@ def _signal(name: str, source: _Source, shared: Array | None, chosen: Measuremen
     assert time_s is not None
     shift_s = chosen.shift_s.get(path.name, 0.0)
     signal = signals.samples(column.name, np.asarray(time_s, np.float64) + shift_s, values, path.name)
-    inside = np.ones(len(signal.time_s), bool)
-    if chosen.start_s is not None:
-        inside &= signal.time_s >= chosen.start_s
-    if chosen.end_s is not None:
-        inside &= signal.time_s <= chosen.end_s
+    start_s = -math.inf if chosen.start_s is None else chosen.start_s
+    end_s = math.inf if chosen.end_s is None else chosen.end_s
+    inside = (signal.time_s >= start_s) & (signal.time_s <= end_s)
     if np.count_nonzero(inside) < 2:
         raise RecordingError(f"{column.name} has no samples between start_s and end_s", file=path.name)
     time_s, values = signal.time_s[inside], signal.values[inside]

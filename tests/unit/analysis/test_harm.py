@@ -16,7 +16,6 @@ from activesteer.analysis.harm import (
     losses,
     severity,
     shown,
-    track_harm_m,
 )
 from activesteer.metric_table import CONES_MISSED, STAYS_IN_LANES
 
@@ -29,7 +28,7 @@ LANE = {
 def test_a_car_that_leaves_its_lane_further_is_harmed_and_one_that_moves_within_it_is_not():
     worse = changes(LANE, LANE | {"lane_overstep_m": 2.45})
     assert harms(worse) == ["lane"]
-    assert track_harm_m(worse) == pytest.approx(2.33)
+    assert worse["lane"] == pytest.approx(2.33)
     assert severity(worse) == pytest.approx(2.33 / 0.05)
     inside = LANE | {"lane_overstep_m": -0.4}
     assert harms(changes(inside, LANE | {"lane_overstep_m": 0.049})) == []
@@ -167,7 +166,6 @@ def test_the_path_of_the_car_without_control_decides_whether_a_stop_counts(witho
 def test_the_worst_measure_is_the_severity():
     change = {"lane": 0.1, "path": 0.2, "cones": 3.0, "heading_open_loop": 9.0, "stopping": -5.0}
     assert severity(change) == pytest.approx(4.0)
-    assert track_harm_m(change) == pytest.approx(0.2)
 
 
 def test_a_longer_stop_is_harm_and_no_stop_is_a_lost_car():
