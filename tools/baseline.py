@@ -19,8 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from activesteer import simulate
-from activesteer.analysis.claims.judge import SYSTEMS
-from activesteer.analysis.claims.statements import SCENARIOS
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.metrics import evaluation_of
 from activesteer.errors import ActiveSteerError, RecordingError
 from activesteer.files import read_text, write_json

@@ -125,10 +125,8 @@ def measured_of(
     time_s = np.asarray(recording.time_s, np.float64)
     # The last row of a run is one step before its end.
     from_s, until_s = table.windows.get(name, (table.from_s, table.until_s))
-    last_s = time_s[-1] - study.timestep_s
-    inside = (time_s >= (-math.inf if from_s is None else from_s)) & (
-        time_s <= min(last_s, math.inf if until_s is None else until_s)
-    )
+    begin, end = -math.inf if from_s is None else from_s, math.inf if until_s is None else until_s
+    inside = (time_s >= begin) & (time_s <= min(end, time_s[-1] - study.timestep_s))
     values = {channel: np.asarray(recording[channel], np.float64)[inside] for channel in channels}
     for channel, each in values.items():
         if np.count_nonzero(np.isfinite(each)) < _FEWEST:

@@ -19,11 +19,6 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
-<<<<<<< HEAD
-from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
-from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
-=======
->>>>>>> 215f5a1b750caca84433747f94fe400c1f219329
 from activesteer.brakes.brake_control_unit import step_brakes
 from activesteer.compilation import compiled
 from activesteer.conventions import CORNERS
