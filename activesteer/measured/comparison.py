@@ -157,11 +157,6 @@ def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[A
         return values, 0.0, reason.problem if chosen else ""
 
 
-def allowance(noises: list[float]) -> float:
-    """Return half of the 95 % interval of the noise in the mean of several runs."""
-    return _TWO_SIDED_95 * math.sqrt(sum(noise**2 for noise in noises)) / len(noises)
-
-
 STANDARDS: Final = {
     "iso19364": "ISO 19364: cross plots over the lateral acceleration",
     "iso19365": "ISO 19365: over time",
@@ -306,10 +301,10 @@ def compare(
         if reason := next((problem for _, _, problem in sides if problem), ""):
             problems.append(f"{quantity_of(name).label}: {reason}")
             smoothed[name] = [smooth(run, name, None) for run in (*measured, simulated)]
-    allowed = {
-        name: allowance([remaining for _, remaining, _ in sides[:-1]]) if noise else 0.0
-        for name, sides in smoothed.items()
-    }
+    allowed = dict.fromkeys(names, 0.0)
+    for name, (*sides, _) in smoothed.items() if noise else ():
+        # Half of the 95 % interval of the noise in the mean of several runs.
+        allowed[name] = _TWO_SIDED_95 * math.sqrt(sum(remaining**2 for _, remaining, _ in sides)) / len(sides)
 
     def mean_of(name: str) -> tuple[Array, Array]:
         values = np.stack([

@@ -228,13 +228,9 @@ def _mark_instants(figure: Figure, recordings: Mapping[str, RecordingLike]) -> N
 
 
 def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """Draw the response to a step steer.
-
-    From the top, over one time axis: yaw rate (dotted: desired by the controller), steering angles (front wheels thin,
-    added angles of rear wheels or front superposition thick), lateral acceleration, sideslip and roll.
-
-    Source: V. Dorsch, Mecatronics-REM 2012, figure 11.
-    """
+    """Draw the response to a step steer, as the paper's figure 11 does."""
+    # From the top: yaw rate (dotted: desired by the controller), steering angles (front wheels thin, added angles
+    # thick), lateral acceleration, sideslip and roll.
     curves = style.curves(recordings)
     figure = new_figure(width_in=style.COLUMN_IN, height_in=1.1 + 5 * PANEL_IN)
     axes: list[Axes] = list(figure.subplots(5, 1, sharex=True))
@@ -257,29 +253,15 @@ def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
     return figure
 
 
-def figure_2(
-    recording: RecordingLike,
-    path: str | os.PathLike[str],
-    models: Mapping[str, Mapping[str, Array]] | None = None,
-) -> Path:
-    """Draw yaw rate and roll angle after a step of the steering, in the form of the paper's figure 2, and save it.
-
-    Args:
-        recording: A step steer.
-        path: File to write; its ending gives the format (.png, .pdf, .svg).
-        models: Label -> channel -> values over the time of the recording, drawn beside it: the single-track model
-            (`identification.single_track_response`), which has no roll, and the linear car
-            (`linearisation.linear_response`).
-
-    Source: V. Dorsch, Mecatronics-REM 2012, figure 2.
-    """
+def figure_2(recording: RecordingLike, path: str | os.PathLike[str], models: Mapping[str, Mapping[str, Array]]) -> Path:
+    """Draw yaw rate and roll angle of a run and of models, in the form of the paper's figure 2, and save them."""
     figure = new_figure(width_in=style.COLUMN_IN, height_in=3.6)
     axes: list[Axes] = list(figure.subplots(2, 1, sharex=True))
     car = DrawnRun(recording, RunLook("multibody car", 0, ()))
     for axis, name in zip(axes, ("yaw_rate", "roll"), strict=True):
         panel = PANELS[name].quantity
         style.draw(axis, car, panel, label=car.look.label, width=2.0)
-        for place, (label, channels) in enumerate((models or {}).items(), start=1):
+        for place, (label, channels) in enumerate(models.items(), start=1):
             if panel.channel in channels:
                 axis.plot(
                     recording.time_s, channels[panel.channel] * panel.factor, color=RUN_COLOURS[place], linewidth=1.2,

@@ -89,7 +89,7 @@ def draw(
     # A leading underscore keeps a line out of the legend.
     axis.plot(
         thinned(curve.recording.time_s), values, color=curve.look.colour, linewidth=width,
-        linestyle=curve.linestyle if style is None else style, label=label or "_hidden",
+        linestyle=style or curve.linestyle, label=label or "_hidden",
     )  # fmt: skip
 
 
@@ -107,16 +107,8 @@ def draw_band(axis: Axes, curve: DrawnRun, channel: str, factor: float = 1.0) ->
     """Draw the band of a channel in the population, behind all curves."""
     band = curve.bands.get(channel)
     if band is not None:
-        edges = band.low * factor, band.high * factor
-        axis.fill_between(
-            band.at,
-            *edges,
-            color=curve.look.colour,
-            alpha=BAND_ALPHA,
-            linewidth=0.0,
-            zorder=1.5,
-            label=f"_{BAND_LABEL}",
-        )
+        look = {"color": curve.look.colour, "alpha": BAND_ALPHA, "linewidth": 0.0, "zorder": 1.5}
+        axis.fill_between(band.at, band.low * factor, band.high * factor, label=f"_{BAND_LABEL}", **look)
 
 
 def friction_label(low: float, high: float) -> str:

@@ -129,18 +129,13 @@ def _events(group: Group) -> list[str]:
 def _facts(groups: Sequence[Group], made: date) -> list[str]:
     """Return date, car, driver and versions of the program."""
     recordings = [run.recording for group in groups for run in group.runs]
-
-    def every(table: str, key: str) -> str:
-        return ", ".join(dict.fromkeys(value for run in recordings if (value := entry(run, table, key))))
-
     facts = [made.isoformat()]
-    for word, value in (
-        ("vehicle", every("vehicle", "name")),
-        ("driver", every("driver", "name")),
-        ("activesteer", every("versions", "activesteer")),
-        ("MuJoCo", every("versions", "mujoco")),
-    ):
-        facts += [f"{word} {value}"] if value else []
+    for word, table, key in (
+        ("vehicle", "vehicle", "name"), ("driver", "driver", "name"), ("activesteer", "versions", "activesteer"),
+        ("MuJoCo", "versions", "mujoco"),
+    ):  # fmt: skip
+        if values := dict.fromkeys(value for run in recordings if (value := entry(run, table, key))):
+            facts.append(f"{word} {', '.join(values)}")
     return facts
 
 
