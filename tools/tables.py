@@ -111,7 +111,8 @@ def _mean(population: Population | StoredPopulation | None, claims: Sequence[str
 
 
 def _proportion(population: Population | StoredPopulation | None, number: str) -> tuple[str, str, str]:
-    found = None if population is None else population.of(number)
+    claims = () if population is None else population.claims
+    found = next((claim for claim in claims if claim.id == number), None)
     if found is None:
         return "", "", ""
     interval = f"{percent(found.low)} to {percent(found.high)}"

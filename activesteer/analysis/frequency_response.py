@@ -27,8 +27,6 @@ from activesteer.errors import RecordingError
 
 INPUT: Final = "steering_wheel_demand_rad"
 """The driver's demand. The steering wheel follows it within a millisecond."""
-OUTPUTS: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
-"""Channels whose response is evaluated."""
 HALF_BAND_LINES: Final = 2
 """Number of lines to either side that are summed into one value."""
 MIN_SPECTRUM: Final = 1e-3

@@ -53,11 +53,6 @@ class CircleValidation:
     upper_deg: Array  # the same at the other ends
 
     @property
-    def assumptions(self) -> tuple[str, ...]:
-        """Assumptions that the file states."""
-        return self.file.table.assumptions
-
-    @property
     def difference_deg(self) -> float:
         """Mean of our samples minus mean of the measured angles."""
         return float(self.samples_deg.mean() - self.measured_deg.mean())
@@ -121,7 +116,7 @@ class CircleValidation:
             "difference_deg": self.difference_deg, "tolerance_deg": self.tolerance_deg,
             "area_metric_deg": self.area_metric_deg, "overlap": self.overlap,
             "effects": {name: self.assumed_deg - angle for name, angle in self.effects.items()},
-            "decisions": self.decisions, "assumptions": list(self.assumptions),
+            "decisions": self.decisions, "assumptions": list(self.file.table.assumptions),
         }  # fmt: skip
 
 

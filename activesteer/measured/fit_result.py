@@ -56,12 +56,10 @@ def autocorrelation_time(values: Array) -> float:
 
 
 def intervals(series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool) -> Intervals:
-    """Return intervals of the parameters, in the linear neighbourhood of the solution.
-
-    Least squares weights each series by its stated noise. If this noise is not trusted, each series gets the variance
-    of its residual, and its n samples count as n/tau, with tau its autocorrelation time. The result is exact if the
-    derivatives change slowly compared with the noise, and too wide if they change as fast.
-    """
+    """Return intervals of the parameters, in the linear neighbourhood of the solution."""
+    # Least squares weights each series by its stated noise. If this noise is not trusted, each series gets the variance
+    # of its residual, and its n samples count as n/tau, with tau its autocorrelation time. The result is exact if the
+    # derivatives change slowly compared with the noise, and too wide if they change as fast.
     from scipy.stats import t  # noqa: PLC0415 - slow to import
 
     count, parameters = sum(map(len, series)), int(np.count_nonzero(free))

@@ -117,8 +117,9 @@ _ORIGINS: Final = {"geometry": "#8a9097", "measured": RUN_COLOURS[2], "assumed":
 def measured_page(result: MeasuredValidation | CircleValidation) -> Page:
     """Return the page of a result."""
     table = result.file.table
-    lead, sections = _circle(result) if isinstance(result, CircleValidation) else _runs(result)
-    sections.append(Section("Assumptions", points=result.assumptions))
+    is_circle = isinstance(result, CircleValidation)
+    lead, sections = _circle(result) if is_circle else _runs(result)
+    sections.append(Section("Assumptions", points=table.assumptions if is_circle else result.assumptions))
     return Page(f"activesteer: {table.vehicle} and its measurement", table.title or table.vehicle, lead, sections)
 
 

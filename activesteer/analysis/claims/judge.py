@@ -120,16 +120,13 @@ class Claim:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A manoeuvre of the paper: call it with recordings to check its statements.
-
-    `metrics` evaluates a run. `compared` returns further metrics, by system or `together`, of all runs and their
-    metrics; it is told whether the three runs are whole.
-    """
+    """A manoeuvre of the paper: call it with recordings to check its statements."""
 
     what: str
     kind: Kind
     statements: tuple[Statement, ...]
-    metrics: Callable[[RecordingLike], Mapping[str, float]]
+    metrics: Callable[[RecordingLike], Mapping[str, float]]  # function that evaluates a run
+    # function that returns further metrics of all runs and their metrics; it is told whether the three runs are whole
     compared: Callable[[Mapping[str, RecordingLike], RunMetrics, bool], RunMetrics] = lambda *_: {}
 
     def __call__(self, recordings: Mapping[str, RecordingLike]) -> list[Claim]:
@@ -191,12 +188,10 @@ def _is_cut_short(recording: RecordingLike) -> bool:
 
 
 def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> tuple[str, float]:
-    """Return why no claim can pass on three runs, and the distance of this obstacle from vanishing, 0 to 1.
-
-    A run must be whole. The run of ars must turn the rear wheels and the run of afs the superposition gear, by
-    `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`largest_action`). No run may
-    demand as much of an actuator that its system does not have: an action that a system did not perform proves nothing.
-    """
+    """Return why no claim can pass on three runs, and the distance of this obstacle from vanishing, 0 to 1."""
+    # A run must be whole. The run of ars must turn the rear wheels and the run of afs the superposition gear, by
+    # `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`largest_action`). No run may
+    # demand as much of an actuator that its system does not have: an action that was not performed proves nothing.
     if cut:
         return ", ".join(f"the run {system} ends too early" for system in cut), 1.0
     found: list[tuple[str, float]] = []

@@ -191,10 +191,6 @@ class Population(NamedTuple):
     vehicle: str
     claims: tuple[ClaimProportion, ...]
 
-    def of(self, claim: str) -> ClaimProportion | None:
-        """Return the proportion of a claim, or None for an unknown claim."""
-        return next((proportion for proportion in self.claims if proportion.id == claim), None)
-
 
 def read_claims(table: Mapping[str, Any]) -> tuple[ClaimProportion, ...]:
     """Return the proportions of a stored population. A damaged table raises `StudyError`."""
@@ -388,8 +384,9 @@ def scorecard(
         known, vehicle = read_setting(PAPER).fails, ""
     reasons = not_reproduced(vehicle) if known is None else known
     stored = population or stored_population(vehicle)
+    proportions = {one.id: one for one in stored.claims} if stored else {}
     judged = (
-        Judged(claim, _verdict(claim, reasons), reasons.get(claim.id, ""), stored.of(claim.id) if stored else None)
+        Judged(claim, _verdict(claim, reasons), reasons.get(claim.id, ""), proportions.get(claim.id))
         for claim in claims
     )
     return Scorecard(tuple(judged), stored, setting)

@@ -76,13 +76,9 @@ def curves(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
 
 
 def draw(
-    axis: Axes,
-    curve: DrawnRun,
-    shown: Quantity,
-    label: str = "",
-    width: float = LINE_PT,
+    axis: Axes, curve: DrawnRun, shown: Quantity, label: str = "", width: float = LINE_PT,
     style: LineStyle | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Draw a channel of a run over time: without a label outside the legend, by default in the run's own style."""
     draw_band(axis, curve, shown.channel, shown.factor)
     values = thinned(drawn_values(curve.recording, shown.channel)) * shown.factor

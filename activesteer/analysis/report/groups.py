@@ -28,7 +28,7 @@ from activesteer.recording.recording import run_names
 def judge(group: Group) -> Scorecard:
     """Check the paper's claims about the runs of a group. Without claims the scorecard is empty, and says why."""
     # The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
-    recordings = group.by_name()
+    recordings = {run.name: run.recording for run in group.runs}
     check = claims_for(group.runs[0].recording)
     if check is None:
         return Scorecard(())
@@ -76,10 +76,6 @@ class Group(NamedTuple):
     name: str  # name of the manoeuvre
     title: str  # its name in words
     runs: tuple[ReportedRun, ...]  # the runs, at least one
-
-    def by_name(self) -> dict[str, Recording]:
-        """Return the recordings by name of the run."""
-        return {run.name: run.recording for run in self.runs}
 
 
 def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:

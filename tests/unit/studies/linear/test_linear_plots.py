@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.figures import figure_2
-from activesteer.analysis.frequency_response import OUTPUTS
 from activesteer.studies.linear.linearisation import draw_bode, draw_root_locus
 from tests.unit.analysis.synthetic import step_steer
+
+OUTPUTS = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 
 
 def system(speed_mps: float = 20.0) -> control.StateSpace:
