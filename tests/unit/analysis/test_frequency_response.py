@@ -10,7 +10,6 @@ import pytest
 from scipy import signal
 
 from activesteer.analysis.frequency_response import (
-    OUTPUTS,
     frequency_response,
     frequency_response_metrics,
     random_response,
@@ -20,6 +19,7 @@ from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun
 
 STEP_S, LAG_S, GAIN = 0.001, 0.15, 0.3
+OUTPUTS = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 
 
 def sweep(rng: np.random.Generator | None = None, last_Hz: float = 6.0) -> SyntheticRun:
