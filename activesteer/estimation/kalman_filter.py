@@ -23,6 +23,7 @@ Sources:
     Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the
     divided-difference filter of second order with h^2 = 3.
     Simon, Optimal State Estimation, 2006, chapter 13 (extended Kalman filter), section 7.2 (coloured noise).
+    Schmidt, Application of State-Space Methods to Navigation Problems, Advances in Control Systems 3, 1966.
     Doumiati, Charara, Victorino, Lechner, Vehicle Dynamics Estimation using Kalman Filtering, 2013, chapter 5.
 """
 
