@@ -59,8 +59,7 @@ def known_column(name: str, columns: Collection[str], channels: Collection[str])
     for mark, names in _NAMES["exporters"].items():
         if mark in columns and name in names:
             key = names[name].lstrip("-")
-            channel = field_in_unit(key, channels)[0]
-            assert channel is not None
+            channel = field_in_unit(key, channels)[0] or key
             return Known(channel, unit_of(key), -1.0 if names[name] != key else 1.0)
     if name in channels:
         return Known(name)
