@@ -121,7 +121,6 @@ OTHER_NAMES: Final = {
     "obstacles": "uneven",
     "native_path": "path_coordinates",
     "closed_loop": "simulation",
-    "native_cars": "batch",
     "native_loop": "batch",
     "pacing": "by_the_clock",
     "preparation": "amplitude_search",

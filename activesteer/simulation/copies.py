@@ -1,9 +1,9 @@
-"""Copies of what runs: pickled simulations, and blocks with new parameters that keep their memory.
+"""Copies of what runs, and blocks with new parameters that keep their memory.
 
-The block is compared with one that was just made with the old parameters. A value that is still the same follows from
-the parameters, and the value of a block made with the new ones replaces it. A value that has changed since is memory
-(filters, integrators, counters), and is kept. A class names values that it computes from parameters on the way, such as
-a schedule of gains, in its attribute `derived`; they are dropped.
+`retuned` compares a block with one that was just made with the old parameters. A value that is still the same follows
+from the parameters, and the value of a block made with the new ones replaces it. A value that has changed since is
+memory (filters, integrators, counters), and is kept. A class names values that it computes from parameters on the way,
+such as a schedule of gains, in its attribute `derived`; they are dropped.
 """
 
 from __future__ import annotations
@@ -12,15 +12,89 @@ import io
 import operator
 import pickle
 import sys
+import threading
 from collections import deque
 from collections.abc import Mapping
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.plugins import in_one_line, is_user_module
+
+
+class NonReentrantLock:
+    """A context that a second caller cannot enter while the first is inside."""
+
+    def __init__(self) -> None:
+        """Make a context that nobody has entered."""
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        """Enter, or refuse."""
+        if not self._lock.acquire(False):
+            raise ManeuverError(
+                "this simulation is already being driven, by another thread or by the caller of its own block; use a "
+                "copy of it (Simulation.copy) for each thread"
+            )
+
+    def __exit__(self, *_: object) -> None:
+        """Leave."""
+        self._lock.release()
+
+
+class Copyable:
+    """Base of what is copied as its inputs and its state, from which the copy is built again."""
+
+    def _portable(self) -> Any:
+        """Return inputs and state, without native memory."""
+        raise NotImplementedError
+
+    def _rebuild(self, portable: Any) -> None:
+        """Become what `_portable` describes."""
+        raise NotImplementedError
+
+    @classmethod
+    def _rebuilt(cls, portable: Any) -> Self:
+        other = cls.__new__(cls)
+        other._rebuild(portable)
+        return other
+
+    def copy(self) -> Self:
+        """Return an independent copy that continues bit-identically.
+
+        The copy builds its cars and lets them settle again, which takes as long as creating them.
+
+        Raises:
+            ManeuverError: the run failed, or is being driven.
+            RecordingError: the run is being written to a file.
+            ActiveSteerError: your own driver or controller cannot be copied.
+        """
+        return self._rebuilt(self._portable())
+
+    def __copy__(self) -> Self:
+        return self.copy()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self.copy()
+
+    def __reduce_ex__(self, _protocol: Any) -> tuple[Any, ...]:
+        buffer, portable = io.BytesIO(), self._portable()
+        try:
+            _Pickler(buffer, pickle.HIGHEST_PROTOCOL).dump(portable)
+        except Exception as reason:
+            raise ParameterError(f"this simulation cannot be pickled: {in_one_line(reason)}") from reason
+        return _unpickled, (type(self), buffer.getvalue())
+
+
+def _unpickled(kind: Any, content: bytes) -> Any:
+    try:
+        return kind._rebuilt(pickle.loads(content))
+    except ActiveSteerError:
+        raise
+    except Exception as reason:
+        raise ParameterError(f"this simulation cannot be unpickled: {in_one_line(reason)}") from reason
 
 
 class _Pickler(pickle.Pickler):
@@ -33,27 +107,6 @@ class _Pickler(pickle.Pickler):
 
 def _class(module: str, name: str) -> Any:
     return operator.attrgetter(name)(sys.modules[module])
-
-
-def pickled(portable: Any) -> bytes:
-    """Pickle the inputs and the state of a simulation."""
-    buffer = io.BytesIO()
-    try:
-        _Pickler(buffer, pickle.HIGHEST_PROTOCOL).dump(portable)
-    except Exception as reason:
-        raise ParameterError(f"this simulation cannot be pickled: {in_one_line(reason)}") from reason
-    return buffer.getvalue()
-
-
-def unpickled(kind: Any, content: bytes) -> Any:
-    """Create a simulation from its pickled inputs and state."""
-    try:
-        portable = pickle.loads(content)
-    except ActiveSteerError:
-        raise
-    except Exception as reason:
-        raise ParameterError(f"this simulation cannot be unpickled: {in_one_line(reason)}") from reason
-    return kind._rebuilt(portable)
 
 
 _WHOLE: Final = (type, ModuleType, FunctionType, BuiltinFunctionType, MethodType)
