@@ -63,7 +63,7 @@ DRIVER: Final = _DriverKind(
     unchecked=("wheel_torques",),
     data=list_drivers,
     reserved=tuple(field.name for field in fields(DriverParameters)),
-    completes=True,
+    filled=("front_steer_demand_rad",),
 )
 """Rules that all drivers follow."""
 

@@ -19,7 +19,6 @@ from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import DRIVER
 from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, shown
 from activesteer.faults import Fault
-from activesteer.plugins import Kind
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario
 from activesteer.signals import (
@@ -29,7 +28,6 @@ from activesteer.signals import (
     Motion,
     arrays_of,
     numbers_of,
-    widths_of,
 )
 from activesteer.simulation.closed_loop import ClosedLoop, LoopState, drive_together
 from activesteer.simulation.copies import Copyable, NonReentrantLock
@@ -41,9 +39,7 @@ MAX_CARS: Final = 100_000
 """Most cars of a batch."""
 _LEAST_STEPS: Final = 40
 """Car-steps below which a second thread costs more than it saves."""
-_MOST: Final = 1e12
 _MOST_STEPS: Final = 2**40
-"""Largest number of a command without a range of its own."""
 _WHEEL, _FRONT = (
     [number.name for number in numbers_of(DriverCommand)].index(name)
     for name in ("steering_wheel_demand_rad", "front_steer_demand_rad")
@@ -241,10 +237,10 @@ class Batch(Copyable):
             ActiveSteerError: your own driver or controller failed. A car that diverges raises nothing: see `failures`.
         """
         left = _steps(steps, len(self))
-        drivers = None if driver_command is None else _columns(DRIVER, driver_command, len(self))
+        drivers = None if driver_command is None else DRIVER.rows(driver_command, len(self))
         if drivers is not None:
             drivers[:, _FRONT] = drivers[:, _WHEEL] / self._ratios
-        controllers = None if actuator_command is None else _columns(CONTROLLER, actuator_command, len(self))
+        controllers = None if actuator_command is None else CONTROLLER.rows(actuator_command, len(self))
         if controllers is not None:
             for car in np.flatnonzero(controllers[:, _WHEEL_TORQUES].any(axis=1)).tolist():
                 with _named(car):
@@ -419,41 +415,6 @@ def _steps(steps: Any, n: int) -> NDArray[np.intp]:
     raise ParameterError(
         f"is {shown(steps)}; a whole number of steps, 0 or more, or {n} of them, is needed", key="steps", value=steps
     )
-
-
-def _columns(kind: Kind, message: Any, n: int) -> Array:
-    """Return the rows of a message of arrays, after checking them."""
-    if not isinstance(message, kind.result):
-        raise kind.fail("", f"is {shown(message)}; an activesteer.{kind.result.__name__} of arrays is needed", message)
-    rows = np.zeros((n, len(numbers_of(kind.result))))
-    place = 0
-    defaults = kind.result._field_defaults
-    for name, width, value in zip(message._fields, widths_of(kind.result), message, strict=True):
-        if value is defaults.get(name) and not value:
-            place += width
-            continue
-        if not width:
-            if value is not None:
-                raise kind.fail("", f"{name} cannot be given to a batch", value)
-            continue
-        if np.iscomplexobj(value):
-            raise kind.fail("", f"{name} is {shown(value)}; real numbers are needed")
-        try:
-            rows[:, place : place + width] = np.reshape(value, (-1, width)) if np.ndim(value) else value
-        except (TypeError, ValueError, OverflowError) as reason:
-            shape = f"({n},)" if width == 1 else f"({n}, {width})"
-            raise kind.fail(
-                "", f"{name} is {shown(value)}; a number, or an array of shape {shape}, is needed"
-            ) from reason
-        given, limits = rows[:, place : place + width], kind.ranges.get(name)
-        low, high = (-_MOST, _MOST) if limits is None else (limits.low, limits.high)
-        if name != "front_steer_demand_rad" and not ((given >= low) & (given <= high)).all():
-            wrong = int(np.argmin(((given >= low) & (given <= high)).all(axis=1)))
-            raise kind.fail(
-                "", f"{name} of car {wrong} is {shown(given[wrong].tolist())}; {low:g} to {high:g} is allowed"
-            )
-        place += width
-    return rows
 
 
 @contextmanager

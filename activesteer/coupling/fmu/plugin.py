@@ -231,7 +231,7 @@ class FmuBlock:
         fields = {field for field, *_ in self._writes}
         whole = (field for field in sorted(fields) if isinstance(self._default[field], int))
         self._whole = [(field, type(self._default[field])) for field in whole]
-        self._unchecked = kind.completes or any(names[field] in kind.unchecked for field in fields)
+        self._unchecked = bool(kind.filled) or any(names[field] in kind.unchecked for field in fields)
 
     def step(self, *messages: Any) -> Any:
         """Return the command of the FMU (see `Controller.step` and `Driver.step`)."""
