@@ -29,8 +29,8 @@ from activesteer.signals import (
     arrays_of,
     numbers_of,
 )
-from activesteer.simulation.closed_loop import ClosedLoop, LoopState, drive_together
-from activesteer.simulation.copies import Copyable, NonReentrantLock
+from activesteer.simulation.closed_loop import ClosedLoop, LoopState, NonReentrantLock, drive_together
+from activesteer.simulation.copies import Copyable
 from activesteer.simulation.native_loop import CAR, MESSAGES, PYTHON, STEP_ADDRESS, drive_cars
 from activesteer.simulation.preparation import prepared
 from activesteer.vehicle import engine_warnings_held

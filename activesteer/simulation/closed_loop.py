@@ -6,6 +6,7 @@ While a car is driven, the state of native blocks and of the controller's bus is
 from __future__ import annotations
 
 import copy
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -15,14 +16,14 @@ from numpy.typing import NDArray
 
 from activesteer.config import Source, build
 from activesteer.controllers import controller_spec
-from activesteer.controllers.native_laws import N_COMMAND, N_HELD, law_address
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver.human import HumanDriver, SetpointTable, setpoint_row, tabulate
 from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged, shown
 from activesteer.faults import Fault, check_faults, fault_table
 from activesteer.maneuver import Maneuver
 from activesteer.maneuver.phases import seen_of
-from activesteer.native_records import record_type, take, values
+from activesteer.native_memory import N_COMMAND, N_HELD, law_address
+from activesteer.native_records import Uncopyable, record_type, take, values
 from activesteer.road.native_path import PathSearch
 from activesteer.scenario import Scenario
 from activesteer.scenario.scenario import changed
@@ -41,10 +42,10 @@ from activesteer.signals import (
     numbers_in,
 )
 from activesteer.simulation import native_loop as native
-from activesteer.simulation.copies import NonReentrantLock, retuned
+from activesteer.simulation.copies import retuned
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.sampled_controller import control_unit
-from activesteer.vehicle import Uncopyable, engine_warnings_held
+from activesteer.vehicle import engine_warnings_held
 from activesteer.vehicle.car import check_gear
 from activesteer.vehicle.faults import Faults
 from activesteer.vehicle.step_bindings import torque_numbers, write_command
@@ -62,6 +63,26 @@ _TIME: Final = Measurement._fields.index("time_s")
 _SPEED: Final = Motion._fields.index("speed_mps")
 _STATE: Final = (*native.MESSAGES, "step", "torques_set", "torques_Nm", "controller_given", "calls", "held")
 """Fields of a car's record that belong to its state."""
+
+
+class NonReentrantLock:
+    """A context that a second caller cannot enter while the first is inside."""
+
+    def __init__(self) -> None:
+        """Make a context that nobody has entered."""
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        """Enter, or refuse."""
+        if not self._lock.acquire(False):
+            raise ManeuverError(
+                "this simulation is already being driven, by another thread or by the caller of its own block; use a "
+                "copy of it (Simulation.copy) for each thread"
+            )
+
+    def __exit__(self, *_: object) -> None:
+        """Leave."""
+        self._lock.release()
 
 
 @dataclass(frozen=True)

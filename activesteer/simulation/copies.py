@@ -12,7 +12,6 @@ import io
 import operator
 import pickle
 import sys
-import threading
 from collections import deque
 from collections.abc import Mapping
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
@@ -20,28 +19,8 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
+from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.plugins import in_one_line, is_user_module
-
-
-class NonReentrantLock:
-    """A context that a second caller cannot enter while the first is inside."""
-
-    def __init__(self) -> None:
-        """Make a context that nobody has entered."""
-        self._lock = threading.Lock()
-
-    def __enter__(self) -> None:
-        """Enter, or refuse."""
-        if not self._lock.acquire(False):
-            raise ManeuverError(
-                "this simulation is already being driven, by another thread or by the caller of its own block; use a "
-                "copy of it (Simulation.copy) for each thread"
-            )
-
-    def __exit__(self, *_: object) -> None:
-        """Leave."""
-        self._lock.release()
 
 
 class Copyable:

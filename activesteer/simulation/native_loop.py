@@ -12,10 +12,12 @@ import numpy as np
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, call_at, compiled_call, inlined
-from activesteer.controllers.native_laws import N_COMMAND, N_HELD, call_law
 from activesteer.driver.human import LINE, SETPOINT, HumanDriver, follow
 from activesteer.native_memory import (
+    N_COMMAND,
+    N_HELD,
     array_of,
+    call_law,
     f64_pointer,
     load_numbers,
     native_type,

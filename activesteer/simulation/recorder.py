@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from activesteer.drawing.car_model import scene_of
 from activesteer.errors import ParameterError, RecordingError, SimulationDiverged
+from activesteer.native_records import Uncopyable
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Poses, Recording, ScenePart
 from activesteer.road.drawn import DrawnSurface, places_to_draw
@@ -21,7 +22,7 @@ from activesteer.road.surface import surface_of
 from activesteer.scenario import Scenario, describe
 from activesteer.signals import ActuatorCommand, Channel, DriverCommand
 from activesteer.simulation.sampled_controller import about
-from activesteer.vehicle import MAX_VALUE, RawRows, Tape, Uncopyable, Vehicle
+from activesteer.vehicle import MAX_VALUE, RawRows, Tape, Vehicle
 from activesteer.version import __version__
 
 BLOCK_INTERVAL_S: Final = 0.3
@@ -289,7 +290,8 @@ class RunContext(NamedTuple):
         if (course := scenario.maneuver.course) is not None:
             metadata["course"] = course.to_table()
         road = scenario.maneuver.ground
-        if (surface := surface_of(road)) is not None:
+        if road.is_uneven:
+            surface = surface_of(road)
             length_m = abs(scenario.maneuver.speed_mps) * scenario.maneuver.duration_s + _BEYOND_M
             s_m, d_m = places_to_draw(road, length_m)
             places = np.meshgrid(s_m, d_m, indexing="ij")

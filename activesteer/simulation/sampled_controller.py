@@ -11,7 +11,7 @@ from activesteer.errors import ParameterError
 from activesteer.plugins import Plugin
 from activesteer.scenario import Scenario
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.actuator_records import steering_rates
+from activesteer.vehicle.step_bindings import steering_rates
 
 _SLOWER: Final = 0.95
 """Ratio of rates below which an actuator counts as slower: loads and geometry change the rate by some percent."""

@@ -19,8 +19,8 @@ from activesteer.faults import ACTUATORS, ANGLE_SENSOR, MOTOR, SENSORS, Fault
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_faults as native
 from activesteer.vehicle.car import Vehicle
-from activesteer.vehicle.electric_drive import FULL_TORQUE_NM, HEALTHY
-from activesteer.vehicle.engine_layout import find
+from activesteer.vehicle.electric_actuators import FULL_TORQUE_NM, HEALTHY
+from activesteer.vehicle.force_block import find
 
 _NEVER: Final = 2**62
 _SAVE: Final = -1

@@ -527,9 +527,9 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
     return allowed(replace(found, parameters=read_values(found.declared, written, source, (kind.table, found.key))))
 
 
-def isolated(given: Any, limit_s: float | None) -> Any:
-    """Return an FMU in its own process. Other blocks, and all without a limit, are returned unchanged."""
-    if limit_s is None or not is_fmu(given):
+def isolated(given: Any, limit_s: float) -> Any:
+    """Return an FMU in its own process. Other blocks are returned unchanged."""
+    if not is_fmu(given):
         return given
     text = os.fspath(given)
     return f"{text}{'&' if '?' in text else '?'}{ISOLATE}={limit_s:g}"
