@@ -86,12 +86,14 @@ const channels = (colour) => [1, 3, 5].map((start) => parseInt(colour.slice(star
 const blend = (one, other, share) => `#${one.map((part, i) => Math.round(part + share * (other[i] - part)).toString(16).padStart(2, "0")).join("")}`;
 const VIRIDIS = ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"].map(channels);
 
+function scaleColour(shade) {
+  const at = Math.min(3, Math.floor(4 * shade));
+  return blend(VIRIDIS[at], VIRIDIS[at + 1], 4 * shade - at);
+}
+
 // A colour of a picture on this page: a run's, a shade of the scale, or another, lighter in the dark.
 function inkOf(colour, shade) {
-  if (shade != null) {
-    const at = Math.min(3, Math.floor(4 * shade));
-    colour = blend(VIRIDIS[at], VIRIDIS[at + 1], 4 * shade - at);
-  }
+  if (shade != null) colour = scaleColour(shade);
   if (colour.startsWith("run-")) return paint[colour];
   if (!onDark() || !colour.startsWith("#")) return colour;
   // In the dark, a pale colour recedes and a dark one comes forward.
@@ -115,12 +117,14 @@ class Chart {
     new ResizeObserver(() => this.fit()).observe(this.holder);
   }
 
-  get height() { return this.panel.names.length ? 60 + 32 * this.panel.names.length : this.panel.equal ? 360 : 230; }
+  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? 32) * this.panel.names.length : this.panel.equal ? 360 : 230; }
 
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
     const { curves, areas, limits, names, log } = this.panel, given = this.panel[`${key}_range`] || [null, null];
-    if (key === "y" && names.length) return [-1, names.length - 0.3];
+    if (key === "y" && names.length) return [-1, given[1] ?? names.length - 0.3];
+    const levels = this.panel[`${key}_levels`];
+    if (levels) return [given[0] ?? -0.5, given[1] ?? levels.length - 0.5];
     const all = [...curves.flatMap((curve) => curve[key]), ...(key === "x" ? areas.flatMap((area) => area.x) : [...areas.flatMap((area) => [...area.low, ...area.high]), ...limits.map(([value]) => value)])];
     const logged = log.includes(key);
     let low = Infinity, high = -Infinity;
@@ -135,6 +139,11 @@ class Chart {
     const plain = axis(26), side = { ...axis(52), size: (u, ticks) => Math.max(34, 12 + 7 * Math.max(0, ...(ticks || []).map((tick) => `${tick}`.length))) };
     // Names stand above their rows, where there is room for them at any width.
     if (panel.names.length) Object.assign(side, { size: 8, values: () => [], splits: () => panel.names.map((_, i) => i) });
+    for (const [axis, levels, room] of [[plain, panel.x_levels, 60], [side, panel.y_levels, 14]]) {
+      if (!levels) continue;
+      axis.splits = () => levels.map((_, i) => i);
+      axis.values = (u) => { const every = Math.ceil((levels.length * room) / (axis === plain ? u.width : u.height)); return levels.map((level, i) => (i % every ? "" : level)); };
+    }
     const axes = [plain, side];
     if (panel.above) axes.push({ ...axis(26), side: 0, scale: "x", grid: { show: false }, values: (_, ticks) => labels("")(_, ticks.map((tick) => +between(tick, panel.above.first, panel.above.second).toPrecision(2))) });
     this.plot = new uPlot({
@@ -180,8 +189,8 @@ class Chart {
       const ends = [...area.x.map((x, i) => [x, area.high[i]]), ...area.x.map((x, i) => [x, area.low[i]]).reverse()];
       for (const [x, y] of ends) if (x != null && y != null) ctx.lineTo(px(x), py(y));
       ctx.closePath();
-      ctx.globalAlpha = area.alpha * (onDark() ? 0.3 : 1);
-      ctx.fillStyle = inkOf(area.colour);
+      ctx.globalAlpha = area.alpha * (onDark() && area.shade == null ? 0.3 : 1);
+      ctx.fillStyle = area.shade == null ? inkOf(area.colour) : scaleColour(area.shade);
       ctx.fill();
       ctx.globalAlpha = 1;
       if (area.edge) { ctx.strokeStyle = inkOf(area.edge); ctx.lineWidth = dpr; ctx.setLineDash([]); ctx.stroke(); }
@@ -190,6 +199,7 @@ class Chart {
     if (panel.zero) { level(py(0)); ctx.beginPath(); ctx.moveTo(px(0), bbox.top); ctx.lineTo(px(0), bbox.top + bbox.height); ctx.stroke(); }
     for (const curve of this.shown()) {
       ctx.strokeStyle = ctx.fillStyle = inkOf(curve.colour, curve.shade);
+      ctx.globalAlpha = curve.alpha ?? 1;
       ctx.lineWidth = 1.25 * curve.width * dpr;
       ctx.setLineDash((curve.dashes || []).map((length) => 1.25 * length * curve.width * dpr));
       ctx.beginPath();
@@ -208,11 +218,13 @@ class Chart {
       if (curve.marker && curve.marker !== "x") ctx.fill();
       if (curve.dashes || curve.marker === "x") ctx.stroke();
     }
+    ctx.globalAlpha = 1;
     ctx.strokeStyle = paint.failed; ctx.lineWidth = 1.2 * dpr; ctx.setLineDash([5 * dpr, 3 * dpr]);
     for (const [value] of panel.limits) level(py(value));
     ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${12 * dpr}px`);
     ctx.textAlign = "center"; ctx.textBaseline = "top";
-    for (const [x, y, text] of panel.notes) ctx.fillText(text, px(x), py(y) + 3 * dpr);
+    for (const [x, y, text, colour] of panel.notes) { ctx.fillStyle = colour || paint.ink; ctx.fillText(text, px(x), py(y) + 3 * dpr); }
+    ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
     panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 6 * dpr, bbox.width - 8 * dpr));
     ctx.restore();
@@ -222,9 +234,9 @@ class Chart {
   read(u) {
     const { left, top } = u.cursor;
     this.values.replaceChildren();
-    if (left == null || left < 0 || this.panel.names.length) return;
+    if (left == null || left < 0) return;
     const x = u.posToVal(left, "x"), found = [];
-    for (const curve of this.shown()) {
+    for (const curve of this.shown().filter((curve) => curve.told || !this.panel.names.length)) {
       let best = Infinity, at = null;
       for (let i = 0; i < curve.x.length; i++) {
         if (curve.x[i] == null || curve.y[i] == null) continue;
@@ -234,8 +246,8 @@ class Chart {
       if (at != null) found.push([curve, at]);
     }
     if (!found.length) return;
-    this.values.append(short(x));
-    for (const [curve, at] of found.slice(0, 6)) this.values.append(" ", element("span", { style: `--run: ${inkOf(curve.colour, curve.shade)}`, title: curve.label }, shown(curve.y[at])));
+    if (!this.panel.names.length) this.values.append(this.panel.x_levels ? this.panel.x_levels[Math.round(x)] ?? "" : short(x));
+    for (const [curve, at] of found.slice(0, 6)) this.values.append(" ", element("span", { style: `--run: ${inkOf(curve.colour, curve.shade)}`, title: curve.label }, curve.told?.[at] ?? shown(curve.y[at])));
   }
 }
 
