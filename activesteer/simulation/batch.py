@@ -21,6 +21,7 @@ from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiver
 from activesteer.faults import Fault
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario
+from activesteer.scenario.overrides import each_overrides
 from activesteer.signals import (
     ActuatorCommand,
     DriverCommand,
@@ -388,22 +389,6 @@ class Batch(Copyable):
             needed = f"numbers from 0 to {len(self) - 1}, or a mask of {len(self)}, are needed"
             raise ParameterError(f"is {shown(cars)}; {needed}", key="cars", value=cars) from reason
         return chosen
-
-
-def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None, n: int) -> list[dict[str, Any]]:
-    """Return the overrides of each car."""
-    if overrides is None or isinstance(overrides, Mapping):
-        table = dict(overrides or {})
-        arrays = {key: value for key, value in table.items() if isinstance(value, np.ndarray) and value.ndim}
-        for key, value in arrays.items():
-            if len(value) != n:
-                raise ParameterError(f"has {len(value)} values; one for each of {n} cars is needed", key=key)
-        return [table | {key: value[car].tolist() for key, value in arrays.items()} for car in range(n)]
-    if isinstance(overrides, (str, bytes)) or not all(isinstance(changes, Mapping) for changes in overrides):
-        raise ParameterError(f"is {shown(overrides)}; a table, or a list of tables, is needed", key="overrides")
-    if len(overrides) != n:
-        raise ParameterError(f"has {len(overrides)} entries; one for each of {n} cars is needed", key="overrides")
-    return [dict(changes) for changes in overrides]
 
 
 def _steps(steps: Any, n: int) -> NDArray[np.intp]:

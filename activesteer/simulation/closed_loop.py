@@ -14,16 +14,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.config import Source, build
+from activesteer.config import Source
 from activesteer.controllers import controller_spec
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver.human import HumanDriver, SetpointTable, setpoint_row, tabulate
 from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged, shown
-from activesteer.faults import Fault, check_faults, fault_table
+from activesteer.faults import Fault, check_faults, fault_from
 from activesteer.maneuver import Maneuver
 from activesteer.maneuver.phases import seen_of
 from activesteer.native_memory import N_COMMAND, N_HELD, law_address
 from activesteer.native_records import Uncopyable, record_type, take, values
+from activesteer.plugins.retuned import retuned
 from activesteer.road.native_path import PathSearch
 from activesteer.scenario import Scenario
 from activesteer.scenario.scenario import changed
@@ -42,7 +43,6 @@ from activesteer.signals import (
     numbers_in,
 )
 from activesteer.simulation import native_loop as native
-from activesteer.simulation.copies import retuned
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.sampled_controller import control_unit
 from activesteer.vehicle import engine_warnings_held
@@ -313,21 +313,14 @@ class ClosedLoop(Uncopyable):
     def add_fault(self, fault: str | Fault) -> str:
         """Set a fault, beside those that act already, and return it in words (see `Simulation.fail`)."""
         now_s = self.step_count * self.vehicle.timestep_s
-        if isinstance(fault, str):
-            start_s = None if "@" in fault else now_s
-            fault = build(Fault, fault_table(fault, start_s), Source("", error=ManeuverError))
-        if not isinstance(fault, Fault):
-            raise ParameterError(f"is {shown(fault)}; a fault or its text is needed", key="fault", value=fault)
-        if fault.start_s < now_s - 1e-9:
-            raise ManeuverError(f"is {fault.start_s:g} s; the run is at {now_s:g} s", key="start_s")
-        self.fail([fault], more=True)
-        later = "" if fault.start_s <= now_s + 1e-9 and fault.end_s is None else f"@{fault.start_s:g}"
-        return f"{fault.name}{later}{'' if fault.end_s is None else f'-{fault.end_s:g}'}"
+        given = fault_from(fault, now_s)
+        self.fail([given], more=True)
+        return given.name_at(now_s)
 
     def change(self, key: str, value: Any) -> None:
         """Change a key of the manoeuvre, its road, the controller or the driver, from the next step on.
 
-        A controller or driver keeps its memory, see `activesteer.simulation.copies`.
+        A controller or driver keeps its memory, see `activesteer.plugins.retuned`.
 
         Raises:
             ParameterError: there is no such key, it cannot change during a run, or nothing reads it.

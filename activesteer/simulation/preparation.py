@@ -40,8 +40,9 @@ from activesteer.plugins import Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import CarSpec, FileOrTable, Scenario, resolve
+from activesteer.scenario.run_context import RunContext
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.recorder import Recorder, RunContext
+from activesteer.simulation.recorder import Recorder
 from activesteer.theory.single_track import IDENTIFIED, IDENTIFY, SingleTrackParameters, characteristic_speed
 from activesteer.vehicle.statics import mass_properties
 from activesteer.version import __version__
@@ -385,4 +386,4 @@ def _test_drive(scenario: Scenario) -> Recording:
     loop = ClosedLoop(replace(scenario, car=scenario.car.with_ideal_sensors()))
     recorder = Recorder(loop.vehicle, loop.steps)
     loop.run(recorder)
-    return RunContext.of(scenario, loop.vehicle, controller_spec("none")).recording(recorder)
+    return RunContext.of(scenario, loop.vehicle, controller_spec("none")).recording(*recorder.result())

@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-import functools
-import platform
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.drawing.car_model import scene_of
 from activesteer.errors import ParameterError, RecordingError, SimulationDiverged
 from activesteer.native_records import Uncopyable
-from activesteer.plugins import Plugin
-from activesteer.recording import McapWriter, Poses, Recording, ScenePart
-from activesteer.road.drawn import DrawnSurface, places_to_draw
-from activesteer.road.surface import surface_of
-from activesteer.scenario import Scenario, describe
-from activesteer.signals import ActuatorCommand, Channel, DriverCommand
-from activesteer.simulation.sampled_controller import about
+from activesteer.recording import McapWriter, Poses
+from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import MAX_VALUE, RawRows, Tape, Vehicle
-from activesteer.version import __version__
 
 BLOCK_INTERVAL_S: Final = 0.3
 """Length of a block, which is turned into channels and written at once [s].
@@ -248,76 +237,3 @@ class Recorder(Uncopyable):
         times = np.asarray(np.arange(begin, end) * (every * self._timestep_s), dtype=np.float64)
         rows = slice(begin - kept, end - kept)
         return Poses(times, self._vehicle.body_names, self._kept.positions_m[rows], self._kept.quaternions[rows])
-
-
-_BEYOND_M: Final = 30.0
-"""Length of road that is drawn beyond the distance at the speed of the manoeuvre [m]."""
-
-
-class RunContext(NamedTuple):
-    """Contents of a recording apart from its rows.
-
-    Attributes:
-        channels: The table of channels.
-        body_names: Bodies whose poses are recorded.
-        metadata: Resolved parameters, versions.
-        files: Manoeuvre, vehicle, model and tyre files, and the code of a user's controller and driver.
-        scene: Appearance of the car.
-    """
-
-    channels: tuple[Channel, ...]
-    body_names: tuple[str, ...]
-    metadata: dict[str, Any]
-    files: dict[str, bytes]
-    scene: tuple[ScenePart, ...]
-
-    @classmethod
-    def of(cls, scenario: Scenario, vehicle: Vehicle, controller: Plugin) -> RunContext:
-        """Return the context of a run of a scenario, before the run."""
-        metadata = {
-            "controller": controller.name,
-            **(
-                {"controller_parameters": values}
-                if (values := controller.parameters_with(scenario.user_parameters))
-                else {}
-            ),
-            **describe(scenario),
-            **about(controller, scenario.car.config.controllers, vehicle.timestep_s),
-            "car": vehicle.dimensions(),
-            "timestep_s": vehicle.timestep_s,
-            "versions": _versions(),
-        }
-        if (course := scenario.maneuver.course) is not None:
-            metadata["course"] = course.to_table()
-        road = scenario.maneuver.ground
-        if road.is_uneven:
-            surface = surface_of(road)
-            length_m = abs(scenario.maneuver.speed_mps) * scenario.maneuver.duration_s + _BEYOND_M
-            s_m, d_m = places_to_draw(road, length_m)
-            places = np.meshgrid(s_m, d_m, indexing="ij")
-            z_m = surface.at(*(place.ravel() for place in places))[:, 0].reshape(len(s_m), len(d_m))
-            metadata["surface"] = DrawnSurface(s_m, d_m, z_m).to_table()
-        files = {**scenario.files, **controller.files}
-        return cls(vehicle.channels.channels, vehicle.body_names, metadata, files, scene_of(vehicle.model))
-
-    def recording(self, recorder: Recorder) -> Recording:
-        """Return the recording of a recorder that keeps all rows."""
-        time_s, values, poses = recorder.result()
-        return Recording(
-            self.channels, time_s, values, poses=poses, metadata=self.metadata, attachments=self.files, scene=self.scene
-        )
-
-    def writer(self, path: Path) -> McapWriter:
-        """Open a file for the rows."""
-        return McapWriter(path, self.channels, self.body_names, self.metadata, self.files, self.scene)
-
-
-@functools.cache
-def _versions() -> dict[str, str]:
-    found = {"activesteer": __version__, "python": platform.python_version(), "platform": platform.platform()}
-    for package in ("mujoco", "numpy", "numba"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found

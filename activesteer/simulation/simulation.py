@@ -23,12 +23,13 @@ from activesteer.recording import McapWriter, Recording
 from activesteer.recording.contents import Event, tables_of
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario
+from activesteer.scenario.run_context import RunContext
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
 from activesteer.simulation.copies import Copyable
 from activesteer.simulation.pacing import RealtimePacer
 from activesteer.simulation.preparation import prepared
-from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder, RunContext
+from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder
 from activesteer.simulation.sampled_controller import slow_actuators
 
 MAX_KEPT_VALUES: Final = 2**25
@@ -422,7 +423,7 @@ class Simulation(Copyable):
             with self._watched():
                 recorder.flush()
         if recorder.keeps_all or self._writer is None:
-            recording = self.context.recording(recorder)
+            recording = self.context.recording(*recorder.result())
         else:
             recording = Recording.open(self._writer.flush())
         recording.metadata["complete"] = failure is None and self.done
