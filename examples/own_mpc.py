@@ -9,11 +9,12 @@ Every 10 ms the controller predicts a quarter of a second and looks for angles, 
     sum of ((r - r*) / r_s)^2 + (beta / beta_s)^2 + |(u - u*) / u_s|^2 + |(change of u) / d_s|^2 + slack
     with |r| <= mu g / v and |alpha_rear| <= slip angle of the largest force, softened by the slack,
 
-where r* is the yaw rate that the driver demands and u* the angles of its steady turn without sideslip. An axle that
-slides has the stiffness force / slip angle: an axle that is steered back then loses force, as it does in reality.
+where r* is the yaw rate that the driver demands and u* the angles of its steady turn without sideslip. The rear axle
+has the tangent of its curve at the present slip angle: where it slides, steering it has no effect. The front axle has
+the stiffness force / slip angle: it is the axle that can be steered back until it loses force.
 
-Source of the envelope: Beal and Gerdes, Model Predictive Control for Vehicle Stabilization at the Limits of Handling,
-IEEE Transactions on Control Systems Technology 21 (4), 2013. Rear steering, lags and blocks are added.
+Source of envelope and tangent: Beal and Gerdes, Model Predictive Control for Vehicle Stabilization at the Limits of
+Handling, IEEE Transactions on Control Systems Technology 21 (4), 2013. Rear steering, lags and blocks are added.
 Guide: docs/controller.md.
 """
 
@@ -60,7 +61,7 @@ class EnvelopeMpc:
             return ActuatorCommand(estimate=now)
         most_radps = now.friction * GRAVITY_MPS2 / speed_mps
         self.lagged_rad += -math.expm1(-self.timestep_s * speed_mps / 0.65) * (driver_rad - self.lagged_rad)
-        a, b = single_track(self.car, speed_mps, (1.0, 1.0))
+        a, b, _ = single_track(self.car, speed_mps, (1.0, 1.0))
         gain_1ps = np.linalg.solve(a, -b[:, 0])[0]  # yaw rate of the car without control per angle
         desired_radps = float(np.clip(gain_1ps * self.lagged_rad, -0.85 * most_radps, 0.85 * most_radps))
         steady_rad = np.linalg.solve(b, -a[:, 0] * desired_radps) - (driver_rad, 0.0)
@@ -71,11 +72,13 @@ class EnvelopeMpc:
             driver_rad + added_rad - now.sideslip_rad - self.car.cg_to_front_m * turning,
             rear_rad - now.sideslip_rad + self.car.cg_to_rear_m * turning,
         )
-        softer = [secant(*each, slip / now.friction) for each, slip in zip(self.curves, slips_rad, strict=True)]
+        softness = secant(*self.curves[0], slips_rad[0] / now.friction)
+        slope, offset_rad = tangent(*self.curves[1], slips_rad[1] / now.friction)
+        model = single_track(self.car, speed_mps, (softness, slope), now.friction * offset_rad)
         angles_rad, forces = self.curves[1]
         envelope = most_radps, now.friction * angles_rad[forces.argmax()]
         state = np.array([now.yaw_rate_radps, now.sideslip_rad, added_rad, rear_rad, driver_rad])
-        demand, outside = self.solve(state, speed_mps, softer, desired_radps, steady_rad, envelope)
+        demand, outside = self.solve(state, speed_mps, model, desired_radps, steady_rad, envelope)
         self.before_rad = demand
         return ActuatorCommand(
             rear_steer_demand_rad=float(demand[1]),
@@ -87,11 +90,11 @@ class EnvelopeMpc:
             estimate=now,
         )
 
-    def solve(self, state, speed_mps, softer, desired_radps, steady_rad, envelope):
+    def solve(self, state, speed_mps, model, desired_radps, steady_rad, envelope):
         """Return the first angles, and whether the car leaves the envelope."""
-        a, b = discrete(*single_track(self.car, speed_mps, softer), self.servos.lag_s, self.timestep_s)
+        a, b, c = discrete(*model, self.servos.lag_s, self.timestep_s)
         block_of, unknowns = np.repeat(np.arange(len(BLOCKS)), BLOCKS), 2 * len(BLOCKS)
-        fixed = a @ state + b @ self.before_rad  # the present demand acts from the next call on
+        fixed = a @ state + b @ self.before_rad + c  # the present demand acts from the next call on
         moved = np.zeros((len(state), unknowns))
         target = np.array([desired_radps, 0.0])
         rows, offsets, checked, checked_offsets = [], [], [], []
@@ -99,7 +102,7 @@ class EnvelopeMpc:
         for call, block in enumerate(block_of):
             chosen = np.zeros((2, unknowns))
             chosen[:, 2 * block : 2 * block + 2] = np.eye(2)
-            fixed, moved = a @ fixed, a @ moved + b @ chosen
+            fixed, moved = a @ fixed + c, a @ moved + b @ chosen
             rows.append(np.vstack([moved[:2], chosen]) / self.scales[:, None])
             offsets.append(np.concatenate([fixed[:2] - target, -steady_rad]) / self.scales)
             if call in CHECKED:
@@ -142,8 +145,19 @@ def secant(angles_rad, forces, slip_rad):
     return max(np.interp(size_rad, angles_rad, forces) / size_rad, 0.1)
 
 
-def single_track(car, speed_mps, softer):
-    """Return the matrices of yaw rate and sideslip angle for the angles of both axles, whose stiffness may be lower."""
+def tangent(angles_rad, forces, slip_rad):
+    """Return slope and offset of the tangent, slope * slip angle + offset, 0 where the force falls."""
+    size_rad, step_rad = min(abs(slip_rad), angles_rad[-1]), angles_rad[1]
+    force, further = np.interp([size_rad, size_rad + step_rad], angles_rad, forces)
+    slope = max((further - force) / step_rad, 0.0)
+    return slope, math.copysign(force - slope * size_rad, slip_rad)
+
+
+def single_track(car, speed_mps, softer, offset_rad=0.0):
+    """Return the matrices of yaw rate and sideslip angle for the angles of both axles, and their constant rates.
+
+    Both axles' stiffness may be lower; the offset is a slip angle that the rear axle seems to have in addition.
+    """
     front, rear = car.front_stiffness_Nprad * softer[0], car.rear_stiffness_Nprad * softer[1]
     lf, lr, momentum = car.cg_to_front_m, car.cg_to_rear_m, car.mass_kg * speed_mps
     moment = rear * lr - front * lf
@@ -155,16 +169,17 @@ def single_track(car, speed_mps, softer):
         [front * lf / car.yaw_inertia_kgm2, -rear * lr / car.yaw_inertia_kgm2],
         [front / momentum, rear / momentum],
     ]
-    return np.array(a), np.array(b)
+    more_N = car.rear_stiffness_Nprad * offset_rad
+    return np.array(a), np.array(b), np.array([-lr / car.yaw_inertia_kgm2, 1.0 / momentum]) * more_N
 
 
-def discrete(a, b, lag_s, timestep_s):
+def discrete(a, b, c, lag_s, timestep_s):
     """Return the model from one call to the next; states: yaw rate, sideslip, both angles, the driver's angle."""
-    whole = np.zeros((7, 7))
-    whole[:2, :2], whole[:2, 2:4], whole[:2, 4] = a, b, b[:, 0]
-    whole[2:4, 2:4], whole[2:4, 5:] = -np.eye(2) / lag_s, np.eye(2) / lag_s
+    whole = np.zeros((8, 8))
+    whole[:2, :2], whole[:2, 2:4], whole[:2, 4], whole[:2, 7] = a, b, b[:, 0], c
+    whole[2:4, 2:4], whole[2:4, 5:7] = -np.eye(2) / lag_s, np.eye(2) / lag_s
     whole = expm(timestep_s * whole)
-    return whole[:5, :5], whole[:5, 5:]
+    return whole[:5, :5], whole[:5, 5:7], whole[:5, 7]
 
 
 def compare():

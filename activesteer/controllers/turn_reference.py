@@ -91,10 +91,10 @@ class BorneTurnReference(TurnReference):
     """Desired yaw rate that falls where the measured lateral acceleration shows that the road does not bear the turn.
 
     A car turns at a_y / v while its sideslip angle is constant; what it turns faster is growing sideslip. If the
-    measured |a_y| is short of v |r* behind a lag T_a| by more than D, the desired yaw rate r* falls by the rest over v,
-    at most to zero. Without this rule, a yaw moment turns a car whose front wheels have reached ice further in, and the
-    car slides when its rear wheels reach the ice too: the estimated friction comes late, and it is one number for both
-    axles.
+    measured |a_y| is short of v |r*| by more than D, the desired yaw rate r* falls by the rest over v, at most to zero.
+    The compared r* lies behind a lag T_a, and does not exceed the present one. Without this rule, a yaw moment turns a
+    car whose front wheels have reached ice further in, and the car slides when its rear wheels reach the ice too: the
+    estimated friction comes late, and it is one number for both axles.
 
     Source: R. Rajamani, Vehicle Dynamics and Control, 2012, section 8.3.3, on a_y = v (r + d beta/dt) and the desired
     yaw rate.
@@ -130,7 +130,9 @@ class BorneTurnReference(TurnReference):
         desired_radps = self.step(front_steer_rad, speed_mps, friction)
         self._expected_radps += self._fraction * (desired_radps - self._expected_radps)
         side = math.copysign(1.0, self._expected_radps)
-        missing_mps2 = side * (speed_mps * self._expected_radps - ay_mps2) - self._shortfall_mps2
+        # What has fallen meanwhile, by the friction or by the driver, does not fall twice.
+        expected_radps = min(side * self._expected_radps, side * desired_radps)
+        missing_mps2 = speed_mps * expected_radps - side * ay_mps2 - self._shortfall_mps2
         fall_radps = max(missing_mps2, 0.0) / speed_mps
         return side * max(side * desired_radps - fall_radps, min(side * desired_radps, 0.0))
 

@@ -35,7 +35,9 @@ from activesteer.estimation.wheels import read_wheels
 _SHORTEST_S: Final = 0.004
 """Shortest time between two steps of the filters, and step of the model on its way to the present [s]."""
 _USED_FRACTION: Final = 0.85
-"""Lower bound of the friction, as a fraction of the acceleration in g."""
+"""Lower bound of the friction, as a fraction of the acceleration in g. The largest acceleration, forgotten with
+`friction_s`, over this fraction is an upper bound beyond the assumed friction: only forces that need a higher friction
+show one. Without it, front wheels that reach snow before the rear ones were explained by more friction."""
 _USED_S: Final = 0.2
 """Time constant of this acceleration: a car rocks when it stops [s]."""
 
@@ -75,7 +77,10 @@ def _filter(known, tyres, memory, said, line):
     memory.innovation = correct(known, tyres, memory, said[SAID_RATE], said[SAID_AY], duration_s)
     used = math.hypot(memory.ax_mps2, memory.loading_mps2) / GRAVITY_MPS2
     memory.friction_used += duration_s / (duration_s + _USED_S) * (used - memory.friction_used)
-    state[FRICTION] = max(state[FRICTION], _USED_FRACTION * memory.friction_used)
+    forgotten = math.exp(-duration_s / known.friction_s)
+    memory.friction_borne = max(memory.friction_borne * forgotten, used)
+    most = max(known.friction, memory.friction_borne / _USED_FRACTION)
+    state[FRICTION] = min(max(state[FRICTION], _USED_FRACTION * memory.friction_used), most)
     memory.left_out = correct_speed(known, memory, duration_s)
 
 

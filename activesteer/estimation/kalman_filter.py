@@ -6,13 +6,22 @@ leans with the body. Differences give the derivatives of the model. The unknowns
     e_i     slip angle errors: Gauss-Markov processes of the size `slip_angle_std_rad` + `slip_angle_fraction` |a_i|
     k_i     stiffness of the tyres of an axle relative to new ones, of the size `stiffness_std`, for `stiffness_s`: it
             shows at small slip angles, where the friction does not
-    b_y     offset of the sensor and inclination of the road, likewise
+    b_y     offset of the lateral accelerometer, likewise
+    g_y     gravity across an inclined road, likewise: it moves the car, and the accelerometer does not feel it
     u       friction, likewise, about its assumed value; it is observable only from forces near the limit
     b_r     offset of the yaw rate sensor, a random walk
     forces  errors of `force_std_N` + `force_fraction` |F| for `force_s`, longitudinal errors of `along_fraction` |X|
     noise   of lateral and yaw acceleration
 
+On a road that is assumed to be dry, the slope of the forces over u is 0 at every slip angle that occurs on snow, so an
+extended filter explains their lack by soft tyres. Over the range in which u is uncertain the slope is not 0. So the
+lateral acceleration is expected from its values at u and at sqrt(3) standard deviations P to both sides:
+
+    slope = (a+ - a-) / (2 sqrt(3 P)),  mean = a + (a+ + a- - 2 a) / 6,  variance + (a+ + a- - 2 a)^2 / 18
+
 Sources:
+    Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the
+    divided-difference filter of second order with h^2 = 3.
     Simon, Optimal State Estimation, 2006, chapter 13 (extended Kalman filter), section 7.2 (coloured noise).
     Doumiati, Charara, Victorino, Lechner, Vehicle Dynamics Estimation using Kalman Filtering, 2013, chapter 5.
 """
@@ -28,6 +37,7 @@ from activesteer.compilation import compiled, inlined
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation.records import (
     AY_OFFSET,
+    BANK,
     FRICTION,
     FRONT_ERROR,
     FRONT_SLIP,
@@ -52,7 +62,7 @@ from activesteer.estimation.two_track_model import (
     slip_angles,
 )
 
-_DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 0.01, 0.01, 0.01])
+_DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 1.0, 0.01, 0.01, 0.01])
 """Steps of the differences, in the units of the states."""
 _MOST_BRAKED: Final = 0.25
 """Fraction of the front axle's friction force above which lateral forces give no information on friction and stiffness:
@@ -78,7 +88,7 @@ def begin(known, memory):
     covariance[:] = 0.0
     sizes = (
         0.1, 0.02, 0.005, 0.005, known.slip_angle_std_rad, known.slip_angle_std_rad, known.rate_offset_std_radps,
-        known.ay_offset_std_mps2, known.friction_std, known.stiffness_std, known.stiffness_std,
+        known.ay_offset_std_mps2, known.bank_std_mps2, known.friction_std, known.stiffness_std, known.stiffness_std,
     )  # fmt: skip
     for place in range(N_STATES):
         covariance[place, place] = sizes[place] ** 2
@@ -133,6 +143,7 @@ def _forget(known, memory, duration_s, moved, slope, added):
         (FRONT_ERROR, 0.0, front, known.slip_angle_s),
         (REAR_ERROR, 0.0, rear, known.slip_angle_s),
         (AY_OFFSET, 0.0, known.ay_offset_std_mps2, known.ay_offset_s),
+        (BANK, 0.0, known.bank_std_mps2, known.bank_s),
         (FRICTION, known.friction, known.friction_std, known.friction_s),
         (FRONT_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
         (REAR_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
@@ -210,6 +221,23 @@ def predict(known, tyres, memory, duration_s):
             covariance[place, place] = variance
 
 
+@compiled
+def _over_friction(known, tyres, memory, here_mps2):
+    """Return slope over the friction, and bend, of the lateral acceleration in the range of its uncertainty."""
+    state, mass = memory.state, known.mass_kg
+    kept, spread = state[FRICTION], math.sqrt(3.0 * memory.covariance[FRICTION, FRICTION])
+    high, low = min(kept + spread, LARGEST_FRICTION), max(kept - spread, LEAST_FRICTION)
+    cos_f, cos_r = math.cos(memory.front_angle_rad), math.cos(memory.rear_angle_rad)
+    state[FRICTION] = high
+    front_N, rear_N = forces_of(known, tyres, memory, state)
+    above_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
+    state[FRICTION] = low
+    front_N, rear_N = forces_of(known, tyres, memory, state)
+    below_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
+    state[FRICTION] = kept
+    return (above_mps2 - below_mps2) / (high - low), above_mps2 + below_mps2 - 2.0 * here_mps2
+
+
 @inlined
 def _take_in(state, covariance, row, error, variance):
     """Process one measured value, and return the expected variance of its error."""
@@ -257,8 +285,12 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         math.cos(memory.front_angle_rad),
         math.cos(memory.rear_angle_rad),
     )
-    for place in (FRONT_SLIP, REAR_SLIP, FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS):
-        if place >= FRICTION and _is_braked(known, memory):
+    bend_mps2 = 0.0
+    if not _is_braked(known, memory):
+        here_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
+        row[FRICTION], bend_mps2 = _over_friction(known, tyres, memory, here_mps2)
+    for place in (FRONT_SLIP, REAR_SLIP, FRONT_STIFFNESS, REAR_STIFFNESS):
+        if place > FRICTION and _is_braked(known, memory):
             continue
         kept, step = state[place], _step_of(state, place)
         state[place] += step
@@ -266,12 +298,13 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         state[place] = kept
         row[place] = ((other_front_N - front_N) * cos_f + (other_rear_N - rear_N) * cos_r) / (mass * step)
     row[AY_OFFSET] = 1.0
-    expected = (front_N * cos_f + rear_N * cos_r + memory.front_along_N * sin_f) / mass
+    expected = (front_N * cos_f + rear_N * cos_r + memory.front_along_N * sin_f) / mass + bend_mps2 / 6.0
     error = ay_mps2 - expected - GRAVITY_MPS2 * memory.roll_rad - state[AY_OFFSET]
     front, rear = _force_errors(known, front_N, rear_N)
     # A force error lasts: during this time all samples count as one measurement.
     repeated = 1.0 + 2.0 * known.force_s / duration_s
     variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
+    variance += bend_mps2 * bend_mps2 / 18.0
     innovation += error * error / _take_in(state, covariance, row, error, variance)
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     for place in (FRONT_STIFFNESS, REAR_STIFFNESS):

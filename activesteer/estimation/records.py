@@ -15,10 +15,10 @@ from activesteer.estimation.setup import EstimatorParameters, EstimatorSetup
 if TYPE_CHECKING:
     from activesteer.sensors.parameters import Sensor
 
-LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OFFSET, AY_OFFSET, FRICTION, \
-    FRONT_STIFFNESS, REAR_STIFFNESS = range(11)  # fmt: skip
-"""Indices of the states v_y, r, a_f, a_r, e_f, e_r, b_r, b_y, u, k_f, k_r; see `two_track_model`, `kalman_filter`."""
-N_STATES: Final = 11
+LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OFFSET, AY_OFFSET, BANK, \
+    FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS = range(12)  # fmt: skip
+"""Indices of the states v_y, r, a_f, a_r, e_f, e_r, b_r, b_y, g_y, u, k_f, k_r; see `kalman_filter`."""
+N_STATES: Final = 12
 """Number of states; those from `FRICTION` on are properties of road and tyres, which are not learned while braking."""
 N_MOVING: Final = 4
 """Number of states that depend on others after an interval; the others, behind them, depend on themselves alone."""
@@ -37,7 +37,7 @@ MEMORY: Final = np.dtype(
         [
             ("estimate", np.float64, (14,)),
             ("calls", np.intp),
-            *((name, np.float64) for name in ("waited_s", "innovation", "left_out", "friction_used")),
+            *((name, np.float64) for name in ("waited_s", "innovation", "left_out", "friction_used", "friction_borne")),
             ("last", np.float64, (3,)),
             ("last_spin_radps", np.float64, (4,)),
             *((name, np.float64) for name in ("speed_mps", "ax_offset_mps2")),
@@ -55,10 +55,10 @@ MEMORY: Final = np.dtype(
 """Memory of an estimator.
 
 The estimate and the number of calls. The last step of the filters: time since then, squared error over its expected
-covariance, wheels left out, smoothed use of the friction, last samples. States and covariances of the filters, and the
-present state. Inputs of the model: steer angles, longitudinal acceleration, longitudinal force of the front axle,
-moment of all longitudinal forces, lateral acceleration that loads the wheels, lateral speed of the roll axis relative
-to v_y, roll; and for each wheel its longitudinal force, its load, and the speed of the car by this wheel.
+covariance, wheels left out, smoothed and largest use of the friction, last samples. States and covariances of the
+filters, and the present state. Inputs of the model: steer angles, longitudinal acceleration, longitudinal force of the
+front axle, moment of all longitudinal forces, lateral acceleration that loads the wheels, lateral speed of the roll
+axis relative to v_y, roll; and for each wheel its longitudinal force, its load, and the speed of the car by this wheel.
 """
 
 KNOWN: Final = np.dtype(
@@ -87,6 +87,8 @@ KNOWN: Final = np.dtype(
 """Knowledge of an estimator; see `known_of`."""
 
 _RATE_FLOOR_RADPS: Final = math.radians(0.02)
+_OFFSET_S: Final = 100.0
+"""Time constant of the offset of the lateral accelerometer [s]."""
 _AY_FLOOR_MPS2: Final = 0.03
 """Smallest standard deviations of a measurement, even if a data sheet gives less."""
 _ENGINE_STEP_S: Final = 0.001
@@ -158,8 +160,8 @@ def _uncertainties(setup: EstimatorSetup, parameters: EstimatorParameters) -> di
     sensors, p = setup.sensors, parameters
     wheel_noise_mps = setup.tyres[0].rolling_radius_m * sensors.wheel_speed.amount("noise")
     return vars(p) | {
-        "ay_offset_std_mps2": math.hypot(sensors.ay.amount("bias"), p.bank_std_mps2),
-        "ay_offset_s": p.bank_s,
+        "ay_offset_std_mps2": math.hypot(sensors.ay.amount("bias"), _AY_FLOOR_MPS2),
+        "ay_offset_s": _OFFSET_S,
         "rate_offset_std_radps": sensors.yaw_rate.amount("bias"),
         "rate_walk_rad2ps3": sensors.yaw_rate.amount("drift") ** 2 / 60.0,
         "rate_variance_rad2ps2": sensors.yaw_rate.amount("noise") ** 2 + _RATE_FLOOR_RADPS**2,

@@ -43,8 +43,9 @@ class EstimatorParameters:
     """Time constant with which the stiffness returns to that of new tyres [s]."""
     slip_angle_s: _Positive = 1.0
     """Time constant of the slip angle error [s]."""
-    bank_std_mps2: _Positive = 0.1
-    """Lateral gravity on an inclined road, in addition to the offset of the accelerometer [m/s2]: 1 %."""
+    bank_std_mps2: _Positive = 0.3
+    """Standard deviation of the gravity across an inclined road [m/s2]: 3 %. Crossfall is 2.5 %, the superelevation of
+    curves up to 8 %."""
     bank_s: _Positive = 10.0
     """Time constant of this gravity [s]."""
     lateral_density_m2ps3: _Positive = 0.0002

@@ -2,21 +2,21 @@
 
 For the axles i = f, r:
 
-    m (v_y' + r v_x) = F_f cos d_f + F_r cos d_r + X_f sin d_f
+    m (v_y' + r v_x) = F_f cos d_f + F_r cos d_r + X_f sin d_f + m g_y
     J_z r'           = l_f (F_f cos d_f + X_f sin d_f) - l_r F_r cos d_r + M_x
     s_i / v_x a_i'   = d_i - (v_y + h p' +- l_i r) / v_x - c_i F_i - q_i p + e_i - a_i
     F_i              = sum over the axle's wheels of u F_y(a_i / u, F_z)
     p'' + 2 D w p' + w^2 p = w^2 k a_y
 
-with the steer angles d, the longitudinal forces X and their moment M_x, slip angles a that build up over the relaxation
-lengths s, the car's own tyre F_y under the wheel's load, the friction u of the road by similarity, and the stiffness
-k_i of the tyres of an axle relative to new ones: u F_y(k_i a_i / u, F_z), which changes the slope of the curve and not
-its peak, as LKY does in the Magic Formula. With a
-longitudinal force, a friction circle reduces u. That lowers the largest force but hardly the force at small slip
-angles, as in the Magic Formula of combined slip (0.7 of the friction for the brake take 8 % at 2 deg). The body rolls
-by p as a mass on a spring, about an axis that lies h below the centre of gravity, so that the axles also move sideways
-by h p'. Springs and dampers of the body load the wheels. The compliance c_i is the difference between the identified
-cornering stiffness of the axle and the stiffness of its tyres:
+with the steer angles d, the gravity g_y across an inclined road, the longitudinal forces X and their moment M_x, slip
+angles a that build up over the relaxation lengths s, the car's own tyre F_y under the wheel's load, the friction u of
+the road by similarity, and the stiffness k_i of the tyres of an axle relative to new ones: u F_y(k_i a_i / u, F_z),
+which changes the slope of the curve and not its peak, as LKY does in the Magic Formula. With a longitudinal force, a
+friction circle reduces u. That lowers the largest force but hardly the force at small slip angles, as in the Magic
+Formula of combined slip (0.7 of the friction for the brake take 8 % at 2 deg). The body rolls by p as a mass on a
+spring, about an axis that lies h below the centre of gravity, so that the axles also move sideways by h p'. Springs and
+dampers of the body load the wheels. The compliance c_i is the difference between the identified cornering stiffness of
+the axle and the stiffness of its tyres:
 
     c_i = 1 / C_i - 1 / (2 C_tyre) - q_i k / m_i
 
@@ -39,6 +39,7 @@ from typing import Final
 
 from activesteer.compilation import compiled, inlined
 from activesteer.estimation.records import (
+    BANK,
     FRICTION,
     FRONT_ERROR,
     FRONT_SLIP,
@@ -181,7 +182,7 @@ def follow(known, tyres, memory, state, duration_s, out):
         out[REAR_SLIP] += follow_rear * (rear_rad - out[REAR_SLIP])
         across_N, behind_N = front_N * cos_f + memory.front_along_N * sin_f, rear_N * cos_r
         turning_Nm = known.cg_to_front_m * across_N - known.cg_to_rear_m * behind_N + memory.moment_Nm
-        out[LATERAL_SPEED] += dt * ((across_N + behind_N) / known.mass_kg - out[YAW_RATE] * vx)
+        out[LATERAL_SPEED] += dt * ((across_N + behind_N) / known.mass_kg + out[BANK] - out[YAW_RATE] * vx)
         out[YAW_RATE] += dt * turning_Nm / known.yaw_inertia_kgm2
 
 

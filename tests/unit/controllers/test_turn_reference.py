@@ -30,3 +30,17 @@ def test_a_driver_who_reverses_is_followed_at_once_although_the_acceleration_sti
     for _ in range(1000):
         reference.borne(0.03, SPEED_MPS, 0.9, 8.0)
     assert [reference.borne(-0.03, SPEED_MPS, 0.9, 8.0) for _ in range(10)][-1] < 0.0
+
+
+@pytest.mark.parametrize("friction", [0.9, 0.3])
+def test_a_desired_turn_that_has_fallen_meanwhile_does_not_fall_twice(friction):
+    """The friction becomes known, or the driver turns back; the road bears the turn that is desired now."""
+    parameters = setup().gains.esc
+    reference, steered = (BorneTurnReference(CAR, parameters, 0.005) for _ in range(2))
+    for _ in range(1000):
+        reference.borne(0.03, SPEED_MPS, 0.9, 8.0)
+        steered.step(0.03, SPEED_MPS, 0.9)
+    angle_rad = 0.03 if friction < 0.9 else 0.005
+    for _ in range(20):
+        wanted = steered.step(angle_rad, SPEED_MPS, friction)
+        assert reference.borne(angle_rad, SPEED_MPS, friction, wanted * SPEED_MPS - 0.4) == pytest.approx(wanted)

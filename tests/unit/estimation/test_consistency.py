@@ -17,6 +17,7 @@ from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation.kalman_filter import begin, correct, predict
 from activesteer.estimation.records import (
     AY_OFFSET,
+    BANK,
     FRICTION,
     FRONT_ERROR,
     FRONT_SLIP,
@@ -36,7 +37,7 @@ from activesteer.estimation.two_track_model import follow, follow_roll, forces_o
 from activesteer.scenario import resolve
 
 MOTION = [LATERAL_SPEED, YAW_RATE]
-RUNS, STEPS, INTERVAL_S, SPEED_MPS = 40, 150, 0.01, 25.0
+RUNS, STEPS, INTERVAL_S, SPEED_MPS = 100, 150, 0.01, 25.0
 
 
 def bounds(freedom: int, samples: int) -> tuple[float, float]:
@@ -60,6 +61,7 @@ def drift(known, memory, state, duration_s, rng):
         (FRONT_ERROR, 0.0, known.slip_angle_std_rad + known.slip_angle_fraction * abs(front_rad), known.slip_angle_s),
         (REAR_ERROR, 0.0, known.slip_angle_std_rad + known.slip_angle_fraction * abs(rear_rad), known.slip_angle_s),
         (AY_OFFSET, 0.0, known.ay_offset_std_mps2, known.ay_offset_s),
+        (BANK, 0.0, known.bank_std_mps2, known.bank_s),
         (FRICTION, known.friction, known.friction_std, known.friction_s),
         (FRONT_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
         (REAR_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),

@@ -152,6 +152,30 @@ def test_soft_tyres_are_told_from_a_slippery_road_and_front_from_rear(mu, front,
         assert run[f"estimated_{name}_stiffness_std"][late].max() < 0.1
 
 
+@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+def test_packed_snow_is_found_as_soon_as_the_tyres_slide_on_it_and_is_not_taken_for_soft_tyres(vehicle):
+    """At the assumed friction of dry asphalt the slope of the forces over the friction is 0 at these slip angles."""
+    run = drive(
+        "step_steer", vehicle, **{"road.mu": 0.25, "speed_kmh": 60.0, "steer.steering_wheel_deg": 40.0}
+    ).recording
+    used = np.maximum(run["fl_friction_utilisation"], run["fr_friction_utilisation"])
+    slid_s = run.time_s - run.time_s[used > 0.9][0]
+    later = (slid_s > 0.4) & (slid_s < 2.0)
+    assert later.any()
+    assert np.abs(run["estimated_friction"][later] - 0.25).max() < 0.1
+    assert run["estimated_front_stiffness"][later].min() > 0.6
+
+
+@pytest.mark.parametrize(("vehicle", "bank_deg"), [("compact", -4.0), ("sedan", -6.0), ("compact", 3.0)])
+def test_the_superelevation_of_a_curve_is_not_taken_for_a_slippery_road(vehicle, bank_deg):
+    """At -6 deg the bank carries a third of the turn. A model without it expects larger forces from the tyres."""
+    run = drive(
+        "banked_curve", vehicle, **{"road.banking.bank_deg": [0.0, 0.0, bank_deg, bank_deg, 0.0, 0.0]}
+    ).recording
+    assert np.abs(run["estimated_sideslip_rad"] - run["sideslip_rad"]).max() < np.radians(0.6)
+    assert (np.abs(run["estimated_friction"] - 0.9) < 2.0 * run["estimated_friction_std"]).mean() > 0.9
+
+
 def test_roll_steer_is_not_taken_for_stiff_tyres():
     """The sedan's front wheels steer out of the turn as it rolls, 0.3 s after the force; its joints are rigid."""
     run = drive("step_steer", "sedan", **{"steer.steering_wheel_deg": 50.0, "duration_s": 3.0}).recording

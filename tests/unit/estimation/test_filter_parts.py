@@ -13,6 +13,7 @@ from activesteer.estimation import advance
 from activesteer.estimation.kalman_filter import begin, correct, predict
 from activesteer.estimation.records import (
     AY_OFFSET,
+    BANK,
     FRICTION,
     FRONT_SLIP,
     FRONT_STIFFNESS,
@@ -173,7 +174,7 @@ def test_noise_and_its_floors_add_as_variances(setup):
     assert known.ay_variance_m2ps4 == pytest.approx(0.04**2 + 0.03**2)
     assert known.rate_offset_std_radps == pytest.approx(0.004)
     assert known.rate_walk_rad2ps3 * 60.0 == pytest.approx(0.06**2)
-    assert known.ay_offset_std_mps2 == pytest.approx(math.hypot(0.5, p.bank_std_mps2))
+    assert known.ay_offset_std_mps2 == pytest.approx(math.hypot(0.5, 0.03))
     assert known.ax_offset_std_mps2 == pytest.approx(math.hypot(0.4, p.slope_std_mps2))
     radius_m = setup.estimation.tyres[0].rolling_radius_m
     assert known.wheel_variance_m2ps2 == pytest.approx((0.1 * radius_m) ** 2 + p.wheel_std_mps**2)
@@ -283,3 +284,14 @@ def test_lateral_acceleration_says_nothing_of_the_offset_of_the_yaw_rate_sensor(
     correct(deaf, tyres, memory, 0.0, 2.0, 0.01)
     assert memory.state[AY_OFFSET] > 1e-4
     assert memory.state[RATE_OFFSET] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_gravity_across_an_inclined_road_moves_the_car_and_the_accelerometer_does_not_feel_it(known, memory, setup):
+    tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
+    memory["speed_mps"], memory["state"][BANK] = 20.0, 0.5
+    moved = np.empty(N_STATES)
+    follow(known, tyres, memory, memory.state, 0.001, moved)
+    assert moved[LATERAL_SPEED] == pytest.approx(0.001 * 0.5)
+    correct(known, tyres, memory, 0.0, 0.0, 0.01)
+    assert memory.state[BANK] == 0.5
+    assert memory.state[AY_OFFSET] == pytest.approx(0.0, abs=1e-9)
