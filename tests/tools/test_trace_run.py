@@ -11,6 +11,7 @@ ROOT = Path(__file__).parents[2]
 
 def test_the_documentation_lists_the_modules_that_a_run_passes_through() -> None:
     command = [sys.executable, str(ROOT / "tools/trace_run.py")]
+    lines: list[str] = []
     for _ in range(2):  # the first run may search the amplitude, and compile
         lines = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout.splitlines()
     found = [line.removeprefix("activesteer.") for line in lines if line.startswith("activesteer.")]
