@@ -113,6 +113,12 @@ _SPEED, _YAW_RATE = map(_MEASURED.index, ("speed_mps", "yaw_rate_radps"))
 _MOTION_SPEED: Final = Motion._fields.index("speed_mps")
 
 
+_WINDOW: Final = 250
+"""Steps whose setpoints are tabulated at a time."""
+_MAX_TABLES: Final = 64
+"""Tables that are kept for cars that share a manoeuvre."""
+
+
 class SetpointTable(NamedTuple):
     """Setpoints of successive steps for compiled code. The last one holds on.
 
@@ -136,6 +142,33 @@ def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | N
         count -= 1
     rows = [setpoint_row(setpoint, rack_per_steering_wheel_m) for setpoint in setpoints[:count]]
     return SetpointTable(np.array(rows, SETPOINT), path, steps)
+
+
+class SharedTables:
+    """Setpoints of manoeuvres over the next steps, for cars that are driven together."""
+
+    def __init__(self) -> None:
+        """Start without tables."""
+        self._kept: dict[tuple[Any, ...], tuple[Any, SetpointTable]] = {}
+
+    def of(self, maneuver: Any, step: int, rack_m: float | None, timestep_s: float) -> tuple[SetpointTable, int]:
+        """Return a table that holds the setpoint of a step, and its first step."""
+
+        def from_step(first: int) -> SetpointTable:
+            steps = range(first, first + _WINDOW)
+            return tabulate([maneuver.setpoint(each * timestep_s) for each in steps], rack_m)
+
+        first = step // _WINDOW * _WINDOW
+        key = id(maneuver), first, rack_m
+        known, table = self._kept.get(key, (None, None))
+        if table is None or known is not maneuver:
+            while len(self._kept) >= _MAX_TABLES:
+                del self._kept[next(iter(self._kept))]
+            table = from_step(first)
+            self._kept[key] = maneuver, table
+        if step >= first + table.steps:  # the path changes on the way
+            return from_step(step), step
+        return table, first
 
 
 def setpoint_row(setpoint: Setpoint, rack_per_steering_wheel_m: float | None) -> tuple[Any, ...]:

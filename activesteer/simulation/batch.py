@@ -17,6 +17,7 @@ from activesteer.controllers import CONTROLLER, controller_spec
 from activesteer.controllers.vectorised import Vectorised
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import DRIVER
+from activesteer.driver.human import SharedTables
 from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, shown
 from activesteer.faults import Fault
 from activesteer.resources import DEFAULT_DRIVER
@@ -150,7 +151,7 @@ class Batch(Copyable):
         self.failures = {}
         self._in_use = NonReentrantLock()
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
-        self._records, tables = np.zeros(len(self), CAR), {}
+        self._records, tables = np.zeros(len(self), CAR), SharedTables()
         for car, loop in enumerate(self.loops):
             loop.join(self._records, car, tables)
         self._last = np.array([loop.steps for loop in self.loops])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from activesteer.config import Source
 from activesteer.controllers import controller_spec
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
-from activesteer.driver.human import HumanDriver, SetpointTable, setpoint_row, tabulate
+from activesteer.driver.human import HumanDriver, SetpointTable, SharedTables, setpoint_row, tabulate
 from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged, shown
 from activesteer.faults import Fault, check_faults, fault_from
 from activesteer.maneuver import Maneuver
@@ -54,10 +54,6 @@ from activesteer.version import __version__
 Given = tuple[DriverCommand | None, ActuatorCommand | None]
 """Commands that replace driver and controller."""
 _NOTHING_GIVEN: Final[Given] = (None, None)
-_WINDOW: Final = 250
-"""Steps whose setpoints are tabulated at a time."""
-_MAX_TABLES: Final = 64
-"""Tables that are kept for cars that share a manoeuvre."""
 _NEVER: Final = 2**62
 _TIME: Final = Measurement._fields.index("time_s")
 _SPEED: Final = Motion._fields.index("speed_mps")
@@ -154,7 +150,7 @@ class ClosedLoop(Uncopyable):
         self._table: SetpointTable | None = None
         self._block: NDArray[Any] | None = None
         self._record = np.zeros(1, native.CAR)
-        self.join(self._record, 0, {})
+        self.join(self._record, 0, SharedTables())
         self._connect()
         steps = round(maneuver.settle_s / timestep_s)
         measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
@@ -182,7 +178,7 @@ class ClosedLoop(Uncopyable):
         if settled:
             self.restore_state(settled)
 
-    def join(self, records: NDArray[Any], place: int, tables: dict[Any, Any]) -> None:
+    def join(self, records: NDArray[Any], place: int, tables: SharedTables) -> None:
         """Move the record of the car to a place among those that are driven together, which share tables."""
         records[place] = self._record[0]
         self._record = record = records[place : place + 1]
@@ -521,28 +517,16 @@ class ClosedLoop(Uncopyable):
         step, rack = self.step_count, self.driver_setup.rack_per_steering_wheel_m
         if self.settling is not None:
             table, first = tabulate([self.settling], rack)._replace(steps=_NEVER), 0
-        elif self.sequence is not None:
+        elif self.sequence is None:
+            table, first = self._tables.of(self.maneuver, step, rack, self.vehicle.timestep_s)
+        else:
             setpoint, table = self._setpoint_at(step), self._table
             if table is not None and table.path is setpoint.path and len(table.rows) == 1:
                 table.rows[0] = setpoint_row(setpoint, rack)
                 self._record["first"], self._record["last"] = step, step + 1
                 return
             table, first = tabulate([setpoint], rack), step
-        else:
-            first = step // _WINDOW * _WINDOW
-            key = id(self.maneuver), first, rack
-            maneuver, table = self._tables.get(key, (None, None))
-            if table is None or maneuver is not self.maneuver:
-                while len(self._tables) >= _MAX_TABLES:
-                    del self._tables[next(iter(self._tables))]
-                table = self._tabulated(first, rack)
-                self._tables[key] = self.maneuver, table
-            if step >= first + table.steps:  # the path changes on the way
-                table, first = self._tabulated(step, rack), step
         self._follow(table, first)
-
-    def _tabulated(self, first: int, rack_m: float | None) -> SetpointTable:
-        return tabulate([self._setpoint_at(first + place) for place in range(_WINDOW)], rack_m)
 
     def _follow(self, table: SetpointTable, first: int) -> None:
         record = self._record

@@ -44,16 +44,13 @@ _COARSE: Final = (
 
 
 class Link(Protocol):
-    """Another process that gives commands."""
+    """Another process that gives commands. `name` is the key of its `report` in the recording."""
 
     name: str
-    """Key of the report in the recording."""
     report: dict[str, int]
-    """Numbers of messages for the recording."""
 
     def connect(self, check: Callable[[Given, str], Given]) -> None:
         """Take the check of commands, which completes them and raises an error that says who gave a wrong one."""
-        ...
 
     def commands(self) -> Given:
         """Return the commands for the next step, or None where the run's own block decides."""
@@ -61,11 +58,9 @@ class Link(Protocol):
 
     def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:
         """Send the state after a step."""
-        ...
 
     def close(self) -> None:
         """End the link."""
-        ...
 
 
 @dataclass(frozen=True)
