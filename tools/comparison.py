@@ -71,7 +71,8 @@ _RULES: Final = (
 def targets(controllers: Sequence[str], rows: Iterable[Any]) -> list[Target]:
     """Judge the nominal runs by their rows of `scenario`, `controller`, `metric` and `value`.
 
-    A target fails if its value was sought and not found. It is left out if no controller has the metric.
+    A target fails if its value was sought and not found. It is left out if no controller has the metric, or
+    if a controller that it compares with was not driven.
     """
     runs: defaultdict[EvaluatedRun, dict[str, float | None]] = defaultdict(dict)
     sought = set()
@@ -82,7 +83,8 @@ def targets(controllers: Sequence[str], rows: Iterable[Any]) -> list[Target]:
     for name in asked(controllers):
         for scenario, text in _RULES:
             rule = Requirement(text, Names(None, [scenario], name), Source("targets"), ())
-            if (next(iter(rule.metrics))[0], scenario) in sought:
+            driven = all(run in runs for _, run in rule.metrics)
+            if driven and (next(iter(rule.metrics))[0], scenario) in sought:
                 found.append(_judged(name, rule, runs))
     return found
 

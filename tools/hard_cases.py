@@ -157,14 +157,14 @@ def main() -> None:
     found = iter(in_parallel(sine_with_dwell, sines, asked.jobs))
     heads = " ".join(f"{amplitude_deg:14.0f}" for amplitude_deg in amplitudes_deg)
     print("sine with dwell: peak of the sideslip angle [deg], displacement [m]; * misses a limit of FMVSS 126")
-    print(f"{'vehicle':16}{'car':20}{'controller':12}{'missed':>7}  {heads}  deg")
+    print(f"{'vehicle':17}{'car':20}{'controller':12}{'missed':>7}  {heads}  deg")
     for vehicle, car, name in groups:
         rows = [next(found) for _ in amplitudes_deg]
         cells = " ".join(
             f"{row['sideslip_deg']:7.1f} {row['displacement_m']:5.2f}{' ' if passes(row) else '*'}" for row in rows
         )
         missed = f"{sum(not passes(row) for row in rows)}/{len(rows)}"
-        print(f"{vehicle:16}{car:20}{name:12}{missed:>7}  {cells}")
+        print(f"{vehicle:17}{car:20}{name:12}{missed:>7}  {cells}")
     others = [
         (vehicle, controller, name, asked.seed)
         for name in asked.courses
@@ -177,7 +177,7 @@ def main() -> None:
             f"{metric.replace('_rad', '_deg')} {math.degrees(value) if metric.endswith('_rad') else value:.3g}"
             for metric, value in values.items()
         )
-        print(f"{COURSES[name].vehicle or vehicle:16}{name:22}{controller:12}{cells}")
+        print(f"{COURSES[name].vehicle or vehicle:17}{name:22}{controller:12}{cells}")
 
 
 if __name__ == "__main__":
