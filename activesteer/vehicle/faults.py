@@ -220,9 +220,9 @@ class _ActuatorFault(_DemandFault):
         self._set(native.WORKS)
 
     def recover(self) -> None:
-        """Start a servo that was free at its present angle. It returns to its demand with its own lag and rate."""
-        if self._kind == native.FLOATS and not self._part["seized"][0]:
-            self._data.act[self._part["act"][0]] = self._data.qpos[self._part["qpos"][0]]
+        """Start a servo that was free at its present angle (see `resume_part`)."""
+        if self._kind == native.FLOATS:
+            native.resume_of(self._part.ctypes.data, self._data.act.ctypes.data, self._data.qpos.ctypes.data)
 
 
 class _MotorFault(_DemandFault):
