@@ -35,7 +35,7 @@ pictures: | $(BIN)/python  # which may need apt-get too
 
 # After lint, when the tests have compiled the kernels.
 baseline: lint
-	$(BIN)/activesteer bench --maneuvers
+	$(BIN)/python tools/baseline.py
 
 lint: $(READY_DEV)  ## ruff, pyright, import-linter
 	$(BIN)/ruff check .

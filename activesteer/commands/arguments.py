@@ -27,6 +27,7 @@ SUCCESSORS: Final = {
     "match": "tune STUDY",
     "falsify": "tune STUDY -c CONTROLLER",
     "linearise --speeds-kmh": "linearise --speed-kmh",
+    "bench --maneuvers": "reproduce --setting paper",
     "reproduce --population": "study population -o DIR` or `activesteer study comparison -o DIR",
     **dict.fromkeys(
         ("reproduce -c", "reproduce --controller", "reproduce --controllers"), "study side_by_side -o DIR -c CONTROLLER"

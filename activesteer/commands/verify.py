@@ -163,14 +163,9 @@ def _test(options: argparse.Namespace) -> bool:
 @command("bench", "where the time of a step goes",
     arguments.one_of(
         arguments.flag("--tyre", "what a tyre's evaluation costs instead"),
-        arguments.flag("--maneuvers",
-            "drive the paper's scenarios instead and compare their key metrics with the stored baseline; exit with 1 "
-            "if one has drifted"),
         arguments.flag("--batch",
             "measure many cars in one native call instead: car-steps per second, processor time, memory"),
     ),
-    arguments.flag("--renew", "with --maneuvers: store the metrics as the new baseline"),
-    arguments.output("SUMMARY.md", "with --maneuvers: write a summary in Markdown"),
     arguments.JSON,
     arguments.option("--rounds", "N", "the best of N counts (default: 5)", type=int),
     description="Where the time of a step goes, in microseconds. Ratios to `bare` compare with an engine that has "
@@ -181,10 +176,6 @@ def _bench(options: argparse.Namespace) -> bool:
 
     if options.rounds is not None and options.rounds < 1:
         raise ParameterError(f"--rounds {options.rounds}: at least 1 is needed")
-    if options.maneuvers:
-        arguments.check_effect(options, "no effect with --maneuvers: each is driven once", "rounds")
-        return _maneuvers(options)
-    arguments.check_effect(options, "an effect with --maneuvers only", "renew", "output")
     rounds = options.rounds or benchmark.ROUNDS
     if options.batch:
         results = benchmark.bench_batch(rounds)
@@ -193,33 +184,3 @@ def _bench(options: argparse.Namespace) -> bool:
         results = (benchmark.bench_tyre if options.tyre else benchmark.bench)(rounds)
         terminal.tell(options, results, (f"{name:28} {value:8.2f}" for name, value in results.items()))
     return False
-
-
-def _maneuvers(options: argparse.Namespace) -> bool:
-    from activesteer.analysis.tables import comparison
-    from activesteer.files import write_text
-    from activesteer.studies import benchmark
-
-    baseline = {} if options.renew else benchmark.read_baseline()
-    found = benchmark.bench_maneuvers()
-    if options.renew:
-        baseline = found.key_metrics()
-        benchmark.write_baseline(found)
-    drifts = benchmark.drifts(found, baseline)
-    if options.output is not None:
-        write_text(options.output, benchmark.as_markdown(found, drifts), ParameterError)
-    lines = []
-    for name, runs in found.by_maneuver().items():
-        factors = ", ".join(f"{run.controller} {run.real_time_factor:.0f}" for run in runs)
-        search = found.search_told(name)
-        lines.append(f"{name}: {factors} times real time" + (f"; {search}" if search else ""))
-        lines += [comparison({run.controller: run.metrics for run in runs}), ""]
-    checked = sum(len(run.metrics) for run in found.runs)
-    lines += [
-        f"peak memory {found.peak_memory_B / 1e6:.0f} MB",
-        *([f"renewed {benchmark.BASELINE}"] if options.renew else ()),
-        *map(str, drifts),
-        f"{checked - len(drifts)} of {checked} key metrics are as in the baseline",
-    ]
-    terminal.tell(options, benchmark.as_json(found, drifts), lines)
-    return bool(drifts)

@@ -52,7 +52,6 @@ MAX_KEPT: Final = 1000
 _MAX_BYTES: Final = 200
 _SUFFIX: Final = ".amplitude"
 _in_process: dict[str, float] = {}
-_reads = True
 _writes = True
 
 
@@ -66,7 +65,7 @@ def folder() -> Path:
 
 def recall(key: str) -> float | None:
     """Return a stored number, bit for bit, or None if there is none."""
-    if _reads and key not in _in_process:
+    if key not in _in_process:
         with contextlib.suppress(ActiveSteerError, RuntimeError, ValueError):
             text = read_bytes(folder() / f"{key}{_SUFFIX}", ActiveSteerError, _MAX_BYTES).decode("ascii")
             value = float.fromhex(text.partition(" ")[0])
@@ -106,18 +105,6 @@ def not_on_disk() -> Iterator[None]:
         yield
     finally:
         _writes = before
-
-
-@contextlib.contextmanager
-def searched_anew() -> Iterator[None]:
-    """Search amplitudes inside as if none had been kept, and write none to disk."""
-    global _in_process, _reads
-    before, _in_process, _reads = (_in_process, _reads), {}, False
-    try:
-        with not_on_disk():
-            yield
-    finally:
-        _in_process, _reads = before
 
 
 def _remember(key: str, value: float) -> None:

@@ -1,4 +1,4 @@
-"""What `activesteer bench` measures: time of a step, of many cars, of a tyre; key metrics against a stored baseline.
+"""What `activesteer bench` measures: time of a step, of many cars, of a tyre.
 
 All times of a table come from one process, interleaved, so that their ratios are meaningful.
 """
@@ -6,38 +6,28 @@ All times of a table come from one process, interleaved, so that their ratios ar
 from __future__ import annotations
 
 import importlib.util
-import json
-import math
 import multiprocessing
 import os
-import resource
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 
-from activesteer.analysis.claims.judge import SYSTEMS
-from activesteer.analysis.claims.statements import SCENARIOS
-from activesteer.analysis.metrics import EVALUATIONS, evaluation_of
 from activesteer.brakes.brake_control_unit import step_brakes
 from activesteer.compilation import compiled
 from activesteer.conventions import CORNERS
-from activesteer.errors import ActiveSteerError, RecordingError
-from activesteer.files import read_text, write_json
-from activesteer.metric_table import recorded_metric
 from activesteer.scenario import Scenario, resolve
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.simulation.batch import Batch
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.preparation import searched_anew, with_amplitude_found
+from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
@@ -406,174 +396,3 @@ def batch_table(found: dict[str, Any]) -> str:
         )
         lines.append(f"{size:6d} {us:12.2f} {two:10.2f} {speedup:9.2f} {rate:12.0f}")
     return "\n".join([*lines, f"memory {found['batch_MB_per_car']:.2f} MB per car"])
-
-
-BASELINE: Final = Path(__file__).with_name("maneuver_baseline.json")
-"""Key metrics of each scenario and system as they were when they were last renewed on purpose."""
-DRIVEN: Final = {
-    **dict.fromkeys((*SCENARIOS, "fishhook", "j_turn", "brake_in_turn_release"), SYSTEMS),
-    "start_stop": ("none",),
-}
-"""Manoeuvre -> controllers that drive it."""
-
-Baseline = dict[str, dict[str, dict[str, float]]]
-"""Manoeuvre -> controller -> name of the metric -> value [SI], nan where the run does not define one."""
-
-
-class BenchmarkRun(NamedTuple):
-    """One manoeuvre driven with one controller; times with settling, building and metrics, key metrics in SI."""
-
-    maneuver: str
-    kind: str
-    controller: str
-    simulated_s: float
-    wall_s: float
-    metrics: dict[str, float]
-
-    @property
-    def real_time_factor(self) -> float:
-        """Simulated time over wall time."""
-        return self.simulated_s / self.wall_s
-
-
-class Drift(NamedTuple):
-    """A key metric [SI] that differs from the baseline by more than its tolerance, or None where a side has none."""
-
-    maneuver: str
-    controller: str
-    metric: str
-    old: float | None
-    new: float | None
-    tolerance: float
-
-    def __str__(self) -> str:
-        """Return one line with old and new value and the tolerance."""
-        metric = recorded_metric(self.metric)
-        old, new = ("missing" if value is None else metric.text(value) for value in (self.old, self.new))
-        tolerance = f"{self.tolerance * metric.unit.factor:.3g} {metric.unit.name}".removesuffix(" -")
-        return f"{self.maneuver}, {self.controller}: {metric.label} {old} -> {new} (tolerance {tolerance})"
-
-
-class Benchmark(NamedTuple):
-    """All runs, the time of the search for a manoeuvre's steering amplitude, and the largest memory of this process."""
-
-    runs: list[BenchmarkRun]
-    search_s: dict[str, float]
-    peak_memory_B: int
-
-    def key_metrics(self) -> Baseline:
-        """Return the key metrics of all runs, rounded to six digits."""
-        found: Baseline = {}
-        for run in self.runs:
-            rounded = {name: float(f"{value:.6g}") for name, value in run.metrics.items()}
-            found.setdefault(run.maneuver, {})[run.controller] = rounded
-        return found
-
-    def by_maneuver(self) -> dict[str, list[BenchmarkRun]]:
-        """Return the runs of each manoeuvre."""
-        found: dict[str, list[BenchmarkRun]] = {}
-        for run in self.runs:
-            found.setdefault(run.maneuver, []).append(run)
-        return found
-
-    def search_told(self, maneuver: str) -> str:
-        """Return the time of the search for a manoeuvre's amplitude in words, or empty where nothing is searched."""
-        search_s = self.search_s.get(maneuver)
-        return "" if search_s is None else f"search of the steering amplitude {search_s:.2f} s"
-
-
-def bench_maneuvers() -> Benchmark:
-    """Drive the paper's five scenarios and the manoeuvres in phases in this process, after searching the amplitudes."""
-    import_module("scipy.signal")  # the metrics load it at their first use; that is no time of a run
-    runs, search_s = [], {}
-    for name, systems in DRIVEN.items():
-        scenario = resolve(name)
-        with searched_anew():
-            start = time.perf_counter()
-            found = with_amplitude_found(scenario)
-            if scenario.maneuver.search is not None:
-                search_s[name] = time.perf_counter() - start
-        simulated_s = scenario.maneuver.settle_s + scenario.maneuver.duration_s
-        for system in systems:
-            start = time.perf_counter()
-            recording = run_scenario(found, system)
-            wall_s = time.perf_counter() - start
-            names = [metric.name for metric in evaluation_of(recording).key_metrics]
-            if missing := [each for each in names if each not in recording.metrics]:
-                raise RecordingError(f"{name}, {system}: there is no key metric {missing[0]}")
-            metrics = {each: recording.metrics[each] for each in names}
-            runs.append(BenchmarkRun(name, scenario.maneuver.kind, system, simulated_s, wall_s, metrics))
-    # Linux gives kibibytes.
-    return Benchmark(runs, search_s, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-
-
-def drifts(benchmark: Benchmark, baseline: Baseline) -> list[Drift]:
-    """Return the key metrics that differ from the baseline by more than their tolerance, or that one side lacks."""
-    kinds = {run.maneuver: run.kind for run in benchmark.runs}
-    olds, news, found = _flat(baseline), _flat(benchmark.key_metrics()), []
-    for run in dict.fromkeys(run[:2] for run in (*olds, *news)):
-        declared = EVALUATIONS[kinds[run[0]]].key_metrics if run[0] in kinds else ()
-        known = {metric.name: metric for metric in declared}
-        for name in dict.fromkeys(key[2] for key in (*olds, *news) if key[:2] == run):
-            old, new = olds.get((*run, name)), news.get((*run, name))
-            metric = known.get(name) or recorded_metric(name)
-            tolerance = metric.tolerance_of(old) if old is not None and math.isfinite(old) else metric.tolerance
-            if old is None or new is None or not np.isclose(new, old, rtol=0.0, atol=tolerance, equal_nan=True):
-                found.append(Drift(*run, name, old, new, tolerance))
-    return found
-
-
-def _flat(baseline: Baseline) -> dict[tuple[str, str, str], float]:
-    return {
-        (maneuver, controller, name): value
-        for maneuver, systems in baseline.items()
-        for controller, metrics in systems.items()
-        for name, value in metrics.items()
-    }
-
-
-def read_baseline(path: Path = BASELINE) -> Baseline:
-    """Return the stored baseline. Null stands for nan."""
-    try:
-        stored = json.loads(read_text(path, RecordingError))
-        for maneuver, controller, name in _flat(stored):
-            value = stored[maneuver][controller][name]
-            stored[maneuver][controller][name] = math.nan if value is None else float(value)
-    except (ValueError, TypeError, AttributeError) as error:
-        raise RecordingError("is no baseline of key metrics; renew it with --renew", file=str(path)) from error
-    return stored
-
-
-def write_baseline(benchmark: Benchmark, path: Path = BASELINE) -> Path:
-    """Write the key metrics of a benchmark as the new baseline."""
-    return write_json(path, benchmark.key_metrics(), ActiveSteerError)
-
-
-def as_json(benchmark: Benchmark, found: Sequence[Drift]) -> dict[str, Any]:
-    """Return a benchmark and its drifts as JSON values."""
-    return {
-        "runs": [run._asdict() | {"real_time_factor": run.real_time_factor} for run in benchmark.runs],
-        "search_s": benchmark.search_s,
-        "peak_memory_B": benchmark.peak_memory_B,
-        "drifts": [drift._asdict() for drift in found],
-    }
-
-
-def as_markdown(benchmark: Benchmark, found: Sequence[Drift]) -> str:
-    """Return a summary for the page of a continuous-integration run: verdict, drifts, a table for each manoeuvre."""
-    checked = sum(len(run.metrics) for run in benchmark.runs)
-    verdict = f"{len(found)} of {checked} key metrics drift" if found else f"{checked} key metrics as in the baseline"
-    parts = [f"# Benchmark of the manoeuvres\n\n{verdict}; peak memory {benchmark.peak_memory_B / 1e6:.0f} MB."]
-    if found:
-        parts.append("\n".join(f"- {drift}" for drift in found))
-    for maneuver, runs in benchmark.by_maneuver().items():
-        rows = [["metric", "unit", *(run.controller for run in runs)], ["---"] * 2 + ["---:"] * len(runs)]
-        for name in runs[0].metrics:
-            metric = recorded_metric(name)
-            rows.append([metric.label, metric.unit.name, *(metric.text(run.metrics[name]) for run in runs)])
-        rows.append(["time of the run", "s", *(f"{run.wall_s:.2f}" for run in runs)])
-        rows.append(["times real time", "-", *(f"{run.real_time_factor:.0f}" for run in runs)])
-        table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-        search = f"{benchmark.search_told(maneuver).capitalize()}.\n\n" if maneuver in benchmark.search_s else ""
-        parts.append(f"## {maneuver}\n\n{search}{table}")
-    return "\n\n".join(parts) + "\n"

@@ -94,7 +94,6 @@ def test_a_misplaced_or_misspelt_word_is_answered_with_the_right_one(capsys, wor
         (["fit", "tesla_model_s"], ["nothing to fit", "activesteer compare tesla_model_s"]),
         (["report", "."], ["DIR/*.mcap"]),
         (["run", "straight_line", "--watch", "--plot"], ["--plot", "--watch"]),
-        (["bench", "--maneuvers", "--rounds", "2"], ["--rounds", "--maneuvers"]),
         (["test", "iso4138", "--jobs", "2", "--scheduler", "tcp://nowhere:1"], ["--jobs 2", "--scheduler"]),
         (["video", "run.mcap", "--corner", "rl"], ["--corner", "--camera wheel"]),
         (["identify", "--write", "--vehicle", str(find_vehicle("compact")), "--set", "factors.mass=1.1"], ["--write"]),

@@ -11,7 +11,7 @@ from typing import Any, Final
 import pytest
 
 from activesteer.metric_table import recorded_metric
-from activesteer.studies.benchmark import BASELINE
+from tools.baseline import BASELINE
 
 ROOT: Final = Path(__file__).parents[2]
 README: Final = (ROOT / "README.md").read_text("utf-8")

@@ -30,6 +30,9 @@ function histogram(metric, { edges, counts }) {
 // Place of a value of a factor on its axis: the value, or the number of its level.
 const placeOf = (factor, value) => (value == null || factor.numeric ? value : factor.levels.indexOf(String(value)));
 
+// The factors that vary in some rows; others belong to other manoeuvres.
+const varied = (rows) => DATA.factors.filter(({ key }) => rows.some((i) => DATA.rows.factors[key][i] != null));
+
 function scatter(factor, label, rows, valueOf) {
   const curves = DATA.controllers.map((_, c) => {
     const own = rows.filter((i) => DATA.rows.controller[i] === c && valueOf(i) != null && DATA.rows.factors[factor.key][i] != null);
@@ -40,7 +43,7 @@ function scatter(factor, label, rows, valueOf) {
 
 // The mean in fields of the first two numeric factors, for designs without grids.
 function binned(rows, values) {
-  const pair = DATA.factors.filter((factor) => factor.numeric).slice(0, 2), runs = rows.length / DATA.controllers.length;
+  const pair = varied(rows).filter((factor) => factor.numeric).slice(0, 2), runs = rows.length / DATA.controllers.length;
   if (pair.length < 2 || runs < 4) return null;
   const count = Math.min(FIELDS, Math.max(2, Math.round(Math.sqrt(runs / 3))));
   const ends = pair.map(({ key }) => endsOf(rows.map((i) => DATA.rows.factors[key][i])));
@@ -100,7 +103,7 @@ function sensitivity(metric, found) {
 // Every run as a line through its factors and the metric, each between its least and its greatest value.
 function parallel(metric, rows) {
   const values = DATA.rows.metrics[metric.name];
-  const axes = [...DATA.factors.map((factor) => ({ factor, of: (i) => placeOf(factor, DATA.rows.factors[factor.key][i]) })), { factor: { ...metric, numeric: true }, of: (i) => values[i] }]
+  const axes = [...varied(rows).map((factor) => ({ factor, of: (i) => placeOf(factor, DATA.rows.factors[factor.key][i]) })), { factor: { ...metric, numeric: true }, of: (i) => values[i] }]
     .map((axis) => ({ ...axis, ends: axis.factor.numeric ? endsOf(rows.map(axis.of)) : [0, axis.factor.levels.length - 1] }));
   const names = axes.map(({ factor, ends }) => `${axisOf(factor)}: ${factor.numeric ? ends.map(number).join(" to ") : factor.levels.join(", ")}`);
   const along = ({ of, ends: [low, high] }, i) => (of(i) == null ? null : high > low ? (of(i) - low) / (high - low) : 0.5);
@@ -146,12 +149,12 @@ function drawAll() {
   show("distribution", [histogram(metric, found.histogram)]);
   tableOf(at("quantiles"), ["controller", ...quantiles], DATA.controllers.map((name, c) => [name, ...(found.quantiles[c] || [null, null, null]).map(number)]));
   at("shown").textContent = DATA.all > DATA.rows.run.length ? `Points are ${DATA.rows.run.length} of ${DATA.all} runs; everything else uses all runs.` : "";
-  show("scatter", DATA.factors.map((factor) => scatter(factor, axisOf(metric), rows, (i) => values[i])));
+  show("scatter", varied(rows).map((factor) => scatter(factor, axisOf(metric), rows, (i) => values[i])));
   if (found.paired.some((pair) => pair)) {
     at("paired-part").hidden = false;
     const base = new Map(rows.filter((i) => DATA.rows.controller[i] === 0).map((i) => [DATA.rows.sample[i], values[i]]));
     const pairs = rows.filter((i) => DATA.rows.controller[i] > 0 && values[i] != null && base.get(DATA.rows.sample[i]) != null);
-    show("paired", DATA.factors.map((factor) => scatter(factor, `difference from ${first}: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]))));
+    show("paired", varied(pairs).map((factor) => scatter(factor, `difference from ${first}: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]))));
     tableOf(at("paired-table"), [`difference from ${first}`, ...quantiles, "smaller in magnitude [%]"],
       found.paired.map((pair, n) => [DATA.controllers[n + 1], ...(pair ? [...pair.quantiles.map(number), short(100 * pair.smaller)] : ["-", "-", "-", "-"])]));
   }

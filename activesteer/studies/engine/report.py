@@ -81,7 +81,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
             "controller": who["controller"][1][shown].tolist(),
             "sample": table["sample"].to_numpy()[shown].tolist(),
             "run": table["run"].to_numpy()[shown].tolist(),
-            "factors": {key: table[key].take(pa.array(shown)).to_pylist() for key in study.keys},
+            "factors": {key: _acting(study, key, table.take(pa.array(shown))) for key in study.keys},
             "metrics": {name: _json(column[shown]) for name, column in values.items()},
         },
         "all": table.num_rows,
@@ -100,6 +100,16 @@ def _shown_rows(table: pa.Table) -> Places:
     samples = table["sample"].to_numpy()
     every = -(-table.num_rows // _SHOWN_ROWS)
     return np.flatnonzero(samples % every == 0)
+
+
+def _acting(study: StudyFile, key: str, rows: pa.Table) -> list[Any]:
+    """Return the values of a factor, None in manoeuvres in which it does not vary."""
+    named = [factor.maneuvers for factor in study.factors if factor.key == key]
+    values, maneuvers = rows[key].to_pylist(), rows["maneuver"].to_pylist()
+    if not all(named):
+        return values
+    where = {name for names in named for name in names}
+    return [value if name in where else None for value, name in zip(values, maneuvers, strict=True)]
 
 
 _RELATIVE: Final = {"times": ", relative", "plus": ", change"}
