@@ -8,7 +8,7 @@ import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from numbers import Integral
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -131,7 +131,7 @@ class Simulation(Copyable):
         self._pacer = None if realtime is False else RealtimePacer(1.0 if realtime is True else realtime, timestep_s)
         self._link = link
         if link is not None:
-            link.connect(self._checked)
+            link.connect(partial(_checked, self.loop))  # not a method, which would keep the run alive
             weakref.finalize(self, link.close)
         self._failure: BaseException | None = None
         self._writer: McapWriter | None = None
@@ -147,14 +147,6 @@ class Simulation(Copyable):
     @property
     def _block_s(self) -> float | None:
         return None if self._pacer is None and self._link is None else PACED_BLOCK_INTERVAL_S
-
-    def _checked(self, given: Given, said: str) -> Given:
-        driver_command, actuator_command = given
-        if driver_command is not None:
-            driver_command = DRIVER.checked(driver_command, "", self.loop.driver_setup, said)
-        if actuator_command is not None:
-            actuator_command = CONTROLLER.checked(actuator_command, "", self.loop.controller_setup, said)
-        return driver_command, actuator_command
 
     @property
     def steps(self) -> int:
@@ -237,7 +229,7 @@ class Simulation(Copyable):
         if steps > left:
             end = f"{self.scenario.maneuver.name} ends at {self.scenario.maneuver.duration_s:g} s (duration_s)"
             raise ManeuverError(f"{end}; {steps} more steps were requested, {left} are left", value=steps, allowed=left)
-        given = self._checked((driver_command, actuator_command), "Simulation.step was given")
+        given = _checked(loop, (driver_command, actuator_command), "Simulation.step was given")
         with self._watched():
             if self._pacer is None and self._link is None:
                 self._drive(int(steps), given)
@@ -480,3 +472,13 @@ class Simulation(Copyable):
             self._failure = failure
             self._recorder.flush(checked=False)
             raise
+
+
+def _checked(loop: ClosedLoop, given: Given, said: str) -> Given:
+    """Check and complete given commands."""
+    driver_command, actuator_command = given
+    if driver_command is not None:
+        driver_command = DRIVER.checked(driver_command, "", loop.driver_setup, said)
+    if actuator_command is not None:
+        actuator_command = CONTROLLER.checked(actuator_command, "", loop.controller_setup, said)
+    return driver_command, actuator_command
