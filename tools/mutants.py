@@ -114,6 +114,8 @@ OTHER_NAMES: Final = {
     "native_curve_axle": "curve_axle",
     "native_screws": "toe_link_screw",
     "find": "plugins",
+    "retuned": "changes",
+    "run_context": "recorder",
     "advance": "filter_parts",
     "two_track_model": "filter_parts",
     "crg": "uneven",
