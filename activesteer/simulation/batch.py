@@ -250,20 +250,17 @@ class Batch(Copyable):
         with self._in_use, engine_warnings_held():
             left = np.minimum(left, self._last - self._records["step"])
             left[~self._mask(cars) | self.done] = 0
-            self._drive(left, drivers, controllers)
+            records, moving = self._records, left > 0
+            records["driver_given"][moving] = drivers is not None
+            records["controller_given"][moving] = controllers is not None
+            if drivers is not None:
+                records["driver_command"][moving] = drivers[moving]
+                records["torques_set"][moving] = False
+            if controllers is not None:
+                records["actuator_command"][moving] = controllers[moving]
+            records["left"] = left
+            self.failures |= drive_together(self.loops, records, self._call)
         return self.measurement
-
-    def _drive(self, left: NDArray[np.intp], drivers: Array | None, controllers: Array | None) -> None:
-        records, moving = self._records, left > 0
-        records["driver_given"][moving] = drivers is not None
-        records["controller_given"][moving] = controllers is not None
-        if drivers is not None:
-            records["driver_command"][moving] = drivers[moving]
-            records["torques_set"][moving] = False
-        if controllers is not None:
-            records["actuator_command"][moving] = controllers[moving]
-        records["left"] = left
-        self.failures |= drive_together(self.loops, records, self._call)
 
     def _call(self, records: NDArray[Any]) -> None:
         """Drive all cars natively, divided among the threads by the steps up to their next stop."""
