@@ -23,6 +23,7 @@ Sources:
     Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the
     divided-difference filter of second order with h^2 = 3.
     Simon, Optimal State Estimation, 2006, chapter 13 (extended Kalman filter), section 7.2 (coloured noise).
+    Schmidt, Application of State-Space Methods to Navigation Problems, Advances in Control Systems 3, 1966.
     Doumiati, Charara, Victorino, Lechner, Vehicle Dynamics Estimation using Kalman Filtering, 2013, chapter 5.
 """
 
@@ -67,6 +68,9 @@ _DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 1
 _MOST_BRAKED: Final = 0.25
 """Fraction of the front axle's friction force above which lateral forces give no information on friction and stiffness:
 brakes then reduce them by more than `force_fraction`, by a friction circle that is itself not exact."""
+_LEAST_SLIP_RAD: Final = math.radians(0.3)
+"""Slip angle of an axle below which its stiffness is not estimated: on a rough road, bump steer and roll make slip
+angles that the model does not know."""
 _CREEP_MPS: Final = 0.05
 """Standard deviation of the lateral speed of an almost standing car [m/s]."""
 _CREEP_DENSITY: Final = 0.05
@@ -240,8 +244,12 @@ def _over_friction(known, tyres, memory, here_mps2):
 
 @inlined
 def _take_in(state, covariance, row, error, variance):
-    """Process one measured value, and return the expected variance of its error."""
+    """Process one measured value, and return the expected variance of its error.
+
+    A stiffness without a slip angle that shows it has no gain; its uncertainty counts (Schmidt's filter).
+    """
     n = len(state)
+    front_hidden, rear_hidden = abs(state[FRONT_SLIP]) < _LEAST_SLIP_RAD, abs(state[REAR_SLIP]) < _LEAST_SLIP_RAD
     spread, expected = np.zeros(n), variance
     for i in range(n):
         for k in range(n):
@@ -249,8 +257,12 @@ def _take_in(state, covariance, row, error, variance):
     for i in range(n):
         expected += row[i] * spread[i]
     for i in range(n):
-        state[i] += spread[i] / expected * error
+        hidden = (i == FRONT_STIFFNESS and front_hidden) or (i == REAR_STIFFNESS and rear_hidden)
+        if not hidden:
+            state[i] += spread[i] / expected * error
         for k in range(i + 1):
+            if hidden and (k == i or (k == FRONT_STIFFNESS and front_hidden)):
+                continue
             covariance[i, k] -= spread[i] * spread[k] / expected
             covariance[k, i] = covariance[i, k]
     return expected

@@ -166,6 +166,15 @@ def test_packed_snow_is_found_as_soon_as_the_tyres_slide_on_it_and_is_not_taken_
     assert run["estimated_front_stiffness"][later].min() > 0.6
 
 
+@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+def test_the_stiffness_of_the_tyres_does_not_drift_on_a_straight_rough_road(vehicle):
+    """No force shows the stiffness, so the estimate and its deviation say that nothing is known."""
+    run = drive("rough_road", vehicle, duration_s=5.0).recording
+    for axle in ("front", "rear"):
+        assert np.abs(run[f"estimated_{axle}_stiffness"] - 1.0).max() < 0.05
+        assert run[f"estimated_{axle}_stiffness_std"].min() > 0.18
+
+
 @pytest.mark.parametrize(("vehicle", "bank_deg"), [("compact", -4.0), ("sedan", -6.0), ("compact", 3.0)])
 def test_the_superelevation_of_a_curve_is_not_taken_for_a_slippery_road(vehicle, bank_deg):
     """At -6 deg the bank carries a third of the turn. A model without it expects larger forces from the tyres."""

@@ -295,3 +295,19 @@ def test_gravity_across_an_inclined_road_moves_the_car_and_the_accelerometer_doe
     correct(known, tyres, memory, 0.0, 0.0, 0.01)
     assert memory.state[BANK] == 0.5
     assert memory.state[AY_OFFSET] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("slip_deg", "learns"), [(0.2, False), (0.4, True)])
+def test_a_stiffness_without_a_slip_angle_is_not_learned_and_its_uncertainty_counts(
+    known, memory, setup, slip_deg, learns
+):
+    tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
+    memory["speed_mps"] = 20.0
+    memory["state"][[FRONT_SLIP, REAR_SLIP]] = np.radians(slip_deg)
+    memory["covariance"][FRONT_STIFFNESS, FRONT_STIFFNESS] = 0.04
+    sure = memory.copy()
+    sure["covariance"][FRONT_STIFFNESS, FRONT_STIFFNESS] = 0.0
+    innovations = [correct(known, tyres, each, 0.0, 3.0, 0.01) for each in (memory, sure)]
+    assert innovations[0] < innovations[1]
+    assert (memory.state[FRONT_STIFFNESS] > 1.0) == learns
+    assert (memory.covariance[FRONT_STIFFNESS, FRONT_STIFFNESS] < 0.04) == learns
