@@ -184,7 +184,10 @@ class ClosedLoop(Uncopyable):
         self._record = record = records[place : place + 1]
         self._tables = tables
         # Views and addresses of what Python uses in every step.
-        self._step, self._stage, self._held = record["step"], record["stage"], record["held"][0]
+        self._step, self._stage, self._torques_set, self._ratio = (
+            record[name] for name in ("step", "stage", "torques_set", "steering_ratio")
+        )
+        self._held, self._seen = record["held"][0], record["seen"][0]
         self._driver_numbers, self._measured, self._motion = (
             record[name].view(np.dtype(nested_fields(native.MESSAGES[name])))[:, 0]
             for name in ("driver_command", "measurement", "motion")
@@ -474,7 +477,7 @@ class ClosedLoop(Uncopyable):
     def _give_driver_command(self, command: Any) -> None:
         write_command(DriverCommand, self._driver_at, command)
         torques = command.wheel_torques
-        self._record["torques_set"] = torques is not None
+        self._torques_set[0] = torques is not None
         if torques is None:
             check_gear(command.gear)
         else:
@@ -494,7 +497,7 @@ class ClosedLoop(Uncopyable):
     def _driver_command(self, numbers: Sequence[float]) -> DriverCommand:
         angle, drive, pedal, saturated, gear, front, parking = numbers
         torques = None
-        if self._record["torques_set"].item(0):
+        if self._torques_set.item(0):
             every = self._record["torques_Nm"][0].tolist()
             torques = WheelTorques(tuple(every[:4]), tuple(every[4:]))
         return new_message(DriverCommand, (angle, drive, pedal, saturated != 0.0, torques, int(gear), front, parking))
@@ -550,8 +553,8 @@ class ClosedLoop(Uncopyable):
 
     def _ask_controller(self) -> None:
         """Call a controller in Python, and hold its decision."""
-        record, controller = self._record, self.blocks[1]
-        told = self._driver_numbers.item(0) if record["steering_ratio"].item(0) == 0.0 else record["seen"][0].tolist()
+        controller = self.blocks[1]
+        told = self._driver_numbers.item(0) if self._ratio.item(0) == 0.0 else self._seen.tolist()
         driver_command = self._driver_command(told)
         if self.unit.uses_truth:
             command = controller.step(driver_command, *self.vehicle.truth())
