@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Annotated, Any, Final, NamedTuple
 
-from activesteer.config import Range
+from activesteer.config import Range, Source, build
 from activesteer.conventions import CORNERS
 from activesteer.errors import ManeuverError, ParameterError, nearest_names, shown
 from activesteer.signals import Measurement, numbers_of
@@ -195,6 +195,11 @@ class Fault:
         value, unit = getattr(self, needed), needed.rpartition("_")[2]
         return f"{self.part}:{self.kind}={value}" if needed == "side" else f"{self.part}:{self.kind}={value:g}{unit}"
 
+    def name_at(self, now_s: float) -> str:
+        """Return the name with its time, apart from a start now that has no end."""
+        start = "" if self.start_s <= now_s + 1e-9 and self.end_s is None else f"@{self.start_s:g}"
+        return f"{self.name}{start}{'' if self.end_s is None else f'-{self.end_s:g}'}"
+
     def shares_a_part_with(self, other: Fault) -> bool:
         """Return True if both faults act on the same part."""
         if self.part in ACTUATORS and other.part in ACTUATORS:
@@ -247,3 +252,15 @@ def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
     elif found["unit"] is not None:
         table["delay_s" if found["unit"] == "s" else f"size_{found['unit']}"] = float(found["value"])
     return table
+
+
+def fault_from(given: Any, now_s: float) -> Fault:
+    """Return a fault given during a run, as an object or as text; without a time it begins now."""
+    if isinstance(given, str):
+        table = fault_table(given, None if "@" in given else now_s)
+        given = build(Fault, table, Source("", error=ManeuverError))
+    if not isinstance(given, Fault):
+        raise ParameterError(f"is {shown(given)}; a fault or its text is needed", key="fault", value=given)
+    if given.start_s < now_s - 1e-9:
+        raise ManeuverError(f"is {given.start_s:g} s; the run is at {now_s:g} s", key="start_s")
+    return given

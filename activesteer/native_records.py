@@ -9,10 +9,11 @@ from __future__ import annotations
 import functools
 from array import array
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, ClassVar, Final, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NoReturn, get_origin, get_type_hints
 
 import numpy as np
 
+from activesteer.errors import ParameterError
 from activesteer.signals import PerWheel
 
 if TYPE_CHECKING:
@@ -103,3 +104,15 @@ def take(block: NativeBlock, record: tuple[Any, ...]) -> None:
             setattr(block, name, hint(value))
         elif isinstance(part := getattr(block, name), NativeBlock):
             take(part, value)
+
+
+class Uncopyable:
+    """Base of objects that can be neither copied nor pickled."""
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        raise ParameterError(
+            f"a {type(self).__name__} holds native memory and cannot be copied or pickled; copy the Simulation "
+            "(Simulation.copy, copy.deepcopy, pickle)"
+        )
+
+    __copy__ = __deepcopy__ = __reduce_ex__ = _refuse

@@ -1,17 +1,151 @@
-"""Constants and state of the native brakes: records of float64, at addresses that stay."""
+"""The table [brakes] of a vehicle file, and constants and state of the native brakes.
+
+The records of float64 stay at their addresses.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.brakes.parameters import Antilock, Brakes, Hydraulics, TractionControl
+from activesteer.config import Range
 from activesteer.conventions import CORNERS
 from activesteer.native_records import numbers_type
+
+NotNegative = Annotated[float, Range(0.0)]
+Positive = Annotated[float, Range(1e-9)]
+Fraction = Annotated[float, Range(0.0, 1.0)]
+
+
+@dataclass(frozen=True)
+class Hydraulics:
+    """Pedal travel and pressures of the wheel brakes; all of them are assumptions, see docs."""
+
+    full_pedal_pressure_Pa: Annotated[float, Range(1e6, 3e7)] = 10e6
+    """Pressure at full pedal, and the pump's highest pressure [Pa]."""
+    dead_travel: Annotated[float, Range(0.0, 0.9)] = 0.0
+    """Pedal position up to which no pressure builds up: play, clearance of the pads, cut-off holes [-]. With 0 the
+    pedal position is the fraction of the pressure, as the manoeuvre files state it."""
+    rise_Paps: Annotated[float, Range(1e6, 1e9)] = 100e6
+    """Fastest rise while the pedal feeds the wheel [Pa/s]: booster and inlet valve, 0 to 100 bar in 0.1 s."""
+    fall_Paps: Annotated[float, Range(1e6, 1e9)] = 100e6
+    """Fastest fall through the outlet valve [Pa/s]."""
+    pump_rise_Paps: Annotated[float, Range(1e6, 1e9)] = 30e6
+    """Fastest rise beyond the pedal's pressure, by the pump of a stability control [Pa/s]."""
+    lag_s: Annotated[float, Range(0.001, 0.5)] = 0.008
+    """Time constant of the pressure relative to its demand: valves, lines, clearance of the pads [s]."""
+
+
+@dataclass(frozen=True)
+class Antilock:
+    """Anti-lock control by wheel deceleration and slip; see `antilock`."""
+
+    select_low: bool = True
+    """Whether both rear wheels get the pressure of the wheel with less grip."""
+    hold_speed_mps: Annotated[float, Range(0.5, 20.0)] = 5.0
+    """Speed below which pressures are held and slip alone releases a wheel [m/s]; a tyre of 0.4 m relaxation length
+    then takes more than 0.08 s to build up its force."""
+    hold_slip_mps: NotNegative = 0.3
+    """Speed difference added to the largest slip there, by which the estimated speed may be off [m/s]."""
+    hold_rise_per_s: NotNegative = 0.03
+    """Rate of the held pressure, as a fraction of the last limit per second [1/s]."""
+    lowest_speed_mps: Annotated[float, Range(0.1, 10.0)] = 0.5
+    """Speed below which the system hands the brakes over to the driver [m/s] ..."""
+    hand_over_Paps: NotNegative = 4e6
+    """... by letting the pressures rise at this rate to the driver's demand [Pa/s]."""
+    first_deceleration_mps2: Positive = 20.0
+    """Deceleration of a wheel relative to the car that releases it while the pedal is being pressed [m/s2]. The fastest
+    rise of pressure causes 14 m/s2 at 100 km/h by the slip that it needs, without any risk of locking."""
+    first_slip: Fraction = 0.08
+    """Least slip for that; below it the pedal or the road causes the deceleration."""
+    deceleration_mps2: Positive = 6.0
+    """Deceleration relative to the car that releases a wheel while pressure builds up slowly [m/s2]."""
+    min_slip: Fraction = 0.02
+    """Least slip for that on a road without grip ..."""
+    min_slip_gain_s2pm: NotNegative = 0.005
+    """... its rise with the deceleration of the car, as the slip at the peak of friction rises [s2/m] ..."""
+    min_slip_speed_mps: NotNegative = 0.1
+    """... and a speed difference added to it, which counts at low speed, where the speed estimate is uncertain [m/s].
+    """
+    largest_slip: Annotated[float, Range(0.05, 0.9)] = 0.3
+    """Slip relative to the estimated speed that releases a wheel in any case."""
+    intervention_slip: Annotated[float, Range(0.05, 0.9)] = 0.5
+    """Slip that releases a front wheel which a controller brakes beyond the pedal. A tyre at a large slip angle takes
+    brake force only with a large slip, which also turns its force away from the side: both turn the car back."""
+    release_fraction: Fraction = 0.9
+    """Pressure of a released wheel, as a fraction of its friction torque ..."""
+    regain_mps2: NotNegative = 10.0
+    """... or less, if that friction would accelerate the wheel by less than this, as on ice [m/s2]."""
+    rolls_fraction: Fraction = 0.5
+    """A released wheel rolls with the car again once its acceleration falls below this fraction of its peak [-]."""
+    resume_fraction: Fraction = 0.97
+    """Pressure of a wheel that rolls again, as a fraction of its friction torque."""
+    build_per_s: Positive = 0.5
+    """Initial rate of pressure from there on, as a fraction of it per second [1/s]."""
+    side_difference_Pa: NotNegative = 0.5e6
+    """Initial limit by which a front wheel's pressure may exceed that of a released one on the other side [Pa] ..."""
+    side_difference_rise_Paps: NotNegative = 4e6
+    """... and the rate at which that limit grows, so that the driver can follow the yaw moment [Pa/s]."""
+    rear_side_fraction: Fraction = 0.5
+    """Part of the difference that a controller steers against which the rear wheels get too: a rear axle braked to its
+    limit has no lateral force."""
+
+
+@dataclass(frozen=True)
+class TractionControl:
+    """Limits of the driven wheels' slip, by the engine and by the brakes; see `control_unit`."""
+
+    slip: Annotated[float, Range(0.005, 0.5)] = 0.05
+    """Allowed slip, relative to the speed of the wheels that are not driven."""
+    spin_mps: Annotated[float, Range(0.05, 5.0)] = 0.6
+    """Allowed speed difference in addition [m/s]."""
+    engine_gain_Nmspm: NotNegative = 400.0
+    """Proportional reduction of the drive torque per excess speed [Nm/(m/s)]."""
+    engine_integral_gain_Nmpm: NotNegative = 1500.0
+    """Integral reduction of the drive torque per excess speed and second [Nm/m]."""
+    brake_gain_Paspm: NotNegative = 1.5e6
+    """Pressure at a driven wheel per speed above that of its axle's other wheel [Pa/(m/s)]."""
+    brake_limit_Pa: NotNegative = 6e6
+    """Highest pressure of that kind [Pa]."""
+
+
+@dataclass(frozen=True)
+class Brakes:
+    """Friction brakes: torque per wheel at full pedal, and the stiffness of pads and caliper in their holder."""
+
+    front_torque_Nm: NotNegative
+    """Torque of a front wheel at full pedal; divided by the pressure there, it is the torque per pressure [N m]."""
+    rear_torque_Nm: NotNegative
+    """The same for a rear wheel; both together set the balance [N m]."""
+    drag_torque_Nm: NotNegative = 0.0
+    """Dry friction of released pads, bearings and seals, per wheel [N m]."""
+    stiffness_Nmprad: Positive = 1e5
+    """Torque per angle of wind-up while the brake holds [N m/rad]."""
+    parking_torque_Nm: NotNegative = 700.0
+    """Torque of a rear wheel with the parking brake fully applied, by cable or spindle, without pressure [N m]."""
+    hydraulics: Hydraulics = Hydraulics()
+    """Pressures."""
+    control_interval_s: Annotated[float, Range(0.001, 0.02)] = 0.005
+    """Interval of the decisions of anti-lock and traction control [s]."""
+    abs: bool = True
+    """Whether the anti-lock system is on; it does nothing while no wheel is close to locking."""
+    tcs: bool = False
+    """Whether traction control is on."""
+    antilock: Antilock = Antilock()
+    """Settings of the anti-lock system."""
+    traction: TractionControl = TractionControl()
+    """Settings of traction control."""
+
+    @property
+    def torques_Nm(self) -> tuple[float, float, float, float]:
+        """Torques of the wheels at full pedal [N m], order of `CORNERS`."""
+        return self.front_torque_Nm, self.front_torque_Nm, self.rear_torque_Nm, self.rear_torque_Nm
+
 
 _HYDRAULICS: Final = ("full_pedal_pressure_Pa", "dead_travel", "rise_Paps", "fall_Paps", "pump_rise_Paps")
 _ANTILOCK: Final = tuple(Antilock.__dataclass_fields__)

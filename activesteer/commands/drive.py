@@ -111,8 +111,10 @@ def _run(options: argparse.Namespace) -> bool:
         return False
     arguments.check_effect(options, "an effect with --watch only", "cutaway")
     options.output = options.output or Path("runs")
-    options.driver = isolated(options.driver, options.isolate)
-    controllers = [controller_spec(isolated(name, options.isolate)) for name in options.controller or ["none"]]
+    names = options.controller or ["none"]
+    if options.isolate is not None:
+        options.driver, *names = (isolated(given, options.isolate) for given in (options.driver, *names))
+    controllers = [controller_spec(name) for name in names]
     scenario, failures, alone = _scenario(options), _Failures(), len(controllers) == 1
     check_gains(scenario.overrides, controllers)
     # Check all controllers before the first run.
@@ -266,6 +268,8 @@ def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
     from activesteer.recording import Recording
     from activesteer.scenario import describe
 
+    if not path.is_file():
+        return
     try:
         before = _flat(Recording.open(path, recover=True).metadata)
     except RecordingError:  # there is no recording

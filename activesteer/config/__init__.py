@@ -15,8 +15,9 @@ Out: frozen dataclasses in SI units, or an error with file, key and line.
 
 from __future__ import annotations
 
-from activesteer.config.source import Range, Source, parse_value, read_toml, toml_text, toml_value
 from activesteer.config.values import (
+    Range,
+    Source,
     build,
     check_overruled,
     checked_number,
@@ -29,8 +30,12 @@ from activesteer.config.values import (
     key_paths,
     leaf_keys,
     merged,
+    parse_value,
+    read_toml,
     spellings,
     to_table,
+    toml_text,
+    toml_value,
 )
 
 __all__ = [

@@ -12,7 +12,7 @@ from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.registry import IN_EXAMPLES, WITHOUT_FILE
 from activesteer.controllers.variant import read_variant
-from activesteer.errors import ControllerError, shown
+from activesteer.errors import ControllerError, ParameterError, shown
 from activesteer.plugins import Declared, Kind, Plugin, declared_in, find
 from activesteer.resources import list_controller_variants
 from activesteer.signals import NO_BRAKES, NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement
@@ -187,3 +187,28 @@ def load_controller(given: Any, setup: ControllerSetup) -> Controller:
         ControllerError: there is no such controller, or it cannot be made.
     """
     return controller_spec(given).make(setup)
+
+
+def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> float:
+    """Time between two calls of a controller [s].
+
+    It is `controllers.interval_s` of the vehicle file, else the controller's attribute `interval_s`, else the step.
+    """
+    given = parameters.interval_s
+    own = getattr(plugin.origin, "interval_s", None)
+    if given is None and own is None:
+        return timestep_s
+    return steps_in("controllers.interval_s", given if given is not None else own, timestep_s, 1) * timestep_s
+
+
+def steps_in(key: str, value: Any, timestep_s: float, minimum: int) -> int:
+    """Return a time as a number of steps."""
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    steps = round(value / timestep_s) if number and 0.0 <= value <= 0.1 else -1
+    if steps < minimum or abs(steps * timestep_s - value) > 1e-9:
+        raise ParameterError(
+            f"is {value!r} s; a whole number of steps ({timestep_s:g} s), 0.1 s at most, is needed",
+            key=key,
+            value=value,
+        )
+    return steps

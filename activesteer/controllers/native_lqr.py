@@ -8,11 +8,10 @@ from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, compiled_call
 from activesteer.controllers.lqr import Lqr, regulated
-from activesteer.controllers.native_laws import CALL, N_COMMAND, N_HELD
 from activesteer.estimation.advance import advance
 from activesteer.estimation.records import KNOWN, MEMORY, SAID
 from activesteer.estimation.setup import GRID
-from activesteer.native_memory import f64_pointer, pointer_to
+from activesteer.native_memory import CALL, N_COMMAND, N_HELD, f64_pointer, pointer_to
 from activesteer.native_records import record_type
 from activesteer.signals import DriverCommand, Measurement, numbers_of
 
@@ -35,7 +34,7 @@ _memory_pointer: Final = pointer_to(from_dtype(MEMORY))
 
 @compiled_call(types.void, *CALL)
 def lqr(block_address, command, measurement, held_address):
-    """Write what `Lqr.step` returns; see `native_laws.CALL`."""
+    """Write what `Lqr.step` returns; see `native_memory.CALL`."""
     block = carray(_block_pointer(block_address), (1,))[0]
     parts = block._estimator
     memory = carray(_memory_pointer(parts._memory.address), (1,))

@@ -10,9 +10,9 @@ from numba import types
 
 from activesteer.compilation import compiled_call
 from activesteer.controllers.find import controller_spec
-from activesteer.controllers.native_laws import N_COMMAND, N_HELD, call_law, law_address
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.conventions import Array
+from activesteer.native_memory import N_COMMAND, N_HELD, call_law, law_address
 from activesteer.native_records import record_type, values
 from activesteer.signals import (
     ActuatorCommand,

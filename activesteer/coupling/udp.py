@@ -88,7 +88,7 @@ class UdpLink:
                 f"a port from 0 to 65535, a timeout from 0.001 to 60 s and one of {', '.join(REACTIONS)} is needed"
             )
             raise ParameterError(f"is {tuple(port)}; {problem}", key="udp", value=port)
-        self.port, self._checks = port, (_refuse, _refuse)
+        self.port, self._check = port, _refuse
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind((port.host, port.port))
@@ -108,9 +108,9 @@ class UdpLink:
         """Address and port that the run listens on."""
         return self._socket.getsockname()
 
-    def connect(self, checks: tuple[Callable[[Any], Any], Callable[[Any], Any]]) -> None:
-        """Accept commands that pass these checks of a driver command and of an actuator command."""
-        self._checks = checks
+    def connect(self, check: Callable[[Commands, str], Commands]) -> None:
+        """Accept commands that pass this check."""
+        self._check = check
 
     def close(self) -> None:
         """Close the port."""
@@ -161,18 +161,19 @@ class UdpLink:
             wheel, drive, pedal, parking, gear, rear, front, fl, fr, rl, rr, change = numbers
             driver = controller = None
             if flags & DRIVES:
-                driver = self._checks[0](DriverCommand(wheel, drive, pedal, gear=int(gear), parking_brake=parking))
+                driver = DriverCommand(wheel, drive, pedal, gear=int(gear), parking_brake=parking)
             if flags & CONTROLS:
-                controller = self._checks[1](ActuatorCommand(
+                controller = ActuatorCommand(
                     rear, front, brake_torque_demand_Nm=(fl, fr, rl, rr), drive_torque_change_Nm=change
-                ))  # fmt: skip
+                )
+            self._now = self._check((driver, controller), f"{self.name} gave")
         except Exception:  # not finite, or beyond the range of a car
             report["refused"] += 1
             return
         report["lost"] += ahead - 1
         report["used"] += 1
         self._sender, self._sequence, self._received_s = sender, sequence, time.perf_counter()
-        self._timed_out, self._now = False, (driver, controller)
+        self._timed_out = False
 
     def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:
         """Send the state after a step to the sender of the commands."""
@@ -187,5 +188,5 @@ class UdpLink:
             return
 
 
-def _refuse(command: Any) -> Any:
-    raise ParameterError("no run is connected", key="udp", value=command)
+def _refuse(commands: Commands, _: str) -> Commands:
+    raise ParameterError("no run is connected", key="udp", value=commands)

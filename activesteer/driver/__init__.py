@@ -5,8 +5,7 @@ Out: steering wheel angle, drive torque, brake pedal and gear.
 """
 
 from activesteer.driver.base import Driver, DriverParameters, DriverSetup
-from activesteer.driver.find import DRIVER, driver_spec, is_driver_file
-from activesteer.driver.human import HumanDriver
+from activesteer.driver.human import DRIVER, HumanDriver, driver_spec, is_driver_file
 from activesteer.driver.open_loop import ConstantRadiusDriver, OpenLoopDriver, SpeedHold
 from activesteer.driver.path_preview import PathPreviewDriver
 

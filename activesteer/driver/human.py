@@ -1,8 +1,11 @@
-"""The human driver, in Python and in compiled code."""
+"""The human driver, in Python and in compiled code, and how a driver is found by name or as a user's own."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import PurePath
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -10,7 +13,8 @@ from numba import carray
 from numpy.typing import NDArray
 
 from activesteer.compilation import inlined
-from activesteer.driver.base import DriverSetup
+from activesteer.config import Range
+from activesteer.driver.base import DriverParameters, DriverSetup
 from activesteer.driver.open_loop import (
     NO_RACK,
     ConstantRadiusDriver,
@@ -20,11 +24,13 @@ from activesteer.driver.open_loop import (
     turned,
 )
 from activesteer.driver.path_preview import N_SPEEDS, SPEED_STEP_MPS, PathPreviewDriver, look, looks, moved
-from activesteer.errors import ManeuverError, SimulationDiverged
+from activesteer.errors import DriverError, ManeuverError, SimulationDiverged, shown
 from activesteer.native_memory import array_of, f64_pointer, word_pointer
 from activesteer.native_records import ARRAY, NativeBlock
+from activesteer.plugins import Kind, Plugin, find
+from activesteer.resources import list_drivers
 from activesteer.road.path import Path
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, numbers_of
+from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, WheelTorques, new_message, numbers_of
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -107,6 +113,12 @@ _SPEED, _YAW_RATE = map(_MEASURED.index, ("speed_mps", "yaw_rate_radps"))
 _MOTION_SPEED: Final = Motion._fields.index("speed_mps")
 
 
+_WINDOW: Final = 250
+"""Steps whose setpoints are tabulated at a time."""
+_MAX_TABLES: Final = 64
+"""Tables that are kept for cars that share a manoeuvre."""
+
+
 class SetpointTable(NamedTuple):
     """Setpoints of successive steps for compiled code. The last one holds on.
 
@@ -130,6 +142,33 @@ def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | N
         count -= 1
     rows = [setpoint_row(setpoint, rack_per_steering_wheel_m) for setpoint in setpoints[:count]]
     return SetpointTable(np.array(rows, SETPOINT), path, steps)
+
+
+class SharedTables:
+    """Setpoints of manoeuvres over the next steps, for cars that are driven together."""
+
+    def __init__(self) -> None:
+        """Start without tables."""
+        self._kept: dict[tuple[Any, ...], tuple[Any, SetpointTable]] = {}
+
+    def of(self, maneuver: Any, step: int, rack_m: float | None, timestep_s: float) -> tuple[SetpointTable, int]:
+        """Return a table that holds the setpoint of a step, and its first step."""
+
+        def from_step(first: int) -> SetpointTable:
+            steps = range(first, first + _WINDOW)
+            return tabulate([maneuver.setpoint(each * timestep_s) for each in steps], rack_m)
+
+        first = step // _WINDOW * _WINDOW
+        key = id(maneuver), first, rack_m
+        known, table = self._kept.get(key, (None, None))
+        if table is None or known is not maneuver:
+            while len(self._kept) >= _MAX_TABLES:
+                del self._kept[next(iter(self._kept))]
+            table = from_step(first)
+            self._kept[key] = maneuver, table
+        if step >= first + table.steps:  # the path changes on the way
+            return from_step(step), step
+        return table, first
 
 
 def setpoint_row(setpoint: Setpoint, rack_per_steering_wheel_m: float | None) -> tuple[Any, ...]:
@@ -185,3 +224,87 @@ def follow(human, setpoint, line, measured, motion, engine_radps, low_Nm, high_N
     command[_SATURATED], command[_GEAR] = 1.0 if saturated or slow_arms else 0.0, float(gear)
     command[_FRONT], command[_PARKING] = turn / robot.steering_ratio, setpoint.parking_brake
     return True
+
+
+_MAX_ANGLE_RAD: Final = 50.0
+"""Largest angle of a command. A larger one is taken for a mistake, such as degrees [rad]."""
+_FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
+_GEARS: Final = (-1, 0, 1)
+_MAX_TORQUE_NM: Final = 1e6
+"""Largest torque of a command: more than any car has [N m]."""
+
+
+@dataclass(frozen=True)
+class _DriverKind(Kind):
+    """Drivers, whose command is completed by the angle at the road wheel."""
+
+    def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
+        """Return a command with the angle at the road wheel (see the base class)."""
+        torques, front = command.wheel_torques, command.front_steer_demand_rad
+        if torques is not None and not _are_torques(torques):
+            needed = "an activesteer.signals.WheelTorques of finite numbers is needed"
+            raise self.fail(name, f"{said} wheel_torques = {shown(torques)}; {needed}", torques)
+        if command.gear not in _GEARS:
+            raise self.fail(name, f"{said} gear = {shown(command.gear)}; -1, 0 or 1 is needed", command.gear, _GEARS)
+        angle = command.steering_wheel_demand_rad / setup.steering_ratio
+        if math.isnan(front):
+            return new_message(DriverCommand, (*command[:_FRONT_STEER], angle, *command[_FRONT_STEER + 1 :]))
+        if not math.isclose(front, angle, rel_tol=1e-9, abs_tol=1e-12):
+            what = f"the steering wheel angle over the steering ratio is {angle:g}; leave it out"
+            raise self.fail(name, f"{said} front_steer_demand_rad = {front:g}, but {what}", front)
+        return command
+
+
+DRIVER: Final = _DriverKind(
+    word="driver",
+    table="driver",
+    example="my_file.py:MyDriver",
+    inputs="setpoint, measurement, motion",
+    built_in={},
+    result=DriverCommand,
+    ranges={
+        "steering_wheel_demand_rad": Range(-_MAX_ANGLE_RAD, _MAX_ANGLE_RAD),
+        "drive_torque_demand_Nm": Range(-_MAX_TORQUE_NM, _MAX_TORQUE_NM),
+        "brake_pedal": Range(0.0, 1.0),
+        "parking_brake": Range(0.0, 1.0),
+        "gear": Range(-1, 1),
+    },
+    error=DriverError,
+    unchecked=("wheel_torques",),
+    data=list_drivers,
+    reserved=tuple(field.name for field in fields(DriverParameters)),
+    filled=("front_steer_demand_rad",),
+)
+"""Rules that all drivers follow."""
+
+
+def driver_spec(given: Any) -> Plugin:
+    """Find a driver (see `activesteer.plugins.find`).
+
+    Args:
+        given: A name from `list_drivers`, a driver file or its table; or a user's own code:
+            `path/to/file.py:ClassName`, a class, an object, a factory.
+
+    Raises:
+        DriverError: there is no such driver.
+    """
+    if not is_driver_file(given):
+        return find(given, DRIVER)
+    name = str(given.get("name", "driver")) if isinstance(given, Mapping) else PurePath(given).stem
+    return Plugin(DRIVER, name, name, HumanDriver, {}, {}, is_builtin=True)
+
+
+def is_driver_file(given: Any) -> bool:
+    """Return whether a driver is given as data, by name, file or table, and not as code."""
+    return isinstance(given, Mapping) or DRIVER.is_data(given)
+
+
+def _are_torques(torques: Any) -> bool:
+    try:
+        return (
+            isinstance(torques, WheelTorques)
+            and len(torques) == len(WheelTorques._fields)
+            and all(len(values) == 4 and all(abs(value) <= _MAX_TORQUE_NM for value in values) for values in torques)
+        )
+    except TypeError:
+        return False

@@ -4,7 +4,6 @@ In: measurements and the controllers' demands.
 Out: speed, sideslip angle, yaw rate, friction and axle stiffness, with standard deviations.
 """
 
-from activesteer.estimation.parameters import EstimatorParameters
-from activesteer.estimation.setup import EstimatorSetup, KnownTyre
+from activesteer.estimation.setup import EstimatorParameters, EstimatorSetup, KnownTyre
 
 __all__ = ["EstimatorParameters", "EstimatorSetup", "KnownTyre"]

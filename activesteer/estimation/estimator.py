@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array
-from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.records import MEMORY, SAID, known_of
-from activesteer.estimation.setup import GRID, EstimatorSetup
+from activesteer.estimation.setup import GRID, EstimatorParameters, EstimatorSetup
 from activesteer.native_records import NativeBlock
 from activesteer.signals import Estimate, Measurement, new_message
 

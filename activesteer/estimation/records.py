@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import GRAVITY_MPS2
-from activesteer.estimation.parameters import EstimatorParameters
-from activesteer.estimation.setup import EstimatorSetup
+from activesteer.estimation.setup import EstimatorParameters, EstimatorSetup
 
 if TYPE_CHECKING:
     from activesteer.sensors.parameters import Sensor

@@ -1,14 +1,87 @@
-"""Knowledge of an estimator: the car of the vehicle file, unloaded and with new tyres, and the sensors' data sheets."""
+"""Parameters and knowledge of an estimator: the unloaded car with new tyres, and the sensors' data sheets."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 
-from activesteer.theory.single_track import SingleTrackParameters
-from activesteer.theory.two_track import TwoTrackParameters
+from activesteer.config import Range
+from activesteer.theory.single_track import SingleTrackParameters, TwoTrackParameters
+
+_Positive = Annotated[float, Range(1e-9)]
+_NotNegative = Annotated[float, Range(0.0)]
+
+
+@dataclass(frozen=True)
+class EstimatorParameters:
+    """Roll steer and uncertainties of the estimator's model; the data sheets give the uncertainties of the sensors."""
+
+    front_roll_steer: Annotated[float, Range(-2.0, 2.0)] = 0.0
+    """Slip angle that the front axle loses per roll angle [rad/rad]. From a K&C test: `roll_understeer`, plus
+    (1 + `roll_camber`) times the camber stiffness of the tyre over its cornering stiffness."""
+    rear_roll_steer: Annotated[float, Range(-2.0, 2.0)] = 0.0
+    """The same of the rear axle [rad/rad], with `roll_understeer` subtracted: the rear wheels then steer into the turn
+    and gain slip angle."""
+
+    friction: Annotated[float, Range(0.05, 1.5)] = 0.9
+    """Assumed friction of the road, relative to the road of the tyre files, until it is observed [-]: dry asphalt."""
+    friction_std: _Positive = 0.25
+    """Standard deviation of this friction: wet asphalt, 0.6, is likely enough; snow, 0.3, is possible."""
+    friction_s: _Positive = 10.0
+    """Time constant with which the friction returns to the assumed value [s]."""
+    slip_angle_std_rad: _Positive = math.radians(0.05)
+    """Standard deviation of the slip angle error of an axle: toe, offset of the steering angle sensor [rad]."""
+    slip_angle_fraction: _NotNegative = 0.05
+    """Slip angle error per slip angle: camber, combined slip, curves that are not similar."""
+    stiffness_std: _Positive = 0.2
+    """Standard deviation of the stiffness of the tyres of an axle, relative to new tyres under the known load: wear,
+    temperature, winter tyres, load."""
+    stiffness_s: _Positive = 100.0
+    """Time constant with which the stiffness returns to that of new tyres [s]."""
+    slip_angle_s: _Positive = 1.0
+    """Time constant of the slip angle error [s]."""
+    bank_std_mps2: _Positive = 0.3
+    """Standard deviation of the gravity across an inclined road [m/s2]: 3 %. Crossfall is 2.5 %, the superelevation of
+    curves up to 8 %."""
+    bank_s: _Positive = 10.0
+    """Time constant of this gravity [s]."""
+    lateral_density_m2ps3: _Positive = 0.0002
+    """Spectral density of the lateral acceleration error, without the force errors: 0.03 m/s2 for 0.1 s."""
+    yaw_density_rad2ps3: _Positive = 0.00005
+    """Spectral density of the yaw acceleration error: 0.016 rad/s2 for 0.1 s, including aligning moments."""
+    force_std_N: _NotNegative = 15.0
+    """Standard deviation of the axle force of the model."""
+    force_fraction: _NotNegative = 0.03
+    """Standard deviation per axle force: loads, combined slip, camber."""
+    force_s: _Positive = 0.05
+    """Duration of the force error [s]: between the lags of tyres, 0.02 s, and body, 1/(2 pi 2.2 Hz) = 0.07 s. From
+    0.0125 to 0.2 s the RMS error of the sideslip changes by no more than 0.03 deg in any scenario."""
+    along_fraction: _NotNegative = 0.2
+    """Standard deviation of the longitudinal force of a wheel, per force: brake pads, roads of two sides."""
+    rate_fraction: _NotNegative = 0.005
+    """Standard deviation of the yaw rate per value, in addition to its noise: the sensor leans with the body."""
+    ay_fraction: _NotNegative = 0.02
+    """Standard deviation of the lateral acceleration per value: the body is not exactly a mass on a spring."""
+    ax_density_m2ps3: _Positive = 0.004
+    """Spectral density of the longitudinal acceleration error."""
+    ax_fraction: _NotNegative = 0.02
+    """Error of the longitudinal acceleration per value and square root of a second: the body pitches."""
+    slope_std_mps2: _Positive = 0.3
+    """Standard deviation of the gravity along the road at the start [m/s2]: 3 %."""
+    slope_density_m2ps5: _Positive = 0.01
+    """Growth of the variance of this gravity: 0.1 m/s2 in a second."""
+    wheel_std_mps: _Positive = 0.03
+    """Standard deviation of the speed of a wheel centre relative to the car [m/s]: suspension, yaw rate."""
+    use_std: _NotNegative = 0.1
+    """Relative standard deviation of the fraction of the friction that a wheel uses: brake pads."""
+    use_s: _Positive = 0.1
+    """Duration of this error [s]."""
+    radius_std: _NotNegative = 0.003
+    """Relative standard deviation of the rolling radius: wear and pressure that the car has not learned."""
+
 
 if TYPE_CHECKING:
     from activesteer.sensors import Sensors

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import CORNERS
+from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
-from activesteer.simulation.recorder import scene_of
 from activesteer.vehicle import Vehicle
 
 BODIES: Final = (CHASSIS, *(f"{corner}_wheel" for corner in CORNERS))

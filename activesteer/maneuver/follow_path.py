@@ -16,10 +16,9 @@ from activesteer.config import Range, Source
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
 from activesteer.files import read_bytes
-from activesteer.maneuver.base import Maneuver, within
+from activesteer.maneuver.base import Maneuver, find_csv, within
 from activesteer.maneuver.lane_changes import AlongCourse
 from activesteer.maneuver.path_points import COLUMNS, OPTIONAL, check_points, read_csv
-from activesteer.maneuver.tables import find_csv
 from activesteer.road.course import Course
 from activesteer.road.native_path import PathSearch
 from activesteer.road.path import Path

@@ -47,7 +47,8 @@ def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
 def build_maneuver(table: Mapping[str, Any], source: Source) -> Maneuver:
     """Build a manoeuvre from its table."""
     maneuver = build(maneuver_class(table, source), table, source)
-    check_faults(maneuver.fault, maneuver.duration_s, source.fail)
+    if maneuver.fault:
+        check_faults(maneuver.fault, maneuver.duration_s, source.fail)
     try:
         _ = maneuver.ground
     except ManeuverError as reason:

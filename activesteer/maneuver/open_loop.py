@@ -14,8 +14,7 @@ from activesteer.config import Range, Source
 from activesteer.conventions import CORNERS
 from activesteer.errors import ManeuverError
 from activesteer.files import read_bytes
-from activesteer.maneuver.base import DriveMode, Maneuver
-from activesteer.maneuver.tables import find_csv, read_columns
+from activesteer.maneuver.base import DriveMode, Maneuver, find_csv, read_columns
 from activesteer.signals import Setpoint, WheelTorques, new_message
 
 

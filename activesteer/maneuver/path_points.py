@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.tables import read_columns
+from activesteer.maneuver.base import read_columns
 
 COLUMNS: Final = ("x_m", "y_m")
 """Columns that a CSV must have."""

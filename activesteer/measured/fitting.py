@@ -22,7 +22,7 @@ from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals,
 from activesteer.measured.signals import at_sensor
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
-from activesteer.scenario.vehicle_file import is_recording, led, open_loop_of
+from activesteer.scenario.scenario import is_recording, led, open_loop_of
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor

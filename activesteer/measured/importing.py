@@ -14,6 +14,7 @@ from activesteer import limits
 from activesteer.analysis.metrics import metrics
 from activesteer.config import Range, build, field_in_unit, read_toml
 from activesteer.conventions import Array
+from activesteer.drawing.car_model import scene_of
 from activesteer.errors import RecordingError, nearest_names, shown
 from activesteer.measured import signals
 from activesteer.measured.columns import Column, find, read_columns, second_of
@@ -21,7 +22,6 @@ from activesteer.recording import Recording
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.signals import Channel
-from activesteer.simulation.recorder import scene_of
 from activesteer.units import UNIT_NAMES, alike, find_unit, unit_of
 from activesteer.version import __version__
 

@@ -10,11 +10,11 @@ import rerun as rr
 
 from activesteer.conventions import Array, yaw_of
 from activesteer.drawing.cars import CHASSIS, bytes_of, height_colours
+from activesteer.limits import LIMIT_M
 from activesteer.playback.car import rotated
 from activesteer.playback.runs import ReplayedRun, times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
-from activesteer.road.recorded import LIMIT_M
 from activesteer.road.road import road_of
 
 ROAD, COURSE, MAP = "road", "course", "map"

@@ -16,7 +16,9 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.config import Range
+from activesteer.conventions import Array
 from activesteer.errors import ActiveSteerError, nearest_names, shown
+from activesteer.signals import numbers_of, widths_of
 
 _USUAL: Final = frozenset({float, bool, np.float64})
 """Types of nearly all numbers in a command. Numbers of other types take the slow check."""
@@ -44,7 +46,7 @@ class Kind:
         unchecked: Fields of the result that are not plain numbers.
         data: Function that returns the names of the blocks that are data files of the package.
         reserved: Keys of the table that no block of a user may have as its name.
-        completes: Whether `completed` fills in fields.
+        filled: Fields of the result that `completed` fills in.
     """
 
     word: str
@@ -58,7 +60,7 @@ class Kind:
     unchecked: tuple[str, ...] = ()
     data: Callable[[], list[str]] = list
     reserved: tuple[str, ...] = ()
-    completes: bool = False
+    filled: tuple[str, ...] = ()
     _places: tuple[tuple[int, float, float], ...] = field(init=False)
     _unlimited: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
 
@@ -130,6 +132,41 @@ class Kind:
                 needed = f"a number from {limits.low:g} to {limits.high:g} is needed"
             raise self.fail(name, f"{said} {key} = {shown(value)}; {needed}", value, limits)
         return self.result(*command)
+
+    def rows(self, message: Any, n: int) -> Array:
+        """Check a command for many cars, whose fields are numbers or arrays, and return its numbers by car."""
+        if not isinstance(message, self.result):
+            problem = f"is {shown(message)}; an activesteer.{self.result.__name__} of arrays is needed"
+            raise self.fail("", problem, message)
+        rows, place = np.zeros((n, len(numbers_of(self.result)))), 0
+        for name, width, value in zip(message._fields, widths_of(self.result), message, strict=True):
+            given = rows[:, place : place + width]
+            place += width
+            if width:
+                self._fill(given, name, value)
+            elif value is not None:
+                raise self.fail("", f"{name} cannot be given to a batch", value)
+        return rows
+
+    def _fill(self, rows: Array, name: str, value: Any) -> None:
+        """Check a field of a command for many cars, and write its numbers."""
+        n, width = rows.shape
+        if value is self.result._field_defaults.get(name) and not value:
+            return
+        if np.iscomplexobj(value):
+            raise self.fail("", f"{name} is {shown(value)}; real numbers are needed")
+        try:
+            rows[:] = np.reshape(value, (-1, width)) if np.ndim(value) else value
+        except (TypeError, ValueError, OverflowError) as reason:
+            shape = f"({n},)" if width == 1 else f"({n}, {width})"
+            problem = f"{name} is {shown(value)}; a number, or an array of shape {shape}, is needed"
+            raise self.fail("", problem) from reason
+        low, high = self.ranges.get(name, Range())
+        wrong = ~((rows >= low) & (rows <= high)).all(axis=1)
+        if name not in self.filled and wrong.any():
+            car = int(np.argmax(wrong))
+            problem = f"{name} of car {car} is {shown(rows[car].tolist())}; {low:g} to {high:g} is allowed"
+            raise self.fail("", problem)
 
 
 def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:

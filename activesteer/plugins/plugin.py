@@ -338,11 +338,11 @@ def find(given: Any, kind: Kind) -> Plugin:
         return given
     if isinstance(given, os.PathLike):
         given = os.fspath(given)
+    if isinstance(given, str) and given in kind.built_in:
+        return Plugin(kind, given, given, kind.built_in[given], {}, {}, is_builtin=True)
     if (found_format := format_of(given)) is not None:
         return found_format.load()(given, kind)
     if isinstance(given, str):
-        if given in kind.built_in:
-            return Plugin(kind, given, given, kind.built_in[given], {}, {}, is_builtin=True)
         origin, written, files = from_file(given, kind)
         label = "-".join([given.partition("?")[0].rpartition(":")[2], *(f"{k}={v}" for k, v in written.items())])
         found = Plugin(kind, given, re.sub(r"[^\w=.+-]+", "_", label), origin, {}, files)

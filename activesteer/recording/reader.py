@@ -35,11 +35,13 @@ from activesteer.recording.contents import (
     SCENE_TOPIC,
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
+    ScenePart,
     check_bodies,
     check_metadata,
     check_metrics,
     check_names,
     decode_event,
+    decode_scene,
     tables_of,
 )
 from activesteer.recording.rows import (
@@ -52,7 +54,6 @@ from activesteer.recording.rows import (
     read_bytes,
     values_of,
 )
-from activesteer.recording.scene import ScenePart, decode_scene
 from activesteer.recording.schemas import ChannelTable, state_fields
 from activesteer.signals import Channel as SignalChannel
 

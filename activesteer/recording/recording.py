@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from activesteer.errors import RecordingError
 from activesteer.recording import export
+from activesteer.recording.contents import ScenePart
 from activesteer.recording.reader import read_mcap
 from activesteer.recording.rows import FileRows, Poses, values_of
-from activesteer.recording.scene import ScenePart
 from activesteer.recording.schemas import ChannelTable, nanoseconds, shaped
 from activesteer.recording.writer import McapWriter
 from activesteer.signals import Channel

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from activesteer import limits
 from activesteer.errors import RecordingError
+from activesteer.limits import LIMIT_M
 from activesteer.recording.chunks import Block, BlockDecoder
-from activesteer.road.recorded import LIMIT_M
 from activesteer.signals import Channel
 
 MAX_CACHED_BYTES: Final = 3 * 2**27

@@ -32,14 +32,15 @@ from activesteer.recording.contents import (
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
     Event,
+    ScenePart,
     check_bodies,
     check_names,
     encode_event,
+    encode_scene,
     events_of,
     is_recording_start,
     metadata_texts,
 )
-from activesteer.recording.scene import ScenePart, encode_scene
 from activesteer.recording.schemas import (
     LOG_SCHEMA,
     SCENE_SCHEMA,

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from activesteer.config import Range
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError
+from activesteer.limits import fail, number, numbers, sequence, table_of, text
 from activesteer.road.obstacles import Grid
 from activesteer.road.path import MIN_CHORD_M, Path
-from activesteer.road.recorded import fail, number, numbers, sequence, table_of, text
 
 
 class Lane(NamedTuple):

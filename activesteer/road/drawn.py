@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.conventions import Array
-from activesteer.road.recorded import fail, numbers, sequence, table_of
+from activesteer.limits import fail, numbers, sequence, table_of
 from activesteer.road.road import Road
 
 _MAX_PLACES: Final = 200_000

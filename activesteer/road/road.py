@@ -19,11 +19,11 @@ import numpy as np
 from activesteer.config import Range, Source, build
 from activesteer.conventions import Array
 from activesteer.errors import ManeuverError, RecordingError, nearest_names
+from activesteer.limits import fail, table_of
 from activesteer.road.course import Course, ProfileTable, course_of
 from activesteer.road.crg import unpacked
 from activesteer.road.obstacles import Grid, Obstacle, Roughness, summed
 from activesteer.road.path import Path
-from activesteer.road.recorded import fail, table_of
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 

@@ -253,13 +253,9 @@ class Surface(NamedTuple):
         return heights_at(self.head[0], self.numbers, self.obstacles, s, d)
 
 
-def surface_of(road: Road) -> Surface | None:
-    """Return the surface of a road, or None if it is plane."""
-    return _surface_of(road) if road.is_uneven else None
-
-
 @functools.lru_cache(maxsize=4)
-def _surface_of(road: Road) -> Surface:
+def surface_of(road: Road) -> Surface:
+    """Return the surface of an uneven road."""
     head = np.zeros(1, SURFACE)
     head["coarse_m"] = COARSE_M
     grid, slopes = road.grid(), road.cross_slopes()

@@ -133,3 +133,19 @@ def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> Non
             f"has no effect: {here}; {given} is read by {', '.join(readers)}",
             key=key, value=overrides[key], allowed=allowed, overridden=True,
         )  # fmt: skip
+
+
+def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None, n: int) -> list[dict[str, Any]]:
+    """Return the overrides of each car."""
+    if overrides is None or isinstance(overrides, Mapping):
+        table = dict(overrides or {})
+        arrays = {key: value for key, value in table.items() if isinstance(value, np.ndarray) and value.ndim}
+        for key, value in arrays.items():
+            if len(value) != n:
+                raise ParameterError(f"has {len(value)} values; one for each of {n} cars is needed", key=key)
+        return [table | {key: value[car].tolist() for key, value in arrays.items()} for car in range(n)]
+    if isinstance(overrides, (str, bytes)) or not all(isinstance(changes, Mapping) for changes in overrides):
+        raise ParameterError(f"is {shown(overrides)}; a table, or a list of tables, is needed", key="overrides")
+    if len(overrides) != n:
+        raise ParameterError(f"has {len(overrides)} entries; one for each of {n} cars is needed", key="overrides")
+    return [dict(changes) for changes in overrides]

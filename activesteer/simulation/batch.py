@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,11 +17,12 @@ from activesteer.controllers import CONTROLLER, controller_spec
 from activesteer.controllers.vectorised import Vectorised
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.driver import DRIVER
+from activesteer.driver.human import SharedTables
 from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, shown
 from activesteer.faults import Fault
-from activesteer.plugins import Kind
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.scenario import FileOrTable, Scenario
+from activesteer.scenario.overrides import each_overrides
 from activesteer.signals import (
     ActuatorCommand,
     DriverCommand,
@@ -29,21 +30,18 @@ from activesteer.signals import (
     Motion,
     arrays_of,
     numbers_of,
-    widths_of,
 )
-from activesteer.simulation.closed_loop import ClosedLoop, LoopState, NonReentrantLock
-from activesteer.simulation.native_cars import NativeCars
-from activesteer.simulation.native_loop import PYTHON, STEP_ADDRESS, drive_cars
-from activesteer.simulation.preparation import with_amplitude_found
+from activesteer.simulation.closed_loop import ClosedLoop, LoopState, NonReentrantLock, drive_together
+from activesteer.simulation.copies import Copyable
+from activesteer.simulation.native_loop import CAR, MESSAGES, PYTHON, STEP_ADDRESS, drive_cars
+from activesteer.simulation.preparation import prepared
 from activesteer.vehicle import engine_warnings_held
 
 MAX_CARS: Final = 100_000
 """Most cars of a batch."""
 _LEAST_STEPS: Final = 40
 """Car-steps below which a second thread costs more than it saves."""
-_MOST: Final = 1e12
 _MOST_STEPS: Final = 2**40
-"""Largest number of a command without a range of its own."""
 _WHEEL, _FRONT = (
     [number.name for number in numbers_of(DriverCommand)].index(name)
     for name in ("steering_wheel_demand_rad", "front_steer_demand_rad")
@@ -53,7 +51,7 @@ _WHEEL_TORQUES: Final = [
 ]
 
 
-class Batch:
+class Batch(Copyable):
     """N independent cars in one manoeuvre, each with its own overrides.
 
     All inputs and outputs are arrays whose first axis is the car. The trajectory of each car is equal to the last bit
@@ -116,26 +114,15 @@ class Batch:
             raise ParameterError(f"is {shown(threads)}; at least 1 is needed", key="threads", value=threads)
         self.threads = threads or os.cpu_count() or 1
         self._controller, self._timestep_s = controller_spec(controller), timestep_s
-        inputs = [maneuver] * n if isinstance(maneuver, Scenario) else []
-        if inputs and (overrides or vehicle != "compact" or driver != DEFAULT_DRIVER):
-            raise ParameterError(
-                "a Scenario already includes vehicle, driver and overrides", key="vehicle, overrides, driver"
-            )
-        self.scenarios = inputs or self._resolved(maneuver, vehicle, each_overrides(overrides, n), driver)
-        self._build()
-
-    def _resolved(
-        self, maneuver: Any, vehicle: Any, overrides: Sequence[Mapping[str, Any]], driver: Any
-    ) -> list[Scenario]:
-        """Return the scenario of each car, the same one for the same overrides."""
+        every = each_overrides(overrides, n)
 
         def of(car: int) -> Scenario:
-            scenario = resolve(maneuver, vehicle, overrides[car], driver, [self._controller])
-            return with_amplitude_found(scenario, self._timestep_s)
+            return prepared(maneuver, self._controller, vehicle, every[car], driver, timestep_s)
 
-        keys = [repr(sorted(changes.items())) for changes in overrides]
+        keys = [repr(sorted(changes.items())) for changes in every]
         known = self._of_different_cars(of, keys)
-        return [known[key] for key in keys]
+        self.scenarios = [known[key] for key in keys]
+        self._build()
 
     def _of_different_cars(self, function: Callable[[int], Any], keys: Sequence[Any]) -> dict[Any, Any]:
         """Call a function with the first car of each key, on all threads, and return its results by key."""
@@ -164,9 +151,9 @@ class Batch:
         self.failures = {}
         self._in_use = NonReentrantLock()
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
-        self._native = NativeCars(self.loops)
+        self._records, tables = np.zeros(len(self), CAR), SharedTables()
         for car, loop in enumerate(self.loops):
-            loop.join(self._native, car)
+            loop.join(self._records, car, tables)
         self._last = np.array([loop.steps for loop in self.loops])
         self._ratios = np.array([loop.driver_setup.steering_ratio for loop in self.loops])
 
@@ -182,17 +169,17 @@ class Batch:
     @property
     def step_count(self) -> NDArray[np.intp]:
         """Number of steps that each car has made."""
-        return self._native.cars["step"].copy()
+        return self._records["step"].copy()
 
     @property
     def time_s(self) -> Array:
         """Present time of each car, from the start of the manoeuvre [s]."""
-        return self._native.cars["step"] * self._timestep_s
+        return self._records["step"] * self._timestep_s
 
     @property
     def done(self) -> NDArray[np.bool_]:
         """True for each car at the end of its manoeuvre, and for each car that has diverged."""
-        done = self._native.cars["step"] >= self._last
+        done = self._records["step"] >= self._last
         done[list(self.failures)] = True
         return done
 
@@ -223,7 +210,8 @@ class Batch:
             kind: `Measurement`, `Motion`, `DriverCommand` or `ActuatorCommand`.
             cars: Numbers of the cars; by default all.
         """
-        return self._native.rows[kind][cars].copy()
+        field = next(name for name, message in MESSAGES.items() if message is kind)
+        return self._records[field][cars].copy()
 
     def advance(
         self,
@@ -251,34 +239,34 @@ class Batch:
             ActiveSteerError: your own driver or controller failed. A car that diverges raises nothing: see `failures`.
         """
         left = _steps(steps, len(self))
-        drivers = None if driver_command is None else _columns(DRIVER, driver_command, len(self))
+        drivers = None if driver_command is None else DRIVER.rows(driver_command, len(self))
         if drivers is not None:
             drivers[:, _FRONT] = drivers[:, _WHEEL] / self._ratios
-        controllers = None if actuator_command is None else _columns(CONTROLLER, actuator_command, len(self))
+        controllers = None if actuator_command is None else CONTROLLER.rows(actuator_command, len(self))
         if controllers is not None:
             for car in np.flatnonzero(controllers[:, _WHEEL_TORQUES].any(axis=1)).tolist():
                 with _named(car):
                     self.loops[car].vehicle.wheels.check_driven(controllers[car, _WHEEL_TORQUES].tolist())
         with self._in_use, engine_warnings_held():
-            left = np.minimum(left, self._last - self._native.cars["step"])
+            left = np.minimum(left, self._last - self._records["step"])
             left[~self._mask(cars) | self.done] = 0
-            self._drive(left, drivers, controllers)
+            records, moving = self._records, left > 0
+            records["driver_given"][moving] = drivers is not None
+            records["controller_given"][moving] = controllers is not None
+            if drivers is not None:
+                records["driver_command"][moving] = drivers[moving]
+                records["torques_set"][moving] = False
+            if controllers is not None:
+                records["actuator_command"][moving] = controllers[moving]
+            records["left"] = left
+            self.failures |= drive_together(self.loops, records, self._call)
         return self.measurement
-
-    def _drive(self, left: NDArray[np.intp], drivers: Array | None, controllers: Array | None) -> None:
-        native, moving = self._native, left > 0
-        if drivers is not None:
-            native.rows[DriverCommand][moving] = drivers[moving]
-            native.cars["torques_set"][moving] = False
-        if controllers is not None:
-            native.rows[ActuatorCommand][moving] = controllers[moving]
-        self.failures |= native.drive(
-            left, drivers_given=drivers is not None, controllers_given=controllers is not None, call=self._call
-        )
 
     def _call(self, records: NDArray[Any]) -> None:
         """Drive all cars natively, divided among the threads by the steps up to their next stop."""
-        in_python = (records["driver_kind"] == PYTHON) | (records["controller_kind"] == PYTHON)
+        in_python = np.zeros(len(records), dtype=bool)
+        for block in ("driver", "controller"):
+            in_python |= (records[f"{block}_kind"] == PYTHON) & (records[f"{block}_given"] == 0)
         done = np.cumsum(np.where(in_python, np.minimum(records["left"], 1), records["left"]))
         parts = self.threads if done[-1] >= _LEAST_STEPS else 1
         ends = [*np.searchsorted(done, done[-1] * np.arange(1, parts) / parts).tolist(), len(records)]
@@ -377,41 +365,18 @@ class Batch:
         self.restore_state([self._starts[id(self.scenarios[car])] for car in chosen], chosen)
         return self.measurement
 
-    def copy(self) -> Self:
-        """Return an independent batch that continues bit-identically."""
-        return self._rebuilt(*self._portable())
+    def _portable(self) -> Any:
+        loops = self.loops
+        inputs = self.scenarios, self._controller, self._timestep_s, self.threads
+        return inputs, self.save_state(), [loop.vehicle.model for loop in loops], dict(self.failures)
 
-    def _portable(self) -> tuple[Any, ...]:
-        states = [loop.save_state() for loop in self.loops]
-        models = [loop.vehicle.model for loop in self.loops]
-        return self.scenarios, self._controller, self._timestep_s, self.threads, states, models, dict(self.failures)
-
-    @classmethod
-    def _rebuilt(
-        cls, scenarios: Any, controller: Any, timestep_s: float, threads: int, states: Any, models: Any, failures: Any
-    ) -> Self:
-        other = cls.__new__(cls)
-        other.scenarios, other._controller, other._timestep_s, other.threads = (
-            scenarios,
-            controller,
-            timestep_s,
-            threads,
-        )
-        other._build()
-        for loop, model in zip(other.loops, models, strict=True):
+    def _rebuild(self, portable: Any) -> None:
+        (self.scenarios, self._controller, self._timestep_s, self.threads), states, models, failures = portable
+        self._build()
+        for loop, model in zip(self.loops, models, strict=True):
             loop.vehicle.adopt_model(model)
-        other.restore_state(states)
-        other.failures = failures
-        return other
-
-    def __copy__(self) -> Self:
-        return self.copy()
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        return self.copy()
-
-    def __reduce_ex__(self, _protocol: Any) -> tuple[Any, ...]:
-        return self._rebuilt, self._portable()
+        self.restore_state(states)
+        self.failures = failures
 
     def _mask(self, cars: ArrayLike | None) -> NDArray[np.bool_]:
         """Return the mask of given cars."""
@@ -424,22 +389,6 @@ class Batch:
         return chosen
 
 
-def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None, n: int) -> list[dict[str, Any]]:
-    """Return the overrides of each car."""
-    if overrides is None or isinstance(overrides, Mapping):
-        table = dict(overrides or {})
-        arrays = {key: value for key, value in table.items() if isinstance(value, np.ndarray) and value.ndim}
-        for key, value in arrays.items():
-            if len(value) != n:
-                raise ParameterError(f"has {len(value)} values; one for each of {n} cars is needed", key=key)
-        return [table | {key: value[car].tolist() for key, value in arrays.items()} for car in range(n)]
-    if isinstance(overrides, (str, bytes)) or not all(isinstance(changes, Mapping) for changes in overrides):
-        raise ParameterError(f"is {shown(overrides)}; a table, or a list of tables, is needed", key="overrides")
-    if len(overrides) != n:
-        raise ParameterError(f"has {len(overrides)} entries; one for each of {n} cars is needed", key="overrides")
-    return [dict(changes) for changes in overrides]
-
-
 def _steps(steps: Any, n: int) -> NDArray[np.intp]:
     """Return the number of steps of each car, after checking it."""
     with suppress(ValueError, OverflowError):
@@ -449,41 +398,6 @@ def _steps(steps: Any, n: int) -> NDArray[np.intp]:
     raise ParameterError(
         f"is {shown(steps)}; a whole number of steps, 0 or more, or {n} of them, is needed", key="steps", value=steps
     )
-
-
-def _columns(kind: Kind, message: Any, n: int) -> Array:
-    """Return the rows of a message of arrays, after checking them."""
-    if not isinstance(message, kind.result):
-        raise kind.fail("", f"is {shown(message)}; an activesteer.{kind.result.__name__} of arrays is needed", message)
-    rows = np.zeros((n, len(numbers_of(kind.result))))
-    place = 0
-    defaults = kind.result._field_defaults
-    for name, width, value in zip(message._fields, widths_of(kind.result), message, strict=True):
-        if value is defaults.get(name) and not value:
-            place += width
-            continue
-        if not width:
-            if value is not None:
-                raise kind.fail("", f"{name} cannot be given to a batch", value)
-            continue
-        if np.iscomplexobj(value):
-            raise kind.fail("", f"{name} is {shown(value)}; real numbers are needed")
-        try:
-            rows[:, place : place + width] = np.reshape(value, (-1, width)) if np.ndim(value) else value
-        except (TypeError, ValueError, OverflowError) as reason:
-            shape = f"({n},)" if width == 1 else f"({n}, {width})"
-            raise kind.fail(
-                "", f"{name} is {shown(value)}; a number, or an array of shape {shape}, is needed"
-            ) from reason
-        given, limits = rows[:, place : place + width], kind.ranges.get(name)
-        low, high = (-_MOST, _MOST) if limits is None else (limits.low, limits.high)
-        if name != "front_steer_demand_rad" and not ((given >= low) & (given <= high)).all():
-            wrong = int(np.argmin(((given >= low) & (given <= high)).all(axis=1)))
-            raise kind.fail(
-                "", f"{name} of car {wrong} is {shown(given[wrong].tolist())}; {low:g} to {high:g} is allowed"
-            )
-        place += width
-    return rows
 
 
 @contextmanager

@@ -1,59 +1,64 @@
-"""The closed loop of one car: its blocks, its state, and what changes on the way. `native_loop` drives it."""
+"""The closed loop of one car: its blocks, its record, what Python does where `native_loop` stops, and changes.
+
+While a car is driven, the state of native blocks and of the controller's bus is in its record.
+"""
 
 from __future__ import annotations
 
 import copy
 import threading
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.config import Source, build
+from activesteer.config import Source
 from activesteer.controllers import controller_spec
-from activesteer.controllers.native_laws import N_HELD
 from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
-from activesteer.driver import Driver
-from activesteer.errors import ManeuverError, ParameterError, shown
-from activesteer.faults import Fault, check_faults, fault_table
+from activesteer.driver.human import HumanDriver, SetpointTable, SharedTables, setpoint_row, tabulate
+from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged, shown
+from activesteer.faults import Fault, check_faults, fault_from
 from activesteer.maneuver import Maneuver
 from activesteer.maneuver.phases import seen_of
+from activesteer.native_memory import N_COMMAND, N_HELD, law_address
+from activesteer.native_records import Uncopyable, record_type, take, values
+from activesteer.plugins.retuned import retuned
+from activesteer.road.native_path import PathSearch
 from activesteer.scenario import Scenario
 from activesteer.scenario.scenario import changed
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint, numbers_in
-from activesteer.simulation.copies import retuned
-from activesteer.simulation.native_cars import NativeCars
-from activesteer.simulation.native_loop import GIVEN, PYTHON
+from activesteer.signals import (
+    NO_TORQUES,
+    ActuatorCommand,
+    DriverCommand,
+    Estimate,
+    Measurement,
+    Motion,
+    Setpoint,
+    WheelTorques,
+    message_of,
+    nested_fields,
+    new_message,
+    numbers_in,
+)
+from activesteer.simulation import native_loop as native
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.sampled_controller import control_unit
-from activesteer.vehicle import Uncopyable, engine_warnings_held
+from activesteer.vehicle import engine_warnings_held
+from activesteer.vehicle.car import check_gear
 from activesteer.vehicle.faults import Faults
+from activesteer.vehicle.step_bindings import torque_numbers, write_command
+from activesteer.version import __version__
 
 Given = tuple[DriverCommand | None, ActuatorCommand | None]
 """Commands that replace driver and controller."""
 _NOTHING_GIVEN: Final[Given] = (None, None)
-
-
-class LoopState(NamedTuple):
-    """State from which a loop continues bit-identically."""
-
-    engine: NDArray[np.float64]
-    faults: tuple[Fault, ...]
-    fault_memories: list[Array]
-    driver: Any
-    controller: Any
-    calls: int
-    held: Array
-    bus: Array
-    measurement: Measurement
-    motion: Motion
-    commands: tuple[DriverCommand, ActuatorCommand]
-    step: int
-    changes: tuple[tuple[str, Any, float], ...]
-    sequence: Any
-    inputs: str
+_NEVER: Final = 2**62
+_TIME: Final = Measurement._fields.index("time_s")
+_SPEED: Final = Motion._fields.index("speed_mps")
+_STATE: Final = (*native.MESSAGES, "step", "torques_set", "torques_Nm", "controller_given", "calls", "held")
+"""Fields of a car's record that belong to its state."""
 
 
 class NonReentrantLock:
@@ -76,6 +81,21 @@ class NonReentrantLock:
         self._lock.release()
 
 
+@dataclass(frozen=True)
+class LoopState:
+    """State from which a loop continues bit-identically. `inputs` describes the loops that it belongs to."""
+
+    inputs: tuple[Any, ...]
+    engine: NDArray[np.float64]
+    faults: tuple[Fault, ...]
+    fault_memories: list[Array]
+    blocks: tuple[Any, Any]
+    numbers: dict[str, NDArray[Any]]
+    bus: Array
+    changes: tuple[tuple[str, Any, float], ...]
+    sequence: Any
+
+
 class ClosedLoop(Uncopyable):
     """A manoeuvre, a driver, a controller and a car.
 
@@ -90,7 +110,6 @@ class ClosedLoop(Uncopyable):
         driver_setup: Properties of the car that a driver may know.
         controller_setup: Properties of the car that a controller may know.
         settling: Setpoint while the car settles.
-        recorder: Recorder of the present steps.
         in_use: Context that refuses a second caller while the loop is driven.
     """
 
@@ -118,52 +137,72 @@ class ClosedLoop(Uncopyable):
         """
         self.scenario, self._plugin, self.sequence = scenario, controller_spec(controller), None
         self._start, self.changes = scenario, ()
+        self._inputs = scenario.digest, self._plugin.name, timestep_s, __version__
         self._maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.ground, timestep_s)
         vehicle.limit_hands(scenario.driver.parameters.steering_torque_limit_Nm)
         self.driver_setup = scenario.driver_setup(timestep_s, vehicle.rack_per_steering_wheel_m, vehicle.wheel_radius_m)
-        driver: Driver = scenario.driver.plugin.make(self.driver_setup)
+        driver = scenario.driver.plugin.make(self.driver_setup)
         self.controller_setup, self.unit, block = control_unit(self._plugin, scenario, vehicle)
-        self.blocks = driver, block
-        self.recorder: Recorder | None = None
+        self.blocks: tuple[Any, Any] = driver, block
+        self._recorder: Recorder | None = None
         self.in_use = NonReentrantLock()
-        self._cars, self._car = NativeCars([self]), 0
+        self._table: SetpointTable | None = None
+        self._block: NDArray[Any] | None = None
+        self._record = np.zeros(1, native.CAR)
+        self.join(self._record, 0, SharedTables())
+        self._connect()
         steps = round(maneuver.settle_s / timestep_s)
         measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
-        self._place(measurement, vehicle.motion(), (DriverCommand(front_steer_demand_rad=0.0), ActuatorCommand()), 0)
+        drive: Any = self.driver_setup.drive  # the vehicle's own
+        first = {
+            "bindings": vehicle.address, "drive_fractions": drive.fractions, "drive_numbers": drive.numbers,
+            "driver_command": numbers_in(DriverCommand(front_steer_demand_rad=0.0)),
+            "measurement": numbers_in(measurement), "motion": vehicle.motion(),
+        }  # fmt: skip
+        for name, value in first.items():
+            self._record[name] = value
         self.faults, self._fault_list = Faults(vehicle), ()
         self.settling: Setpoint | None = maneuver.settling_setpoint()
         self.drive(0 if settled else steps)
         self.settling = None
-        commands = self.commands
-        if (estimate := (settled.commands if settled else commands)[1].estimate) is not None:
-            vehicle.record_estimate(estimate)
+        self._store()
+        arrived = self._arrived if settled is None else _arrived(settled.bus, settled.numbers["calls"])
+        if arrived[-1]:
+            vehicle.record_estimate(Estimate(*arrived[N_COMMAND:-1].tolist()))
         vehicle.rebase()
         self.fail(maneuver.fault)
         self.sequence = maneuver.sequence()
-        self._place(self.measurement._replace(time_s=0.0), vehicle.motion(), commands, 0)
+        self._record["measurement"][0, _TIME] = 0.0
+        self._record["motion"], self._record["step"] = vehicle.motion(), 0
         if settled:
             self.restore_state(settled)
 
-    def _place(
-        self, measurement: Measurement, motion: Motion, commands: tuple[DriverCommand, ActuatorCommand], step: int
-    ) -> None:
-        """Set the present signals and the number of steps."""
-        self._store()
-        cars, car = self._cars, self._car
-        cars.rows[Measurement][car], cars.rows[Motion][car] = numbers_in(measurement), motion
-        cars.give_driver_command(car, commands[0])
-        cars.rows[ActuatorCommand][car] = numbers_in(commands[1])
-        cars.cars["step"][car] = step
-        cars.cars["controller_kind"][car] = GIVEN if commands[1].estimate is None else PYTHON
+    def join(self, records: NDArray[Any], place: int, tables: SharedTables) -> None:
+        """Move the record of the car to a place among those that are driven together, which share tables."""
+        records[place] = self._record[0]
+        self._record = record = records[place : place + 1]
+        self._tables = tables
+        # Views and addresses of what Python uses in every step.
+        self._step, self._stage, self._torques_set, self._ratio = (
+            record[name] for name in ("step", "stage", "torques_set", "steering_ratio")
+        )
+        self._held, self._seen = record["held"][0], record["seen"][0]
+        self._driver_numbers, self._measured, self._motion = (
+            record[name].view(np.dtype(nested_fields(native.MESSAGES[name])))[:, 0]
+            for name in ("driver_command", "measurement", "motion")
+        )
+        self._driver_at, self._actuator_at, self._held_at = (
+            record[name].ctypes.data for name in ("driver_command", "actuator_command", "held")
+        )
 
-    def join(self, cars: NativeCars, car: int) -> None:
-        """Become one of several cars that are driven together."""
-        cars.adopt(car, self._cars, self._car)
-        self._cars, self._car = cars, car
-
-    def _store(self) -> None:
-        self._cars.store(self._car)
+    def _connect(self) -> None:
+        """Connect a new controller with its bus, on which nothing is yet."""
+        record, unit = self._record, self.unit
+        self._bus = np.zeros((unit.delay + 1, N_HELD))
+        record["bus"]["address"], record["bus"]["size"] = self._bus.ctypes.data, self._bus.size
+        record["every"], record["on_bus"] = unit.every, unit.delay
+        record["calls"] = record["held"] = record["loaded"] = 0
 
     @property
     def driver(self) -> Any:
@@ -195,7 +234,7 @@ class ClosedLoop(Uncopyable):
         """
         self._plugin = controller_spec(controller)
         self.controller_setup, self.unit, self.controller = control_unit(self._plugin, self.scenario, self.vehicle)
-        self._cars.connect(self._car)
+        self._connect()
 
     @property
     def maneuver(self) -> Maneuver:
@@ -207,12 +246,7 @@ class ClosedLoop(Uncopyable):
         self._store()
         self._maneuver = maneuver
 
-    @property
-    def foresees(self) -> bool:
-        """True if the next setpoints are known before the car gets there."""
-        return self.sequence is None
-
-    def setpoint_at(self, step: int) -> Setpoint:
+    def _setpoint_at(self, step: int) -> Setpoint:
         """Return the setpoint of a step; with phases, of the present one only."""
         if self.settling is not None:
             return self.settling
@@ -225,22 +259,30 @@ class ClosedLoop(Uncopyable):
     @property
     def measurement(self) -> Measurement:
         """Present signals of the sensors."""
-        return self._cars.measurement(self._car)
+        return new_message(Measurement, self._measured.item(0))
 
     @property
     def motion(self) -> Motion:
         """Present position and motion of the car."""
-        return self._cars.motion(self._car)
+        return new_message(Motion, self._motion.item(0))
 
     @property
     def commands(self) -> tuple[DriverCommand, ActuatorCommand]:
         """Last commands of driver and controller."""
-        return self._cars.commands(self._car)
+        command = message_of(ActuatorCommand, self._record["actuator_command"][0].tolist())
+        arrived = self._arrived
+        if arrived[-1] and not self._record["controller_given"][0]:
+            command = command._replace(estimate=Estimate(*arrived[N_COMMAND:-1].tolist()))
+        return self._driver_command(self._driver_numbers.item(0)), command
+
+    @property
+    def _arrived(self) -> Array:
+        return _arrived(self._bus, self._record["calls"])
 
     @property
     def step_count(self) -> int:
         """Steps of the manoeuvre driven so far."""
-        return int(self._cars.cars["step"][self._car])
+        return self._step.item(0)
 
     @property
     def steps(self) -> int:
@@ -270,21 +312,14 @@ class ClosedLoop(Uncopyable):
     def add_fault(self, fault: str | Fault) -> str:
         """Set a fault, beside those that act already, and return it in words (see `Simulation.fail`)."""
         now_s = self.step_count * self.vehicle.timestep_s
-        if isinstance(fault, str):
-            start_s = None if "@" in fault else now_s
-            fault = build(Fault, fault_table(fault, start_s), Source("", error=ManeuverError))
-        if not isinstance(fault, Fault):
-            raise ParameterError(f"is {shown(fault)}; a fault or its text is needed", key="fault", value=fault)
-        if fault.start_s < now_s - 1e-9:
-            raise ManeuverError(f"is {fault.start_s:g} s; the run is at {now_s:g} s", key="start_s")
-        self.fail([fault], more=True)
-        later = "" if fault.start_s <= now_s + 1e-9 and fault.end_s is None else f"@{fault.start_s:g}"
-        return f"{fault.name}{later}{'' if fault.end_s is None else f'-{fault.end_s:g}'}"
+        given = fault_from(fault, now_s)
+        self.fail([given], more=True)
+        return given.name_at(now_s)
 
     def change(self, key: str, value: Any) -> None:
         """Change a key of the manoeuvre, its road, the controller or the driver, from the next step on.
 
-        A controller or driver keeps its memory, see `activesteer.simulation.copies`.
+        A controller or driver keeps its memory, see `activesteer.plugins.retuned`.
 
         Raises:
             ParameterError: there is no such key, it cannot change during a run, or nothing reads it.
@@ -292,34 +327,31 @@ class ClosedLoop(Uncopyable):
         """
         time_s = self.step_count * self.vehicle.timestep_s
         part, after = changed(self.scenario, key, value, self._plugin, time_s)
-        if part == "controller":
-            _, _, old = control_unit(self._plugin, self.scenario, self.vehicle)
-            self.controller_setup, _, new = control_unit(self._plugin, after, self.vehicle)
-            self.controller = retuned(self.controller, old, new)
-        elif part == "driver":
-            make, who = after.driver.plugin.make, after.driver
-            old = make(self.driver_setup)
-            self.driver_setup = replace(
-                self.driver_setup, parameters=who.parameters, user_parameters=who.user_parameters
-            )
-            self.driver = retuned(self.driver, old, make(self.driver_setup))
+        if part in ("driver", "controller"):
+            old, new = (self._new_block(part, scenario) for scenario in (self.scenario, after))
+            setattr(self, part, retuned(getattr(self, part), old, new))
         self._adopt(after)
         self.changes = (*self.changes, (key, value, time_s))
 
+    def _new_block(self, part: str, scenario: Scenario) -> Any:
+        """Create the driver or the controller of a scenario, and note what it may know."""
+        if part == "controller":
+            self.controller_setup, _, block = control_unit(self._plugin, scenario, self.vehicle)
+            return block
+        who = scenario.driver
+        setup = replace(self.driver_setup, parameters=who.parameters, user_parameters=who.user_parameters)
+        block = who.plugin.make(setup)
+        self.driver_setup = setup
+        return block
+
     def _adopt(self, scenario: Scenario) -> None:
-        """Take over a changed scenario, apart from the blocks that controller and driver are."""
+        """Take over a changed scenario, apart from driver and controller."""
         if scenario.maneuver is not self.scenario.maneuver:
             self.vehicle.change_road(scenario.maneuver.ground)
         self.scenario, self.maneuver = scenario, scenario.maneuver
         if self.sequence is not None:
             self.sequence.maneuver = scenario.maneuver
         self.vehicle.limit_hands(scenario.driver.parameters.steering_torque_limit_Nm)
-
-    def _changed_by(self, changes: Sequence[tuple[str, Any, float]]) -> Scenario:
-        scenario = self._start
-        for key, value, time_s in changes:
-            scenario = changed(scenario, key, value, self._plugin, time_s).scenario
-        return scenario
 
     def run(self, recorder: Recorder | None = None) -> None:
         """Drive the manoeuvre to its end (see `advance`)."""
@@ -344,50 +376,43 @@ class ClosedLoop(Uncopyable):
 
     def drive(self, steps: int, recorder: Recorder | None = None, given: Given = _NOTHING_GIVEN) -> None:
         """Drive some steps inside `in_use` (see `advance`)."""
-        vehicle, cars, car = self.vehicle, self._cars, self._car
+        vehicle, record = self.vehicle, self._record
         driver_command, actuator_command = given
         if driver_command is not None:
-            cars.give_driver_command(car, driver_command)
+            self._give_driver_command(driver_command)
         if actuator_command is not None:
-            cars.give_actuator_command(car, actuator_command)
-        left = np.zeros(len(cars.cars), dtype=np.intp)
-        left[car] = steps
-        self.recorder = recorder
+            self._give_actuator_command(actuator_command)
+        record["left"] = steps
+        if steps:
+            record["driver_given"] = driver_command is not None
+            record["controller_given"] = actuator_command is not None
+        self._recorder = recorder
         vehicle.follow_model()
         with engine_warnings_held():
             vehicle.record_on(None if recorder is None else recorder.tape)
             try:
-                failed = cars.drive(
-                    left, drivers_given=driver_command is not None, controllers_given=actuator_command is not None
-                )
+                failed = drive_together([self], record)
             finally:
                 vehicle.record_on(None)
-                self.recorder = None
-        for error in failed.values():
-            raise error
+                self._recorder = None
+        if failed:
+            raise failed[0]
         if recorder is not None:
             recorder.make_room()
 
     def save_state(self) -> LoopState:
         """Return the state from which the loop continues bit-identically."""
-        driver, controller = self.driver, self.controller
-        cars, car = self._cars, self._car
+        self._store()
         return LoopState(
+            self._inputs,
             self.vehicle.save_state(),
             self._fault_list,
             self.faults.save_state(),
-            copy.deepcopy(driver),
-            copy.deepcopy(controller),
-            int(cars.cars["calls"][car]),
-            cars.cars["held"][car].copy(),
-            cars.buses[car].copy(),
-            self.measurement,
-            self.motion,
-            self.commands,
-            self.step_count,
+            (copy.deepcopy(self.blocks[0]), copy.deepcopy(self.blocks[1])),
+            {name: self._record[name].copy() for name in _STATE},
+            self._bus.copy(),
             self.changes,
             copy.deepcopy(self.sequence),
-            self._start.digest,
         )
 
     def restore_state(self, state: LoopState) -> None:
@@ -399,43 +424,189 @@ class ClosedLoop(Uncopyable):
         Raises:
             ParameterError: `state` is something else.
         """
-        if not isinstance(state, LoopState) or not _is_sound(state, self._cars.buses[self._car].shape):
+        if not isinstance(state, LoopState):
             raise ParameterError(f"is {shown(state)}; a state of this loop is needed", key="state", value=state)
-        if state.inputs != self._start.digest:
+        if state.inputs != self._inputs:
             raise ParameterError("was saved by a simulation with other inputs", key="state")
         if state.changes != self.changes:
-            self._adopt(self._changed_by(state.changes))
-            self.changes, who = state.changes, self.scenario.driver
-            self.driver_setup = replace(
-                self.driver_setup, parameters=who.parameters, user_parameters=who.user_parameters
-            )
-            self.controller_setup, _, _ = control_unit(self._plugin, self.scenario, self.vehicle)
+            scenario = self._start
+            for key, value, time_s in state.changes:
+                scenario = changed(scenario, key, value, self._plugin, time_s).scenario
+            for part in ("driver", "controller"):
+                self._new_block(part, scenario)
+            self._adopt(scenario)
+            self.changes = state.changes
         if state.faults != self._fault_list:
             self.fail(state.faults)
         self.vehicle.restore_state(state.engine)
         self.faults.restore_state(state.fault_memories)
-        self.driver, self.controller = copy.deepcopy(state.driver), copy.deepcopy(state.controller)
-        cars, car = self._cars, self._car
-        cars.cars["calls"][car], cars.cars["held"][car], cars.buses[car][:] = state.calls, state.held, state.bus
-        self._place(state.measurement, state.motion, state.commands, state.step)
+        self._store()
+        self.blocks = copy.deepcopy(state.blocks[0]), copy.deepcopy(state.blocks[1])
+        for name, value in state.numbers.items():
+            self._record[name] = value
+        self._stage[0], self._bus[:] = native.DRIVE, state.bus
         self.sequence = copy.deepcopy(state.sequence)
 
+    def _load(self) -> None:
+        """Copy driver and controller into the record."""
+        record, vehicle, (driver, controller) = self._record, self.vehicle, self.blocks
+        vehicle.follow_model()
+        record["driver_kind"] = record["controller_kind"] = native.PYTHON
+        if type(driver) is HumanDriver and not driver.is_watched:
+            record["driver_kind"], record["driver"][0] = native.NATIVE, values(driver)
+        if not self.unit.uses_truth and (law := law_address(controller)):
+            self._block = np.array([values(controller)], record_type(type(controller)))
+            record["controller_kind"], record["law"] = native.NATIVE, law
+            record["block"] = self._block.ctypes.data
+        estimate = vehicle.rows.estimate
+        record["estimate"] = estimate.ctypes.data if estimate.size else 0
+        # Faults that act are found again before the next step, and setpoints are looked up.
+        record["next_change"], record["last"], self._table = self._step, 0, None
+        record["loaded"] = 1
 
-def _is_sound(state: LoopState, bus: tuple[int, ...]) -> bool:
-    """Return whether the parts of a state have the right types; the vehicle checks its own part."""
-    commands = state.commands if isinstance(state.commands, tuple) else ()
-    return (
-        isinstance(state.faults, tuple)
-        and all(isinstance(fault, Fault) for fault in state.faults)
-        and isinstance(state.fault_memories, list)
-        and all(callable(getattr(block, "step", None)) for block in (state.driver, state.controller))
-        and isinstance(state.calls, int)
-        and all(isinstance(part, np.ndarray) for part in (state.held, state.bus))
-        and (state.held.shape, state.bus.shape) == ((N_HELD,), bus)
-        and isinstance(state.measurement, Measurement)
-        and isinstance(state.motion, Motion)
-        and [type(command) for command in commands] == [DriverCommand, ActuatorCommand]
-        and isinstance(state.step, int)
-        and isinstance(state.changes, tuple)
-        and all(isinstance(change, tuple) and len(change) == 3 for change in state.changes)
-    )
+    def _store(self) -> None:
+        """Copy the record back into driver and controller, which may be changed before the next step."""
+        record = self._record
+        if record["loaded"][0]:
+            record["loaded"] = 0
+            if record["driver_kind"][0] == native.NATIVE:
+                take(self.blocks[0], record["driver"][0].item())
+            if self._block is not None and record["controller_kind"][0] == native.NATIVE:
+                take(self.blocks[1], self._block[0].item())
+
+    def _give_driver_command(self, command: Any) -> None:
+        write_command(DriverCommand, self._driver_at, command)
+        torques = command.wheel_torques
+        self._torques_set[0] = torques is not None
+        if torques is None:
+            check_gear(command.gear)
+        else:
+            self._record["torques_Nm"] = torque_numbers(torques)
+
+    def _give_actuator_command(self, command: Any) -> None:
+        """Let the car have a command that reaches its actuators at once."""
+        write_command(ActuatorCommand, self._actuator_at, command)
+        self._check_driven(command)
+        if command.estimate is not None:
+            self.vehicle.note_estimate(command.estimate)
+
+    def _check_driven(self, command: ActuatorCommand) -> None:
+        if command.wheel_torque_demand_Nm is not NO_TORQUES:
+            self.vehicle.wheels.check_driven(command.wheel_torque_demand_Nm)
+
+    def _driver_command(self, numbers: Sequence[float]) -> DriverCommand:
+        angle, drive, pedal, saturated, gear, front, parking = numbers
+        torques = None
+        if self._torques_set.item(0):
+            every = self._record["torques_Nm"][0].tolist()
+            torques = WheelTorques(tuple(every[:4]), tuple(every[4:]))
+        return new_message(DriverCommand, (angle, drive, pedal, saturated != 0.0, torques, int(gear), front, parking))
+
+    def _change_faults(self) -> None:
+        """Let the faults of a step begin and end."""
+        step = self.step_count
+        self.faults.act(step)
+        ratio = self.unit.steering_ratio
+        if self.faults.angle_fails and not self.unit.uses_truth:
+            ratio = self.vehicle.parameters.steering.ratio
+        self._record["next_change"], self._record["steering_ratio"] = self.faults.next_change(step), ratio
+
+    def _make_room(self) -> None:
+        if self._recorder is not None:
+            self._recorder.make_room()
+
+    def _tabulate(self) -> None:
+        """Give the driver the setpoints of the next steps."""
+        step, rack = self.step_count, self.driver_setup.rack_per_steering_wheel_m
+        if self.settling is not None:
+            table, first = tabulate([self.settling], rack)._replace(steps=_NEVER), 0
+        elif self.sequence is None:
+            table, first = self._tables.of(self.maneuver, step, rack, self.vehicle.timestep_s)
+        else:
+            setpoint, table = self._setpoint_at(step), self._table
+            if table is not None and table.path is setpoint.path and len(table.rows) == 1:
+                table.rows[0] = setpoint_row(setpoint, rack)
+                self._record["first"], self._record["last"] = step, step + 1
+                return
+            table, first = tabulate([setpoint], rack), step
+        self._follow(table, first)
+
+    def _follow(self, table: SetpointTable, first: int) -> None:
+        record = self._record
+        record["setpoints"], record["n_setpoints"] = table.rows.ctypes.data, len(table.rows)
+        record["first"], record["last"] = first, first + table.steps
+        before, self._table = self._table, table
+        if table.path is not None and (before is None or before.path is not table.path):
+            spacing_m, xs, ys, *headings = PathSearch(table.path).line
+            record["path"][0] = spacing_m, (xs.ctypes.data, xs.size), (ys.ctypes.data, ys.size), headings
+
+    def _prepare(self) -> None:
+        """Compute the gains of the driver for the present speed."""
+        speed_mps = float(self._record["motion"][0, _SPEED])
+        self._record["driver"]["_path"]["_row_size"] = self.blocks[0].prepare(speed_mps)
+
+    def _ask_driver(self) -> None:
+        """Call a driver in Python."""
+        setpoint = self._setpoint_at(self._step.item(0))
+        self._give_driver_command(self.blocks[0].step(setpoint, self.measurement, self.motion))
+        self._stage[0] = native.CONTROL
+
+    def _ask_controller(self) -> None:
+        """Call a controller in Python, and hold its decision."""
+        controller = self.blocks[1]
+        told = self._driver_numbers.item(0) if self._ratio.item(0) == 0.0 else self._seen.tolist()
+        driver_command = self._driver_command(told)
+        if self.unit.uses_truth:
+            command = controller.step(driver_command, *self.vehicle.truth())
+        else:
+            command = controller.step(driver_command, self.measurement)
+        write_command(ActuatorCommand, self._held_at, command)
+        self._check_driven(command)
+        if command.estimate is not None:
+            self._held[N_COMMAND:-1], self._held[-1] = command.estimate, 1.0
+        elif self._held.item(-1):
+            self._held[-1] = 0.0
+        self._stage[0] = native.PASS_ON
+
+    def _check(self) -> None:
+        self.vehicle.check()
+
+
+_ACTS: Final[dict[int, Callable[[ClosedLoop], None]]] = {
+    native.NEEDS_BLOCKS: ClosedLoop._load,
+    native.AT_CHANGE: ClosedLoop._change_faults,
+    native.TAPE_FULL: ClosedLoop._make_room,
+    native.NEEDS_SETPOINTS: ClosedLoop._tabulate,
+    native.NEEDS_GAINS: ClosedLoop._prepare,
+    native.NEEDS_DRIVER: ClosedLoop._ask_driver,
+    native.NEEDS_CONTROLLER: ClosedLoop._ask_controller,
+    native.INSANE: ClosedLoop._check,
+}
+
+
+def _arrived(bus: Array, calls: Any) -> Array:
+    """Return the decision that arrives from a bus after some calls."""
+    return bus[int(calls[0]) % len(bus)]
+
+
+def _drive_all(records: NDArray[Any]) -> None:
+    native.drive_cars(records, 0, len(records), native.STEP_ADDRESS)
+
+
+def drive_together(
+    loops: Sequence[ClosedLoop], records: NDArray[Any], call: Callable[[NDArray[Any]], None] = _drive_all
+) -> dict[int, SimulationDiverged]:
+    """Drive each car for the steps in `left`, let Python act where one stops, and return which cars diverged."""
+    failed, status, several = {}, records["status"], len(records) > 1
+    while True:
+        call(records)
+        # One car stops in every step of a block in Python, and numpy's search takes as long as the block.
+        stopped = np.flatnonzero(status).tolist() if several else [0] if status.item(0) else []
+        if not stopped:
+            return failed
+        for index in stopped:
+            try:
+                _ACTS[status.item(index)](loops[index])
+            except SimulationDiverged as error:
+                failed[index] = error
+                records["left"][index] = 0

@@ -13,12 +13,12 @@ from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Final, NamedTuple, Protocol
 
 from activesteer.conventions import run_looks
+from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import SLOWEST_MPS
 from activesteer.errors import PlaybackError
 from activesteer.maneuver import Maneuver
 from activesteer.road.course import Footprint
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.recorder import scene_of
 from activesteer.units import quantity_of
 from activesteer.video import FilmedCar, RenderScene
 from activesteer.video.cameras import CUTAWAY

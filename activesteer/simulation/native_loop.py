@@ -1,7 +1,7 @@
 """The loop: setpoint -> driver -> controller -> vehicle with faults, sensors and recorded row, once every step.
 
 Every run of every car passes through `drive_cars`: one car or many, with native and with Python blocks. It stops where
-Python has to act, says why, and goes on from there; see `native_cars`.
+Python has to act, says why, and goes on from there; see `closed_loop`.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ import numpy as np
 from numba import carray, from_dtype, types
 
 from activesteer.compilation import address_of, call_at, compiled_call, inlined
-from activesteer.controllers.native_laws import N_COMMAND, N_HELD, call_law
 from activesteer.driver.human import LINE, SETPOINT, HumanDriver, follow
 from activesteer.native_memory import (
+    N_COMMAND,
+    N_HELD,
     array_of,
+    call_law,
     f64_pointer,
     load_numbers,
     native_type,
@@ -28,29 +30,36 @@ from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Mot
 from activesteer.vehicle import native_step
 from activesteer.vehicle.parameters import drive_limits, engine_speed
 
-GIVEN, NATIVE, PYTHON = range(3)
-"""Kinds of a driver or controller: its present command holds; compiled code; a block in Python."""
+NATIVE, PYTHON = range(2)
+"""Kinds of a driver or controller: compiled code; a block in Python."""
 DRIVE, CONTROL, PASS_ON = range(3)
 """Stages of a step, each of which a car can stop before: the driver; the controller; its bus, and the car."""
-DONE, AT_CHANGE, TAPE_FULL, NEEDS_SETPOINTS, NEEDS_GAINS, NEEDS_DRIVER, NEEDS_CONTROLLER, INSANE = range(8)
-"""Why a car has stopped: all its steps are made. A fault begins or ends. The tape has no room. The next setpoints, the
-driver's gains at a new speed, the driver's or the controller's command are needed. A value is beyond all reason."""
+DONE, NEEDS_BLOCKS, AT_CHANGE, TAPE_FULL, NEEDS_SETPOINTS = range(5)
+NEEDS_GAINS, NEEDS_DRIVER, NEEDS_CONTROLLER, INSANE = range(5, 9)
+"""Why a car has stopped: all its steps are made. Driver and controller are not in the record. A fault begins or ends.
+The tape has no room. The next setpoints, the driver's gains at a new speed, the driver's or the controller's command
+are needed. A value is beyond all reason."""
 
+MESSAGES: Final[dict[str, type[Any]]] = {
+    "driver_command": DriverCommand, "actuator_command": ActuatorCommand, "measurement": Measurement, "motion": Motion,
+}  # fmt: skip
+"""Field of `CAR` with the numbers of a message -> the message."""
 CAR: Final = np.dtype(
     (
         np.record,
         [
             *((name, np.intp) for name in ("step", "left", "stage", "status", "next_change", "bindings")),
-            *((name, np.intp) for name in ("driver_command", "actuator_command", "measurement", "motion")),
+            *((name, np.float64, (len(numbers_of(message)),)) for name, message in MESSAGES.items()),
             *((name, np.intp) for name in ("setpoints", "n_setpoints", "first", "last")),
             ("path", LINE),
-            ("driver_kind", np.intp),
+            *((name, np.intp) for name in ("loaded", "driver_kind", "driver_given")),
             ("driver", record_type(HumanDriver)),
             ("drive_fractions", np.float64, (4,)),
             ("drive_numbers", np.float64, (4,)),
             ("torques_set", np.intp),
             ("torques_Nm", np.float64, (8,)),
-            *((name, np.intp) for name in ("controller_kind", "law", "block", "every", "calls", "on_bus", "estimate")),
+            *((name, np.intp) for name in ("controller_kind", "controller_given", "law", "block")),
+            *((name, np.intp) for name in ("every", "calls", "on_bus", "estimate")),
             ("steering_ratio", np.float64),
             ("seen", np.float64, (len(numbers_of(DriverCommand)),)),
             ("held", np.float64, (N_HELD,)),
@@ -61,12 +70,13 @@ CAR: Final = np.dtype(
 """A car with its loop.
 
 `step`, `left`: steps made and steps to make; `stage`, `status`: where it stands and why; `next_change`: step before
-which a fault begins or ends. `bindings`: `Vehicle.address`. The next four: addresses of the numbers of messages.
-`first`, `last`: steps of the first setpoint and behind the last one. `torques_Nm`: torques of the wheels if they are
-set. `law`, `block`: addresses of a native controller's law and block. `every`, `on_bus`: steps between two calls of the
-controller, and steps that its command takes to arrive; `calls`: steps that it has counted. `estimate`: address of the
-recorded estimate, or 0. `steering_ratio`: not 0 if the controller knows the driver's demand by the angle sensor only;
-`seen`: the driver's command as it knows it. `held`, `bus`: its last decision, and those on the way (`N_HELD`)."""
+which a fault begins or ends. `bindings`: `Vehicle.address`. `first`, `last`: steps of the first setpoint and behind the
+last one. `loaded`: whether driver and controller are in the record. `driver_given`, `controller_given`: whether the
+present command holds. `torques_Nm`: torques of the wheels if they are set. `law`, `block`: addresses of a native
+controller's law and block. `every`, `on_bus`: steps between two calls of the controller, and steps that its command
+takes to arrive; `calls`: steps that it has counted. `estimate`: address of the recorded estimate, or 0.
+`steering_ratio`: not 0 if the controller knows the driver's demand by the angle sensor only; `seen`: the driver's
+command as it knows it. `held`, `bus`: its last decision, and those on the way (`N_HELD`)."""
 
 _ARGUMENTS: Final = (types.intp, native_type(DriverCommand), native_type(ActuatorCommand), types.boolean)
 _step: Final = call_at(types.Tuple([types.boolean, native_type(Measurement), native_type(Motion)]), *_ARGUMENTS)
@@ -78,12 +88,14 @@ _DRIVER_NUMBERS: Final = [number.name for number in numbers_of(DriverCommand)]
 _WHEEL, _FRONT = map(_DRIVER_NUMBERS.index, ("steering_wheel_demand_rad", "front_steer_demand_rad"))
 _MEASURED: Final = [number.name for number in numbers_of(Measurement)]
 _STEERING_WHEEL, _WHEEL_SPEEDS = map(_MEASURED.index, ("steering_wheel_rad", "fl_wheel_speed_radps"))
-_N_MEASURED, _N_MOTION, _N_DRIVER = len(_MEASURED), len(numbers_of(Motion)), len(_DRIVER_NUMBERS)
+_N_DRIVER: Final = len(_DRIVER_NUMBERS)
 
 
 @inlined
 def _begin(car, bindings):
     """Return whether a step can begin, as a status."""
+    if car.loaded == 0:
+        return NEEDS_BLOCKS
     if car.step == car.next_change:
         return AT_CHANGE
     if bindings.tape != 0 and carray(native_step._tape_pointer(bindings.tape), (1,))[0].room == 0:
@@ -94,7 +106,7 @@ def _begin(car, bindings):
 @inlined
 def _drive(car):
     """Find the setpoint and let the driver act. Return a status."""
-    if car.driver_kind == GIVEN:
+    if car.driver_given != 0:
         return DONE
     if car.driver_kind == PYTHON:
         return NEEDS_DRIVER
@@ -102,15 +114,16 @@ def _drive(car):
         return NEEDS_SETPOINTS
     setpoints: Any = carray(_setpoint_pointer(car.setpoints), (car.n_setpoints,))
     setpoint = setpoints[min(car.step - car.first, car.n_setpoints - 1)]
-    measured: Any = carray(f64_pointer(car.measurement), (_N_MEASURED,))
+    measured: Any = car.measurement
     engine_radps, low_Nm, high_Nm = 0.0, 0.0, 0.0
     if setpoint.holds_speed != 0:
         engine_radps = engine_speed(car.drive_fractions, measured[_WHEEL_SPEEDS : _WHEEL_SPEEDS + 4])
         n = car.drive_numbers
         low_Nm, high_Nm = drive_limits(engine_radps, 1 if setpoint.speed_mps >= 0.0 else -1, n[0], n[1], n[2], n[3])
-    motion = carray(f64_pointer(car.motion), (_N_MOTION,))
-    command = carray(f64_pointer(car.driver_command), (_N_DRIVER,))
-    if not follow(car.driver, setpoint, car.path, measured, motion, engine_radps, low_Nm, high_Nm, command):
+    found = follow(
+        car.driver, setpoint, car.path, measured, car.motion, engine_radps, low_Nm, high_Nm, car.driver_command
+    )
+    if not found:
         return NEEDS_GAINS
     car.torques_set = setpoint.torques_set
     if setpoint.torques_set != 0:
@@ -122,19 +135,18 @@ def _drive(car):
 @inlined
 def _control(car):
     """Let the controller decide if it is its turn. Return a status."""
-    if car.controller_kind == GIVEN or car.calls % car.every != 0:
+    if car.controller_given != 0 or car.calls % car.every != 0:
         return DONE
-    command = car.driver_command
+    seen = car.driver_command
     if car.steering_ratio != 0.0:
-        given, seen = f64_pointer(command), car.seen
+        seen = car.seen
         for place in range(_N_DRIVER):
-            seen[place] = given[place]
-        seen[_WHEEL] = f64_pointer(car.measurement)[_STEERING_WHEEL]
+            seen[place] = car.driver_command[place]
+        seen[_WHEEL] = car.measurement[_STEERING_WHEEL]
         seen[_FRONT] = seen[_WHEEL] / car.steering_ratio
-        command = seen.ctypes.data
     if car.controller_kind == PYTHON:
         return NEEDS_CONTROLLER
-    call_law(car.law, (car.block, command, car.measurement, car.held.ctypes.data))
+    call_law(car.law, (car.block, seen.ctypes.data, car.measurement.ctypes.data, car.held.ctypes.data))
     return DONE
 
 
@@ -145,9 +157,9 @@ def _pass_on(car):
     newest, oldest = car.calls % length * N_HELD, (car.calls + 1) % length * N_HELD
     for place in range(N_HELD):
         bus[newest + place] = car.held[place]
-    command, estimate = f64_pointer(car.actuator_command), f64_pointer(car.estimate)
+    estimate = f64_pointer(car.estimate)
     for place in range(N_COMMAND):
-        command[place] = bus[oldest + place]
+        car.actuator_command[place] = bus[oldest + place]
     if car.estimate != 0 and bus[oldest + N_HELD - 1] != 0.0:
         for place in range(N_COMMAND, N_HELD - 1):
             estimate[place - N_COMMAND] = bus[oldest + place]
@@ -167,13 +179,13 @@ def _advance(car, bindings, step_address):
         step_address,
         (
             car.bindings,
-            load_numbers(car.driver_command, _DRIVER_COMMAND),
-            load_numbers(car.actuator_command, _ACTUATOR_COMMAND),
+            load_numbers(car.driver_command.ctypes.data, _DRIVER_COMMAND),
+            load_numbers(car.actuator_command.ctypes.data, _ACTUATOR_COMMAND),
             torques_set,
         ),
     )
-    store_numbers(car.measurement, measurement)
-    store_numbers(car.motion, motion)
+    store_numbers(car.measurement.ctypes.data, measurement)
+    store_numbers(car.motion.ctypes.data, motion)
     car.step += 1
     car.left -= 1
     return DONE if sane else INSANE
@@ -199,7 +211,7 @@ def drive_cars(cars, first, last, step_address):
                 if car.status != DONE:
                     break
                 car.stage = PASS_ON
-            if car.stage == PASS_ON and car.controller_kind != GIVEN:
+            if car.stage == PASS_ON and car.controller_given == 0:
                 _pass_on(car)
             car.stage = DRIVE
             car.status = _advance(car, bindings, step_address)

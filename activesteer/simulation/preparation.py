@@ -32,14 +32,17 @@ from activesteer.compilation import content_key, processor
 from activesteer.config import to_table
 from activesteer.controllers import controller_spec
 from activesteer.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
-from activesteer.errors import ActiveSteerError, ManeuverError, ModelError
+from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError
 from activesteer.files import read_bytes
 from activesteer.maneuver.base import Search
 from activesteer.maneuver.steering_tests import RampAngle, SteadyTurn, StepSteer
+from activesteer.plugins import Plugin
 from activesteer.recording import Recording
+from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import CarSpec, FileOrTable, Scenario, resolve
+from activesteer.scenario.run_context import RunContext
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.recorder import Recorder, RunContext
+from activesteer.simulation.recorder import Recorder
 from activesteer.theory.single_track import IDENTIFIED, IDENTIFY, SingleTrackParameters, characteristic_speed
 from activesteer.vehicle.statics import mass_properties
 from activesteer.version import __version__
@@ -348,8 +351,26 @@ def with_amplitude_found(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTE
     return replace(scenario, maneuver=replace(found, fault=scenario.maneuver.fault))
 
 
+def prepared(
+    maneuver: FileOrTable | Scenario,
+    controller: Plugin,
+    vehicle: FileOrTable,
+    overrides: Mapping[str, Any] | None,
+    driver: Any,
+    timestep_s: float,
+) -> Scenario:
+    """Return the scenario that the arguments of a `Simulation` describe, with the results of all searches."""
+    if not isinstance(maneuver, Scenario):
+        maneuver = resolve(maneuver, vehicle, overrides, driver, [controller])
+    elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:
+        raise ParameterError(
+            "a Scenario already includes vehicle, driver and overrides", key="vehicle, overrides, driver"
+        )
+    return with_amplitude_found(maneuver, timestep_s)
+
+
 def _test_drive(scenario: Scenario) -> Recording:
     loop = ClosedLoop(replace(scenario, car=scenario.car.with_ideal_sensors()))
     recorder = Recorder(loop.vehicle, loop.steps)
     loop.run(recorder)
-    return RunContext.of(scenario, loop.vehicle, controller_spec("none")).recording(recorder)
+    return RunContext.of(scenario, loop.vehicle, controller_spec("none")).recording(*recorder.result())

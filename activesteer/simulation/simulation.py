@@ -7,12 +7,11 @@ import json
 import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from numbers import Integral
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Protocol, Self
-
-import mujoco
+from typing import Any, Final, Protocol
 
 from activesteer.controllers import CONTROLLER, controller_spec
 from activesteer.conventions import DEFAULT_TIMESTEP_S
@@ -20,23 +19,22 @@ from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
 from activesteer.faults import Fault
 from activesteer.limits import MAX_EVENTS
-from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Recording
 from activesteer.recording.contents import Event, tables_of
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.scenario import FileOrTable, Scenario
+from activesteer.scenario.run_context import RunContext
 from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
-from activesteer.simulation.copies import pickled, unpickled
+from activesteer.simulation.copies import Copyable
 from activesteer.simulation.pacing import RealtimePacer
-from activesteer.simulation.preparation import with_amplitude_found
-from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder, RunContext
+from activesteer.simulation.preparation import prepared
+from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows, Recorder
 from activesteer.simulation.sampled_controller import slow_actuators
 
 MAX_KEPT_VALUES: Final = 2**25
 """Most values of a run with a file that stay in memory: 256 MiB, about three minutes. The values of a longer run are
 read from the file when needed, so that memory does not grow with the run."""
-_GIVEN: Final = "Simulation.step was given"
 _COARSE_S: Final = 5e-4
 """Step from which longitudinal tyre forces on short obstacles are coarse [s]: they move by 10 % in a millisecond."""
 _COARSE: Final = (
@@ -46,16 +44,13 @@ _COARSE: Final = (
 
 
 class Link(Protocol):
-    """Another process that gives commands."""
+    """Another process that gives commands. `name` is the key of its `report` in the recording."""
 
     name: str
-    """Key of the report in the recording."""
     report: dict[str, int]
-    """Numbers of messages for the recording."""
 
-    def connect(self, checks: tuple[Callable[[Any], Any], Callable[[Any], Any]]) -> None:
-        """Take the checks of a driver command and of an actuator command, which raise an error for a wrong one."""
-        ...
+    def connect(self, check: Callable[[Given, str], Given]) -> None:
+        """Take the check of commands, which completes them and raises an error that says who gave a wrong one."""
 
     def commands(self) -> Given:
         """Return the commands for the next step, or None where the run's own block decides."""
@@ -63,34 +58,23 @@ class Link(Protocol):
 
     def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:
         """Send the state after a step."""
-        ...
 
     def close(self) -> None:
         """End the link."""
-        ...
 
 
-class SavedState(NamedTuple):
+@dataclass(frozen=True)
+class SavedState:
     """State from which a simulation continues bit-identically, with the rows recorded so far."""
 
+    metadata: dict[str, Any]
     loop: LoopState
     rows: RecordedRows
     given: dict[str, int]
     events: tuple[Event, ...]
-    metadata: dict[str, Any]
 
 
-class Portable(NamedTuple):
-    """A simulation without its native memory: inputs, state, and the engine's model with changes made at run time."""
-
-    scenario: Scenario
-    controller: Plugin
-    timestep_s: float
-    state: SavedState
-    model: mujoco.MjModel
-
-
-class Simulation:
+class Simulation(Copyable):
     """`simulate`, step by step.
 
     `copy()`, `copy.deepcopy` and `pickle` return an independent simulation that continues bit-identically. One thread
@@ -139,14 +123,7 @@ class Simulation:
             ActiveSteerError: an input is wrong, or the car does not settle.
         """
         self._controller = controller = controller_spec(controller)
-        if not isinstance(maneuver, Scenario):
-            maneuver = resolve(maneuver, vehicle, overrides, driver, [controller])
-        elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:
-            raise ParameterError(
-                "a Scenario already includes vehicle, driver and overrides", key="vehicle, overrides, driver"
-            )
-        # Does nothing if nothing has to be searched for.
-        self.scenario = with_amplitude_found(maneuver, timestep_s)
+        self.scenario = prepared(maneuver, controller, vehicle, overrides, driver, timestep_s)
         self.loop = ClosedLoop(self.scenario, controller, timestep_s)
         self.context = RunContext.of(self.scenario, self.loop.vehicle, controller)
         self._given: dict[str, int] = {}
@@ -154,7 +131,8 @@ class Simulation:
         self._pacer = None if realtime is False else RealtimePacer(1.0 if realtime is True else realtime, timestep_s)
         self._link = link
         if link is not None:
-            self._connect(link)
+            link.connect(partial(_checked, self.loop))  # not a method, which would keep the run alive
+            weakref.finalize(self, link.close)
         self._failure: BaseException | None = None
         self._writer: McapWriter | None = None
         if timestep_s >= _COARSE_S and self.scenario.maneuver.ground.is_steep:
@@ -169,18 +147,6 @@ class Simulation:
     @property
     def _block_s(self) -> float | None:
         return None if self._pacer is None and self._link is None else PACED_BLOCK_INTERVAL_S
-
-    def _connect(self, link: Link) -> None:
-        loop = self.loop
-
-        def of_driver(command: DriverCommand) -> DriverCommand:
-            return DRIVER.checked(command, "", loop.driver_setup, f"{link.name} gave")
-
-        def of_controller(command: ActuatorCommand) -> ActuatorCommand:
-            return CONTROLLER.checked(command, "", loop.controller_setup, f"{link.name} gave")
-
-        link.connect((of_driver, of_controller))
-        weakref.finalize(self, link.close)
 
     @property
     def steps(self) -> int:
@@ -263,11 +229,7 @@ class Simulation:
         if steps > left:
             end = f"{self.scenario.maneuver.name} ends at {self.scenario.maneuver.duration_s:g} s (duration_s)"
             raise ManeuverError(f"{end}; {steps} more steps were requested, {left} are left", value=steps, allowed=left)
-        if driver_command is not None:
-            driver_command = DRIVER.checked(driver_command, "", loop.driver_setup, _GIVEN)
-        if actuator_command is not None:
-            actuator_command = CONTROLLER.checked(actuator_command, "", loop.controller_setup, _GIVEN)
-        given = driver_command, actuator_command
+        given = _checked(loop, (driver_command, actuator_command), "Simulation.step was given")
         with self._watched():
             if self._pacer is None and self._link is None:
                 self._drive(int(steps), given)
@@ -389,7 +351,7 @@ class Simulation:
         with self.loop.in_use:
             with self._watched():
                 rows = self._recorder.save_state()
-            return SavedState(self.loop.save_state(), rows, dict(self._given), self.events, self.context.metadata)
+            return SavedState(self.context.metadata, self.loop.save_state(), rows, dict(self._given), self.events)
 
     def restore_state(self, state: SavedState) -> None:
         """Go back to a saved state, from which the simulation continues bit-identically.
@@ -404,7 +366,7 @@ class Simulation:
             RecordingError: the run is being written to a file.
             ManeuverError: the simulation is being driven.
         """
-        if not isinstance(state, SavedState) or not isinstance(state.given, dict):
+        if not isinstance(state, SavedState):
             raise ParameterError(f"is {shown(state)}; a state of this simulation is needed", key="state", value=state)
         if state.metadata is not self.context.metadata and state.metadata != self.context.metadata:
             raise ParameterError("was saved by a simulation with other inputs", key="state")
@@ -414,42 +376,19 @@ class Simulation:
             self._recorder.restore_state(state.rows)
             self._given, self.events, self._failure = dict(state.given), state.events, None
 
-    def copy(self) -> Self:
-        """Return an independent simulation that continues bit-identically.
-
-        The copy builds the car and lets it settle again, which takes as long as creating a `Simulation`.
-
-        Raises:
-            ManeuverError: the run failed, or is being driven.
-            RecordingError: the run is being written to a file.
-            ActiveSteerError: your own driver or controller cannot be copied.
-        """
-        return self._rebuilt(self._portable())
-
-    def __copy__(self) -> Self:
-        return self.copy()
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        return self.copy()
-
-    def __reduce_ex__(self, _protocol: Any) -> tuple[Any, ...]:
-        return unpickled, (type(self), pickled(self._portable()))
-
-    def _portable(self) -> Portable:
+    def _portable(self) -> Any:
         if self._writer is not None:
             raise RecordingError("a run that is being written to a file can be neither copied nor pickled")
         if self._failure is not None:
             raise ManeuverError(f"a run that failed can be neither copied nor pickled: {self._failure}")
         vehicle = self.loop.vehicle
-        return Portable(self.scenario, self._controller, vehicle.timestep_s, self.save_state(), vehicle.model)
+        return self.scenario, self._controller, vehicle.timestep_s, self.save_state(), vehicle.model
 
-    @classmethod
-    def _rebuilt(cls, portable: Portable) -> Self:
-        other = cls.__new__(cls)
-        Simulation.__init__(other, portable.scenario, portable.controller, timestep_s=portable.timestep_s)
-        other.loop.vehicle.adopt_model(portable.model)
-        other.restore_state(portable.state)
-        return other
+    def _rebuild(self, portable: Any) -> None:
+        scenario, controller, timestep_s, state, model = portable
+        Simulation.__init__(self, scenario, controller, timestep_s=timestep_s)
+        self.loop.vehicle.adopt_model(model)
+        self.restore_state(state)
 
     def recording(self) -> Recording:
         """Return the recording of the steps driven so far.
@@ -471,7 +410,7 @@ class Simulation:
             with self._watched():
                 recorder.flush()
         if recorder.keeps_all or self._writer is None:
-            recording = self.context.recording(recorder)
+            recording = self.context.recording(*recorder.result())
         else:
             recording = Recording.open(self._writer.flush())
         recording.metadata["complete"] = failure is None and self.done
@@ -533,3 +472,13 @@ class Simulation:
             self._failure = failure
             self._recorder.flush(checked=False)
             raise
+
+
+def _checked(loop: ClosedLoop, given: Given, said: str) -> Given:
+    """Check and complete given commands."""
+    driver_command, actuator_command = given
+    if driver_command is not None:
+        driver_command = DRIVER.checked(driver_command, "", loop.driver_setup, said)
+    if actuator_command is not None:
+        actuator_command = CONTROLLER.checked(actuator_command, "", loop.controller_setup, said)
+    return driver_command, actuator_command

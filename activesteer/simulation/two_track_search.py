@@ -19,8 +19,7 @@ from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.simulation.preparation import Run
-from activesteer.theory.single_track import SingleTrack
-from activesteer.theory.two_track import TwoTrackParameters
+from activesteer.theory.single_track import SingleTrack, TwoTrackParameters
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.statics import mass_properties
 

@@ -6,7 +6,7 @@ Out: measurements, raw rows of channels, and states that can be restored.
 
 from activesteer.vehicle.car import Vehicle
 from activesteer.vehicle.channels import MAX_VALUE, ChannelMap, RawRows
-from activesteer.vehicle.divergence import Uncopyable, engine_warnings_held
+from activesteer.vehicle.native_forces import engine_warnings_held
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.step_bindings import Tape
 
@@ -15,7 +15,6 @@ __all__ = [
     "ChannelMap",
     "RawRows",
     "Tape",
-    "Uncopyable",
     "Vehicle",
     "VehicleParameters",
     "engine_warnings_held",

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE, brake_setup, reset
-from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
+from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S, Array
 from activesteer.errors import ActiveSteerError, ModelError, ParameterError, SimulationDiverged, shown
+from activesteer.native_records import Uncopyable
 from activesteer.road.road import Road
 from activesteer.sensors import SensorBlock
 from activesteer.sensors.block import speed_radii
@@ -29,21 +30,24 @@ from activesteer.signals import (
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
-from activesteer.vehicle.actuator_records import ActuatorRecords
 from activesteer.vehicle.channels import ChannelMap
-from activesteer.vehicle.divergence import Uncopyable, raise_if_diverged
-from activesteer.vehicle.electric_drive import ENERGY, ElectricDrive
-from activesteer.vehicle.engine_layout import find, tendon_arms
+from activesteer.vehicle.electric_actuators import ENERGY, ElectricDrive
+from activesteer.vehicle.force_block import find, tendon_arms
 from activesteer.vehicle.implicit_plan import ImplicitPlan, drop_metric
 from activesteer.vehicle.loading import load_model
 from activesteer.vehicle.native_forces import install_native_forces
+from activesteer.vehicle.native_step import FASTEST_MPS
 from activesteer.vehicle.parameters import CLUTCH_OPEN, VehicleParameters
 from activesteer.vehicle.statics import YAW_DOF, static_ride, turn_chassis_back
 from activesteer.vehicle.step_bindings import (
+    CARRIED_OUT,
+    COMMANDS,
+    ActuatorRecords,
     RecordedArrays,
     Tape,
     WheelSet,
     bind_step,
+    engine_arrays,
     read_through,
     record_from,
     write_estimate,
@@ -356,7 +360,7 @@ class Vehicle(Uncopyable):
                     f"{wheel['contact_y_m']:.2f} m, {self.data.time:.3f} s; road.outside = 'extend' extends its edge"
                 )
         speed_mps = float(self._velocimeter[0])
-        raise_if_diverged(self.model, self.data, self.rows.commands, speed_mps)
+        _raise_if_diverged(self.model, self.data, self.rows.commands, speed_mps)
 
     def record_estimate(self, estimate: Estimate) -> None:
         """Record the controller's estimate from now on.
@@ -501,6 +505,29 @@ class Vehicle(Uncopyable):
     def body_names(self) -> tuple[str, ...]:
         """Names of all bodies but the world, in the engine's order."""
         return tuple(self.model.body(index).name for index in range(1, self.model.nbody))
+
+
+def _raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Array, speed_mps: float) -> None:
+    """Look for warnings of the engine and for values that are not finite, commands first."""
+    for name in CARRIED_OUT:
+        value = commands[COMMANDS.index(name)]
+        if not math.isfinite(value):
+            raise SimulationDiverged(f"the command {name} is {value:g} at {data.time:.3f} s", value=name)
+    for kind, warning in enumerate(data.warning):
+        if warning.number:
+            text = mujoco.mju_warningText(kind, warning.lastinfo)
+            raise SimulationDiverged(f"MuJoCo warns at {data.time:.3f} s: {text}", value=mujoco.mjtWarning(kind))
+    if not np.isfinite(data.qpos).all() or not np.isfinite(data.qvel).all():
+        bad = np.flatnonzero(~np.isfinite(data.qvel))
+        joints = sorted({model.joint(int(model.dof_jntid[dof])).name for dof in bad})
+        raise SimulationDiverged(f"the state is not finite at {data.time:.3f} s; joints: {', '.join(joints)}")
+    if not np.isfinite(data.act).all():
+        raise SimulationDiverged(f"an activation (slip of a tyre, angle of a servo) is not finite at {data.time:.3f} s")
+    if not -FASTEST_MPS < speed_mps < FASTEST_MPS:
+        raise SimulationDiverged(f"the speed is {speed_mps:g} m/s at {data.time:.3f} s")
+    for name, live in engine_arrays(data).items():
+        if not np.isfinite(live).all():
+            raise SimulationDiverged(f"the recorded {name} is not finite at {data.time:.3f} s", value=name)
 
 
 def _changeable(part: mujoco.MjModel | mujoco.MjOption) -> list[str]:

@@ -30,7 +30,7 @@ from activesteer.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
 from activesteer.native_memory import records_at
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.engine_layout import find, tendon_arms
+from activesteer.vehicle.force_block import find, tendon_arms
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -190,8 +190,6 @@ _INTERVALS: Final = 32
 def fit_curve_axles(spec: mujoco.MjSpec, curves: Curves) -> None:
     """Add tendons to each wheel of a curve axle, for the fast natural modes of its knuckle."""
     corners = [corner for corner in CORNERS if curves.axle(corner) is not None]
-    if not corners:
-        return
     model = spec.compile()
     for corner in corners:
         axle = curves.axle(corner)

@@ -19,8 +19,8 @@ from activesteer.faults import ACTUATORS, ANGLE_SENSOR, MOTOR, SENSORS, Fault
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_faults as native
 from activesteer.vehicle.car import Vehicle
-from activesteer.vehicle.electric_drive import FULL_TORQUE_NM, HEALTHY
-from activesteer.vehicle.engine_layout import find
+from activesteer.vehicle.electric_actuators import FULL_TORQUE_NM, HEALTHY
+from activesteer.vehicle.force_block import find
 
 _NEVER: Final = 2**62
 _SAVE: Final = -1
@@ -220,9 +220,9 @@ class _ActuatorFault(_DemandFault):
         self._set(native.WORKS)
 
     def recover(self) -> None:
-        """Start a servo that was free at its present angle. It returns to its demand with its own lag and rate."""
-        if self._kind == native.FLOATS and not self._part["seized"][0]:
-            self._data.act[self._part["act"][0]] = self._data.qpos[self._part["qpos"][0]]
+        """Start a servo that was free at its present angle (see `resume_part`)."""
+        if self._kind == native.FLOATS:
+            native.resume_of(self._part.ctypes.data, self._data.act.ctypes.data, self._data.qpos.ctypes.data)
 
 
 class _MotorFault(_DemandFault):

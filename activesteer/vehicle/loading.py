@@ -22,12 +22,12 @@ from activesteer.road.surface import surface_of
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.curve_axles import curve_axle_records, fit_curve_axles
-from activesteer.vehicle.electric_actuators import MOTOR, NAME, fit_motor, motor_record
-from activesteer.vehicle.engine_layout import find
+from activesteer.vehicle.electric_actuators import NAME, SPEED_STATE, fit_motor, motor_record
+from activesteer.vehicle.force_block import find
 from activesteer.vehicle.native_contact import cam_record
 from activesteer.vehicle.parameters import CLUTCH_OPEN, VIBRATION_AT_MPS, Factors, Load, VehicleParameters
 from activesteer.vehicle.statics import mass_properties, point_mass_inertia
-from activesteer.vehicle.toe_links import fit_screws, screw_records, sensor_range
+from activesteer.vehicle.toe_links import fit_screws, screw_records
 
 _AXLES: Final = (CORNERS[:2], CORNERS[2:])
 _BOOT_M: Final = (0.0, 0.0, 0.6)
@@ -166,7 +166,8 @@ def _compile(
             fit_screws(spec, parameters.rear_actuator.resolved())
         if parameters.superposition_actuator.is_geared:
             fit_motor(spec)
-        fit_curve_axles(spec, parameters.curves)
+        if parameters.curves.front or parameters.curves.rear:
+            fit_curve_axles(spec, parameters.curves)
         _fit_actuators(spec, parameters)
         for corner in CORNERS:
             if inertia_kgm2 := parameters.motors.inertia_kgm2(corner):
@@ -234,7 +235,7 @@ def _force_block(
     header["engine_power_W"] = (share or 1.0) * powertrain.max_power_W
     header["engine_limit_radps"] = powertrain.max_wheel_speed_radps
     header["engine_drag_Nm"], header["gear"] = share * powertrain.engine_brake_torque_Nm, CLUTCH_OPEN
-    header["screw_sensors"], header["n_screw_sensors"] = sensor_range(model)
+    header["screw_sensors"], header["n_screw_sensors"] = fb.sensor_range(model)
     for name in ("rack_friction", *(f"{corner}_damper_friction" for corner in CORNERS)):
         if _friction(name, parameters)[0] > 0.0:
             # Friction in the vehicle file must not get lost because the model has no actuator for it.
@@ -250,12 +251,14 @@ def _force_block(
         grid = PathGrid.of(road.path)
         sections["path_points"], sections["path_cells"] = [grid.points], [grid.cells]
         sections["path_grids"] = [np.array([grid[:6]], fb.PATH_GRID)]
-    if (surface := surface_of(road)) is not None:
+    if road.is_uneven:
+        surface = surface_of(road)
         pressures = [float(wheel["pressure_Pa"][0]) for wheel in sections["wheels"]]
         sections["surfaces"], sections["obstacles"] = [surface.head], [surface.obstacles]
         sections["heights"] = [surface.numbers]
         sections["cams"] = [cam_record(tyre, at) for tyre, at in zip(mounted.values(), pressures, strict=True)]
-    sections["curve_axle_wheels"], sections["curves"] = curve_axle_records(model, parameters.curves)
+    if parameters.curves.front or parameters.curves.rear:
+        sections["curve_axle_wheels"], sections["curves"] = curve_axle_records(model, parameters.curves)
     places: dict[str, tuple[float, int]] = {}
     if parameters.rear_actuator.is_screw:
         screws = screw_records(model, parameters.rear_actuator.resolved())
@@ -263,7 +266,7 @@ def _force_block(
         places |= screws.places
     if parameters.superposition_actuator.is_geared:
         motors = sections.setdefault("screws", [])
-        places |= {NAME: (fb.KIND_SCREW, len(motors)), NAME + MOTOR: (fb.KIND_MOTOR, len(motors))}
+        places |= {NAME: (fb.KIND_SCREW, len(motors)), NAME + SPEED_STATE: (fb.KIND_MOTOR, len(motors))}
         motors.append(motor_record(model, parameters.superposition_actuator.resolved()))
     sections["actuators"] = [_actuator(model, index, parameters, places) for index in range(model.nu)]
     return fb.pack(header, sections)

@@ -45,7 +45,7 @@ from numba import carray, from_dtype
 from activesteer.compilation import compiled, inlined
 from activesteer.native_memory import pointer_to, records_at
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.electric_drive import BATTERY, BATTERY_STATE, MOTOR, MOTOR_STATE
+from activesteer.vehicle.electric_actuators import BATTERY, BATTERY_STATE, MOTOR, MOTOR_STATE
 from activesteer.vehicle.parameters import CLUTCH_OPEN, drive_limits
 
 _CONTACT_S: Final = 3e-4

@@ -171,8 +171,37 @@ def set_fault(part, block, gain, bias, healthy, kind, offset, held):
         fail_part(own, numbers[0], numbers[1], numbers[2], numbers[3], kind, offset, held)
 
 
+@inlined
+def resume_part(part, act, qpos):
+    """Start a servo that was free at its present angle. It returns to its demand with its own lag and rate."""
+    if part.seized == 0:
+        act[part.act] = qpos[part.qpos]
+
+
+@inlined
+def change_fault(part, block, gain, bias, healthy, acting, kind, offset, ctrl, act, qpos):
+    """Replace the fault of a part, by addresses. `acting`: kind, offset, and the demand at which a brake sticks."""
+    own, before = carray(_part_pointer(part), (1,))[0], f64_pointer(acting)
+    if before[0] == FLOATS and kind != FLOATS:
+        resume_part(own, f64_pointer(act), f64_pointer(qpos))
+    if kind == STICKS and before[0] != STICKS:
+        before[2] = f64_pointer(ctrl)[own.actuator]
+    before[0], before[1] = kind, offset
+    fail_part(
+        own, f64_pointer(block), f64_pointer(gain), f64_pointer(bias), f64_pointer(healthy), kind, offset, before[2]
+    )
+
+
+@compiled_call(types.void, types.intp, types.intp, types.intp)
+def resume_of(part, act, qpos):
+    """Call `resume_part` from Python, by addresses."""
+    resume_part(carray(_part_pointer(part), (1,))[0], f64_pointer(act), f64_pointer(qpos))
+
+
 SET_FAULT: Final = (*(types.intp,) * 6, types.float64, types.float64)
 """Arguments of `set_fault`."""
+CHANGE_FAULT: Final = (*(types.intp,) * 6, types.float64, types.float64, *(types.intp,) * 3)
+"""Arguments of `change_fault`."""
 
 
 @compiled_call(types.void, *SET_FAULT)

@@ -10,8 +10,10 @@ scalar product of its motion axis (`cdof`, about the centre of mass of the tree)
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
+from collections.abc import Iterator
 from typing import Any, Final
 
 import mujoco
@@ -27,7 +29,7 @@ from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.curve_axles import add_curve_axle_forces
-from activesteer.vehicle.engine_layout import EngineLayout, engine_layout
+from activesteer.vehicle.force_block import EngineLayout, engine_layout
 from activesteer.vehicle.native_actuators import brake_rate, drive_rate, dry_friction_rate, screw_rate, servo_rate
 from activesteer.vehicle.native_contact import CAM, contact_plane, plane_axes, spin_on_bend
 
@@ -406,3 +408,19 @@ def remove_native_forces() -> None:
         mujoco.set_mjcb_sensor(None)
     if mujoco.get_mjcb_time() is _no_clock.ctypes:
         mujoco.set_mjcb_time(None)
+
+
+@contextlib.contextmanager
+def engine_warnings_held() -> Iterator[None]:
+    """Leave the engine's warnings to `Vehicle.check`. By default it writes them to a file in the user's folder.
+
+    A handler that another part of the program has installed stays in force.
+    """
+    if mujoco.get_mju_user_warning() is not None:
+        yield
+        return
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(None)

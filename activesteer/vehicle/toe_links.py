@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from activesteer.errors import ModelError
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.electric_actuators import MOTOR, STOP_BEYOND, RearActuator, known
+from activesteer.vehicle.electric_actuators import SPEED_STATE, STOP_BEYOND, RearActuator, known
 
 DEGREE: Final = 5
 """Degree of the polynomials. They have no constant term."""
@@ -212,9 +212,9 @@ def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:
         spec.add_sensor(name=f"{corner}_steer_angle", type=mujoco.mjtSensor.mjSENS_USER, dim=1)
     for part in parts:
         # ... and torque of the motor, and whether it is at a limit.
-        spec.add_sensor(name=part + MOTOR, type=mujoco.mjtSensor.mjSENS_USER, dim=2)
+        spec.add_sensor(name=part + SPEED_STATE, type=mujoco.mjtSensor.mjSENS_USER, dim=2)
         spec.nuserdata += 2
-        for state in (SCREW, MOTOR):
+        for state in (SCREW, SPEED_STATE):
             _add(spec, part + state, toe_link_of(spec, "rl" if part == "rear" else part).name, 0.0, None)
 
 
@@ -266,7 +266,7 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
     places: dict[str, tuple[float, int]] = {}
     links: list[NDArray[Any]] = []
     screws: list[NDArray[Any]] = []
-    said = model.nuserdata - 1 - sensor_range(model)[1]
+    said = model.nuserdata - 1 - fb.sensor_range(model)[1]
     for index, (corner, tendon) in enumerate(zip(CORNERS, names, strict=True)):
         part = "rear" if central else corner
         places[f"{corner}_steer"] = (fb.KIND_LINK, index)
@@ -285,14 +285,14 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
         )
         links.append(link)
     for index, part in enumerate(parts):
-        places[part + SCREW], places[part + MOTOR] = (fb.KIND_SCREW, index), (fb.KIND_MOTOR, index)
+        places[part + SCREW], places[part + SPEED_STATE] = (fb.KIND_SCREW, index), (fb.KIND_MOTOR, index)
         # One screw for both: it moves the left link out and the right one in.
         travel = maps[index].travel_of_angle if not central else (0.5 * (left.travel_of_angle - right.travel_of_angle))
         moved = [0, 1] if central else [index]
         screw = fb.filled(
             fb.SCREW,
             act=_act(model, part + SCREW),
-            motor_act=_act(model, part + MOTOR),
+            motor_act=_act(model, part + SPEED_STATE),
             command=model.actuator(f"{CORNERS[index]}_steer").id,
             lead_mprad=lead,
             stop_m=STOP_BEYOND * max(mapped.travel_m for mapped in maps),
@@ -305,15 +305,6 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
         )
         screws.append(screw)
     return Screws(links, screws, places)
-
-
-def sensor_range(model: mujoco.MjModel) -> tuple[int, int]:
-    """Return the first place in `sensordata` of the sensors that a callback fills, and the number of their values.
-
-    Their values, and then the number of active faults, are the end of `userdata`.
-    """
-    ours = np.flatnonzero(model.sensor_type == int(mujoco.mjtSensor.mjSENS_USER))
-    return (int(model.sensor_adr[ours[0]]), int(model.sensor_dim[ours].sum())) if ours.size else (0, 0)
 
 
 def _act(model: mujoco.MjModel, actuator: str) -> int:

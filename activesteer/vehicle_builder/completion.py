@@ -11,12 +11,12 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.brakes.parameters import Brakes
+from activesteer.brakes.records import Brakes
 from activesteer.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.units import known_unit
-from activesteer.vehicle.electric_drive import Motors
+from activesteer.vehicle.electric_actuators import Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind, Mount, mount
 from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, TopMount

@@ -20,7 +20,7 @@ from activesteer.resources import find_vehicle
 from activesteer.rigs.kc.result import KcResult
 from activesteer.scenario import CarSpec
 from activesteer.simulation.two_track_search import two_track_lines
-from activesteer.theory.two_track import TwoTrackParameters
+from activesteer.theory.single_track import TwoTrackParameters
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.design import CarDesign, hardware_tables, in_degrees

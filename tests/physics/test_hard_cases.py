@@ -11,7 +11,7 @@ from activesteer import Simulation, simulate
 from activesteer.analysis.sine_with_dwell import RATIO_LIMITS
 from activesteer.scenario import resolve
 from activesteer.signals import ActuatorCommand
-from activesteer.vehicle.actuator_records import steering_rates
+from activesteer.vehicle.step_bindings import steering_rates
 
 SENSORS = {"sensors.preset": "production", "sensors.seed": 1}
 CARS = {

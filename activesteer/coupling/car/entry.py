@@ -23,7 +23,7 @@ from activesteer.vehicle.channels.native_channels import (
     is_limited,
     record_of,
 )
-from activesteer.vehicle.native_faults import SET_FAULT, set_fault
+from activesteer.vehicle.native_faults import CHANGE_FAULT, SET_FAULT, change_fault, set_fault
 from activesteer.vehicle.native_step import carry_out
 
 _BYTES: Final = 8
@@ -98,3 +98,9 @@ def derive(rows, places, design, gravity, forces, n_forces, limits, n_limits, nu
 def fault(part, block, gain, bias, healthy, kind, offset, held):
     """Write a fault of an actuator into the model (see `faults.set_fault`)."""
     set_fault(part, block, gain, bias, healthy, kind, offset, held)
+
+
+@compiled_callback(types.void, *CHANGE_FAULT)
+def change(part, block, gain, bias, healthy, acting, kind, offset, ctrl, act, qpos):
+    """Replace the fault of an actuator (see `native_faults.change_fault`)."""
+    change_fault(part, block, gain, bias, healthy, acting, kind, offset, ctrl, act, qpos)

@@ -45,8 +45,8 @@ from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.corners import design_heights_m
-from activesteer.vehicle.engine_layout import sensor_columns
 from activesteer.vehicle.faults import part_of
+from activesteer.vehicle.force_block import sensor_columns
 from activesteer.vehicle.native_faults import N_HEALTH
 from activesteer.vehicle.step_bindings import BRAKES, CARRIED_OUT, COMMANDS
 from activesteer.version import __version__

@@ -39,15 +39,16 @@ class Code(NamedTuple):
 
 
 def car_code() -> dict[str, Code]:
-    """Return the code of `step`, `derive` and `fault` (`entry`) and of the callbacks `passive`, `act_dyn`, `sensor`."""
+    """Return the code of the functions in `entry` and of the callbacks `passive`, `act_dyn`, `sensor`."""
     # Compiles for half a minute at first use.
-    from activesteer.coupling.car.entry import car_step, derive, fault  # noqa: PLC0415
-    from activesteer.vehicle.engine_layout import engine_layout  # noqa: PLC0415
+    from activesteer.coupling.car.entry import car_step, change, derive, fault  # noqa: PLC0415
+    from activesteer.vehicle.force_block import engine_layout  # noqa: PLC0415
     from activesteer.vehicle.native_forces import _make_callbacks  # noqa: PLC0415
 
     passive, act_dyn, sensor = _make_callbacks(engine_layout())
     functions = {
-        "step": car_step, "derive": derive, "fault": fault, "passive": passive, "act_dyn": act_dyn, "sensor": sensor,
+        "step": car_step, "derive": derive, "fault": fault, "change": change, "passive": passive, "act_dyn": act_dyn,
+        "sensor": sensor,
     }  # fmt: skip
     return {name: _code(name, function) for name, function in functions.items()}
 

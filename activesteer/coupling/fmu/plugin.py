@@ -231,7 +231,7 @@ class FmuBlock:
         fields = {field for field, *_ in self._writes}
         whole = (field for field in sorted(fields) if isinstance(self._default[field], int))
         self._whole = [(field, type(self._default[field])) for field in whole]
-        self._unchecked = kind.completes or any(names[field] in kind.unchecked for field in fields)
+        self._unchecked = bool(kind.filled) or any(names[field] in kind.unchecked for field in fields)
 
     def step(self, *messages: Any) -> Any:
         """Return the command of the FMU (see `Controller.step` and `Driver.step`)."""
@@ -527,9 +527,9 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
     return allowed(replace(found, parameters=read_values(found.declared, written, source, (kind.table, found.key))))
 
 
-def isolated(given: Any, limit_s: float | None) -> Any:
-    """Return an FMU in its own process. Other blocks, and all without a limit, are returned unchanged."""
-    if limit_s is None or not is_fmu(given):
+def isolated(given: Any, limit_s: float) -> Any:
+    """Return an FMU in its own process. Other blocks are returned unchanged."""
+    if not is_fmu(given):
         return given
     text = os.fspath(given)
     return f"{text}{'&' if '?' in text else '?'}{ISOLATE}={limit_s:g}"

@@ -33,8 +33,7 @@ from activesteer.simulation.preparation import (
 )
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.two_track_search import two_track_lines, two_track_of
-from activesteer.theory.single_track import SingleTrack
-from activesteer.theory.two_track import TwoTrackParameters
+from activesteer.theory.single_track import SingleTrack, TwoTrackParameters
 
 RADIUS_TEST: Final = "100 m"
 """The test on a circle."""

@@ -39,6 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.controllers import Controller, ControllerSetup, controller_spec
+from activesteer.controllers.find import interval_s
 from activesteer.controllers.linear_form import (
     SIGNALS,
     has_linear_form,
@@ -53,7 +54,6 @@ from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
 from activesteer.signals import Measurement
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.simulation.sampled_controller import interval_s
 from activesteer.studies.engine.plan import Plan, task_size
 from activesteer.studies.engine.study import StudyProgress
 from activesteer.studies.engine.study_file import StudyFile, read_study

@@ -15,10 +15,15 @@ from activesteer.sensors.block import MEASURED
 from activesteer.vehicle.channels.corners import (
     MOTION_CHANNELS,
     CarMotion,
+    actuator_signals,
     brake_signals,
     corner_signals,
+    electric_signals,
+    link_signals,
     motion_copied,
     motion_inputs,
+    motor_signals,
+    steering_signals,
 )
 from activesteer.vehicle.channels.native_channels import (
     Actuator,
@@ -32,13 +37,6 @@ from activesteer.vehicle.channels.native_channels import (
     signal,
     take_rows,
     within,
-)
-from activesteer.vehicle.channels.steering import (
-    actuator_signals,
-    electric_signals,
-    link_signals,
-    motor_signals,
-    steering_signals,
 )
 from activesteer.vehicle.parameters import VehicleParameters
 from activesteer.vehicle.step_bindings import COMMAND_CHANNELS, ESTIMATE_CHANNELS

@@ -17,7 +17,7 @@ from activesteer.compilation import compiled_call, inlined
 from activesteer.conventions import Array
 from activesteer.native_memory import f64_pointer
 from activesteer.signals import Channel
-from activesteer.vehicle.engine_layout import sensor_columns
+from activesteer.vehicle.force_block import sensor_columns
 
 
 class RawRows(NamedTuple):

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.brakes import Brakes
 from activesteer.brakes.antilock import BUILD, HOLD, OFF, RECOVER, RELEASE, antilock
-from activesteer.brakes.parameters import Antilock
+from activesteer.brakes.records import Antilock
 from tests.unit.brakes.test_hydraulics import of
 
 CAR = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0)

@@ -11,7 +11,7 @@ import pytest
 from activesteer.controllers import ControllerParameters, ControllerSetup, SingleTrackParameters
 from activesteer.driver import DriverSetup
 from activesteer.estimation import EstimatorSetup, KnownTyre
-from activesteer.theory.two_track import TwoTrackParameters
+from activesteer.theory.single_track import TwoTrackParameters
 
 DOCS = Path(__file__).parents[3] / "docs"
 OF_CONTROLLERS = (

@@ -15,7 +15,6 @@ from scipy.stats import chi2
 from activesteer import simulate
 from activesteer.conventions import GRAVITY_MPS2
 from activesteer.estimation.kalman_filter import begin, correct, predict
-from activesteer.estimation.parameters import EstimatorParameters
 from activesteer.estimation.records import (
     AY_OFFSET,
     BANK,
@@ -33,6 +32,7 @@ from activesteer.estimation.records import (
     YAW_RATE,
     known_of,
 )
+from activesteer.estimation.setup import EstimatorParameters
 from activesteer.estimation.two_track_model import follow, follow_roll, forces_of, slip_angles
 from activesteer.scenario import resolve
 

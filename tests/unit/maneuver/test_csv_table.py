@@ -7,7 +7,7 @@ import math
 import pytest
 
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.tables import read_columns
+from activesteer.maneuver.base import read_columns
 from tests.raising import raises
 
 

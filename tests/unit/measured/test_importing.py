@@ -18,7 +18,7 @@ from activesteer.measured.importing import import_file
 from activesteer.measured.signals import suspicions
 from activesteer.playback.runs import runs_of
 from activesteer.recording import Recording
-from activesteer.scenario.vehicle_file import open_loop_of
+from activesteer.scenario.scenario import open_loop_of
 from activesteer.signals import Channel
 from tests.raising import raises
 

@@ -22,9 +22,7 @@ from activesteer.scenario import resolve
 
 
 def surface(**keys: Any) -> Surface:
-    found = surface_of(Road(**keys))
-    assert found is not None
-    return found
+    return surface_of(Road(**keys))
 
 
 def spectra(seeds: range, **keys: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

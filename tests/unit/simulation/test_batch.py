@@ -11,6 +11,7 @@ import activesteer
 from activesteer import ActuatorCommand, Batch, DriverCommand, Simulation
 from activesteer.controllers import NoControl
 from activesteer.errors import ActiveSteerError, ControllerError, ParameterError
+from activesteer.scenario import resolve
 from activesteer.signals import numbers_in
 from tests.raising import raises
 
@@ -185,6 +186,15 @@ def test_a_diverging_car_stops_alone() -> None:
 def test_wrong_inputs_are_refused(arguments: dict, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         Batch("straight_line", **arguments)
+
+
+def test_a_scenario_gets_its_amplitude_as_in_a_simulation() -> None:
+    batch, alone = Batch(resolve("step_steer"), 2), Simulation("step_steer")
+    for each in (batch, alone):
+        each.advance(700)
+    assert batch.driver_command.steering_wheel_demand_rad[1] == alone.loop.commands[0].steering_wheel_demand_rad > 0.1
+    with raises(ParameterError, key="vehicle, overrides, driver"):
+        Batch(resolve("step_steer"), 2, overrides={"road.mu": 0.5})
 
 
 def test_wrong_commands_are_refused_before_anything_is_driven() -> None:

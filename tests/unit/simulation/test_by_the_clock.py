@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import shutil
 import socket
@@ -114,6 +115,15 @@ def test_the_reaction_stop_ends_the_run_and_keeps_its_rows(client: socket.socket
     with pytest.raises(ManeuverError, match=r"no command for 0\.5 s"):
         simulation.step()
     assert len(simulation.recording()) == 1
+
+
+def test_the_port_is_closed_once_the_run_is_gone() -> None:
+    simulation = linked()
+    link: Any = simulation._link
+    assert link._socket.fileno() >= 0
+    del simulation
+    gc.collect()
+    assert link._socket.fileno() == -1
 
 
 @pytest.mark.parametrize("text", ["no", "1.2.3:5", "host:5005"])

@@ -6,10 +6,10 @@ import copy
 import pickle
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 import pytest
 
 import activesteer
@@ -18,6 +18,7 @@ from activesteer.faults import Fault
 from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.simulation import Simulation
+from tests.raising import raises
 
 Copied = Callable[[Simulation], Simulation]
 COPIED = {
@@ -219,25 +220,34 @@ def test_a_block_cannot_drive_its_own_simulation() -> None:
 
 def test_a_state_of_anything_else_is_refused_and_changes_nothing() -> None:
     simulation = driven(steps=100)
-    state, other = simulation.save_state(), Simulation("step_steer", "afs", overrides=KEYS).save_state()
-    loop, wrong = state.loop, [None, 1, "state", (), object(), tuple(simulation.save_state()), other, other.loop]
-    wrong += [state._replace(**{name: value}) for name in ("loop", "rows", "given") for value in (None, (), "x")]
-    wrong.append(state._replace(metadata={}))
-    for name in ("engine", "faults", "fault_memories", "measurement", "motion", "commands", "step", "driver"):
-        wrong += [state._replace(loop=loop._replace(**{name: value})) for value in (None, "x", np.zeros(3))]
-    wrong += [
-        state._replace(rows=state.rows._replace(**{name: value}))
-        for name in ("kept", "rows", "yaw_rad")
-        for value in (None, "x")
-    ]
-    wrong.append(state._replace(rows=state.rows._replace(rows=10**6)))
+    state = simulation.save_state()
+    others = [
+        Simulation("step_steer", controller, overrides={**KEYS, **keys}, timestep_s=timestep_s).save_state()
+        for controller, keys, timestep_s in (
+            ("afs", {}, 1e-3), ("ars", {"controllers.bus_delay_s": 0.002}, 1e-3), ("ars", {}, 5e-4),
+        )
+    ]  # fmt: skip
+    older = replace(state.loop, inputs=(*state.loop.inputs[:-1], "0.0.1"))
+    both = [None, 1, "state", (), object(), {}, state.rows]
     before = simulation.truth
-    for given in wrong:
-        with pytest.raises(ParameterError):
-            simulation.restore_state(given)  # type: ignore[arg-type]
-        assert repr(simulation.truth) == repr(before), given
+    for restore, wrong in (
+        (simulation.restore_state, [*both, *others, state.loop]),
+        (simulation.loop.restore_state, [*both, *(other.loop for other in others), state, older]),
+    ):
+        for given in wrong:
+            with raises(ParameterError, key="state"):
+                restore(given)
+            assert repr(simulation.truth) == repr(before), given
     simulation.restore_state(state)
     assert_same_end(simulation, driven(steps=100))
+
+
+def test_a_damaged_pickle_is_one_error() -> None:
+    rebuild, (kind, content) = driven(steps=1).__reduce_ex__(5)
+    scenario, *_ = pickle.loads(content)
+    for damaged in (content[:-100], b"", pickle.dumps(None), pickle.dumps((scenario, "ars", 1e-3, None, None))):
+        with pytest.raises(ParameterError, match=r"cannot be unpickled"):
+            rebuild(kind, damaged)
 
 
 def test_the_public_name_is_the_same_class() -> None:

@@ -10,8 +10,7 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.tyre import MagicFormula, load_tir
-from activesteer.tyre.conventions import TyreConventions
-from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.tyre.tyre_parameters import TyreConventions, TyreParameters
 from tests.raising import raises
 from tests.unit.tyre.tyres import TYRES, differing
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ModelError
-from activesteer.vehicle import engine_layout
-from activesteer.vehicle.engine_layout import measure_engine_layout
+from activesteer.vehicle import force_block
+from activesteer.vehicle.force_block import measure_engine_layout
 from tests.raising import raises
 from tests.unit.vehicle.cars import standing
 
@@ -43,7 +43,7 @@ def test_offsets_differ_and_are_aligned() -> None:
 
 
 def test_an_unknown_struct_is_an_error_that_names_the_member(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine_layout, "_DATA_BYTES", 64)
+    monkeypatch.setattr(force_block, "_DATA_BYTES", 64)
     with raises(ModelError, value="mjData.qvel"):
         measure_engine_layout()
 
@@ -52,7 +52,7 @@ def test_two_models_that_disagree_are_an_error(monkeypatch: pytest.MonkeyPatch) 
     found = measure_engine_layout()
     answers = found, found._replace(d_qvel=found.d_qvel + 8)
     given = iter(answers)
-    monkeypatch.setattr(engine_layout, "_measure", lambda *_: next(given))
+    monkeypatch.setattr(force_block, "_measure", lambda *_: next(given))
     with raises(ModelError, value=answers):
         measure_engine_layout()
 

@@ -17,7 +17,7 @@ from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Vehicle
-from activesteer.vehicle.electric_drive import Battery, Motor, Motors
+from activesteer.vehicle.electric_actuators import Battery, Motor, Motors
 from activesteer.vehicle.faults import Faults
 from tests.raising import raises
 

@@ -24,9 +24,7 @@ RADIUS_M = PARAMETERS["UNLOADED_RADIUS"]
 
 
 def surface(contact: Any, *obstacles: Obstacle) -> Surface:
-    found = surface_of(Road(obstacle=obstacles, contact=contact))
-    assert found is not None
-    return found
+    return surface_of(Road(obstacle=obstacles, contact=contact))
 
 
 def plane(road: Surface, s: float, d: float = 0.0, heading: float = 0.0) -> tuple[float, float, float, float]:

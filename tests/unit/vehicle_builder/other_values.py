@@ -7,7 +7,7 @@ import typing
 from typing import Any, Final
 
 from activesteer.config import Range, dataclass_in
-from activesteer.vehicle.electric_drive import Motor, Motors
+from activesteer.vehicle.electric_actuators import Motor, Motors
 from tests.unit.vehicle_builder.other_curves import other_curves
 
 _WORDS: Final = {

@@ -15,8 +15,7 @@ from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
 from activesteer.scenario.car import VehicleConfig
 from activesteer.sensors.parameters import Sensors
-from activesteer.vehicle.electric_actuators import RearActuator
-from activesteer.vehicle.electric_drive import Motors
+from activesteer.vehicle.electric_actuators import Motors, RearActuator
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder import new_vehicle
 from activesteer.vehicle_builder.completion import pedal_of

@@ -29,7 +29,7 @@ typedef struct { int64_t kind, base, added, size; } Target;
 typedef struct { int64_t tendon; double first, second, third, damping, low, high; } Force;
 typedef struct { int64_t control, activation; double lag, rate, low, high, low_torque, high_torque; } Limit;
 typedef struct { int64_t variable, actuator, record, has_torque, act, qpos, seized, backlash; double ratio, free_m; } Part; /* native_faults.PART */
-enum { WORKS, STUCK, RUNS_LEFT, RUNS_RIGHT, FLOATS, REVERSED, DROPS_OUT };
+enum { WORKS, STICKS, RUNS_LEFT, RUNS_RIGHT, FLOATS }; /* native_faults.WORKS and others */
 enum { INPUT, OUTPUT, PARAMETER };
 enum { FROM_ROW = 16, FROM_RESULT, FROM_FORCE, FROM_LIMIT, FROM_MOTION, FROM_INPUT };
 typedef struct { const char *name; int causality, from, column; double start, low, high; } Variable;
@@ -38,6 +38,7 @@ typedef struct { const char *name; int causality, from, column; double start, lo
 extern void activesteer_step(intptr_t, intptr_t, intptr_t, intptr_t);
 extern void activesteer_derive(intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t);
 extern void activesteer_fault(intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, double, double);
+extern void activesteer_change(intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, intptr_t, double, double, intptr_t, intptr_t, intptr_t);
 extern void activesteer_passive(const mjModel *, mjData *);
 extern double activesteer_act_dyn(const mjModel *, const mjData *, int);
 extern void activesteer_sensor(const mjModel *, mjData *, int);
@@ -128,16 +129,12 @@ static void apply_fault(as_car *c, int part, int save) {
 static void follow_faults(as_car *c) {
     int active = 0;
     for (int part = 0; part < N_PARTS; part++) {
-        const Part *p = PARTS + part;
-        const double *wanted = c->values + p->variable;
-        double *fault = c->fault[part];
+        const double *wanted = c->values + PARTS[part].variable, *acting = c->fault[part];
         active += wanted[0] != WORKS || wanted[1] != 0.0;
-        if (wanted[0] == fault[0] && wanted[1] == fault[1]) continue;
-        /* A servo that was free starts at its present angle. */
-        if (fault[0] == FLOATS && wanted[0] != FLOATS && !p->seized) c->data->act[p->act] = c->data->qpos[p->qpos];
-        if (wanted[0] == STUCK && fault[0] != STUCK) fault[2] = c->data->ctrl[p->actuator];
-        fault[0] = wanted[0], fault[1] = wanted[1];
-        apply_fault(c, part, 0);
+        if (wanted[0] == acting[0] && wanted[1] == acting[1]) continue;
+        activesteer_change((intptr_t)(PARTS + part), (intptr_t)c->block, (intptr_t)c->model->actuator_gainprm,
+                           (intptr_t)c->model->actuator_biasprm, (intptr_t)c->healthy[part], (intptr_t)acting, wanted[0], wanted[1],
+                           (intptr_t)c->data->ctrl, (intptr_t)c->data->act, (intptr_t)c->data->qpos);
     }
     c->data->userdata[c->model->nuserdata - 1] = active;
 }

@@ -16,8 +16,7 @@ from activesteer.files import json_text
 from activesteer.resources import find_vehicle
 from activesteer.scenario import load_car
 from activesteer.studies.linear.identification import Identification, single_track_response, write_identified
-from activesteer.theory.single_track import SingleTrack
-from activesteer.theory.two_track import TwoTrackParameters
+from activesteer.theory.single_track import SingleTrack, TwoTrackParameters
 from tests.unit.analysis.synthetic import step_steer
 
 DEGPG = math.radians(1.0) / 9.81

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from activesteer.tyre import MagicFormula, load_tir
-from activesteer.tyre.conventions import TyreConventions
 from activesteer.tyre.file.syntax import COEFFICIENTS
 from activesteer.tyre.file.tir import tir_from_text, tir_text
+from activesteer.tyre.tyre_parameters import TyreConventions
 from tests.unit.tyre.tyres import TYRES, tyre
 
 FILES = sorted(TYRES.glob("*.tir"))

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from activesteer.drawing.car_model import links_of, primitives_of, scene_of
 from activesteer.resources import models_dir
-from activesteer.simulation.recorder import links_of, primitives_of, scene_of
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,96 @@
+"""Contents of the recording of a run apart from its rows: what is needed to repeat and draw it."""
+
+from __future__ import annotations
+
+import functools
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from activesteer.controllers.find import interval_s
+from activesteer.conventions import Array
+from activesteer.drawing.car_model import scene_of
+from activesteer.plugins import Plugin
+from activesteer.recording import McapWriter, Poses, Recording, ScenePart
+from activesteer.road.drawn import DrawnSurface, places_to_draw
+from activesteer.road.surface import surface_of
+from activesteer.scenario.scenario import Scenario, describe
+from activesteer.signals import Channel
+from activesteer.vehicle import Vehicle
+from activesteer.version import __version__
+
+_BEYOND_M: Final = 30.0
+"""Length of road that is drawn beyond the distance at the speed of the manoeuvre [m]."""
+
+
+class RunContext(NamedTuple):
+    """Contents of a recording apart from its rows.
+
+    Attributes:
+        channels: The table of channels.
+        body_names: Bodies whose poses are recorded.
+        metadata: Resolved parameters, versions.
+        files: Manoeuvre, vehicle, model and tyre files, and the code of a user's controller and driver.
+        scene: Appearance of the car.
+    """
+
+    channels: tuple[Channel, ...]
+    body_names: tuple[str, ...]
+    metadata: dict[str, Any]
+    files: dict[str, bytes]
+    scene: tuple[ScenePart, ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario, vehicle: Vehicle, controller: Plugin) -> RunContext:
+        """Return the context of a run of a scenario, before the run."""
+        own_s = interval_s(controller, scenario.car.config.controllers, vehicle.timestep_s)
+        metadata = {
+            "controller": controller.name,
+            **(
+                {"controller_parameters": values}
+                if (values := controller.parameters_with(scenario.user_parameters))
+                else {}
+            ),
+            **describe(scenario),
+            **({"controller_uses_truth": True} if controller.uses_truth else {}),
+            **({"controller_interval_s": own_s} if own_s != vehicle.timestep_s else {}),
+            "car": vehicle.dimensions(),
+            "timestep_s": vehicle.timestep_s,
+            "versions": _versions(),
+        }
+        if (course := scenario.maneuver.course) is not None:
+            metadata["course"] = course.to_table()
+        road = scenario.maneuver.ground
+        if road.is_uneven:
+            surface = surface_of(road)
+            length_m = abs(scenario.maneuver.speed_mps) * scenario.maneuver.duration_s + _BEYOND_M
+            s_m, d_m = places_to_draw(road, length_m)
+            places = np.meshgrid(s_m, d_m, indexing="ij")
+            z_m = surface.at(*(place.ravel() for place in places))[:, 0].reshape(len(s_m), len(d_m))
+            metadata["surface"] = DrawnSurface(s_m, d_m, z_m).to_table()
+        files = {**scenario.files, **controller.files}
+        return cls(vehicle.channels.channels, vehicle.body_names, metadata, files, scene_of(vehicle.model))
+
+    def recording(self, time_s: Array, values: Array, poses: Poses) -> Recording:
+        """Return the recording with these rows."""
+        return Recording(
+            self.channels, time_s, values, poses=poses, metadata=self.metadata, attachments=self.files, scene=self.scene
+        )
+
+    def writer(self, path: Path) -> McapWriter:
+        """Open a file for the rows."""
+        return McapWriter(path, self.channels, self.body_names, self.metadata, self.files, self.scene)
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    found = {"activesteer": __version__, "python": platform.python_version(), "platform": platform.platform()}
+    for package in ("mujoco", "numpy", "numba"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "unknown"
+    return found
