@@ -24,7 +24,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-import activesteer
 from activesteer.analysis.claims.judge import SCENARIOS
 from activesteer.config import toml_value
 from activesteer.controllers import controller_spec, is_variant, read_variant
@@ -64,7 +63,7 @@ def _of_bytes(value: object) -> str:
 @functools.cache
 def source_digest() -> str:
     """Return the hash of the sources that results depend on. The version number does not change with every edit."""
-    package = Path(activesteer.__file__).parent
+    package = Path(__file__).parents[2]
     found = {}
     for part in _DECIDING:
         inside = (path for path in (package / part).rglob("*") if path.suffix in (".py", ".txt"))
