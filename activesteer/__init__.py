@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from activesteer.version import __version__
+from activesteer.core.version import __version__
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from activesteer.core.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, Setpoint
     from activesteer.recording import Recording
-    from activesteer.signals import ActuatorCommand, DriverCommand, Estimate, Measurement, Motion, Setpoint
     from activesteer.simulation.batch import Batch
     from activesteer.simulation.runner import simulate
     from activesteer.simulation.simulation import Simulation
@@ -34,13 +34,13 @@ __all__ = [
 _HOMES = {
     "Batch": "activesteer.simulation.batch",
     "Recording": "activesteer.recording",
-    "DriverCommand": "activesteer.signals",
-    "Estimate": "activesteer.signals",
-    "Measurement": "activesteer.signals",
-    "Motion": "activesteer.signals",
-    "Setpoint": "activesteer.signals",
+    "DriverCommand": "activesteer.core.signals",
+    "Estimate": "activesteer.core.signals",
+    "Measurement": "activesteer.core.signals",
+    "Motion": "activesteer.core.signals",
+    "Setpoint": "activesteer.core.signals",
     "Simulation": "activesteer.simulation.simulation",
-    "ActuatorCommand": "activesteer.signals",
+    "ActuatorCommand": "activesteer.core.signals",
     "simulate": "activesteer.simulation.runner",
     "study": "activesteer.studies.engine.study",
 }

@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import Final
 
+from activesteer.core.files import is_file, is_folder, user_path, why_no_file
 from activesteer.errors import (
     ActiveSteerError,
     ControllerError,
@@ -20,7 +21,6 @@ from activesteer.errors import (
     nearest_names,
     shown,
 )
-from activesteer.files import is_file, is_folder, user_path, why_no_file
 
 _PACKAGE = Path(__file__).resolve().parent
 

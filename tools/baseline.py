@@ -21,9 +21,9 @@ import numpy as np
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.metrics import evaluation_of
+from activesteer.core.files import read_text, write_json
+from activesteer.core.metric_table import recorded_metric
 from activesteer.errors import ActiveSteerError, RecordingError
-from activesteer.files import read_text, write_json
-from activesteer.metric_table import recorded_metric
 from activesteer.recording import Recording
 
 BASELINE: Final = Path(__file__).with_name("baseline.json")

@@ -25,10 +25,10 @@ from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, R
 from activesteer.analysis.tables import Change, significance
 from activesteer.config import Source
 from activesteer.controllers import controller_spec
+from activesteer.core.files import make_folder
+from activesteer.core.metric_table import SIDESLIP_PEAKS
+from activesteer.core.metric_table import metric as declared
 from activesteer.errors import ParameterError, SimulationDiverged
-from activesteer.files import make_folder
-from activesteer.metric_table import SIDESLIP_PEAKS
-from activesteer.metric_table import metric as declared
 from activesteer.plotting import Heat, Picture, draw
 from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, resolve

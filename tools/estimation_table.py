@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer import simulate
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.studies.engine.workers import in_parallel

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from PIL import Image
 
-from activesteer.conventions import SYSTEM_LABELS
+from activesteer.core.conventions import SYSTEM_LABELS
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.simulation.preparation import with_amplitude_found

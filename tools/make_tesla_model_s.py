@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.config import toml_text
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.resources import models_dir
 from activesteer.studies.linear.identification import RADIUS_TEST, identify, write_identified
 from activesteer.vehicle_builder import new_vehicle

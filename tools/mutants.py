@@ -67,16 +67,16 @@ ROOMS: Final = {
     ),
     "estimation": Room("estimation/*.py", "unit/estimation", "physics/test_sensors.py"),
     "brakes": Room(
-        "brakes/*.py",
-        "unit/brakes physics/test_chassis_hardware.py",
+        "vehicle/brakes/*.py",
+        "unit/vehicle/brakes physics/test_chassis_hardware.py",
         "physics/test_braking.py physics/test_standstill.py",
-        plain="unit/brakes",
+        plain="unit/vehicle/brakes",
     ),
     "driver": Room(
         "driver/*.py", "unit/driver physics/test_step_steer.py", "unit/scenario physics/test_driver_loop.py"
     ),
     "sensors": Room("sensors/*.py", "unit/sensors physics/test_sensors.py"),
-    "faults": Room("faults.py vehicle/faults.py", "unit/faults physics/test_faults.py"),
+    "faults": Room("config/faults.py vehicle/faults.py", "unit/faults physics/test_faults.py"),
     "tyre/kernels": Room(
         "tyre/kernels/*.py",
         "unit/tyre/kernels reference/test_tyre_against_mfeval.py",

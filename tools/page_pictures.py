@@ -19,7 +19,7 @@ from typing import Final
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
-from activesteer.cli import main as activesteer
+from activesteer.commands.cli import main as activesteer
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.render.headless import Headless
@@ -57,7 +57,7 @@ def write_pages(folder: Path) -> dict[str, Path]:
 
 def draw_explore(browser: Browser, folder: Path) -> Image.Image:
     """Return a picture of `activesteer explore` in the middle of a sine with dwell."""
-    program = "from activesteer.cli import main; main()"
+    program = "from activesteer.commands.cli import main; main()"
     command = [sys.executable, "-c", program, "explore", "--json", "-o", str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None

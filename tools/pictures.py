@@ -24,6 +24,7 @@ from PIL import Image
 from activesteer import ActuatorCommand, Simulation, study
 from activesteer.analysis.figures import BY_KIND, over_time, style
 from activesteer.analysis.frequency_response import frequency_response
+from activesteer.core.units import DisplayUnit, quantity_of
 from activesteer.drawing.panels import PANELS, Line, Panel, panel_of
 from activesteer.plotting import Heat, Picture, draw, new_figure
 from activesteer.resources import list_maneuvers, models_dir
@@ -35,7 +36,6 @@ from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops, driver_loops_figure
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
-from activesteer.units import DisplayUnit, quantity_of
 from tools.comparison import COMPARED, compare, comparison_figure, comparison_population_figure
 from tools.population_results import read_population
 

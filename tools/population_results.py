@@ -19,10 +19,10 @@ from activesteer.analysis.claims.judge import Claim
 from activesteer.analysis.claims.scorecard import NO_FACTOR, ClaimProportion, read_claims, stored_table
 from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity
 from activesteer.analysis.harm import changes as growth_of
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.files import finite
+from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.errors import ManeuverError, ModelError, ParameterError, StudyError
-from activesteer.files import finite
-from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.analysis import strongest
 from activesteer.studies.engine.factor_values import FactorValues, label_of

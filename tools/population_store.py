@@ -22,10 +22,10 @@ from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.scorecard import BANDS, PAPER, SUMMARY, TRACK, Band, read_setting
 from activesteer.analysis.harm import MEASURES
 from activesteer.commands.terminal import Progress
-from activesteer.conventions import CURVE_STEP_S, Array
+from activesteer.core.conventions import CURVE_STEP_S, Array
+from activesteer.core.files import atomic_write, make_folder, write_text
+from activesteer.core.metric_table import metric
 from activesteer.errors import StudyError
-from activesteer.files import atomic_write, make_folder, write_text
-from activesteer.metric_table import metric
 from activesteer.resources import find_study, studies_dir
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.runs import CLAIM, CURVE, DISTANCE, drive

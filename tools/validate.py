@@ -16,9 +16,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.files import write_json
 from activesteer.errors import ActiveSteerError, ParameterError
-from activesteer.files import write_json
 from activesteer.pages import write_page
 from tests.reference.chrono.comparison import Comparison, to_json
 from tests.reference.chrono.programme import validate, write_runs

@@ -15,7 +15,7 @@ import numpy as np
 
 from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import RecordingError
 
 STOPPED_MPS: Final = 0.1

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import RecordingError
 
 INPUT: Final = "steering_wheel_demand_rad"

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.series import sizes
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import RecordingError
 from activesteer.road.road import road_of
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from activesteer.analysis.series import timestep
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.theory.single_track import characteristic_speed
 

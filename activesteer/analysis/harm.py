@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
-from activesteer.metric_table import (
+from activesteer.core.metric_table import (
     CONES_HIT,
     CONES_MISSED,
     LANE_OVERSTEP,
@@ -23,7 +23,7 @@ from activesteer.metric_table import (
     STAYS_IN_LANES,
     recorded_metric,
 )
-from activesteer.units import DisplayUnit, display_unit
+from activesteer.core.units import DisplayUnit, display_unit
 
 Metrics = Mapping[str, float | None]
 """Metrics of a run. A value that is not defined is None or nan."""

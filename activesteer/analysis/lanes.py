@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike, read_footprint
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.path import Path
 from activesteer.errors import RecordingError
 from activesteer.road.course import CONE_RADIUS_M, Course, Footprint
-from activesteer.road.path import Path
 
 
 def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> float:

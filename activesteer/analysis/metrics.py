@@ -17,8 +17,8 @@ from activesteer.analysis import (
 )
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 from activesteer.config import read_toml
+from activesteer.core.metric_table import Metric, metric
 from activesteer.errors import RecordingError, nearest_names
-from activesteer.metric_table import Metric, metric
 
 
 class Evaluation(NamedTuple):

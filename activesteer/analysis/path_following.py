@@ -16,7 +16,7 @@ import numpy as np
 from activesteer.analysis import lanes
 from activesteer.analysis.series import counted, lag, largest_rate, rate_rms, rms, sizes, timestep
 from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.road.course import Course
 
 AFTER_S: Final = 3.0

@@ -27,8 +27,8 @@ import numpy as np
 
 from activesteer.analysis.harm import changes, severity
 from activesteer.config import Source, field_in_unit
+from activesteer.core.metric_table import METRICS, RENAMED
 from activesteer.errors import nearest_names, shown
-from activesteer.metric_table import METRICS, RENAMED
 
 HARM: Final = "harm"
 CLAIM: Final = "claim"

@@ -31,7 +31,7 @@ from activesteer.analysis.series import (
     zeroing_range,
 )
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import RecordingError
 
 STEERING_CUT_OFF_Hz: Final = 10.0

@@ -19,7 +19,7 @@ from activesteer.analysis import handling
 from activesteer.analysis.series import Array, crossing_time, largest_rate, low_pass, step_response, timestep
 from activesteer.analysis.sine_with_dwell import MOTION_CUT_OFF_Hz, STEERING_CUT_OFF_Hz
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.errors import RecordingError
 
 STEADY_WINDOW_S: Final = 1.0

@@ -8,9 +8,9 @@ from enum import StrEnum
 from typing import Final, NamedTuple
 
 from activesteer.analysis.harm import LOST, shown
-from activesteer.metric_table import FRICTION_UTILISATION, recorded_metric
-from activesteer.text_table import text_table, wrapped_line
-from activesteer.units import typeset
+from activesteer.core.metric_table import FRICTION_UTILISATION, recorded_metric
+from activesteer.core.text_table import text_table, wrapped_line
+from activesteer.core.units import typeset
 
 Paint = Callable[[str, str, float, float, str], str]
 """Function from label of a run, name of a metric, its value in this and in the first run, and its text to the text

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.commands import arguments, terminal
+from activesteer.core.files import write_text
 from activesteer.errors import ParameterError, TyreFileError, nearest_names
-from activesteer.files import write_text
 from activesteer.resources import models_dir
 
 command: Final = arguments.Group("car")
@@ -150,8 +150,8 @@ def _kc(options: argparse.Namespace) -> None:
     arguments.JSON,
 )  # fmt: skip
 def _export(options: argparse.Namespace) -> None:
+    from activesteer.core.files import make_folder
     from activesteer.coupling.car import export_fmu, export_library
-    from activesteer.files import make_folder
     from activesteer.scenario import resolve
 
     scenario = resolve(options.maneuver, options.vehicle, arguments.overrides_of(options))

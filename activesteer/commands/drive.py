@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands import arguments, terminal
+from activesteer.core.files import make_folder
 from activesteer.errors import ActiveSteerError, ParameterError, shown
-from activesteer.files import make_folder
 
 if TYPE_CHECKING:
     from activesteer.plugins import Plugin
@@ -101,7 +101,7 @@ class _Failures(dict[str, str]):
 )  # fmt: skip
 def _run(options: argparse.Namespace) -> bool:
     from activesteer.controllers import controller_spec
-    from activesteer.conventions import DEFAULT_TIMESTEP_S
+    from activesteer.core.conventions import DEFAULT_TIMESTEP_S
     from activesteer.coupling.fmu import isolated
     from activesteer.scenario import check_gains
     from activesteer.simulation.preparation import with_amplitude_found

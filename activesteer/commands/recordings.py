@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands import arguments, terminal
+from activesteer.core.files import atomic_write, shown_path
 from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
-from activesteer.files import atomic_write, shown_path
 
 if TYPE_CHECKING:
     from activesteer.recording import Recording
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 command: Final = arguments.Group("recordings")
 _CUTAWAY: Final = arguments.flag("--cutaway", "show the suspension through the body")
 _CORNERS: Final = ("fl", "fr", "rl", "rr")
-"""As in `activesteer.conventions`, which takes too long to import for `--help`."""
+"""As in `activesteer.core.conventions`, which takes too long to import for `--help`."""
 
 
 @command("info", "print the contents of a recording, or repair it",

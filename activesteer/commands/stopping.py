@@ -103,8 +103,8 @@ class StopSignals:
                 saved = "the saved files are unknown"
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
             line = f"activesteer: stopped by {name}; {saved}{getattr(self.options, 'how_to_resume', '')}"
-            if "activesteer.files" in sys.modules:
-                sys.modules["activesteer.files"].delete_temporary_files()
+            if "activesteer.core.files" in sys.modules:
+                sys.modules["activesteer.core.files"].delete_temporary_files()
             if not self._watching:
                 print(line, file=sys.stderr)
                 return 128 + number

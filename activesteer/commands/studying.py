@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands import arguments, terminal
+from activesteer.core.files import make_folder
 from activesteer.errors import ParameterError, StudyError
-from activesteer.files import make_folder
 from activesteer.resources import DEFAULT_DRIVER
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from activesteer.files import json_text
-from activesteer.text_table import COLUMNS, WHOLE, text_table, wrapped_line
+from activesteer.core.files import json_text
+from activesteer.core.text_table import COLUMNS, WHOLE, text_table, wrapped_line
 
 if TYPE_CHECKING:
     from activesteer.studies.engine.study import StudyProgress

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from activesteer.commands import arguments, terminal
+from activesteer.core.files import write_json
 from activesteer.errors import ParameterError
-from activesteer.files import write_json
 
 if TYPE_CHECKING:
     from activesteer.studies.reproduction import Reproduction

@@ -14,11 +14,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
-from activesteer import limits
+from activesteer.core import limits
+from activesteer.core.files import read_text
+from activesteer.core.limits import MAX_NUMBER, MAX_TOML_LETTERS
+from activesteer.core.units import EDGE_UNITS
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
-from activesteer.files import read_text
-from activesteer.limits import MAX_NUMBER, MAX_TOML_LETTERS
-from activesteer.units import EDGE_UNITS
 
 
 class Range(NamedTuple):

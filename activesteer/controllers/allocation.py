@@ -33,9 +33,9 @@ from typing import Final
 
 from activesteer.controllers.axle_slopes import AxleSlopes, axle_forces, excess, front_slip, slopes
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.native_records import NativeBlock
-from activesteer.shared_laws import shared
-from activesteer.signals import Estimate
+from activesteer.core.signals import Estimate
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import shared
 
 _FRICTION: Final = Estimate._fields.index("friction")
 

@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.signals import Estimate
 from activesteer.estimation import KnownTyre
-from activesteer.native_records import NativeBlock, Table, table
-from activesteer.shared_laws import shared
-from activesteer.signals import Estimate
+from activesteer.native.records import NativeBlock, Table, table
+from activesteer.native.shared_laws import shared
 
 LEAST: Final = 0.05
 """Smallest slope, for a curve that is level or falls: steering always keeps some effect [-]."""

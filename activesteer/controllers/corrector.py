@@ -7,8 +7,8 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 from activesteer.controllers.parameters import CorrectorParameters, DesiredYawRateParameters
-from activesteer.native_records import NativeBlock
-from activesteer.shared_laws import shared
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import shared
 from activesteer.theory.single_track import SingleTrack, yaw_rate_gain
 from activesteer.theory.tolerance import tolerance
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from activesteer.controllers.parameters import ControllerSetup, EscParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 
 if TYPE_CHECKING:
     from activesteer.estimation.estimator import Estimator

@@ -12,10 +12,10 @@ from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.registry import IN_EXAMPLES, WITHOUT_FILE
 from activesteer.controllers.variant import read_variant
+from activesteer.core.signals import NO_BRAKES, NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement
 from activesteer.errors import ControllerError, ParameterError, shown
 from activesteer.plugins import Declared, Kind, Plugin, declared_in, find
 from activesteer.resources import list_controller_variants
-from activesteer.signals import NO_BRAKES, NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement
 
 
 class Controller(Protocol):

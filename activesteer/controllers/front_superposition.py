@@ -16,9 +16,9 @@ from activesteer.controllers.corrector import (
     reset,
 )
 from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
-from activesteer.native_records import NativeBlock
-from activesteer.shared_laws import law_of
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, steering
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import law_of
 from activesteer.theory.single_track import SingleTrack
 
 

@@ -55,9 +55,9 @@ from activesteer.controllers.lqr import Lqr, Turn
 from activesteer.controllers.parameters import ControllerSetup, IntegratedParameters
 from activesteer.controllers.torque_vectoring import SplitTorques
 from activesteer.controllers.turn_reference import BorneTurnReference
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
 from activesteer.errors import ControllerError, not_installed
-from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
 
 Solve = Callable[[Array, Array, Array, Array, Array], Array]
 """Function from H, f, A, lower and upper to the x that minimises x' H x / 2 + f' x; first the bounds of x,

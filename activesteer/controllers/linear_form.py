@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from activesteer.controllers.find import is_variant, system_of
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup, CorrectorParameters
 from activesteer.controllers.variant import read_variant
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.errors import ControllerError, shown
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.theory.single_track import SingleTrack
 
 _LINEAR: Final = ("none", "ars", "afs")

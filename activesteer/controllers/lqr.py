@@ -58,11 +58,19 @@ from activesteer.controllers.turn_reference import (
     desired_ahead,
     desired_turn,
 )
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import (
+    NO_BRAKES,
+    ActuatorCommand,
+    DriverCommand,
+    Estimate,
+    Measurement,
+    PerWheel,
+    steering,
+)
 from activesteer.estimation.estimator import Estimator
-from activesteer.native_records import NativeBlock, Table, table
-from activesteer.shared_laws import shared
-from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement, PerWheel, steering
+from activesteer.native.records import NativeBlock, Table, table
+from activesteer.native.shared_laws import shared
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
 SPEED_STEP_MPS: Final = 5.0

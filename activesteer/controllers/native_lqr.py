@@ -6,14 +6,14 @@ from typing import Any, Final
 
 from numba import carray, from_dtype, types
 
-from activesteer.compilation import address_of, compiled_call
 from activesteer.controllers.lqr import Lqr, regulated
+from activesteer.core.signals import DriverCommand, Measurement, numbers_of
 from activesteer.estimation.advance import advance
 from activesteer.estimation.records import KNOWN, MEMORY, SAID
 from activesteer.estimation.setup import GRID
-from activesteer.native_memory import CALL, N_COMMAND, N_HELD, f64_pointer, pointer_to
-from activesteer.native_records import record_type
-from activesteer.signals import DriverCommand, Measurement, numbers_of
+from activesteer.native.compilation import address_of, compiled_call
+from activesteer.native.memory import CALL, N_COMMAND, N_HELD, f64_pointer, pointer_to
+from activesteer.native.records import record_type
 
 _MEASURED: Final = [number.name for number in numbers_of(Measurement)]
 _SAID, _REAR, _SUPERPOSITION, _PRESSURES = map(

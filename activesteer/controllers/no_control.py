@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from activesteer.controllers.corrector import DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.native_records import NativeBlock
-from activesteer.shared_laws import law_of
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, steering
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import law_of
 from activesteer.theory.single_track import SingleTrack
 
 if TYPE_CHECKING:

@@ -24,9 +24,9 @@ from activesteer.controllers.corrector import (
     reset,
 )
 from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters, SideslipRearSteerParameters
-from activesteer.native_records import NativeBlock
-from activesteer.shared_laws import law_of, shared
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, steering
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, steering
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import law_of, shared
 from activesteer.theory.single_track import SingleTrack, rear_prediction
 
 if TYPE_CHECKING:

@@ -36,9 +36,9 @@ from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.esc import beyond
 from activesteer.controllers.parameters import ControllerSetup, TorqueVectoringParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.signals import NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement, PerWheel
 from activesteer.errors import ControllerError
-from activesteer.signals import NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement, PerWheel
 
 if TYPE_CHECKING:
     from activesteer.estimation.estimator import Estimator

@@ -6,11 +6,11 @@ import math
 from typing import Final, NamedTuple
 
 from activesteer.controllers.parameters import ControllerSetup, EscParameters, TorqueVectoringParameters
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.signals import Estimate, new_message
 from activesteer.estimation.estimator import Estimator
-from activesteer.native_records import NativeBlock
-from activesteer.shared_laws import shared
-from activesteer.signals import Estimate, new_message
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import shared
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, yaw_rate_gain
 
 

@@ -8,13 +8,10 @@ from typing import Any, Final
 import numpy as np
 from numba import types
 
-from activesteer.compilation import compiled_call
 from activesteer.controllers.find import controller_spec
 from activesteer.controllers.parameters import ControllerSetup
-from activesteer.conventions import Array
-from activesteer.native_memory import N_COMMAND, N_HELD, call_law, law_address
-from activesteer.native_records import record_type, values
-from activesteer.signals import (
+from activesteer.core.conventions import Array
+from activesteer.core.signals import (
     ActuatorCommand,
     DriverCommand,
     Measurement,
@@ -23,6 +20,9 @@ from activesteer.signals import (
     numbers_in,
     numbers_of,
 )
+from activesteer.native.compilation import compiled_call
+from activesteer.native.memory import N_COMMAND, N_HELD, call_law, law_address
+from activesteer.native.records import record_type, values
 
 _ROWS: Final = types.Array(types.float64, 2, "C")
 

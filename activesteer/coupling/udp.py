@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.errors import ManeuverError, ParameterError
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 
 COMMAND: Final = struct.Struct("<4sIII12d")
 """Magic `ASC1`, sequence number, flags, 0. Then steering wheel, drive torque, brake pedal, parking brake, gear, rear

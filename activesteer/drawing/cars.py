@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.recording import Primitive, ScenePart
 from activesteer.resources import models_dir
 from activesteer.road.course import Footprint

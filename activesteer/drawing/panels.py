@@ -7,9 +7,9 @@ from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
+from activesteer.core.units import ESTIMATED, MEASURED, DisplayUnit, Quantity, quantity_of
 from activesteer.errors import RecordingError
-from activesteer.units import ESTIMATED, MEASURED, DisplayUnit, Quantity, quantity_of
 
 FIGURE, REPORT, EXPLORE, FILM = "figure", "report", "explore", "film"
 MOTION, DRIVING, BODY, WHEELS = "Motion", "Driving", "Body", "Wheels"

@@ -11,10 +11,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
+from activesteer.core.units import quantity_of
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
-from activesteer.units import quantity_of
 
 CHANNELS: Final = tuple(f"{corner}_steer_rad" for corner in CORNERS)
 RADIUS_M: Final = 1.2

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Protocol
 
 from activesteer.config import Range
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
+from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.theory.single_track import SingleTrackParameters
 
 

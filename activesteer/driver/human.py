@@ -12,8 +12,9 @@ import numpy as np
 from numba import carray
 from numpy.typing import NDArray
 
-from activesteer.compilation import inlined
 from activesteer.config import Range
+from activesteer.core.path import Path
+from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint, WheelTorques, new_message, numbers_of
 from activesteer.driver.base import DriverParameters, DriverSetup
 from activesteer.driver.open_loop import (
     NO_RACK,
@@ -25,12 +26,11 @@ from activesteer.driver.open_loop import (
 )
 from activesteer.driver.path_preview import N_SPEEDS, SPEED_STEP_MPS, PathPreviewDriver, look, looks, moved
 from activesteer.errors import DriverError, ManeuverError, SimulationDiverged, shown
-from activesteer.native_memory import array_of, f64_pointer, word_pointer
-from activesteer.native_records import ARRAY, NativeBlock
+from activesteer.native.compilation import inlined
+from activesteer.native.memory import array_of, f64_pointer, word_pointer
+from activesteer.native.records import ARRAY, NativeBlock
 from activesteer.plugins import Kind, Plugin, find
 from activesteer.resources import list_drivers
-from activesteer.road.path import Path
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, WheelTorques, new_message, numbers_of
 from activesteer.theory.single_track import SingleTrack
 
 
@@ -242,7 +242,7 @@ class _DriverKind(Kind):
         """Return a command with the angle at the road wheel (see the base class)."""
         torques, front = command.wheel_torques, command.front_steer_demand_rad
         if torques is not None and not _are_torques(torques):
-            needed = "an activesteer.signals.WheelTorques of finite numbers is needed"
+            needed = "an activesteer.core.signals.WheelTorques of finite numbers is needed"
             raise self.fail(name, f"{said} wheel_torques = {shown(torques)}; {needed}", torques)
         if command.gear not in _GEARS:
             raise self.fail(name, f"{said} gear = {shown(command.gear)}; -1, 0 or 1 is needed", command.gear, _GEARS)

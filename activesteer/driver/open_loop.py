@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
+from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint, new_message
 from activesteer.driver.base import DriverParameters, DriverSetup, Drivetrain
 from activesteer.errors import ManeuverError
-from activesteer.native_records import NativeBlock
-from activesteer.shared_laws import shared
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint, new_message
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import shared
 
 _STANDSTILL_MPS: Final = 0.05
 """Below this speed standing still needs no torque [m/s]."""

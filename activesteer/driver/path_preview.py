@@ -20,14 +20,14 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.compilation import compiled
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.driver.base import DriverParameters
 from activesteer.driver.open_loop import OpenLoopDriver
-from activesteer.native_records import NativeBlock
+from activesteer.native.compilation import compiled
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import shared
 from activesteer.road.native_path import PathSearch, nearest, point_at
-from activesteer.shared_laws import shared
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 
 LateralModel = Callable[[float], tuple[Array, Array]]
 """Function from speed [m/s] to system matrix (2, 2) and input matrix (2, k). The states are yaw rate [rad/s] and

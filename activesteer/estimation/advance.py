@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.compilation import compiled, inlined
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.estimation.kalman_filter import begin, correct, predict
 from activesteer.estimation.records import (
     FRICTION,
@@ -31,6 +30,7 @@ from activesteer.estimation.records import (
 from activesteer.estimation.speed_filter import correct_speed, predict_speed, start_speed
 from activesteer.estimation.two_track_model import SLOWEST_MPS, follow, follow_roll, forces_of
 from activesteer.estimation.wheels import read_wheels
+from activesteer.native.compilation import compiled, inlined
 
 _SHORTEST_S: Final = 0.004
 """Shortest time between two steps of the filters, and step of the model on its way to the present [s]."""

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import Estimate, Measurement, new_message
 from activesteer.estimation.records import MEMORY, SAID, known_of
 from activesteer.estimation.setup import GRID, EstimatorParameters, EstimatorSetup
-from activesteer.native_records import NativeBlock
-from activesteer.signals import Estimate, Measurement, new_message
+from activesteer.native.records import NativeBlock
 
 _pack_into = struct.Struct(f"{len(SAID)}d").pack_into
 

@@ -34,8 +34,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.compilation import compiled, inlined
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.estimation.records import (
     AY_OFFSET,
     BANK,
@@ -62,6 +61,7 @@ from activesteer.estimation.two_track_model import (
     forces_of,
     slip_angles,
 )
+from activesteer.native.compilation import compiled, inlined
 
 _DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 1.0, 0.01, 0.01, 0.01])
 """Steps of the differences, in the units of the states."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.estimation.setup import EstimatorParameters, EstimatorSetup
 
 if TYPE_CHECKING:

@@ -26,8 +26,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.compilation import compiled, inlined
 from activesteer.estimation.records import FRICTION
+from activesteer.native.compilation import compiled, inlined
 
 _GATE: Final = 3.0
 """Standard deviations of additional slip beyond which a wheel is left out."""

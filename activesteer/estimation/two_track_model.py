@@ -37,7 +37,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.compilation import compiled, inlined
 from activesteer.estimation.records import (
     BANK,
     FRICTION,
@@ -51,6 +50,7 @@ from activesteer.estimation.records import (
     REAR_STIFFNESS,
     YAW_RATE,
 )
+from activesteer.native.compilation import compiled, inlined
 
 LEAST_FRICTION: Final = 0.05
 LARGEST_FRICTION: Final = 1.5

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.compilation import compiled
 from activesteer.estimation.records import (
     FRICTION,
     LATERAL_SPEED,
@@ -20,6 +19,7 @@ from activesteer.estimation.records import (
     SAID_SPINS,
     YAW_RATE,
 )
+from activesteer.native.compilation import compiled
 
 STANDING_MPS: Final = 0.5
 """Below this speed, standing wheels mean a standing car [m/s]."""

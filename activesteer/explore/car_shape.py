@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed
 from activesteer.recording import Recording

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.controllers import CONTROLLERS
+from activesteer.core.files import is_file
 from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.explore.messages import Choice
-from activesteer.files import is_file
 from activesteer.maneuver import KINDS
 from activesteer.resources import (
     list_controller_variants,

@@ -12,7 +12,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from msgspec import UNSET
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
+from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.driver import DriverSetup
 from activesteer.driver.open_loop import SpeedHold
 from activesteer.errors import ActiveSteerError
@@ -22,7 +23,6 @@ from activesteer.explore.messages import Act, Start
 from activesteer.explore.runs import Reply, free_path
 from activesteer.road.course import CONE_RADIUS_M, Footprint
 from activesteer.scenario import resolve
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.live_view import FramePacer
 from activesteer.simulation.simulation import Simulation
 

@@ -18,14 +18,14 @@ from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.run_page import write_report
 from activesteer.controllers import controller_spec
-from activesteer.conventions import run_looks
+from activesteer.core.conventions import run_looks
+from activesteer.core.metric_table import Better, recorded_metric
 from activesteer.drawing.panels import EXPLORE
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.car_shape import poses_of, shape_of
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import Choice, Describe, RunRequest
 from activesteer.explore.sliders import Slider, sliders
-from activesteer.metric_table import Better, recorded_metric
 from activesteer.plugins import Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER

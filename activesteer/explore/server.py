@@ -28,14 +28,14 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.core.files import finite
+from activesteer.core.version import __version__
 from activesteer.errors import ActiveSteerError
 from activesteer.explore.choice import Folder
 from activesteer.explore.drive import COURSES
 from activesteer.explore.messages import MAX_CONTROLLERS, MAX_MESSAGE_BYTES, End, Message, add, read
 from activesteer.explore.worker import work
-from activesteer.files import finite
-from activesteer.version import __version__
 
 HOST: Final = "127.0.0.1"
 _TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}

@@ -13,10 +13,10 @@ from typing import Any, Final, NamedTuple
 
 from activesteer.config import field_in_unit, leaf_keys, spellings
 from activesteer.controllers import declared_parameters
+from activesteer.core.units import parameter_label, parameter_words
 from activesteer.errors import ParameterError
 from activesteer.plugins import Declared
 from activesteer.scenario import Scenario, value_of
-from activesteer.units import parameter_label, parameter_words
 
 _MANEUVER: Final = {
     "speed_kmh": (20.0, 160.0, 1.0),

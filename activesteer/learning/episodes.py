@@ -13,10 +13,10 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, Motion, arrays_of, numbers_of
 from activesteer.errors import ParameterError, shown
 from activesteer.road.native_path import PathSearches
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, arrays_of, numbers_of
 from activesteer.simulation.batch import Batch
 from activesteer.studies.engine.factor_values import FactorValues
 from activesteer.studies.engine.study_file import read_study

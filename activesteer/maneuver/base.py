@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Final, Literal
 
-from activesteer import limits
 from activesteer.config import Range, Source, field_in_unit
+from activesteer.config.faults import Fault
+from activesteer.core import limits
+from activesteer.core.files import csv_number, is_file, read_bytes, read_csv, user_path
+from activesteer.core.signals import Setpoint, new_message
 from activesteer.errors import ManeuverError, nearest_names, shown
-from activesteer.faults import Fault
-from activesteer.files import csv_number, is_file, read_bytes, read_csv, user_path
 from activesteer.road.course import Course
 from activesteer.road.crg import packed, referenced
 from activesteer.road.road import Road
-from activesteer.signals import Setpoint, new_message
 
 Speed = Annotated[float, Range(-20.0, 100.0)]
 Side = Literal["left", "right"]

@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import Annotated, Final
 
 from activesteer.config import Range
+from activesteer.core.path import Path
+from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import Maneuver, check_search_speed, within
 from activesteer.maneuver.steering_tests import SteadyTurn, StepInput, StepSteer
 from activesteer.road.course import Course
-from activesteer.road.path import Path
-from activesteer.signals import Setpoint
 
 
 @dataclass(frozen=True)

@@ -11,18 +11,18 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 
-from activesteer import limits
 from activesteer.config import Range, Source
-from activesteer.conventions import Array
+from activesteer.core import limits
+from activesteer.core.conventions import Array
+from activesteer.core.files import read_bytes
+from activesteer.core.path import Path
+from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.files import read_bytes
 from activesteer.maneuver.base import Maneuver, find_csv, within
 from activesteer.maneuver.lane_changes import AlongCourse
 from activesteer.maneuver.path_points import COLUMNS, OPTIONAL, check_points, read_csv
 from activesteer.road.course import Course
 from activesteer.road.native_path import PathSearch
-from activesteer.road.path import Path
-from activesteer.signals import Setpoint
 
 _WINDOW_M: Final = 5.0
 """Distance to either side of the last place in which the car is looked for [m]. So a path may cross itself."""

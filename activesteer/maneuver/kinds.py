@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from activesteer.config import Source, build
+from activesteer.config.faults import check_faults
 from activesteer.errors import ManeuverError, nearest_names, shown
-from activesteer.faults import check_faults
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.braking import BrakeInTurn, StraightBraking
 from activesteer.maneuver.follow_path import ConstantRadius, FollowPath

@@ -38,12 +38,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Range
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.path import Path
+from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import SIGNS, Maneuver, Side
 from activesteer.road.course import Course, Lane
-from activesteer.road.path import Path
-from activesteer.signals import Setpoint
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

@@ -9,13 +9,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from activesteer import limits
 from activesteer.config import Range, Source
-from activesteer.conventions import CORNERS
+from activesteer.core import limits
+from activesteer.core.conventions import CORNERS
+from activesteer.core.files import read_bytes
+from activesteer.core.signals import Setpoint, WheelTorques, new_message
 from activesteer.errors import ManeuverError
-from activesteer.files import read_bytes
 from activesteer.maneuver.base import DriveMode, Maneuver, find_csv, read_columns
-from activesteer.signals import Setpoint, WheelTorques, new_message
 
 
 def check_table(times_s: Sequence[float], values: Sequence[float]) -> None:

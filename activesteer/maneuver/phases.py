@@ -15,10 +15,10 @@ from functools import cached_property
 from typing import Annotated, Any, Final, NamedTuple
 
 from activesteer.config import Range
+from activesteer.core.signals import Setpoint, new_message
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Side, Speed, check_search_speed, within
 from activesteer.maneuver.steering_tests import RampAngle, reference_angle_search
-from activesteer.signals import Setpoint, new_message
 
 _Pedal = Annotated[float, Range(0.0, 1.0)]
 _Ramp = Annotated[float, Range(0.0, 60.0)]

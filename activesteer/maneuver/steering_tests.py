@@ -12,10 +12,10 @@ from typing import Annotated, ClassVar, Final
 import numpy as np
 
 from activesteer.config import Range
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Search, Side, check_search_speed, within
-from activesteer.signals import Setpoint
 
 _SEARCH_S: Final = 4.5
 """Length of a run of the amplitude search after the beginning of the step [s]."""

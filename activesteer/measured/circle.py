@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.stats import gaussian_kde, wasserstein_distance
 
-from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.errors import ParameterError
 from activesteer.measured.circle_changes import Case, ChangeTable
 from activesteer.measured.folder_file import STEERING, MeasuredFile

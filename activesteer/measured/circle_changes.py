@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 import numpy as np
 
 from activesteer.config import Range
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.vehicle.curve_axles import COORDINATES, upper_triangle
 

@@ -15,11 +15,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer import limits
-from activesteer.child_process import Child, ChildFault
-from activesteer.conventions import Array
+from activesteer.core import limits
+from activesteer.core.child_process import Child, ChildFault
+from activesteer.core.conventions import Array
+from activesteer.core.files import is_file, read_bytes, shown_path, why_no_file
 from activesteer.errors import RecordingError, nearest_names, shown
-from activesteer.files import is_file, read_bytes, shown_path, why_no_file
 from activesteer.measured import foreign_files
 from activesteer.measured.foreign_files import Column, check_rows, numbers, understood
 

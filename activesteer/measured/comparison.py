@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.lanes import TIME_TOLERANCE_S, corridor
 from activesteer.analysis.series import low_pass, rms
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.measured.signals import at_sensor
 from activesteer.recording import Recording
-from activesteer.units import quantity_of
 
 INPUTS: Final = ("steering_wheel_rad", "rack_m")
 """Channels that align the clocks if both runs have them: the response of another car may lag, its input may not."""

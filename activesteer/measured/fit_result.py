@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.series import rms
-from activesteer.conventions import Array
-from activesteer.units import quantity_of
+from activesteer.core.conventions import Array
+from activesteer.core.units import quantity_of
 
 LEVEL: Final = 0.95
 """Probability that an interval contains the true value."""

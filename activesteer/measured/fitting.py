@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Range, build, field_in_unit
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.driver import is_driver_file
 from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
 from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, notes_of, told_apart, without_effect

@@ -18,7 +18,7 @@ import numpy as np
 
 from activesteer.analysis.series import rms
 from activesteer.config import field_in_unit
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ParameterError, RecordingError, StudyError
 from activesteer.measured.comparison import Compared, assumptions, compare
 from activesteer.measured.fit_result import Fit

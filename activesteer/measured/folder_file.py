@@ -13,9 +13,9 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 
 from activesteer.config import Range, Source, build, field_in_unit, read_toml
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.files import is_file, is_folder, make_folder, shown_path, user_path, write_text
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
-from activesteer.files import is_file, is_folder, make_folder, shown_path, user_path, write_text
 from activesteer.measured.circle_changes import Case, ChangeTable
 from activesteer.measured.comparison import TOLERANCES, Tolerance
 from activesteer.resources import find_vehicle, models_dir

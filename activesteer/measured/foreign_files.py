@@ -15,10 +15,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer import limits
-from activesteer.conventions import Array
+from activesteer.core import limits
+from activesteer.core.conventions import Array
+from activesteer.core.files import shown_path
 from activesteer.errors import RecordingError, not_installed, shown
-from activesteer.files import shown_path
 
 
 class Column(NamedTuple):

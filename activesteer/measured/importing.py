@@ -10,10 +10,13 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from activesteer import limits
 from activesteer.analysis.metrics import metrics
 from activesteer.config import Range, build, field_in_unit, read_toml
-from activesteer.conventions import Array
+from activesteer.core import limits
+from activesteer.core.conventions import Array
+from activesteer.core.signals import Channel
+from activesteer.core.units import UNIT_NAMES, alike, find_unit, unit_of
+from activesteer.core.version import __version__
 from activesteer.drawing.car_model import scene_of
 from activesteer.errors import RecordingError, nearest_names, shown
 from activesteer.measured import signals
@@ -21,9 +24,6 @@ from activesteer.measured.columns import Column, find, read_columns, second_of
 from activesteer.recording import Recording
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
-from activesteer.signals import Channel
-from activesteer.units import UNIT_NAMES, alike, find_unit, unit_of
-from activesteer.version import __version__
 
 
 @dataclass(frozen=True)

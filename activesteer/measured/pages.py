@@ -13,9 +13,10 @@ from markupsafe import Markup
 
 from activesteer.analysis.series import rms
 from activesteer.config import toml_value
-from activesteer.conventions import RUN_COLOURS, Array
+from activesteer.core.conventions import RUN_COLOURS, Array
+from activesteer.core.files import json_text, make_folder, write_text
+from activesteer.core.units import parameter_title, quantity_of, typeset
 from activesteer.errors import StudyError
-from activesteer.files import json_text, make_folder, write_text
 from activesteer.measured.circle import CircleValidation
 from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
 from activesteer.measured.fit_result import Compared as FitCompared
@@ -24,7 +25,6 @@ from activesteer.measured.folder import MeasuredValidation, Part
 from activesteer.measured.folder_file import STEERING
 from activesteer.pages import Page, Section, Table, Text, failed, passed, render_page
 from activesteer.plotting import Area, Curve, Panel, Picture
-from activesteer.units import parameter_title, quantity_of, typeset
 
 _EDGE: Final = "#9bbbd4"
 

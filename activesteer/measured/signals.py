@@ -12,10 +12,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from activesteer.config import field_in_unit, read_toml
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.units import Unit, find_unit, known_unit, unit_of
 from activesteer.errors import RecordingError
 from activesteer.recording import Poses, Recording
-from activesteer.units import Unit, find_unit, known_unit, unit_of
 from activesteer.vehicle import Vehicle
 
 _NAMES: Final = read_toml(Path(__file__).with_name("names.toml"), RecordingError)[0]

@@ -13,12 +13,12 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.core.files import make_folder, write_text
+from activesteer.core.units import parameter_title, typeset
+from activesteer.core.version import __version__
 from activesteer.errors import ParameterError
-from activesteer.files import make_folder, write_text
 from activesteer.pages.model import Page, Section, Table, Text, failed, passed, picture_values
-from activesteer.units import parameter_title, typeset
-from activesteer.version import __version__
 
 
 def render_page(page: Page) -> str:

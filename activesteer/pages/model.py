@@ -11,9 +11,9 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer.conventions import RUN_COLOURS, Array
+from activesteer.core.conventions import RUN_COLOURS, Array
+from activesteer.core.text_table import text_table, wrapped_line
 from activesteer.plotting.model import Curve, Panel, Picture
-from activesteer.text_table import text_table, wrapped_line
 
 _MOST_POINTS: Final = 2000
 """Most points of a curve: twice the pixels of a chart."""

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer.conventions import CORNERS, Array, yaw_of
+from activesteer.core.conventions import CORNERS, Array, yaw_of
 from activesteer.drawing.cars import (
     CHASSIS,
     SEE_THROUGH,

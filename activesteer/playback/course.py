@@ -8,9 +8,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import rerun as rr
 
-from activesteer.conventions import Array, yaw_of
+from activesteer.core.conventions import Array, yaw_of
+from activesteer.core.limits import LIMIT_M
 from activesteer.drawing.cars import CHASSIS, bytes_of, height_colours
-from activesteer.limits import LIMIT_M
 from activesteer.playback.car import rotated
 from activesteer.playback.runs import ReplayedRun, times
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, Footprint, course_of, footprint_of

@@ -9,6 +9,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from activesteer.core.units import display_unit
 from activesteer.drawing.cars import CHASSIS, bytes_of
 from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Panel, panels_in
 from activesteer.playback import plots
@@ -17,7 +18,6 @@ from activesteer.playback.course import COURSE, MAP, ROAD, map_bounds
 from activesteer.playback.runs import TIMELINE, ReplayedRun, times
 from activesteer.playback.wheel_angles import plan_view, wedges_path
 from activesteer.recording.contents import events_of
-from activesteer.units import display_unit
 
 LEGEND: Final = "legend"
 """Parent entity of the legends."""

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.drawing.cars import bytes_of
 from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Line, Panel, drawn_values, link_panels, panels_in
 from activesteer.playback.runs import ReplayedRun, times

@@ -10,7 +10,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from activesteer.conventions import run_looks
+from activesteer.core.conventions import run_looks
 from activesteer.drawing.cars import CHASSIS
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording

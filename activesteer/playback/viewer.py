@@ -16,9 +16,9 @@ from typing import Any, Final
 import rerun as rr
 import rerun.blueprint as rrb
 
+from activesteer.core.files import atomic_write, shown_path
+from activesteer.core.metric_table import recorded_metric
 from activesteer.errors import PlaybackError
-from activesteer.files import atomic_write, shown_path
-from activesteer.metric_table import recorded_metric
 from activesteer.playback.car import send_car, send_ghost, send_links, send_tyre_forces
 from activesteer.playback.course import send_course, send_road, send_track
 from activesteer.playback.layout import LEGEND, LEGEND_OF_RUNS, SUMMARY, blueprint, send_events, send_legend

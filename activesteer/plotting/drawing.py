@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.conventions import RUN_COLOURS, Array
+from activesteer.core.conventions import RUN_COLOURS, Array
+from activesteer.core.files import atomic_write, make_folder, shown_path
 from activesteer.errors import ActiveSteerError, ParameterError, not_installed
-from activesteer.files import atomic_write, make_folder, shown_path
 from activesteer.plotting.model import Heat, Panel, Picture
 
 if TYPE_CHECKING:

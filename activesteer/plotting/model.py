@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 
 Dashes = str | tuple[float, tuple[float, ...]]
 """Dashes of a line as matplotlib takes them, or empty for points without a line."""

@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, NamedTuple, NoReturn
 
 from activesteer.config import parse_value
+from activesteer.core.files import is_file, read_bytes, shown_path, user_path, why_no_file
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
-from activesteer.files import is_file, read_bytes, shown_path, user_path, why_no_file
 from activesteer.plugins.kind import Kind, in_one_line
 
 _FORM: Final = re.compile(r"(?P<path>.+?):(?P<name>[^:?]+)(?:\?(?P<parameters>.*))?", re.DOTALL)

@@ -16,9 +16,9 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.config import Range
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import numbers_of, widths_of
 from activesteer.errors import ActiveSteerError, nearest_names, shown
-from activesteer.signals import numbers_of, widths_of
 
 _USUAL: Final = frozenset({float, bool, np.float64})
 """Types of nearly all numbers in a command. Numbers of other types take the slow check."""

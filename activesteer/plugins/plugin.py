@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from activesteer.config import Range, Source, convert, field_in_unit, spellings
+from activesteer.core.units import unit_of
 from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.plugins.file import format_of, from_file, is_user_module
 from activesteer.plugins.kind import Kind, in_one_line
-from activesteer.units import unit_of
 
 SETUP: Final = "setup"
 """Name of the argument that gets the properties of the car."""

@@ -12,7 +12,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from activesteer import limits
+from activesteer.core import limits
 from activesteer.errors import RecordingError
 from activesteer.recording.container import ChunkData
 from activesteer.recording.contents import TRANSFORMS_TOPIC

@@ -35,7 +35,7 @@ from mcap.records import (
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import MCAP0_MAGIC
 
-from activesteer import limits
+from activesteer.core import limits
 
 _ZSTD = zstandard.ZstdCompressionParameters.from_level(
     1, strategy=zstandard.STRATEGY_FAST, hash_log=12, min_match=5, target_length=1

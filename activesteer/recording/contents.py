@@ -22,9 +22,9 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
-from activesteer import limits
+from activesteer.core import limits
+from activesteer.core.limits import fail, sequence, table_of, text
 from activesteer.errors import RecordingError
-from activesteer.limits import fail, sequence, table_of, text
 from activesteer.recording.schemas import LOG_SCHEMA, SCENE_SCHEMA, WORLD, message_class
 from activesteer.road.course import course_of, footprint_of
 from activesteer.road.drawn import surface_in

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.files import atomic_write, finite
 from activesteer.errors import RecordingError, not_installed
-from activesteer.files import atomic_write, finite
 from activesteer.recording.contents import metadata_texts
 from activesteer.recording.schemas import TIME, ChannelTable
 

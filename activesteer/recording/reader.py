@@ -21,9 +21,10 @@ from mcap.records import Attachment, Channel, DataEnd, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
-from activesteer import limits
+from activesteer.core import limits
+from activesteer.core.files import reading, shown_path
+from activesteer.core.signals import Channel as SignalChannel
 from activesteer.errors import RecordingError
-from activesteer.files import reading, shown_path
 from activesteer.recording.chunks import Block, BlockDecoder, Group
 from activesteer.recording.contents import (
     EVENTS_TOPIC,
@@ -55,7 +56,6 @@ from activesteer.recording.rows import (
     values_of,
 )
 from activesteer.recording.schemas import ChannelTable, state_fields
-from activesteer.signals import Channel as SignalChannel
 
 _RECORD: Final = struct.Struct("<BQ")
 _PIECE_BYTES: Final = 2**20

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.recording import export
 from activesteer.recording.contents import ScenePart
@@ -17,7 +18,6 @@ from activesteer.recording.reader import read_mcap
 from activesteer.recording.rows import FileRows, Poses, values_of
 from activesteer.recording.schemas import ChannelTable, nanoseconds, shaped
 from activesteer.recording.writer import McapWriter
-from activesteer.signals import Channel
 
 if TYPE_CHECKING:
     import pandas as pd

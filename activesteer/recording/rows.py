@@ -20,11 +20,11 @@ from mcap.exceptions import McapError
 from mcap.records import Chunk
 from numpy.typing import NDArray
 
-from activesteer import limits
+from activesteer.core import limits
+from activesteer.core.limits import LIMIT_M
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
-from activesteer.limits import LIMIT_M
 from activesteer.recording.chunks import Block, BlockDecoder
-from activesteer.signals import Channel
 
 MAX_CACHED_BYTES: Final = 3 * 2**27
 """Largest size of the cached channels of all open files together."""

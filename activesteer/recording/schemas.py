@@ -26,9 +26,9 @@ from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message_factory import GetMessageClass
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer import limits
+from activesteer.core import limits
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError, nearest_names
-from activesteer.signals import Channel
 
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
 """Wire types."""

@@ -15,9 +15,11 @@ from typing import BinaryIO, Final, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from activesteer import limits
+from activesteer.core import limits
+from activesteer.core.files import reading, shown_path, writing
+from activesteer.core.signals import Channel
+from activesteer.core.version import __version__
 from activesteer.errors import RecordingError
-from activesteer.files import reading, shown_path, writing
 from activesteer.recording.chunks import BlockEncoder, few_messages
 from activesteer.recording.container import McapFile
 from activesteer.recording.contents import (
@@ -52,8 +54,6 @@ from activesteer.recording.schemas import (
     state_schema,
     state_schema_name,
 )
-from activesteer.signals import Channel
-from activesteer.version import __version__
 
 _START_BYTES: Final = 64
 

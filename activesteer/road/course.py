@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Range
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.limits import fail, number, numbers, sequence, table_of, text
+from activesteer.core.path import MIN_CHORD_M, Path
 from activesteer.errors import ManeuverError
-from activesteer.limits import fail, number, numbers, sequence, table_of, text
 from activesteer.road.obstacles import Grid
-from activesteer.road.path import MIN_CHORD_M, Path
 
 
 class Lane(NamedTuple):

@@ -26,11 +26,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer import limits
-from activesteer.conventions import Array
+from activesteer.core import limits
+from activesteer.core.conventions import Array
+from activesteer.core.path import Path
 from activesteer.errors import ManeuverError, shown
 from activesteer.road.obstacles import Grid
-from activesteer.road.path import Path
 
 _HIGHEST_M: Final = 1000.0
 _LINE_BYTES: Final = 80

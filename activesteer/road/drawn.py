@@ -9,8 +9,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import Array
-from activesteer.limits import fail, numbers, sequence, table_of
+from activesteer.core.conventions import Array
+from activesteer.core.limits import fail, numbers, sequence, table_of
 from activesteer.road.road import Road
 
 _MAX_PLACES: Final = 200_000

@@ -14,9 +14,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.compilation import compiled
-from activesteer.conventions import Array
-from activesteer.road.path import SPACING_M, Path
+from activesteer.core.conventions import Array
+from activesteer.core.path import SPACING_M, Path
+from activesteer.native.compilation import compiled
 
 
 class PathSearch:

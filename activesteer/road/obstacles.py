@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Range
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ManeuverError
-from activesteer.native_records import numbers_type
+from activesteer.native.records import numbers_type
 
 
 class Grid(NamedTuple):

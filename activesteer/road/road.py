@@ -17,13 +17,13 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 import numpy as np
 
 from activesteer.config import Range, Source, build
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.limits import fail, table_of
+from activesteer.core.path import Path
 from activesteer.errors import ManeuverError, RecordingError, nearest_names
-from activesteer.limits import fail, table_of
 from activesteer.road.course import Course, ProfileTable, course_of
 from activesteer.road.crg import unpacked
 from activesteer.road.obstacles import Grid, Obstacle, Roughness, summed
-from activesteer.road.path import Path
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 

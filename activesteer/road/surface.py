@@ -18,9 +18,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.compilation import compiled
-from activesteer.conventions import Array
-from activesteer.native_records import numbers_type
+from activesteer.core.conventions import Array
+from activesteer.native.compilation import compiled
+from activesteer.native.records import numbers_type
 from activesteer.road.obstacles import COSINE_BUMP, CROSS_SLOPE, OBSTACLE, PLATEAU, SINE, Grid
 from activesteer.road.road import Road
 

@@ -24,7 +24,8 @@ import numpy as np
 from activesteer.config import Range, Source, build, checked_number, read_toml, to_table
 from activesteer.controllers import ControllerParameters, SingleTrackParameters
 from activesteer.controllers.parameters import SplitAxle
-from activesteer.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
+from activesteer.core.files import is_file, read_bytes, user_path, why_no_file
 from activesteer.driver import DriverParameters, driver_spec, is_driver_file
 from activesteer.errors import (
     ActiveSteerError,
@@ -37,7 +38,6 @@ from activesteer.errors import (
 )
 from activesteer.estimation import EstimatorSetup, KnownTyre
 from activesteer.estimation.setup import GRID
-from activesteer.files import is_file, read_bytes, user_path, why_no_file
 from activesteer.plugins import Plugin
 from activesteer.resources import DEFAULT_DRIVER, find_driver_file, find_vehicle, models_dir
 from activesteer.road.road import Road

@@ -11,16 +11,16 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.controllers.find import interval_s
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import Channel
+from activesteer.core.version import __version__
 from activesteer.drawing.car_model import scene_of
 from activesteer.plugins import Plugin
 from activesteer.recording import McapWriter, Poses, Recording, ScenePart
 from activesteer.road.drawn import DrawnSurface, places_to_draw
 from activesteer.road.surface import surface_of
 from activesteer.scenario.scenario import Scenario, describe
-from activesteer.signals import Channel
 from activesteer.vehicle import Vehicle
-from activesteer.version import __version__
 
 _BEYOND_M: Final = 30.0
 """Length of road that is drawn beyond the distance at the speed of the manoeuvre [m]."""

@@ -26,11 +26,11 @@ from activesteer.config import (
     merged,
     to_table,
 )
+from activesteer.config.faults import fault_table
 from activesteer.controllers import ControllerParameters, ControllerSetup
+from activesteer.core.files import user_path
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, nearest_names
-from activesteer.faults import fault_table
-from activesteer.files import user_path
 from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
 from activesteer.maneuver.base import with_road_files
 from activesteer.plugins import Plugin

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Final
 
 from activesteer.config import read_toml
+from activesteer.core.files import write_text
 from activesteer.errors import ParameterError
-from activesteer.files import write_text
 
 _NOTE: Final = "# Written by `"
 """Start of the comment with the origin of the values, which replaces an older one."""

@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.compilation import inlined
-from activesteer.conventions import CORNERS
-from activesteer.native_memory import load_numbers, store_numbers
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import Measurement, numbers_of, widths_of
+from activesteer.native.compilation import inlined
+from activesteer.native.memory import load_numbers, store_numbers
 from activesteer.sensors.parameters import RANDOM, Sensor, Sensors
 from activesteer.sensors.signal_chain import CHAIN, FILTERED, HELD, LINE, PHASE, SPEED, passed_on
-from activesteer.signals import Measurement, numbers_of, widths_of
 
 MEASURED: Final = numbers_of(Measurement)[1:]
 """Outputs, in their order: the numbers of a `Measurement` without its time."""

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.compilation import inlined
+from activesteer.native.compilation import inlined
 
 CHAIN: Final = np.dtype(
     (

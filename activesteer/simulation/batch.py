@@ -13,17 +13,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from activesteer.config.faults import Fault
 from activesteer.controllers import CONTROLLER, controller_spec
 from activesteer.controllers.vectorised import Vectorised
-from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
-from activesteer.driver import DRIVER
-from activesteer.driver.human import SharedTables
-from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, shown
-from activesteer.faults import Fault
-from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, Scenario
-from activesteer.scenario.overrides import each_overrides
-from activesteer.signals import (
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S, Array
+from activesteer.core.signals import (
     ActuatorCommand,
     DriverCommand,
     Measurement,
@@ -31,6 +25,12 @@ from activesteer.signals import (
     arrays_of,
     numbers_of,
 )
+from activesteer.driver import DRIVER
+from activesteer.driver.human import SharedTables
+from activesteer.errors import ActiveSteerError, ParameterError, SimulationDiverged, shown
+from activesteer.resources import DEFAULT_DRIVER
+from activesteer.scenario import FileOrTable, Scenario
+from activesteer.scenario.overrides import each_overrides
 from activesteer.simulation.closed_loop import ClosedLoop, LoopState, NonReentrantLock, drive_together
 from activesteer.simulation.copies import Copyable
 from activesteer.simulation.native_loop import CAR, MESSAGES, PYTHON, STEP_ADDRESS, drive_cars

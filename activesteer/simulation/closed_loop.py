@@ -15,20 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Source
+from activesteer.config.faults import Fault, check_faults, fault_from
 from activesteer.controllers import controller_spec
-from activesteer.conventions import DEFAULT_TIMESTEP_S, Array
-from activesteer.driver.human import HumanDriver, SetpointTable, SharedTables, setpoint_row, tabulate
-from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged, shown
-from activesteer.faults import Fault, check_faults, fault_from
-from activesteer.maneuver import Maneuver
-from activesteer.maneuver.phases import seen_of
-from activesteer.native_memory import N_COMMAND, N_HELD, law_address
-from activesteer.native_records import Uncopyable, record_type, take, values
-from activesteer.plugins.retuned import retuned
-from activesteer.road.native_path import PathSearch
-from activesteer.scenario import Scenario
-from activesteer.scenario.scenario import changed
-from activesteer.signals import (
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S, Array
+from activesteer.core.signals import (
     NO_TORQUES,
     ActuatorCommand,
     DriverCommand,
@@ -42,6 +32,17 @@ from activesteer.signals import (
     new_message,
     numbers_in,
 )
+from activesteer.core.version import __version__
+from activesteer.driver.human import HumanDriver, SetpointTable, SharedTables, setpoint_row, tabulate
+from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged, shown
+from activesteer.maneuver import Maneuver
+from activesteer.maneuver.phases import seen_of
+from activesteer.native.memory import N_COMMAND, N_HELD, law_address
+from activesteer.native.records import Uncopyable, record_type, take, values
+from activesteer.plugins.retuned import retuned
+from activesteer.road.native_path import PathSearch
+from activesteer.scenario import Scenario
+from activesteer.scenario.scenario import changed
 from activesteer.simulation import native_loop as native
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.sampled_controller import control_unit
@@ -49,7 +50,6 @@ from activesteer.vehicle import engine_warnings_held
 from activesteer.vehicle.car import check_gear
 from activesteer.vehicle.faults import Faults
 from activesteer.vehicle.step_bindings import torque_numbers, write_command
-from activesteer.version import __version__
 
 Given = tuple[DriverCommand | None, ActuatorCommand | None]
 """Commands that replace driver and controller."""

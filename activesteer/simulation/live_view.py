@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Final, NamedTuple, Protocol
 
-from activesteer.conventions import run_looks
+from activesteer.core.conventions import run_looks
+from activesteer.core.units import quantity_of
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import SLOWEST_MPS
 from activesteer.errors import PlaybackError
 from activesteer.maneuver import Maneuver
 from activesteer.road.course import Footprint
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.units import quantity_of
 from activesteer.video import FilmedCar, RenderScene
 from activesteer.video.cameras import CUTAWAY
 from activesteer.video.gauges import MIN_SPEED_MPS

@@ -11,9 +11,10 @@ from typing import Any, Final
 import numpy as np
 from numba import carray, from_dtype, types
 
-from activesteer.compilation import address_of, call_at, compiled_call, inlined
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_of
 from activesteer.driver.human import LINE, SETPOINT, HumanDriver, follow
-from activesteer.native_memory import (
+from activesteer.native.compilation import address_of, call_at, compiled_call, inlined
+from activesteer.native.memory import (
     N_COMMAND,
     N_HELD,
     array_of,
@@ -25,8 +26,7 @@ from activesteer.native_memory import (
     store_numbers,
     zeros_of,
 )
-from activesteer.native_records import ARRAY, record_type
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_of
+from activesteer.native.records import ARRAY, record_type
 from activesteer.vehicle import native_step
 from activesteer.vehicle.parameters import drive_limits, engine_speed
 

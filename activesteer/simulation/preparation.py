@@ -28,14 +28,15 @@ import numpy as np
 from activesteer.analysis.handling import CarGeometry, Handling, evaluate
 from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.step_response import FIT, angle_at
-from activesteer.compilation import content_key, processor
 from activesteer.config import to_table
 from activesteer.controllers import controller_spec
-from activesteer.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
+from activesteer.core.files import read_bytes
+from activesteer.core.version import __version__
 from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError
-from activesteer.files import read_bytes
 from activesteer.maneuver.base import Search
 from activesteer.maneuver.steering_tests import RampAngle, SteadyTurn, StepSteer
+from activesteer.native.compilation import content_key, processor
 from activesteer.plugins import Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
@@ -45,7 +46,6 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
 from activesteer.theory.single_track import IDENTIFIED, IDENTIFY, SingleTrackParameters, characteristic_speed
 from activesteer.vehicle.statics import mass_properties
-from activesteer.version import __version__
 
 MAX_KEPT: Final = 1000
 """Maximum of numbers in the process and in the folder. The oldest are deleted first."""

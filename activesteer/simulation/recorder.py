@@ -8,10 +8,10 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.errors import ParameterError, RecordingError, SimulationDiverged
-from activesteer.native_records import Uncopyable
+from activesteer.native.records import Uncopyable
 from activesteer.recording import McapWriter, Poses
-from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import MAX_VALUE, RawRows, Tape, Vehicle
 
 BLOCK_INTERVAL_S: Final = 0.3

@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S
 from activesteer.errors import ActiveSteerError
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER

@@ -13,18 +13,18 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any, Final, Protocol
 
+from activesteer.config.faults import Fault
 from activesteer.controllers import CONTROLLER, controller_spec
-from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.limits import MAX_EVENTS
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
-from activesteer.faults import Fault
-from activesteer.limits import MAX_EVENTS
 from activesteer.recording import McapWriter, Recording
 from activesteer.recording.contents import Event, tables_of
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario
 from activesteer.scenario.run_context import RunContext
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop, Given, LoopState
 from activesteer.simulation.copies import Copyable
 from activesteer.simulation.pacing import RealtimePacer

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.simulation.preparation import Run

@@ -11,9 +11,10 @@ from typing import Any, Final
 
 from markupsafe import Markup
 
-from activesteer.conventions import run_looks
+from activesteer.core.conventions import run_looks
+from activesteer.core.files import file_word
+from activesteer.core.units import parameter_title, typeset
 from activesteer.drawing.cars import bytes_of
-from activesteer.files import file_word
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Panel, Picture
 from activesteer.scenario import FileOrTable, check_gains, check_parts, read_by, resolve
@@ -23,7 +24,6 @@ from activesteer.standards.study_test_runner import StudyTestRunner
 from activesteer.studies.engine.factor_values import label_of
 from activesteer.studies.engine.runs import versions
 from activesteer.studies.engine.workers import workers_for
-from activesteer.units import parameter_title, typeset
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.config import Source, build
+from activesteer.config.faults import Fault, fault_table
 from activesteer.controllers import system_of
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.errors import SimulationDiverged
-from activesteer.faults import Fault, fault_table
 from activesteer.scenario import FileOrTable, check_parts, resolve
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import Recorder
 from activesteer.standards.r79_circle import FIGURES

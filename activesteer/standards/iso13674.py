@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.conventions import CURVE_STEP_S, Array
+from activesteer.core.conventions import CURVE_STEP_S, Array
+from activesteer.core.units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
@@ -22,7 +23,6 @@ from activesteer.standards.standard import (
     cell,
     steering_wheel_at,
 )
-from activesteer.units import quantity_of
 
 SPEED_KMH: Final = 100.0
 """Speed [km/h]."""

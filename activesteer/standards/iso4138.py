@@ -8,12 +8,12 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.handling import CarGeometry, evaluate
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.metric_table import metric
+from activesteer.core.units import quantity_of
 from activesteer.errors import RecordingError
-from activesteer.metric_table import metric
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, axis_label, metrics_table
-from activesteer.units import quantity_of
 
 RADIUS_M: Final = 100.0
 """Radius of the first method [m]."""

@@ -17,7 +17,8 @@ from activesteer.analysis.frequency_response import (
     frequency_response,
     random_response,
 )
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.units import DisplayUnit, display_unit
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
@@ -31,7 +32,6 @@ from activesteer.standards.standard import (
     steering_wheel_at,
     time_panels,
 )
-from activesteer.units import DisplayUnit, display_unit
 
 SPEED_KMH: Final = 80.0
 """Speed of all runs [km/h]."""

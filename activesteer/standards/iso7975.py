@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.metric_table import metric
+from activesteer.core.metric_table import metric
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.standard import (
     SIDES,

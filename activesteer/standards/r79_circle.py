@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from activesteer.core.units import display_unit
 from activesteer.errors import SimulationDiverged
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
@@ -21,7 +22,6 @@ from activesteer.standards.standard import (
     cell,
     time_panels,
 )
-from activesteer.units import display_unit
 
 
 class Effort(NamedTuple):

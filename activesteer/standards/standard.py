@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 
 from activesteer.config import Range
-from activesteer.conventions import CURVE_STEP_S, Array
+from activesteer.core.conventions import CURVE_STEP_S, Array
+from activesteer.core.metric_table import metric
+from activesteer.core.units import quantity_of
 from activesteer.errors import ManeuverError, RecordingError
-from activesteer.metric_table import metric
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.units import quantity_of
 
 if TYPE_CHECKING:
     from activesteer.scenario import FileOrTable, Scenario

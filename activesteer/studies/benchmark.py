@@ -19,12 +19,11 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
-from activesteer.brakes.brake_control_unit import step_brakes
-from activesteer.compilation import compiled
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.native.compilation import compiled
 from activesteer.scenario import Scenario, resolve
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.simulation.batch import Batch
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
@@ -33,6 +32,7 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
 from activesteer.tyre.report import bench as tyre_bench
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.brakes.brake_control_unit import step_brakes
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 
 ROUNDS: Final = 5

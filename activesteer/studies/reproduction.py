@@ -19,9 +19,9 @@ from activesteer.analysis.figures import FORMATS, figure_2
 from activesteer.analysis.figures import draw_all as draw_runs
 from activesteer.analysis.report import write_report
 from activesteer.controllers import SingleTrackParameters
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.files import make_folder
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
-from activesteer.files import make_folder
 from activesteer.plotting import save
 from activesteer.recording import Recording, check_target
 from activesteer.rigs import kinematics_compliance

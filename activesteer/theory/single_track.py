@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
-from activesteer.native_records import NativeBlock
-from activesteer.shared_laws import shared
+from activesteer.native.records import NativeBlock
+from activesteer.native.shared_laws import shared
 
 if TYPE_CHECKING:
     import control

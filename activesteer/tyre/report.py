@@ -13,9 +13,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from activesteer.compilation import compiled
+from activesteer.core.text_table import text_table, wrapped_line
+from activesteer.native.compilation import compiled
 from activesteer.plotting import Curve, Panel, Picture, save_all
-from activesteer.text_table import text_table, wrapped_line
 from activesteer.tyre.diagnostics import remarks
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.kernels.magic_formula import magic_formula

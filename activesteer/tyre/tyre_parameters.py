@@ -17,9 +17,9 @@ from typing import Final, Literal
 
 import numpy as np
 
-from activesteer.compilation import compiled
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.native_records import numbers_type
+from activesteer.native.compilation import compiled
+from activesteer.native.records import numbers_type
 from activesteer.tyre.file.syntax import BY_NAME, COEFFICIENTS
 from activesteer.tyre.kernels.contact import tyre_on_road
 from activesteer.tyre.kernels.magic_formula import (

@@ -11,14 +11,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE, brake_setup, reset
-from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S, Array
-from activesteer.errors import ActiveSteerError, ModelError, ParameterError, SimulationDiverged, shown
-from activesteer.native_records import Uncopyable
-from activesteer.road.road import Road
-from activesteer.sensors import SensorBlock
-from activesteer.sensors.block import speed_radii
-from activesteer.signals import (
+from activesteer.core.conventions import CORNERS, DEFAULT_TIMESTEP_S, Array
+from activesteer.core.signals import (
     NO_TORQUES,
     ActuatorCommand,
     DriverCommand,
@@ -27,9 +21,15 @@ from activesteer.signals import (
     Motion,
     new_message,
 )
+from activesteer.errors import ActiveSteerError, ModelError, ParameterError, SimulationDiverged, shown
+from activesteer.native.records import Uncopyable
+from activesteer.road.road import Road
+from activesteer.sensors import SensorBlock
+from activesteer.sensors.block import speed_radii
 from activesteer.tyre.tyre_parameters import TyreParameters
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_step
+from activesteer.vehicle.brakes.records import BRAKE_SETUP, BRAKE_STATE, brake_setup, reset
 from activesteer.vehicle.channels import ChannelMap
 from activesteer.vehicle.electric_actuators import ENERGY, ElectricDrive
 from activesteer.vehicle.force_block import find, tendon_arms

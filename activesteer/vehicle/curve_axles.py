@@ -24,11 +24,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.compilation import inlined
 from activesteer.config import Range
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
-from activesteer.native_memory import records_at
+from activesteer.native.compilation import inlined
+from activesteer.native.memory import records_at
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.force_block import find, tendon_arms
 

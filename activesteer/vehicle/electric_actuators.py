@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Range, build, read_toml
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
-from activesteer.native_records import numbers_type
+from activesteer.native.records import numbers_type
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.force_block import tendon_arms
 

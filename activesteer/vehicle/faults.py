@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import Array
+from activesteer.config.faults import ACTUATORS, ANGLE_SENSOR, MOTOR, SENSORS, Fault
+from activesteer.core.conventions import Array
 from activesteer.errors import ManeuverError
-from activesteer.faults import ACTUATORS, ANGLE_SENSOR, MOTOR, SENSORS, Fault
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle import native_faults as native
 from activesteer.vehicle.car import Vehicle

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.errors import ModelError, nearest_names
-from activesteer.native_records import numbers_type
+from activesteer.native.records import numbers_type
 from activesteer.road.obstacles import OBSTACLE
 from activesteer.road.surface import SURFACE
 from activesteer.tyre.tyre_parameters import TYRE_RECORD

@@ -53,10 +53,10 @@ from mujoco import _functions
 from numba import carray, types
 from numpy.typing import NDArray
 
-from activesteer.compilation import compiled_call
 from activesteer.errors import ModelError
-from activesteer.native_memory import f64_pointer, pointer_to, word_pointer
-from activesteer.native_records import numbers_type
+from activesteer.native.compilation import compiled_call
+from activesteer.native.memory import f64_pointer, pointer_to, word_pointer
+from activesteer.native.records import numbers_type
 
 UNCHANGED: Final = 0
 CHANGED: Final = 1

@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, Array, yaw_of
+from activesteer.core.conventions import CORNERS, Array, yaw_of
 from activesteer.errors import ModelError, ParameterError
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.car import Vehicle

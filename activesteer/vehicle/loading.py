@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.road.native_path import PathGrid
 from activesteer.road.road import LaidRoad, Road

@@ -42,8 +42,8 @@ from typing import Final
 
 from numba import carray, from_dtype
 
-from activesteer.compilation import compiled, inlined
-from activesteer.native_memory import pointer_to, records_at
+from activesteer.native.compilation import compiled, inlined
+from activesteer.native.memory import pointer_to, records_at
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.electric_actuators import BATTERY, BATTERY_STATE, MOTOR, MOTOR_STATE
 from activesteer.vehicle.parameters import CLUTCH_OPEN, drive_limits

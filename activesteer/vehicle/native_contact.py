@@ -30,8 +30,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.compilation import compiled
-from activesteer.native_records import numbers_type
+from activesteer.native.compilation import compiled
+from activesteer.native.records import numbers_type
 from activesteer.road.obstacles import PLATEAU
 from activesteer.road.surface import (
     COARSE_M,

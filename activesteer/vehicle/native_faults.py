@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 from numba import carray, from_dtype, types
 
-from activesteer.compilation import compiled_call, inlined
-from activesteer.native_memory import f64_pointer, pointer_to
-from activesteer.native_records import numbers_type
-from activesteer.shared_laws import shared
+from activesteer.native.compilation import compiled_call, inlined
+from activesteer.native.memory import f64_pointer, pointer_to
+from activesteer.native.records import numbers_type
+from activesteer.native.shared_laws import shared
 from activesteer.vehicle import force_block as fb
 
 IDLE, LISTENS, ACTS = range(3)

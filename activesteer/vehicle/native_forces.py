@@ -19,9 +19,9 @@ from typing import Any, Final
 import mujoco
 from numba import carray, types
 
-from activesteer.compilation import compiled_callback, inlined
 from activesteer.errors import ModelError
-from activesteer.native_memory import array_at, f64_pointer, records_at, word
+from activesteer.native.compilation import compiled_callback, inlined
+from activesteer.native.memory import array_at, f64_pointer, records_at, word
 from activesteer.road.native_path import along_path
 from activesteer.road.obstacles import OBSTACLE
 from activesteer.road.surface import SURFACE, left_grid

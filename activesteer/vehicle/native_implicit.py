@@ -14,8 +14,8 @@ from llvmlite import ir
 from numba import from_dtype, types
 from numba.extending import intrinsic
 
-from activesteer.compilation import inlined
-from activesteer.native_memory import f64_pointer, pointer_to
+from activesteer.native.compilation import inlined
+from activesteer.native.memory import f64_pointer, pointer_to
 from activesteer.vehicle.implicit_plan import IMPLICIT_PLAN
 
 _N_BIAS: Final = int(mujoco.mjNBIAS)

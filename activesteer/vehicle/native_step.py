@@ -11,14 +11,14 @@ from typing import Final
 
 from numba import carray, from_dtype, types
 
-from activesteer.brakes.brake_control_unit import step_brakes
-from activesteer.brakes.records import BRAKE_SETUP, BRAKE_STATE
-from activesteer.compilation import compiled_call, inlined
-from activesteer.conventions import CORNERS
-from activesteer.native_memory import f64_pointer, load_numbers, native_type, pointer_to
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import Measurement, Motion
+from activesteer.native.compilation import compiled_call, inlined
+from activesteer.native.memory import f64_pointer, load_numbers, native_type, pointer_to
 from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.sensors.signal_chain import CHAIN
-from activesteer.signals import Measurement, Motion
+from activesteer.vehicle.brakes.brake_control_unit import step_brakes
+from activesteer.vehicle.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.vehicle.channels.native_channels import ENGINE_ARRAYS
 from activesteer.vehicle.native_actuators import step_motors
 from activesteer.vehicle.native_faults import give_late, keep_demands, misread

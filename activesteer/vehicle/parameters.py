@@ -23,13 +23,13 @@ from typing import Annotated, ClassVar, Final
 
 from numba import types
 
-from activesteer.brakes.records import Brakes
-from activesteer.compilation import compiled, compiled_call
 from activesteer.config import Range
 from activesteer.errors import ParameterError
+from activesteer.native.compilation import compiled, compiled_call
+from activesteer.native.shared_laws import shared
 from activesteer.sensors.parameters import Sensors
-from activesteer.shared_laws import shared
 from activesteer.tyre.tyre_parameters import TyreConventions, TyreParameters
+from activesteer.vehicle.brakes.records import Brakes
 from activesteer.vehicle.curve_axles import Curves
 from activesteer.vehicle.electric_actuators import Battery, Motors, RearActuator, SuperpositionActuator
 from activesteer.vehicle.force_block import MAX_CURVE_POINTS

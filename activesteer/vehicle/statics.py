@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ModelError
 
 _ITERATIONS: Final = 40

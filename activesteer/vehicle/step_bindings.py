@@ -13,16 +13,16 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from activesteer.compilation import compiled_call, inlined
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
+from activesteer.core.signals import ActuatorCommand, Channel, DriverCommand, Estimate, Number, WheelTorques, numbers_of
+from activesteer.core.units import ESTIMATED
 from activesteer.errors import ParameterError, shown
-from activesteer.native_memory import native_type, store_numbers
-from activesteer.native_records import numbers_type
+from activesteer.native.compilation import compiled_call, inlined
+from activesteer.native.memory import native_type, store_numbers
+from activesteer.native.records import numbers_type
 from activesteer.sensors.block import SensorBlock
-from activesteer.signals import ActuatorCommand, Channel, DriverCommand, Estimate, Number, WheelTorques, numbers_of
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.units import ESTIMATED
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.channels.native_channels import ENGINE_ARRAYS, RawRows
 from activesteer.vehicle.electric_actuators import NAME, ElectricActuator, ElectricDrive, known

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 
 

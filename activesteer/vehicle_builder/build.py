@@ -11,8 +11,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from activesteer.core.files import is_file, user_path, writing
 from activesteer.errors import ActiveSteerError, ParameterError, TyreFileError, nearest_names, shown
-from activesteer.files import is_file, user_path, writing
 from activesteer.resources import models_dir
 from activesteer.scenario import FileOrTable, load_car
 from activesteer.simulation.runner import run_scenario

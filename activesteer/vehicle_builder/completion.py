@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.brakes.records import Brakes
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.units import known_unit
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.units import known_unit
+from activesteer.vehicle.brakes.records import Brakes
 from activesteer.vehicle.electric_actuators import Motors
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import AxleKind, LinkKind, Mount, mount

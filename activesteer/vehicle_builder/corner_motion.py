@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ModelError
 
 _ROTATION_M = 0.3

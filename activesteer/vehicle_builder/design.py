@@ -10,12 +10,12 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
-from activesteer.brakes.records import Brakes
 from activesteer.config import to_table
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.sensors.parameters import Sensors
 from activesteer.tyre.tyre_parameters import TyreParameters
+from activesteer.vehicle.brakes.records import Brakes
 from activesteer.vehicle.electric_actuators import Battery, Motors, RearActuator, SuperpositionActuator
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle.statics import mass_properties, point_mass_inertia

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import least_squares
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.vehicle.curve_axles import COORDINATES, AxleCurves, upper_triangle
 from activesteer.vehicle_builder.kc_tables import KcTables, Samples, check_signs, smoothed, unusual

@@ -24,13 +24,13 @@ from typing import Any, Final
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
-from activesteer import limits
 from activesteer.config import Source, build, read_toml
-from activesteer.conventions import Array
+from activesteer.core import limits
+from activesteer.core.conventions import Array
+from activesteer.core.files import csv_number, is_file, is_folder, read_csv
+from activesteer.core.units import UNIT_NAMES, alike, find_unit
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.files import csv_number, is_file, is_folder, read_csv
 from activesteer.rigs.kc.result import CHANNELS, OF_THE_AXLE, TESTS
-from activesteer.units import UNIT_NAMES, alike, find_unit
 
 _HEAD: Final = re.compile(r"(?P<name>[\w ]+?)\s*\[\s*(?P<unit>[\w/]+)\s*\]")
 _SIDES: Final = ("left", "right")

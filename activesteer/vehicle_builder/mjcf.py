@@ -9,7 +9,7 @@ from string import Template
 
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.vehicle_builder.axle_kinds import Mount
 from activesteer.vehicle_builder.completion import rack_per_steer_m
 from activesteer.vehicle_builder.design import Axle, CarDesign, Solid

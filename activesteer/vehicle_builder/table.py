@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from activesteer.brakes.records import Brakes
 from activesteer.config import Range, Source, build, read_toml
+from activesteer.core.files import read_csv
+from activesteer.core.units import known_unit
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.files import read_csv
 from activesteer.sensors.parameters import Sensors
-from activesteer.units import known_unit
+from activesteer.vehicle.brakes.records import Brakes
 from activesteer.vehicle.electric_actuators import Battery, Motors, RearActuator, SuperpositionActuator
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder.axle_kinds import DEFAULTS, AxleKind, kind_of

@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from activesteer.config import read_toml, to_table, toml_text
-from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.resources import find_vehicle
 from activesteer.rigs.kc.result import KcResult
 from activesteer.scenario import CarSpec

@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.rigs.kc.modes import tyre_stiffness

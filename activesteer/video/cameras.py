@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.video.track import Track
 

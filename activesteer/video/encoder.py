@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from activesteer.core.files import atomic_write
 from activesteer.errors import ParameterError, PlaybackError, not_installed
-from activesteer.files import atomic_write
 
 Pixels = NDArray[np.uint8]
 

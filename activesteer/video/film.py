@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, run_looks
+from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, course_of, footprint_of

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from activesteer.core.units import quantity_of
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.cars import bytes_of
 from activesteer.drawing.panels import FILM, PANELS, panels_in
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, footprint_of
-from activesteer.units import quantity_of
 
 Colour = tuple[int, int, int, int]
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont

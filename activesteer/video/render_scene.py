@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.conventions import Array, yaw_of
+from activesteer.core.conventions import Array, yaw_of
 from activesteer.drawing.cars import CHASSIS, SEE_THROUGH, BodySurface, dressed, share_seen, shares_of, without_tail
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart

@@ -8,11 +8,11 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.path import Path
 from activesteer.drawing.cars import height_colours
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course
 from activesteer.road.drawn import DrawnSurface
-from activesteer.road.path import Path
 from activesteer.road.road import Road
 
 _TEXTURE: Final = "road"

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, Array, yaw_of
+from activesteer.core.conventions import CORNERS, Array, yaw_of
 from activesteer.drawing import tyre_forces, wheel_angles
 from activesteer.drawing.cars import CHASSIS, direction_of_motion, shares_of
 from activesteer.errors import PlaybackError

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from activesteer.cli import main
+from activesteer.commands.cli import main
 
 COMPILING = "activesteer: compiling native code, which is kept for the next time: some 15 s\n"
 

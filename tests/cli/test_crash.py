@@ -20,7 +20,7 @@ from activesteer import Recording
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S
 
 ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 LIMITED = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)); " + MAIN
 STATES = ("/state/vehicle", "/state/control")
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from activesteer import Recording
-from activesteer.cli import command_line, main
 from activesteer.commands.arguments import SUCCESSORS
+from activesteer.commands.cli import command_line, main
 from activesteer.resources import find_vehicle
 
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.3")

@@ -24,7 +24,7 @@ websockets = pytest.importorskip("websockets.sync.client", reason="needs the ext
 
 SERVER: list[int] = []
 """Process number of the running server."""
-COMMAND = [sys.executable, "-c", "from activesteer.cli import main; raise SystemExit(main())", "explore"]
+COMMAND = [sys.executable, "-c", "from activesteer.commands.cli import main; raise SystemExit(main())", "explore"]
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.claims.scorecard import claims_for
 from activesteer.analysis.metrics import EVALUATIONS, metrics
 from activesteer.analysis.report import report_page
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.errors import ActiveSteerError, RecordingError
 from activesteer.playback import runs_of, save
 from activesteer.recording import Poses, Recording

@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.resources import find_vehicle
 
 

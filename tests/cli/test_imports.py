@@ -19,7 +19,7 @@ class Refuse:
         if name.partition(".")[0] in {refused!r}:
             raise ImportError(f"{{name}} is refused here", name=name)
 sys.meta_path.insert(0, Refuse())
-from activesteer.cli import main
+from activesteer.commands.cli import main
 status = 0
 for words in {calls!r}:
     try:

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 import pytest
 
 import activesteer
-from activesteer.cli import main
+from activesteer.commands.cli import main
+from activesteer.core.version import __version__
 from activesteer.resources import list_maneuvers
 from activesteer.studies.benchmark import DrivenStop
-from activesteer.version import __version__
 
 KEYS = {
     "bare_step_us",
@@ -195,7 +195,7 @@ def test_misused_command_line_is_told_with_its_usage(capsys, words):
 
 def test_reader_that_stops_early_is_no_error(file):
     """As in `activesteer info FILE | head -1`."""
-    program = f"import sys; from activesteer.cli import main; sys.exit(main(['info', {str(file)!r}]))"
+    program = f"import sys; from activesteer.commands.cli import main; sys.exit(main(['info', {str(file)!r}]))"
     root = Path(__file__).resolve().parents[2]
     with subprocess.Popen(
         [sys.executable, "-u", "-c", program], cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -10,7 +10,7 @@ import shutil
 import pytest
 
 from activesteer import rigs
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.plotting import drawing
 
 

@@ -22,7 +22,7 @@ from activesteer import Recording
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S
 
 ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 MORE_LIMITS = (100, 5_000, 50_000, 100_000, 200_000, 800_000)
 MORE_STEPS = range(700, 9_700, 1_000)
 SHORT = ("--set", "duration_s=2", "--set", "settle_s=0")
@@ -161,7 +161,7 @@ def unprivileged() -> tuple[str, ...]:
 )
 def test_a_run_and_its_report_need_no_home_and_no_language(tmp_path: Path, environment: dict[str, str]) -> None:
     words = (("run", "step_steer", "-c", "ars", "-o", "run.mcap"), ("report", "run.mcap", "-o", "report.html"))
-    both = f"import sys; from activesteer.cli import main; sys.exit(any([main(words) for words in {words}]))"
+    both = f"import sys; from activesteer.commands.cli import main; sys.exit(any([main(words) for words in {words}]))"
     done = subprocess.run(
         [sys.executable, "-c", both], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
         capture_output=True, text=True, check=False, timeout=300,
@@ -228,7 +228,7 @@ def test_a_run_killed_at_any_moment_leaves_a_recording_or_one_error(call, tmp_pa
 
 @pytest.mark.slow
 def test_half_an_hour_of_driving_takes_less_than_a_gigabyte(tmp_path: Path) -> None:
-    code = "import resource; from activesteer.cli import main; status = main(); "
+    code = "import resource; from activesteer.commands.cli import main; status = main(); "
     code += "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); raise SystemExit(status)"
     for duration_s in (1, 1800):  # the first run compiles, which takes a quarter of a gigabyte itself
         words = ("run", "straight_line", "--set", f"duration_s={duration_s}", "--json", "-o", f"{duration_s}.mcap")

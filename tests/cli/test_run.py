@@ -18,9 +18,9 @@ from activesteer.analysis.metrics import EVALUATIONS
 from activesteer.analysis.tables import comparison
 from activesteer.commands import drive as run_command
 from activesteer.commands.terminal import BAD, coloured, painted
-from activesteer.metric_table import recorded_metric
+from activesteer.core.metric_table import recorded_metric
+from activesteer.core.version import __version__
 from activesteer.resources import find_vehicle
-from activesteer.version import __version__
 
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.3")
 STEP = ("--set", "settle_s=0.1", "--set", "steer.steering_wheel_deg=30", "--set", "steer.start_s=0.1")
@@ -198,7 +198,7 @@ def test_search_for_the_amplitude_is_the_same_for_all_controllers(call):
 def test_program_starts_from_a_shell_whose_terminal_lacks_letters(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii"}
     done = subprocess.run(
-        [sys.executable, "-c", "import sys; from activesteer.cli import main; sys.exit(main())",
+        [sys.executable, "-c", "import sys; from activesteer.commands.cli import main; sys.exit(main())",
          "run", "straight_line", *SHORT, "--all"],
         cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
     )  # fmt: skip

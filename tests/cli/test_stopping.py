@@ -17,7 +17,7 @@ from activesteer import Recording
 from activesteer.commands.stopping import StopSignals
 
 ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 END_S = 5.0
 """What an end may take at most; on a busy machine even one second is no measure."""
 
@@ -74,7 +74,7 @@ def test_command_that_does_not_listen_is_ended_and_leaves_no_half_file(tmp_path,
     body = f"""
         import contextlib, time
         from activesteer.errors import ParameterError
-        from activesteer.files import atomic_write
+        from activesteer.core.files import atomic_write
         with atomic_write("half.png", ParameterError) as part:
             part.write_text("half")
             open("busy", "w").close()

@@ -16,7 +16,7 @@ from activesteer.commands.terminal import Progress
 from activesteer.studies.engine.study import StudyProgress
 
 ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 
 STUDY = """
 controllers = ["none"]

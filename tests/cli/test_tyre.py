@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from activesteer.cli import main
+from activesteer.commands.cli import main
 
 
 def test_a_tyre_by_name_is_described_in_words(capsys):

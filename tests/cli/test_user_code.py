@@ -16,7 +16,7 @@ from activesteer import Recording
 from tests.cli.conftest import Call
 
 ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.cli import main; sys.exit(main())"
+MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.2", "--set", "steer.start_s=0.05")
 PRINTS = """
 if self.steps == 1:

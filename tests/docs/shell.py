@@ -13,7 +13,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from activesteer.cli import command_line, main
+from activesteer.commands.cli import command_line, main
 from tests.docs.blocks import Command, same_output
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.cli import command_line
+from activesteer.commands.cli import command_line
 from activesteer.maneuver import KINDS
 from activesteer.resources import list_maneuvers
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import pytest
 
-from activesteer.metric_table import recorded_metric
+from activesteer.core.metric_table import recorded_metric
 from tools.baseline import BASELINE
 
 ROOT: Final = Path(__file__).parents[2]

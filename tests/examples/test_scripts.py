@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import activesteer
-from activesteer.cli import main
+from activesteer.commands.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"

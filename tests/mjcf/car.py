@@ -7,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2
 
 FOLDER = Path(__file__).resolve().parents[2] / "models" / "mjcf" / "compact"
 

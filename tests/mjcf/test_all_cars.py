@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from tests.mjcf.car import warnings
 
 MJCF = Path(__file__).resolve().parents[2] / "models" / "mjcf"

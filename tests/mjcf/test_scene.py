@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from tests.mjcf.car import FOLDER, TENDONS, names, warnings
 
 

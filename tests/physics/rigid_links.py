@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 
 FRONT_LINKS = ("lca_front", "lca_rear", "tie_rod")
 REAR_LINKS = ("spring_link", "toe_link", "camber_link", "trailing_lower", "trailing_upper")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import activesteer
 from activesteer import Simulation
 from activesteer.analysis.metrics import EVALUATIONS
-from activesteer.conventions import CORNERS, DEFAULT_TIMESTEP_S
+from activesteer.core.conventions import CORNERS, DEFAULT_TIMESTEP_S
 from activesteer.recording import Recording
 from activesteer.scenario import Scenario, resolve
 from activesteer.simulation.closed_loop import ClosedLoop

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.rigs.kc.held_car import HeldCar
 from tests.physics.rigid_links import FRONT_LINKS, REAR_LINKS
 

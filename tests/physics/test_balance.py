@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.recording import Recording
 from activesteer.scenario import load_car
 from activesteer.tyre.kernels.magic_formula import magic_formula

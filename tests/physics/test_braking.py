@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from activesteer import ActuatorCommand, DriverCommand, Recording, Simulation, simulate
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.resources import models_dir
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre.evaluation import MagicFormula

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer import Simulation
-from activesteer.faults import fault_table
+from activesteer.config.faults import fault_table
 from activesteer.sensors.parameters import RANDOM, Sensor, Sensors
 from tests.physics.runs import assert_goes_on_bit_by_bit
 

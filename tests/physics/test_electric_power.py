@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from activesteer import ActuatorCommand, DriverCommand, Simulation
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.vehicle.statics import mass_properties
 
 DT_S = 0.001

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.recording import Recording
 from activesteer.resources import list_maneuvers
 from activesteer.scenario import resolve

@@ -9,8 +9,8 @@ import pytest
 
 import activesteer
 from activesteer import ActuatorCommand, Recording, Simulation
+from activesteer.config.faults import fault_table
 from activesteer.errors import ManeuverError
-from activesteer.faults import fault_table
 from tests.physics.runs import assert_goes_on_bit_by_bit
 from tests.raising import raises
 

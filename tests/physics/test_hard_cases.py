@@ -9,8 +9,8 @@ import pytest
 
 from activesteer import Simulation, simulate
 from activesteer.analysis.sine_with_dwell import RATIO_LIMITS
+from activesteer.core.signals import ActuatorCommand
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand
 from activesteer.vehicle.step_bindings import steering_rates
 
 SENSORS = {"sensors.preset": "production", "sensors.seed": 1}

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.rigs.kc.held_car import MOUNT_ENDINGS, Case, HeldCar

@@ -12,9 +12,9 @@ import pytest
 
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.config import Range
+from activesteer.core.signals import ActuatorCommand
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car, resolve
-from activesteer.signals import ActuatorCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.studies.linear.linearisation import (
     INPUTS,

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.resources import find_maneuver, list_maneuvers
 from activesteer.scenario import load_car
 

@@ -11,7 +11,7 @@ from scipy.signal import lsim
 
 from activesteer import simulate
 from activesteer.analysis.harm import LOST_SIDESLIP_RAD
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.controllers import CONTROLLER
 from activesteer.errors import ControllerError
 from activesteer.resources import find_vehicle, models_dir

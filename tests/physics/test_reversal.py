@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from activesteer import simulate
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 
 REVERSAL = {
     "kind": "open_loop",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.recording import Recording
 from tests.physics.runs import COAST_OR_BRAKE, corners
 

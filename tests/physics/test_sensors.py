@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.scenario import resolve

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.recording import Recording
 from tests.physics.runs import car, corners, last, mass_kg, run
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.vehicle import Vehicle
 from tests.physics.runs import car, corners, mass_kg, run
 

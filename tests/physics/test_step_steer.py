@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from tests.physics.runs import last, run
 
 

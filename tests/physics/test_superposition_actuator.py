@@ -10,8 +10,8 @@ import pytest
 
 import activesteer
 from activesteer import ActuatorCommand, Recording
+from activesteer.config.faults import fault_table
 from activesteer.errors import ParameterError
-from activesteer.faults import fault_table
 from activesteer.scenario import load_car
 from activesteer.vehicle.electric_actuators import STRAIN_WAVE
 from tests.raising import raises

@@ -10,8 +10,8 @@ import pytest
 
 import activesteer
 from activesteer import ActuatorCommand, Recording
+from activesteer.config.faults import fault_table
 from activesteer.errors import ParameterError
-from activesteer.faults import fault_table
 from activesteer.rigs import kinematics_compliance
 from activesteer.scenario import load_car
 from activesteer.studies.linear.linearisation import linearise

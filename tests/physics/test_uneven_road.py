@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError, ParameterError, SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.road.obstacles import Obstacle

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 pytest.importorskip("uvicorn", reason="needs the extra `explore`")
 pytestmark = pytest.mark.render
 
-COMMAND = [sys.executable, "-c", "from activesteer.cli import main; raise SystemExit(main())", "explore", "--json"]
+MAIN = "from activesteer.commands.cli import main; raise SystemExit(main())"
+COMMAND = [sys.executable, "-c", MAIN, "explore", "--json"]
 LAST_YAW_RATE = """() => [...activesteer.runs.values()].map((run) =>
   run.plots.panels.find((panel) => panel.title === "Yaw rate").series[0].values.at(-1))"""
 DONE = "#state:has-text('all after')"

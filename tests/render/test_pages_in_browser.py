@@ -11,7 +11,7 @@ import pytest
 
 from activesteer import study
 from activesteer.analysis.report import write_report
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.pages import Page, Section, Table, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.standards.examination import examination_page

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from activesteer.analysis.report import write_report
-from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from tests.conftest import PHONE
 from tests.contrast import contrast
 from tests.unit.analysis.synthetic_files import lane_changes, step_steers

@@ -9,7 +9,7 @@ import pytest
 import rerun as rr
 from numpy.typing import NDArray
 
-from activesteer.conventions import CORNERS, RUN_COLOURS_ON_DARK
+from activesteer.core.conventions import CORNERS, RUN_COLOURS_ON_DARK
 from activesteer.drawing.panels import WHEELS, panels_in
 from activesteer.playback import Showing, runs_of, save
 from activesteer.playback.layout import blueprint

@@ -11,7 +11,7 @@ import pytest
 from activesteer import ActuatorCommand, simulate
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
 from activesteer.controllers import load_controller
-from activesteer.metric_table import STEER_RAD
+from activesteer.core.metric_table import STEER_RAD
 from activesteer.recording import Recording
 from tests.fakes import Fake, rejected
 

@@ -11,8 +11,8 @@ import pytest
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
-from activesteer.conventions import CORNERS
-from activesteer.metric_table import STEER_RAD
+from activesteer.core.conventions import CORNERS
+from activesteer.core.metric_table import STEER_RAD
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from activesteer.analysis.claims.judge import STATEMENTS
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.studies import reproduction
 from activesteer.studies.reproduction import Reproduction
 

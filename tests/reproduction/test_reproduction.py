@@ -11,7 +11,7 @@ import pytest
 from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, SYSTEMS
 from activesteer.analysis.claims.scorecard import not_reproduced
 from activesteer.analysis.figures import BY_SCENARIO, OF_ANY_RUN
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.studies.reproduction import Reproduction, draw_figures, reproduce

@@ -11,8 +11,8 @@ import pyarrow as pa
 import pytest
 
 from activesteer.commands.arguments import overrides_of
+from activesteer.core.metric_table import SIDESLIP_PEAKS
 from activesteer.errors import ParameterError, StudyError
-from activesteer.metric_table import SIDESLIP_PEAKS
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.plan import Plan
 from activesteer.theory.proportions import Proportion

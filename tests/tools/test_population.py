@@ -13,8 +13,8 @@ import pytest
 
 from activesteer.analysis.claims.judge import SYSTEMS, Claim
 from activesteer.analysis.claims.scorecard import NO_FACTOR, ClaimProportion
+from activesteer.core.metric_table import CONES_MISSED
 from activesteer.errors import StudyError
-from activesteer.metric_table import CONES_MISSED
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import StudyFile, read_study

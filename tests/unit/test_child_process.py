@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.child_process import Child, ChildFault
+from activesteer.core.child_process import Child, ChildFault
 
 SERVED = """
 import os, signal, socket, struct, subprocess, sys, time

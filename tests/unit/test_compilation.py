@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 import activesteer
-from activesteer import compilation, resources
+from activesteer import resources
+from activesteer.native import compilation
 from activesteer.tyre import load_tir
 
 _PACKAGE = Path(activesteer.__file__).parent
@@ -35,10 +36,10 @@ def package(tmp_path: Path) -> Path:
     (folder / "inner" / "__init__.py").write_text("")
     (folder / "numbers.py").write_text("FACTOR = 3.0\n")
     (folder / "inner" / "function.py").write_text(
-        "from activesteer.compilation import compiled\n@compiled\ndef inner(x):\n    return x + 1.0\n"
+        "from activesteer.native.compilation import compiled\n@compiled\ndef inner(x):\n    return x + 1.0\n"
     )
     (folder / "outer.py").write_text(
-        "from activesteer.compilation import compiled\n"
+        "from activesteer.native.compilation import compiled\n"
         "from gearbox import numbers as n\n"
         "from gearbox.inner.function import (\n    inner,\n)\n"
         "@compiled\ndef outer(x):\n    return n.FACTOR * inner(x)\n"
@@ -145,7 +146,7 @@ def test_without_a_folder_that_can_be_written_it_runs_and_says_so_once(package: 
 
 @pytest.mark.slow
 def test_only_some_states_of_a_function_are_kept(package: Path, tmp_path: Path) -> None:
-    call = "from activesteer import compilation\ncompilation._KEPT = 2\n" + _CALL.format(package=package.name)
+    call = "from activesteer.native import compilation\ncompilation._KEPT = 2\n" + _CALL.format(package=package.name)
     kept = []
     for factor in range(3):
         (package / "numbers.py").write_text(f"FACTOR = {factor}.0\n")
@@ -181,4 +182,4 @@ def test_compiling_needs_no_linear_algebra_and_leaves_it_to_those_who_do() -> No
 def test_all_native_code_of_the_package_is_made_in_one_place() -> None:
     words = re.compile(r"\b(njit|jit|cfunc|guvectorize|vectorize)\b")
     found = [file for file in _PACKAGE.rglob("*.py") if words.search(file.read_text())]
-    assert found == [_PACKAGE / "compilation.py"]
+    assert found == [_PACKAGE / "native" / "compilation.py"]

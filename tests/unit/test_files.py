@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from activesteer.errors import ParameterError, PlaybackError
-from activesteer.files import (
+from activesteer.core.files import (
     atomic_write,
     csv_number,
     delete_temporary_files,
@@ -16,6 +15,7 @@ from activesteer.files import (
     write_text,
     writing,
 )
+from activesteer.errors import ParameterError, PlaybackError
 from tests.raising import raises
 
 

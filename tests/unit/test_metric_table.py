@@ -7,8 +7,8 @@ import math
 import pytest
 
 from activesteer.analysis.metrics import EVALUATIONS
+from activesteer.core.metric_table import METRICS, metric, recorded_metric
 from activesteer.errors import ParameterError
-from activesteer.metric_table import METRICS, metric, recorded_metric
 from tests.raising import raises
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK, RUN_DASHES, run_looks
+from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK, RUN_DASHES, run_looks
 from tests.contrast import contrast
 
 

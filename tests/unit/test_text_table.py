@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from activesteer.text_table import COLUMNS, text_table, wrapped_line
+from activesteer.core.text_table import COLUMNS, text_table, wrapped_line
 
 HEAD = ["", "unit", *(f"controller_{number}" for number in range(8))]
 ROWS = [HEAD, ["yaw rate peak", "deg/s", *(f"{number}.125" for number in range(8))]]

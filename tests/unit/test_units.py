@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from activesteer.metric_table import METRICS
-from activesteer.units import parameter_title, quantity_of, typeset
+from activesteer.core.metric_table import METRICS
+from activesteer.core.units import parameter_title, quantity_of, typeset
 
 
 def test_the_channel_of_a_corner_is_shown_as_that_of_any_other():

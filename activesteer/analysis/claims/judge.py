@@ -27,8 +27,7 @@ from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, d
 from activesteer.analysis.series import Array, crossing_time, rms, smooth, timestep
 from activesteer.analysis.source import Evaluable, RecordingLike, read_course
 from activesteer.config import Source, build, read_toml
-from activesteer.errors import ParameterError, RecordingError
-from activesteer.metric_table import (
+from activesteer.core.metric_table import (
     CONES_HIT,
     LANE_OVERSTEP,
     SETTLED_SIDESLIP_RAD,
@@ -40,6 +39,7 @@ from activesteer.metric_table import (
     TRACK_M,
     YAW_RATE_RADPS,
 )
+from activesteer.errors import ParameterError, RecordingError
 
 SYSTEMS: Final = ("none", "ars", "afs")
 """Names of the compared runs: no control, active rear steering, active front superposition."""

@@ -28,10 +28,10 @@ import numpy as np
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, SYSTEMS, Claim, Scenario
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Source, build, read_toml
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.files import finite, reading
+from activesteer.core.metric_table import recorded_metric
 from activesteer.errors import ParameterError, StudyError, nearest_names
-from activesteer.files import finite, reading
-from activesteer.metric_table import recorded_metric
 from activesteer.resources import DEFAULT_DRIVER, studies_dir
 from activesteer.theory.proportions import ProportionVerdict, percent, proportion_verdict
 

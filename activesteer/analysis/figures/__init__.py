@@ -23,10 +23,10 @@ from activesteer.analysis.figures import style, tracks
 from activesteer.analysis.figures.over_time import figure_2, figure_11, time_figure
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Source, build
-from activesteer.conventions import RUN_COLOURS, SYSTEM_LABELS
+from activesteer.core.conventions import RUN_COLOURS, SYSTEM_LABELS
+from activesteer.core.files import make_folder
 from activesteer.drawing.panels import PANELS
 from activesteer.errors import ParameterError, RecordingError, shown
-from activesteer.files import make_folder
 from activesteer.plotting import new_figure, save
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 from activesteer.theory.tolerance import tolerance

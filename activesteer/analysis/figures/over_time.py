@@ -17,12 +17,12 @@ from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.figures import style
 from activesteer.analysis.figures.style import DrawnRun
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import CORNERS, RUN_COLOURS, RUN_DASHES, Array, RunLook
+from activesteer.core.conventions import CORNERS, RUN_COLOURS, RUN_DASHES, Array, RunLook
+from activesteer.core.units import quantity_of
 from activesteer.drawing.panels import FIGURE, PANELS, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure, save
 from activesteer.recording.contents import events_of
-from activesteer.units import quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,11 +16,11 @@ from activesteer.analysis.claims.scorecard import Band, bands_of
 from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
-from activesteer.conventions import RunLook, run_looks
+from activesteer.core.conventions import RunLook, run_looks
+from activesteer.core.units import Quantity
 from activesteer.drawing.panels import FIGURE, PANELS, Panel, added_lines, drawn_values
 from activesteer.errors import ParameterError
 from activesteer.plotting import plain_axis
-from activesteer.units import Quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

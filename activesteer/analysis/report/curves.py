@@ -13,7 +13,7 @@ from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
 from activesteer.analysis.report.groups import Group, ReportedRun, entry
 from activesteer.analysis.source import read_course, read_footprint
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.panels import PATH_DISTANCE, REPORT, Panel, panels_in
 from activesteer.errors import RecordingError

@@ -18,9 +18,9 @@ from activesteer.analysis.claims.scorecard import (
     setting_of,
 )
 from activesteer.analysis.harm import kept, losses
-from activesteer.conventions import RunLook, run_looks
+from activesteer.core.conventions import RunLook, run_looks
+from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
-from activesteer.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.recording import Recording
 from activesteer.recording.recording import run_names
 

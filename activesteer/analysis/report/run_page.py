@@ -16,14 +16,14 @@ from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import Group, ReportedRun, entry, groups_of, judge
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
+from activesteer.core.files import write_text
+from activesteer.core.metric_table import Better, recorded_metric
+from activesteer.core.units import display_unit, parameter_label, typeset
 from activesteer.errors import ParameterError
-from activesteer.files import write_text
-from activesteer.metric_table import Better, recorded_metric
 from activesteer.pages import render
 from activesteer.recording import Recording
 from activesteer.recording.contents import events_of
 from activesteer.theory.proportions import percent
-from activesteer.units import display_unit, parameter_label, typeset
 
 TITLE: Final = "activesteer report"
 _VERDICT_LOOK: Final = {

@@ -10,10 +10,10 @@ from typing import Final
 
 from numba import carray, from_dtype, types
 
-from activesteer.compilation import compiled_callback
+from activesteer.core.signals import ActuatorCommand, DriverCommand, numbers_of
 from activesteer.coupling.car.variables import PLACE_GROUPS, PLACES
-from activesteer.native_memory import f64_pointer, load_numbers, pointer_to, store_numbers, word_pointer, zeros_of
-from activesteer.signals import ActuatorCommand, DriverCommand, numbers_of
+from activesteer.native.compilation import compiled_callback
+from activesteer.native.memory import f64_pointer, load_numbers, pointer_to, store_numbers, word_pointer, zeros_of
 from activesteer.vehicle.channels.corners import angle_sides, in_the_road_plane, sideslip_share
 from activesteer.vehicle.channels.native_channels import (
     Actuator,

@@ -17,7 +17,10 @@ from typing import Any, Final, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.brakes.records import BRAKE_SETUP
+from activesteer.config.faults import ACTUATORS
+from activesteer.core.files import atomic_write
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_in, numbers_of
+from activesteer.core.version import __version__
 from activesteer.coupling.car.objects import Memory, car_code, native_memory
 from activesteer.coupling.car.variables import (
     INPUT,
@@ -35,21 +38,18 @@ from activesteer.coupling.car.variables import (
     parameters_of,
 )  # fmt: skip
 from activesteer.errors import ModelError, ParameterError
-from activesteer.faults import ACTUATORS
-from activesteer.files import atomic_write
 from activesteer.scenario import Scenario
 from activesteer.sensors.signal_chain import CHAIN
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.brakes.records import BRAKE_SETUP
 from activesteer.vehicle.channels.corners import design_heights_m
 from activesteer.vehicle.faults import part_of
 from activesteer.vehicle.force_block import sensor_columns
 from activesteer.vehicle.native_faults import N_HEALTH
 from activesteer.vehicle.step_bindings import BRAKES, CARRIED_OUT, COMMANDS
-from activesteer.version import __version__
 
 _SOURCES: Final = Path(__file__).parent / "c"
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)

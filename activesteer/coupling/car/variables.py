@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 from xml.sax.saxutils import quoteattr
 
+from activesteer.config.faults import ACTUATORS
 from activesteer.controllers import CONTROLLER
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import CORNERS_IN_WORDS, Measurement, numbers_in, numbers_of
+from activesteer.core.units import find_unit
+from activesteer.core.version import __version__
 from activesteer.driver import DRIVER
-from activesteer.faults import ACTUATORS
-from activesteer.signals import CORNERS_IN_WORDS, Measurement, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.units import find_unit
 from activesteer.vehicle.channels.native_channels import Actuator, AxialForce, Column, RawRows
 from activesteer.vehicle.parameters import Factors
 from activesteer.vehicle.step_bindings import CARRIED_OUT, COMMANDS
-from activesteer.version import __version__
 
 INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 FROM_RESULT, FROM_FORCE, FROM_LIMIT, FROM_MOTION, FROM_INPUT = range(17, 22)

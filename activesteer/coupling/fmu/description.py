@@ -17,11 +17,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, NamedTuple
 
-from activesteer import limits
+from activesteer.core import limits
+from activesteer.core.files import read_bytes, shown_path
+from activesteer.core.units import Unit, find_unit, known_unit
 from activesteer.errors import not_installed, shown
-from activesteer.files import read_bytes, shown_path
 from activesteer.plugins import Kind
-from activesteer.units import Unit, find_unit, known_unit
 
 _BLOCK_BYTES: Final = 1 << 20
 _DAMAGED: Final = (zipfile.BadZipFile, zlib.error, OSError, EOFError, NotImplementedError, RuntimeError)

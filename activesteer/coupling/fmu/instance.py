@@ -14,7 +14,7 @@ import weakref
 from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple, Protocol
 
-from activesteer.child_process import Child, ChildFault
+from activesteer.core.child_process import Child, ChildFault
 
 _WARNING: Final = 1
 _FATAL: Final = 4

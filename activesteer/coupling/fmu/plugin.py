@@ -15,16 +15,16 @@ from pathlib import Path
 from typing import Annotated, Any, Final, NamedTuple, get_args, get_origin, get_type_hints
 
 from activesteer.config import Source, read_toml
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.files import is_file, shown_path, user_path, why_no_file
+from activesteer.core.signals import DriverCommand, Measurement, Motion, PerWheel, Setpoint, new_message
+from activesteer.core.units import UNIT_NAMES, find_unit, split_ending
 from activesteer.coupling.fmu.description import Archive, Variable, describe_fmu
 from activesteer.coupling.fmu.instance import FmuFault, Group, Instance, Spec, make_instance
 from activesteer.errors import nearest_names, shown
-from activesteer.files import is_file, shown_path, user_path, why_no_file
 from activesteer.plugins import Kind, Plugin
 from activesteer.plugins.file import parse_parameters
 from activesteer.plugins.plugin import allowed, read_values
-from activesteer.signals import DriverCommand, Measurement, Motion, PerWheel, Setpoint, new_message
-from activesteer.units import UNIT_NAMES, find_unit, split_ending
 
 _NO_SIGNAL: Final = "none"
 """Signal of a map for a variable that is left alone."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, save_all
 from activesteer.plotting import draw as drawn

@@ -19,7 +19,7 @@ from typing import Final, Literal, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.vehicle import Vehicle
 

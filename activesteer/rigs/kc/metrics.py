@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from activesteer.config import Source, build, read_toml
-from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.errors import nearest_names
 from activesteer.resources import models_dir
 from activesteer.rigs.kc.held_car import MOUNT_ENDINGS

@@ -15,7 +15,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.tyre.kernels.slip import carcass_stiffnesses
 from activesteer.tyre.kernels.vertical import deflection_under_load, vertical_force

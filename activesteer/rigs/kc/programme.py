@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
 from activesteer.rigs.kc.modes import Modes, TyreStiffness, modes, parking_moment_Nm, tyre_stiffness

@@ -18,13 +18,13 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.files import make_folder, write_text
+from activesteer.core.units import known_unit
 from activesteer.errors import ModelError, ParameterError, nearest_names
-from activesteer.files import make_folder, write_text
 from activesteer.rigs.kc.metrics import DEFINITIONS, Axle, Target, Targets, load_targets
 from activesteer.rigs.kc.programme import INWARDS, Measured, Sweep, measure
 from activesteer.scenario import FileOrTable, check_gains, load_car
-from activesteer.units import known_unit
 from activesteer.vehicle.parameters import Friction
 
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from activesteer.config import Range, Source, parse_value
+from activesteer.core.files import read_csv
 from activesteer.errors import ParameterError, StudyError, nearest_names, not_installed, shown
-from activesteer.files import read_csv
 from activesteer.studies.engine.factors import Factor, Value
 
 DESIGNS: Final = ("grid", "list", "sobol", "latin_hypercube", "random", "saltelli", "morris")

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from activesteer.config import Source
+from activesteer.core.limits import MAX_NUMBER
 from activesteer.errors import nearest_names, shown
-from activesteer.limits import MAX_NUMBER
 
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """Kinds of factors. A factor's table has exactly one of these keys."""

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from activesteer.controllers import controller_spec
-from activesteer.conventions import Array, run_looks
+from activesteer.core.conventions import Array, run_looks
+from activesteer.core.files import file_word, write_text
+from activesteer.core.metric_table import recorded_metric
+from activesteer.core.units import parameter_label
 from activesteer.driver import driver_spec
 from activesteer.errors import ActiveSteerError, StudyError
-from activesteer.files import file_word, write_text
-from activesteer.metric_table import recorded_metric
 from activesteer.pages import render
 from activesteer.plotting import Curve, Panel, Picture, draw, save
 from activesteer.studies.engine.analysis import MAX_SAMPLES, indices
@@ -27,7 +28,6 @@ from activesteer.studies.engine.runs import CURVE, run_command
 from activesteer.studies.engine.store import IDENTITY, OUTCOME, Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.tuning import Goal, Trial, Tuning
-from activesteer.units import parameter_label
 
 _SHOWN_ROWS: Final = 3000
 """Most runs whose points the page holds. Counts and means are over all runs."""

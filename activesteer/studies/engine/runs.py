@@ -27,9 +27,10 @@ import numpy as np
 from activesteer.analysis.claims.judge import SCENARIOS
 from activesteer.config import toml_value
 from activesteer.controllers import controller_spec, is_variant, read_variant
-from activesteer.conventions import CURVE_STEP_S
+from activesteer.core.conventions import CURVE_STEP_S
+from activesteer.core.files import file_word, make_folder, writing
+from activesteer.core.version import __version__
 from activesteer.errors import ActiveSteerError, StudyError
-from activesteer.files import file_word, make_folder, writing
 from activesteer.plugins.file import format_of, source_of
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
@@ -40,11 +41,10 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.study_file import StudyFile
 from activesteer.studies.engine.workers import Workers
 from activesteer.vehicle.native_forces import install_native_forces
-from activesteer.version import __version__
 
 _DECIDING: Final = (
-    "config", "conventions.py", "coupling", "signals.py", "theory", "road", "maneuver", "driver", "controllers",
-    "estimation", "tyre", "brakes", "sensors", "faults", "vehicle", "scenario", "simulation", "analysis",
+    "config", "core", "coupling", "native", "theory", "road", "maneuver", "driver", "controllers", "estimation",
+    "tyre", "sensors", "vehicle", "scenario", "simulation", "analysis",
 )  # fmt: skip
 """Parts of the package that a result depends on."""
 

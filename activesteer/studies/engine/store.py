@@ -22,10 +22,10 @@ from typing import Any, Final, NamedTuple
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from activesteer.core.files import atomic_write, make_folder, reading, write_text, writing
+from activesteer.core.units import unit_of
 from activesteer.errors import StudyError
-from activesteer.files import atomic_write, make_folder, reading, write_text, writing
 from activesteer.studies.engine.runs import CURVE, Row, versions
-from activesteer.units import unit_of
 
 IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")
 """Columns that identify the run of a row. The factors follow them."""

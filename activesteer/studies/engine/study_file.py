@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.config import Source, build, read_toml, toml_value
-from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.files import user_path
 from activesteer.errors import StudyError, nearest_names, shown
-from activesteer.files import user_path
 from activesteer.resources import DEFAULT_DRIVER, find_study
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.design import DesignTable, Samples, cases, choose_design, draw, read_cases

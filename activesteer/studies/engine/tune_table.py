@@ -15,8 +15,8 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 from activesteer.analysis.claims.judge import SCENARIO_OF
 from activesteer.analysis.requirement import ANY, EvaluatedRun, Expression, Names, Requirement, Runs, distance
 from activesteer.config import Range, build
+from activesteer.core.metric_table import METRICS
 from activesteer.errors import nearest_names, shown
-from activesteer.metric_table import METRICS
 from activesteer.studies.engine.factor_values import Prior
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from activesteer.analysis.requirement import ANY, Names, Requirement
+from activesteer.core.files import file_word, finite, make_folder, reading, write_text
 from activesteer.errors import ParameterError, StudyError, nearest_names, not_installed
-from activesteer.files import file_word, finite, make_folder, reading, write_text
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.analysis import without_effect
 from activesteer.studies.engine.factor_values import Plausibility

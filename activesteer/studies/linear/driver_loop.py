@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.controllers.linear_form import LinearController, linear_controller
-from activesteer.conventions import DEFAULT_TIMESTEP_S, RUN_COLOURS, Array, run_looks
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S, RUN_COLOURS, Array, run_looks
 from activesteer.driver import DriverParameters
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
 from activesteer.errors import DriverError, StudyError

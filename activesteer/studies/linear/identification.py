@@ -21,8 +21,8 @@ from activesteer.analysis.handling import Handling
 from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.tables import comparison
 from activesteer.controllers import SingleTrackParameters
+from activesteer.core.metric_table import metric
 from activesteer.errors import RecordingError
-from activesteer.metric_table import metric
 from activesteer.scenario import FileOrTable, check_gains, check_parts, resolve
 from activesteer.scenario.vehicle_file import write_values
 from activesteer.simulation.preparation import (

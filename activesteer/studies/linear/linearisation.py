@@ -33,14 +33,14 @@ import numpy as np
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Range
-from activesteer.conventions import RUN_COLOURS, Array
+from activesteer.core.conventions import RUN_COLOURS, Array
+from activesteer.core.signals import ActuatorCommand, DriverCommand
+from activesteer.core.text_table import text_table
+from activesteer.core.units import quantity_of
 from activesteer.errors import ModelError, ParameterError
 from activesteer.plotting import Curve, Panel, Picture, draw, save
 from activesteer.scenario import FileOrTable, check_parts, resolve
-from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
-from activesteer.text_table import text_table
-from activesteer.units import quantity_of
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.linear_state import LocalState, Mode, find_modes
 

@@ -47,12 +47,12 @@ from activesteer.controllers.linear_form import (
     pulse_responses,
     response_of,
 )
-from activesteer.conventions import GRAVITY_MPS2, Array
+from activesteer.core.conventions import GRAVITY_MPS2, Array
+from activesteer.core.signals import Measurement
 from activesteer.pages import Page, Section, Table, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
-from activesteer.signals import Measurement
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.studies.engine.plan import Plan, task_size
 from activesteer.studies.engine.study import StudyProgress

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from activesteer import limits
+from activesteer.core import limits
+from activesteer.core.files import read_bytes
 from activesteer.errors import TyreFileError
-from activesteer.files import read_bytes
 
 """Size of the largest file that is read. Real ones have some tens of kilobytes."""
 

@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from activesteer.compilation import compiled
+from activesteer.native.compilation import compiled
 from activesteer.tyre.kernels.magic_formula import limit_flags, slip_stiffnesses, steady_state
 from activesteer.tyre.kernels.slip import MIN_RELAXATION_LENGTH_M, relaxation_lengths
 from activesteer.tyre.kernels.vertical import (

@@ -24,7 +24,7 @@ import math
 from enum import IntFlag
 from typing import NamedTuple
 
-from activesteer.compilation import compiled
+from activesteer.native.compilation import compiled
 from activesteer.tyre.kernels.slip import (
     EPSILON,
     MF52,

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.compilation import compiled
+from activesteer.native.compilation import compiled
 from activesteer.tyre.kernels.vertical import effective_rolling_radius
 
 EPSILON = 1e-6

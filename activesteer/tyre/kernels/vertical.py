@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from activesteer.compilation import compiled
+from activesteer.native.compilation import compiled
 
 MF62 = 62.0
 _SOFTEST = 0.1

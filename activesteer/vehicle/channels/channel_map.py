@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ParameterError
 from activesteer.sensors.block import MEASURED
 from activesteer.vehicle.channels.corners import (

@@ -11,11 +11,11 @@ import mujoco
 import numpy as np
 from numba import types
 
-from activesteer.brakes.records import PER_WHEEL, PLACES
-from activesteer.compilation import compiled_call, inlined
-from activesteer.conventions import CORNERS, Array
-from activesteer.signals import CORNERS_IN_WORDS, Channel
+from activesteer.core.conventions import CORNERS, Array
+from activesteer.core.signals import CORNERS_IN_WORDS, Channel
+from activesteer.native.compilation import compiled_call, inlined
 from activesteer.vehicle import force_block as fb
+from activesteer.vehicle.brakes.records import PER_WHEEL, PLACES
 from activesteer.vehicle.channels.native_channels import (
     Actuator,
     AxialForce,

@@ -13,10 +13,10 @@ import mujoco
 import numpy as np
 from numba import from_dtype, types
 
-from activesteer.compilation import compiled_call, inlined
-from activesteer.conventions import Array
-from activesteer.native_memory import f64_pointer
-from activesteer.signals import Channel
+from activesteer.core.conventions import Array
+from activesteer.core.signals import Channel
+from activesteer.native.compilation import compiled_call, inlined
+from activesteer.native.memory import f64_pointer
 from activesteer.vehicle.force_block import sensor_columns
 
 

@@ -11,12 +11,12 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.errors import ActiveSteerError, ModelError, SimulationDiverged, nearest_names
 from activesteer.resources import find_vehicle
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.scenario import CarSpec, load_car
-from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.statics import mass_properties

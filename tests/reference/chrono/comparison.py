@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from activesteer.files import finite
+from activesteer.core.files import finite
 
 Kind = Literal["relative", "absolute"]
 

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.units import quantity_of
 from activesteer.plotting import Area, Curve, Panel, Picture
-from activesteer.units import quantity_of
 from tests.reference.chrono.kinematics import Curves
 from tests.reference.chrono.our_runs import QUANTITIES, RMS_TOLERANCE, traces
 from tests.reference.chrono.reference import Table

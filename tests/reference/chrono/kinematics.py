@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.vehicle import Vehicle
 from tests.reference.chrono.comparison import Comparison, absolute, relative

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from activesteer.analysis.lanes import TIME_TOLERANCE_S, corridor
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from tests.reference.chrono.comparison import Comparison, absolute, relative
 from tests.reference.chrono.reference import Table
 

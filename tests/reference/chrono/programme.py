@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.files import atomic_write, make_folder, shown_path
 from activesteer.errors import ParameterError
-from activesteer.files import atomic_write, make_folder, shown_path
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import simulate

@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.files import is_file, is_folder, read_text, shown_path
+from activesteer.core.limits import MAX_CSV_BYTES
 from activesteer.errors import ParameterError, nearest_names, shown
-from activesteer.files import is_file, is_folder, read_text, shown_path
-from activesteer.limits import MAX_CSV_BYTES
 from activesteer.resources import models_dir
 
 Table = dict[str, Array]

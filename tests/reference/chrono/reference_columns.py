@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.recording import Recording
 
 _ACCELERATION_INTERVAL_S: Final = 0.005

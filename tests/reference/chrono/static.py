@@ -8,8 +8,8 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS
-from activesteer.signals import ActuatorCommand, DriverCommand
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from tests.reference.chrono.comparison import Comparison, absolute, relative
 from tests.reference.chrono.reference import ReferenceData

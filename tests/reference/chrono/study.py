@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.conventions import DEFAULT_TIMESTEP_S
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S
 from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.workers import in_parallel
 from tests.reference.chrono.reference import ReferenceData

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.tyre.tyre_parameters import Side, TyreParameters
 from tests.reference.chrono.comparison import Comparison

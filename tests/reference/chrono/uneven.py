@@ -14,9 +14,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
+from activesteer.core.files import read_text, shown_path
 from activesteer.errors import ParameterError, shown
-from activesteer.files import read_text, shown_path
 from tests.reference.chrono.comparison import Comparison
 from tests.reference.chrono.our_runs import compare_rms
 from tests.reference.chrono.reference import Table

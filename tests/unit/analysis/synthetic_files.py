@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from activesteer.core.signals import Channel
 from activesteer.recording import Recording
-from activesteer.signals import Channel
 from tests.unit.analysis.synthetic import SyntheticRun, along_path, sine_with_dwell, step_steer
 
 CORNERS = ("fl", "fr", "rl", "rr")

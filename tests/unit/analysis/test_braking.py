@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.analysis.braking import BEFORE_S, MIN_YAW_RATE_RADPS, straight_braking_metrics
 from activesteer.analysis.metrics import metrics
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun

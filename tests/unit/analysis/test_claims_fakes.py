@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, largest_action
-from activesteer.metric_table import STEER_RAD
+from activesteer.core.metric_table import STEER_RAD
 from tests.fakes import Fake, rejected
 from tests.unit.analysis.good_runs import good, runs_of
 from tests.unit.analysis.synthetic import SyntheticRun

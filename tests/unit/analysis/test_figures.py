@@ -19,7 +19,7 @@ from activesteer.analysis.figures import (
     style,
     tracks,
 )
-from activesteer.conventions import run_looks
+from activesteer.core.conventions import run_looks
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.road.course import CONE_RADIUS_M
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters

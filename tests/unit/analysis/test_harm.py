@@ -17,7 +17,7 @@ from activesteer.analysis.harm import (
     severity,
     shown,
 )
-from activesteer.metric_table import CONES_MISSED, STAYS_IN_LANES
+from activesteer.core.metric_table import CONES_MISSED, STAYS_IN_LANES
 
 LANE = {
     "lane_overstep_m": 0.12, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.05, "heading_end_rad": 0.01,

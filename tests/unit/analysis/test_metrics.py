@@ -10,10 +10,10 @@ import pytest
 from activesteer.analysis import general, step_response
 from activesteer.analysis.general import weighted, weighting
 from activesteer.analysis.metrics import EVALUATIONS, metrics
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.metric_table import METRICS
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.maneuver.kinds import KINDS
-from activesteer.metric_table import METRICS
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun, step_steer
 

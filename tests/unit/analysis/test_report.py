@@ -18,11 +18,11 @@ from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
 from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of, judge, outcome, verdict
 from activesteer.analysis.report.run_page import Result, results, rows
 from activesteer.analysis.tables import Change, difference_text, number
+from activesteer.core.metric_table import recorded_metric
+from activesteer.core.signals import Channel
 from activesteer.errors import ParameterError, RecordingError
-from activesteer.metric_table import recorded_metric
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M
-from activesteer.signals import Channel
 from tests.raising import raises
 from tests.unit.analysis.synthetic import along_path, offset_track, step_steer
 from tests.unit.analysis.synthetic_files import lane_changes, recording_of, sines, step_steers

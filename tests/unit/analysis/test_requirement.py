@@ -16,9 +16,9 @@ from activesteer.analysis.requirement import (
     distance,
 )
 from activesteer.config import Source
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.metric_table import METRICS
 from activesteer.errors import StudyError
-from activesteer.metric_table import METRICS
 from tests.raising import raises
 from tests.unit.analysis.good_runs import check, good
 

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.analysis import step_response
 from activesteer.analysis.step_response import REFERENCE_MPS2, angle_at, step_response_metrics
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import RAMP_S, STEP_S, SyntheticRun, first_order, second_order, step_steer

@@ -9,7 +9,7 @@ import pytest
 from activesteer.analysis import step_response
 from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.tables import Change, comparison, significance
-from activesteer.metric_table import METRICS
+from activesteer.core.metric_table import METRICS
 from tests.unit.analysis.synthetic import step_steer
 from tools.comparison import SHOWN
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from activesteer.controllers import Controller, ControllerParameters, ControllerSetup, SingleTrackParameters
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 
 CAR = SingleTrackParameters(
     mass_kg=1400.0,

@@ -8,8 +8,8 @@ import pytest
 
 from activesteer.controllers.allocation import angle_range
 from activesteer.controllers.turn_reference import ConfidenceMonitor
+from activesteer.core.signals import Estimate
 from activesteer.scenario import resolve
-from activesteer.signals import Estimate
 
 LIMIT_RAD, AGAINST_RAD = math.radians(3.0), math.radians(1.0)
 

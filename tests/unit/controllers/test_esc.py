@@ -10,8 +10,8 @@ import pytest
 from activesteer.controllers import load_controller
 from activesteer.controllers.esc import Esc, brake_levers, wheel_torques
 from activesteer.controllers.turn_reference import BorneTurnReference
+from activesteer.core.signals import DriverCommand, Estimate
 from activesteer.scenario import resolve
-from activesteer.signals import DriverCommand, Estimate
 from activesteer.theory.single_track import SingleTrack
 from tests.unit.controllers.cars import held, measured, steering
 

@@ -20,9 +20,9 @@ from activesteer.controllers import (
     declared_parameters,
     load_controller,
 )
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.errors import ControllerError
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
 

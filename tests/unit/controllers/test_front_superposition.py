@@ -8,7 +8,7 @@ import pytest
 
 from activesteer.controllers import ControllerParameters, FrontSuperposition, NoControl, RearSteer
 from activesteer.controllers.parameters import CorrectorParameters, FrontSuperpositionParameters, RearSteerParameters
-from activesteer.signals import ActuatorCommand
+from activesteer.core.signals import ActuatorCommand
 from activesteer.theory.tolerance import tolerance
 from tests.unit.controllers.cars import held, measured, setup, steering
 

@@ -12,9 +12,9 @@ import pytest
 from activesteer.controllers import load_controller
 from activesteer.controllers.axle_slopes import LEAST, AxleSlopes
 from activesteer.controllers.integrated import Integrated, SupervisedActuator, solver
+from activesteer.core.signals import Estimate
 from activesteer.errors import ControllerError, ParameterError
 from activesteer.scenario import resolve
-from activesteer.signals import Estimate
 from tests.raising import raises
 from tests.unit.controllers.cars import held, measured, steering
 

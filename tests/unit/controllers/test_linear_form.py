@@ -9,9 +9,9 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.linear_form import linear_controller, pulse_responses, response_of
+from activesteer.core.signals import ActuatorCommand
 from activesteer.errors import ControllerError
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
 

@@ -11,9 +11,9 @@ import pytest
 from activesteer.controllers import ControllerParameters, load_controller
 from activesteer.controllers.allocation import Allocation, allocated, moment_change
 from activesteer.controllers.lqr import BOTH, SPEEDS_MPS, STATES, Lqr, feedback, model, schedule, steady_turn
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.signals import Estimate
 from activesteer.scenario import resolve
-from activesteer.signals import Estimate
 from activesteer.theory.single_track import SingleTrack
 from tests.unit.controllers.cars import CAR, held, measured, steering
 

@@ -13,9 +13,9 @@ from activesteer.controllers.axle_slopes import LEAST, AxleSlopes
 from activesteer.controllers.esc import wheel_torques
 from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.lqr import SPEEDS_MPS, Lqr, _gain, _place, schedule, steady_turn
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.signals import Estimate
 from activesteer.scenario import resolve
-from activesteer.signals import Estimate
 from activesteer.theory.single_track import SingleTrack
 from tests.unit.controllers.cars import held, measured, steering
 

@@ -8,7 +8,7 @@ import pytest
 
 from activesteer.controllers.parameters import RearSteerParameters
 from activesteer.controllers.rear_steer import RearSteer, SideslipRearSteer
-from activesteer.signals import Estimate
+from activesteer.core.signals import Estimate
 from tests.unit.controllers.cars import measured, setup, steering
 
 GAIN, LIMIT_RAD, SPEED_MPS = 0.5, RearSteerParameters().limit_rad, 25.0

@@ -11,10 +11,10 @@ from activesteer.controllers import load_controller
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.torque_vectoring import Range, SplitTorques, TorqueVectoring
 from activesteer.controllers.turn_reference import BorneTurnReference
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.signals import NO_TORQUES, DriverCommand, Estimate
 from activesteer.errors import ControllerError
 from activesteer.scenario import resolve
-from activesteer.signals import NO_TORQUES, DriverCommand, Estimate
 from tests.raising import raises
 from tests.unit.controllers.cars import held, measured, steering
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.drawing.cars import direction_of_motion
 
 TIME_S: Array = np.linspace(0.0, 10.0, 1001)

@@ -11,7 +11,7 @@ import pytest
 from activesteer.analysis.figures.over_time import time_figure
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.drawing import panels
 from activesteer.drawing.panels import (
     EXPLORE,

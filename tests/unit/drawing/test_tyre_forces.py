@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import Channel
 from activesteer.drawing.tyre_forces import force_arrows, force_scale
 from activesteer.recording import Recording
-from activesteer.signals import Channel
 from tests.unit.playback import synthetic
 from tests.unit.playback.synthetic import circle
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.core.signals import Channel
 from activesteer.drawing.wheel_angles import (
     CHANNELS,
     RADIUS_M,
@@ -17,7 +18,6 @@ from activesteer.drawing.wheel_angles import (
 )  # fmt: skip
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
-from activesteer.signals import Channel
 
 SIZE = Footprint(1.8, 2.6, (0.2, 0.2))
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from activesteer.core.signals import Measurement, Motion, Setpoint
 from activesteer.driver import ConstantRadiusDriver, OpenLoopDriver, SpeedHold
-from activesteer.signals import Measurement, Motion, Setpoint
 from tests.unit.driver.drives import DRIVE, parameters
 
 RATIO, WHEELBASE_M, LOCK_RAD, SPEED_MPS, STEP_S = 16.0, 2.6, 8.0, 15.0, 0.001

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from activesteer.core.signals import Measurement, Motion, Setpoint
 from activesteer.driver import OpenLoopDriver, SpeedHold
-from activesteer.signals import Measurement, Motion, Setpoint
 from tests.unit.driver.drives import DRIVE, parameters
 
 MASS_KG, RADIUS_M = 1400.0, 0.31

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from activesteer.core.path import Path
+from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.driver import DriverParameters, OpenLoopDriver, PathPreviewDriver, SpeedHold
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, steering_gains
-from activesteer.road.path import Path
-from activesteer.signals import DriverCommand, Measurement, Motion, Setpoint
 from tests.unit.driver.drives import DRIVE
 from tests.unit.driver.drives import parameters as somebody
 

@@ -9,9 +9,9 @@ import numpy as np
 
 import activesteer
 from activesteer.controllers import load_controller
+from activesteer.core.signals import Estimate, Measurement
 from activesteer.estimation.estimator import Estimator
 from activesteer.recording import Recording
-from activesteer.signals import Estimate, Measurement
 
 
 class Drive(NamedTuple):

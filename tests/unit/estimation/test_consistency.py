@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import chi2
 
 from activesteer import simulate
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.estimation.kalman_filter import begin, correct, predict
 from activesteer.estimation.records import (
     AY_OFFSET,

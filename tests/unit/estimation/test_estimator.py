@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.signals import Measurement
 from activesteer.errors import ControllerError
 from activesteer.estimation import EstimatorParameters
 from activesteer.rigs.kc import kinematics_compliance
 from activesteer.scenario import resolve
-from activesteer.signals import Measurement
 from activesteer.tyre.evaluation import MagicFormula
 from tests.raising import raises
 from tests.unit.controllers.cars import setup

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.estimation import advance
 from activesteer.estimation.kalman_filter import begin, correct, predict
 from activesteer.estimation.records import (

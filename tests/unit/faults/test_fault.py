@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from activesteer.config.faults import ACTUATORS, KINDS, SENSORS, Fault, fault_table
 from activesteer.errors import ManeuverError, ParameterError
-from activesteer.faults import ACTUATORS, KINDS, SENSORS, Fault, fault_table
 from activesteer.scenario import resolve
 from tests.raising import raises
 

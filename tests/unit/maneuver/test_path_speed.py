@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.path_following import path_following_metrics
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.follow_path import FollowPath
 from activesteer.road.course import Course

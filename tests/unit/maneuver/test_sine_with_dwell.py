@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from activesteer.config import Source
+from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.steering_tests import RampAngle, SineWithDwell
-from activesteer.signals import Setpoint
 from tests.raising import raises
 
 SOURCE = Source("my_dwell.toml", error=ManeuverError)

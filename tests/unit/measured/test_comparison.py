@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 import pytest
 
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.measured.comparison import FILTERS, TOLERANCES, compare, smooth
 from activesteer.measured.pages import comparison_page
 from activesteer.recording import Recording
-from activesteer.signals import Channel
 from tests.raising import raises
 
 plain = partial(compare, filtered="none", noise=False)

@@ -11,6 +11,7 @@ import pytest
 from pyarrow import parquet
 from scipy.io import savemat
 
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.measured import foreign_files
 from activesteer.measured.columns import csv_columns, find, read_columns
@@ -19,7 +20,6 @@ from activesteer.measured.signals import suspicions
 from activesteer.playback.runs import runs_of
 from activesteer.recording import Recording
 from activesteer.scenario.scenario import open_loop_of
-from activesteer.signals import Channel
 from tests.raising import raises
 
 TIME_S = np.arange(0.0, 4.0, 0.01)
@@ -131,7 +131,7 @@ def test_too_many_rows_are_refused_before_one_is_read(tmp_path, monkeypatch, nam
     path = written_by(name, tmp_path / f"a.{name}")
     read = csv_columns if name == "csv" else foreign_files.READERS[f".{name}"]
     assert len(read(path)) in (1, 2)
-    monkeypatch.setattr("activesteer.limits.MAX_ROWS", len(TIME_S) - 1)
+    monkeypatch.setattr("activesteer.core.limits.MAX_ROWS", len(TIME_S) - 1)
     for reader in ("pyarrow.csv.read_csv", "scipy.io.loadmat", "pyarrow.parquet.ParquetFile.read"):
         monkeypatch.setattr(reader, lambda *_, **__: pytest.fail("read"))
     rows = len(TIME_S) + (name == "csv")  # the line of names counts

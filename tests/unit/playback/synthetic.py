@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import Channel
 from activesteer.recording import Link, Poses, Primitive, Recording, ScenePart
-from activesteer.signals import Channel
 
 SPEED_MPS, RADIUS_M, WHEEL_RADIUS_M = 10.0, 50.0, 0.3
 WHEELS = {"fl": (0.0, 0.76), "fr": (0.0, -0.76), "rl": (-2.6, 0.76), "rr": (-2.6, -0.76)}

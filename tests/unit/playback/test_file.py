@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from activesteer.core.signals import Channel
 from activesteer.drawing.panels import MOTION, panels_in
 from activesteer.drawing.wheel_angles import SLICES, factors, tips_beside
 from activesteer.errors import PlaybackError
@@ -20,7 +21,6 @@ from activesteer.playback.course import extent, map_bounds
 from activesteer.playback.plots import axis_range, views
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint
-from activesteer.signals import Channel
 from tests.raising import raises
 from tests.unit.playback import synthetic
 from tests.unit.playback.rrd import Rrd

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import yaw_of
+from activesteer.core.conventions import yaw_of
 from activesteer.playback.car import about_vertical, between, rotated, xyzw
 
 

@@ -16,7 +16,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from rerun.chunk import RrdReader
 from scipy.spatial.transform import Rotation
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.playback.viewer import viewer_binary
 
 Messages = dict[str, list[tuple[int, Any]]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.conventions import RUN_COLOURS_ON_DARK
+from activesteer.core.conventions import RUN_COLOURS_ON_DARK
 from activesteer.errors import RecordingError
 from activesteer.playback import runs_of
 from activesteer.recording import Poses, Recording

@@ -15,7 +15,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.errors import PlaybackError
 from activesteer.playback import runs_of, show
 from activesteer.playback.viewer import viewer_binary
@@ -50,7 +50,7 @@ def test_the_command_writes_a_file(file: Path, tmp_path: Path, capsys: pytest.Ca
 def test_the_viewer_says_nothing_of_its_own(tmp_path: Path) -> None:
     """The viewer warns of application ids that it has to change; names of manoeuvres and files are free."""
     circle(0.1, {"maneuver": {"name": "an: odd/name, ü", "title": "Odd"}}).save(tmp_path / "run.mcap")
-    code = "import sys; from activesteer.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from activesteer.commands.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", code, "replay", "run.mcap", "--save", "out.rrd"]
     done = subprocess.run(command, cwd=tmp_path, env=_environment(tmp_path), capture_output=True, text=True, check=True)
     assert done.stdout == ""
@@ -123,7 +123,7 @@ def _runs_viewer(process: psutil.Process) -> bool:
 
 
 def test_web_serves_the_viewer_to_this_machine_until_it_is_interrupted(file: Path, tmp_path: Path) -> None:
-    code = "import sys; from activesteer.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from activesteer.commands.cli import main; sys.exit(main(sys.argv[1:]))"
     command = [sys.executable, "-c", code, "replay", str(file), "--web"]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=_environment(tmp_path)

@@ -16,10 +16,10 @@ import pytest
 from activesteer import ActuatorCommand, DriverCommand, simulate
 from activesteer.config import Range
 from activesteer.controllers import controller_spec
+from activesteer.core.signals import WheelTorques, new_message
 from activesteer.driver import driver_spec
 from activesteer.errors import ControllerError, DriverError, ParameterError
 from activesteer.scenario import resolve, value_of
-from activesteer.signals import WheelTorques, new_message
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup, steering
 

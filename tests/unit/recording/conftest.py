@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from activesteer.core.signals import Channel
 from activesteer.recording import Link, McapWriter, Poses, Primitive, Recording
-from activesteer.signals import Channel
 
 BLOCK_ROWS = 50
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.recording import ChannelTable, Recording
-from activesteer.signals import Channel
 from tests.raising import raises
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
-from activesteer.signals import Channel
 from tests.raising import raises
 
 

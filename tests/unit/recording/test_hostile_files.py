@@ -16,10 +16,10 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Chunk, McapRecord, Metadata
 from mcap.records import Channel as Topic
 
+from activesteer.core.limits import MAX_CHUNK_BYTES, MAX_EXPANSION, MAX_FILE_BYTES, MAX_OTHER_BYTES
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
-from activesteer.limits import MAX_CHUNK_BYTES, MAX_EXPANSION, MAX_FILE_BYTES, MAX_OTHER_BYTES
 from activesteer.recording import McapWriter, Recording
-from activesteer.signals import Channel
 from tests.raising import raises
 from tests.unit.recording.conftest import assert_same
 from tests.unit.recording.records import chunk, encoded, message, records_of, write_records
@@ -90,7 +90,7 @@ def test_attachments_and_metadata_have_a_budget(
     mcap_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     records = records_of(mcap_file)
-    monkeypatch.setattr("activesteer.limits.MAX_OTHER_BYTES", 200_000)
+    monkeypatch.setattr("activesteer.core.limits.MAX_OTHER_BYTES", 200_000)
     Recording.open(mcap_file)
     attachment = Attachment(create_time=0, log_time=0, name="large", media_type="", data=bytes(200_000))
     for more in ([attachment], [Metadata(name="x", metadata={str(key): "y" * 100 for key in range(2000)})]):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.recording.schemas import (
     FixedMessage,
@@ -14,7 +15,6 @@ from activesteer.recording.schemas import (
     timestamps,
     varint,
 )
-from activesteer.signals import Channel
 from tests.raising import raises
 
 

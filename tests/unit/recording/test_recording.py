@@ -6,10 +6,10 @@ from pathlib import Path, PurePath
 import numpy as np
 import pytest
 
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.recording import Link, McapWriter, Poses, Primitive, Recording
 from activesteer.recording.contents import check_metrics
-from activesteer.signals import Channel
 from tests.raising import raises
 from tests.unit.recording.conftest import assert_same
 
@@ -163,7 +163,7 @@ def test_a_value_above_the_limit_is_written_as_infinity_and_refused_where_a_file
     assert opened["yaw_rate_radps"][150] == opened.metrics["peak_rad"] == math.copysign(math.inf, value)
     large.metrics.clear()
     with monkeypatch.context() as lifted:
-        lifted.setattr("activesteer.limits.MAX_NUMBER", math.inf)
+        lifted.setattr("activesteer.core.limits.MAX_NUMBER", math.inf)
         large.save(path)
     with pytest.raises(RecordingError) as refused:
         Recording.open(path)

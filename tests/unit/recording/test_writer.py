@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
+from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.recording import McapWriter, Recording, check_target
-from activesteer.signals import Channel
 from tests.raising import raises
 
 SPEED = [Channel("v_mps", "m/s", "Speed", "vehicle", single=False)]
@@ -22,7 +22,7 @@ CHILD = """
 import sys, time
 import numpy as np
 from activesteer.recording import McapWriter
-from activesteer.signals import Channel
+from activesteer.core.signals import Channel
 writer = McapWriter(sys.argv[1], [Channel("v_mps", "m/s", "Speed", "vehicle", single=False)], ["chassis"], {"run": 1})
 for second in range(1000):
     time_s = (1000 * second + np.arange(1000)) / 1000

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from activesteer.core.files import json_text
 from activesteer.errors import ParameterError
-from activesteer.files import json_text
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, draw, kinematics_compliance
 from activesteer.rigs.kc.held_car import WheelPose

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.core.path import SPACING_M, Path
 from activesteer.errors import ManeuverError
 from activesteer.road.native_path import PathSearch
-from activesteer.road.path import SPACING_M, Path
 from tests.raising import raises
 
 

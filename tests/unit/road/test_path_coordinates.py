@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.core.path import Path
 from activesteer.errors import ManeuverError
 from activesteer.road.course import Course
 from activesteer.road.native_path import PathGrid, along_path
-from activesteer.road.path import Path
 from activesteer.road.road import Road, RoadPatch
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from activesteer.core.path import Path
 from activesteer.road.native_path import PathSearch, PathSearches
-from activesteer.road.path import Path
 
 
 def test_many_cars_find_what_each_finds_alone(rng: np.random.Generator) -> None:

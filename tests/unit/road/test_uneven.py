@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ManeuverError
-from activesteer.road import path as lines
+from activesteer.core import path as lines
 from activesteer.road.course import ProfileTable
 from activesteer.road.crg import CrgRoad, packed, read_crg, referenced, unpacked
 from activesteer.road.drawn import DrawnSurface, places_to_draw

@@ -17,7 +17,7 @@ import pytest
 
 import activesteer
 from activesteer.config import key_paths
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.driver import DriverParameters
 from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError, TyreFileError
 from activesteer.maneuver import KINDS

@@ -7,11 +7,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer.compilation import compiled
 from activesteer.config import Source, build
+from activesteer.core.signals import Measurement
+from activesteer.native.compilation import compiled
 from activesteer.sensors import SensorBlock, Sensors
 from activesteer.sensors.block import measured
-from activesteer.signals import Measurement
 
 Values = NDArray[np.float64]
 STANDING: Final = Measurement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))

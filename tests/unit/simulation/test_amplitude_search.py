@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import activesteer
-from activesteer.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.errors import ManeuverError
 from activesteer.maneuver.braking import BrakeInTurn
 from activesteer.maneuver.steering_tests import SineWithDwell, StepSteer

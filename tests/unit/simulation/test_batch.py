@@ -10,9 +10,9 @@ import pytest
 import activesteer
 from activesteer import ActuatorCommand, Batch, DriverCommand, Simulation
 from activesteer.controllers import NoControl
+from activesteer.core.signals import numbers_in
 from activesteer.errors import ActiveSteerError, ControllerError, ParameterError
 from activesteer.scenario import resolve
-from activesteer.signals import numbers_in
 from tests.raising import raises
 
 FRICTIONS = np.array([0.7, 0.8, 0.9])

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import activesteer
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, Motion
 from activesteer.simulation.closed_loop import ClosedLoop
 from tests.physics.runs import STEP_DEG, assert_goes_on_from_its_state
 from tests.raising import raises

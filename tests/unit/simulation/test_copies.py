@@ -13,9 +13,9 @@ from typing import Any, cast
 import pytest
 
 import activesteer
+from activesteer.config.faults import Fault
+from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError, RecordingError
-from activesteer.faults import Fault
-from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.simulation import Simulation
 from tests.raising import raises

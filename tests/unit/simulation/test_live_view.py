@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import run_looks
+from activesteer.core.conventions import run_looks
 from activesteer.drawing.cars import shares_of
 from activesteer.scenario import resolve
 from activesteer.simulation.closed_loop import ClosedLoop

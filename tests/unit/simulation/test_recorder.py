@@ -8,11 +8,11 @@ import re
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.errors import SimulationDiverged
 from activesteer.recording import McapWriter, Recording
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S, POSE_INTERVAL_S, Recorder
 from activesteer.simulation.runner import run_scenario

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from activesteer.conventions import CURVE_STEP_S
+from activesteer.core.conventions import CURVE_STEP_S
 from activesteer.standards.standard import StandardRun
 
 

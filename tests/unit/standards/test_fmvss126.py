@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
+from activesteer.core.files import json_text
 from activesteer.errors import ManeuverError
-from activesteer.files import json_text
 from activesteer.pages import render_page
 from activesteer.standards import fmvss126
 from activesteer.standards.examination import examination_page, examine

@@ -12,8 +12,8 @@ import pytest
 from activesteer.analysis.frequency_response import FrequencyResponse
 from activesteer.analysis.handling import CarGeometry, evaluate
 from activesteer.config import Range
+from activesteer.core.files import json_text
 from activesteer.errors import ManeuverError, ParameterError, RecordingError
-from activesteer.files import json_text
 from activesteer.standards import examination, iso7401, iso7975, iso13674
 from activesteer.standards.catalogue import STANDARDS, standard_of
 from activesteer.standards.examination import Examination, examine

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.files import json_text
+from activesteer.core.files import json_text
 from activesteer.standards.examination import examine
 from activesteer.standards.fault_circle import CIRCLES
 from activesteer.standards.r79_circle import EFFORTS, FIGURES, RIM_RADIUS_M, STANDARD, reached

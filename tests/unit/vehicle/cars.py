@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb

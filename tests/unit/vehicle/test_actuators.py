@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.errors import ParameterError
-from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Tape, Vehicle
 from activesteer.vehicle.parameters import PowertrainLimits
 from tests.raising import raises

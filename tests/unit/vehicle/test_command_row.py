@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 from numba import njit, types
 
-from activesteer.conventions import CORNERS
-from activesteer.native_memory import load_numbers, native_type, store_numbers
-from activesteer.sensors import SensorBlock, Sensors
-from activesteer.sensors.block import MEASURED
-from activesteer.signals import (
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import (
     ActuatorCommand,
     DriverCommand,
     Estimate,
@@ -22,6 +19,9 @@ from activesteer.signals import (
     numbers_of,
     widths_of,
 )
+from activesteer.native.memory import load_numbers, native_type, store_numbers
+from activesteer.sensors import SensorBlock, Sensors
+from activesteer.sensors.block import MEASURED
 from activesteer.vehicle.step_bindings import (
     CARRIED_OUT,
     COMMANDS,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from activesteer import simulate
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ModelError, ParameterError
 from activesteer.rigs.kc import kinematics_compliance
 from activesteer.rigs.kc.result import write_tables

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.errors import ModelError, SimulationDiverged
 from activesteer.scenario import load_car
-from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle.implicit_plan import ARRAYS, OPTIONS, handed_over
 from tests.unit.vehicle.cars import standing, tilted_and_moving
 from tests.unit.vehicle.random_models import RandomModel, Stepper, differences, thrown

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import RearSteer
+from activesteer.core.signals import DriverCommand
 from activesteer.driver import HumanDriver
 from activesteer.errors import SimulationDiverged
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
-from activesteer.signals import DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.runner import run_scenario
 from activesteer.vehicle import Vehicle

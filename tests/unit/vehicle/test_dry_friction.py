@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
 from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle.linear_state import LocalState
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from activesteer.config import read_toml
-from activesteer.conventions import CORNERS
+from activesteer.config.faults import Fault
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import NO_BRAKES, ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.errors import ManeuverError, ParameterError
-from activesteer.faults import Fault
 from activesteer.resources import find_vehicle
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
-from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.electric_actuators import Battery, Motor, Motors
 from activesteer.vehicle.faults import Faults

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from activesteer.core.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, WheelTorques, new_message
 from activesteer.errors import ActiveSteerError, ControllerError, DriverError, ParameterError
-from activesteer.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, WheelTorques, new_message
 from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.channels import RawRows

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb

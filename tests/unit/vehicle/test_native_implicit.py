@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.scenario import load_car
-from activesteer.signals import ActuatorCommand, DriverCommand
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.implicit_plan import ImplicitPlan, handed_over
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.errors import ParameterError, SimulationDiverged
 from activesteer.scenario import load_car
-from activesteer.signals import ActuatorCommand, DriverCommand, WheelTorques
 from activesteer.vehicle import Tape, Vehicle
 from activesteer.vehicle.channels import RawRows
 from tests.raising import raises

@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.path import Path
 from activesteer.road.course import Course
-from activesteer.road.path import Path
 from activesteer.road.road import Road, RoadPatch
 from activesteer.scenario import load_car
 from activesteer.tyre.kernels.magic_formula import steady_state

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError, TyreFileError
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance

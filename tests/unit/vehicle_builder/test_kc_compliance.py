@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.vehicle.curve_axles import COORDINATES
 from activesteer.vehicle_builder.kc_fit import Load, fitted
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from activesteer.brakes import Brakes
 from activesteer.config import Source, build, read_toml, to_table, toml_text
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
 from activesteer.scenario.car import VehicleConfig
 from activesteer.sensors.parameters import Sensors
+from activesteer.vehicle.brakes import Brakes
 from activesteer.vehicle.electric_actuators import Motors, RearActuator
 from activesteer.vehicle.parameters import Aerodynamics, Powertrain
 from activesteer.vehicle_builder import new_vehicle

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.core.signals import Channel
 from activesteer.drawing.wheel_angles import CHANNELS
 from activesteer.recording import Recording
-from activesteer.signals import Channel
 from activesteer.video.gauges import LARGEST_SHARE, Dials, Gauges, LargeSideslip
 
 SIZE, LARGE = (1280, 720), (1920, 1080)

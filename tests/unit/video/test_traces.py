@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import Channel
 from activesteer.recording import Poses, Recording
 from activesteer.road.course import Footprint
-from activesteer.signals import Channel
 from activesteer.video.road import edges_beside
 from activesteer.video.track import Traces, Track
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from activesteer.core.signals import Channel
 from activesteer.errors import PlaybackError
 from activesteer.recording import Poses, Recording
-from activesteer.signals import Channel
 from activesteer.video.track import Track
 from tests.raising import raises
 from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, WHEELS, circle

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 import activesteer
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, numbers_in, numbers_of
 from activesteer.coupling.car import export_fmu, export_library
 from activesteer.coupling.car.objects import native_memory
 from activesteer.coupling.car.variables import MOTION
 from activesteer.errors import ModelError
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand, DriverCommand, Measurement, numbers_in, numbers_of
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.step_bindings import CARRIED_OUT, COMMANDS

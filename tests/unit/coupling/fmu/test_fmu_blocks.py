@@ -14,10 +14,10 @@ import pytest
 
 import activesteer
 from activesteer.controllers import controller_spec
+from activesteer.core.signals import DriverCommand, Measurement
 from activesteer.driver import driver_spec
 from activesteer.errors import ControllerError, DriverError
 from activesteer.scenario import resolve
-from activesteer.signals import DriverCommand, Measurement
 
 HERE = Path(__file__).parent
 EXAMPLES = Path(__file__).resolve().parents[4] / "examples" / "fmu"
@@ -220,7 +220,7 @@ def test_an_archive_cannot_write_outside_of_its_folder_or_fill_the_disk(fmus, tm
         fmu = changed(fmus / "yaw_damper_fmi2.fmu", tmp_path / "x.fmu", added=[(info, "/etc")])
         with pytest.raises(ControllerError, match="outside of the FMU"):
             controller_spec(fmu)
-    monkeypatch.setattr("activesteer.limits.MAX_FMU_UNPACKED_BYTES", 10_000)
+    monkeypatch.setattr("activesteer.core.limits.MAX_FMU_UNPACKED_BYTES", 10_000)
     fmu = changed(fmus / "yaw_damper_fmi2.fmu", tmp_path / "x.fmu", added=[("resources/zeros", bytes(100_000))])
     with pytest.raises(ControllerError, match="unpacked bytes, at most 10000"):
         controller_spec(fmu)

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from activesteer.child_process import ChildFault
+from activesteer.core.child_process import ChildFault
 from activesteer.coupling.fmu import instance as module
 from activesteer.coupling.fmu.instance import FmuFault, Group, IsolatedInstance, Spec
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from activesteer import study
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.errors import StudyError
 from activesteer.studies.engine.analysis import indices
 from activesteer.studies.engine.design import draw

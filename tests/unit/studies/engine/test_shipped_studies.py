@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.resources import list_studies
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.study_file import changed_study, read_study

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.studies.engine.factor_values import Plausibility, Prior
 from activesteer.studies.engine.store import LOCK, locked

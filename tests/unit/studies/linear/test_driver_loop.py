@@ -9,10 +9,10 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.linear_form import LinearController, linear_controller
+from activesteer.core.signals import ActuatorCommand
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains
 from activesteer.errors import ControllerError, DriverError
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand
 from activesteer.studies.linear.driver_loop import DriverLoop, driver_loop, driver_loops
 from activesteer.studies.linear.linearisation import INPUTS, OUTPUTS, LinearCar
 from tests.raising import raises

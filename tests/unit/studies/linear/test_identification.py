@@ -12,7 +12,7 @@ import pytest
 from activesteer.analysis.handling import Handling
 from activesteer.config import read_toml
 from activesteer.controllers import SingleTrackParameters
-from activesteer.files import json_text
+from activesteer.core.files import json_text
 from activesteer.resources import find_vehicle
 from activesteer.scenario import load_car
 from activesteer.studies.linear.identification import Identification, single_track_response, write_identified

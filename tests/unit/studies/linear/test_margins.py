@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.cli import main
+from activesteer.commands.cli import main
 from activesteer.controllers import load_controller
 from activesteer.controllers.linear_form import SIGNALS, linear_controller, pulse_responses
+from activesteer.core.signals import ActuatorCommand
 from activesteer.errors import ControllerError, ParameterError, StudyError
 from activesteer.scenario import resolve
-from activesteer.signals import ActuatorCommand
 from activesteer.simulation.runner import simulate
 from activesteer.studies.linear.linearisation import ACTUATORS, INPUTS, OUTPUTS, LinearCar
 from activesteer.studies.linear.margins import (

@@ -17,7 +17,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer import limits
+from activesteer.core import limits
 from activesteer.errors import ActiveSteerError, shown
 
 _passing: Final[set[Path]] = set()

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Range
-from activesteer.conventions import CORNERS
-from activesteer.native_records import numbers_type
+from activesteer.core.conventions import CORNERS
+from activesteer.native.records import numbers_type
 
 NotNegative = Annotated[float, Range(0.0)]
 Positive = Annotated[float, Range(1e-9)]

@@ -4,7 +4,7 @@ Messages are named tuples because the loop creates them every millisecond, and a
 as long to create. Where even the call of the class takes too long, use `new_message`.
 
 The fields of a message are the one description of it. The channels of a recording and the memory layout of native code
-are derived from them; see `numbers_of` and `native_memory`.
+are derived from them; see `numbers_of` and `native.memory`.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from collections.abc import Iterable
 from itertools import accumulate
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple, Protocol, TypeAlias, TypeVar, cast, get_type_hints
 
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
 
 if TYPE_CHECKING:
-    from activesteer.road.path import Path
+    from activesteer.core.path import Path
 
 _Message = TypeVar("_Message", bound=tuple[Any, ...])
 

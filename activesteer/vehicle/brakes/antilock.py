@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from activesteer.compilation import compiled, inlined
+from activesteer.native.compilation import compiled, inlined
 
 OFF, RELEASE, RECOVER, BUILD, HOLD = 0.0, 1.0, 2.0, 3.0, 4.0
 

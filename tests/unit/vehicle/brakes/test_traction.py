@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from activesteer.brakes import Brakes
-from activesteer.brakes.brake_control_unit import traction
-from activesteer.brakes.records import NO_LIMIT_NM
-from tests.unit.brakes.test_hydraulics import of
+from activesteer.vehicle.brakes import Brakes
+from activesteer.vehicle.brakes.brake_control_unit import traction
+from activesteer.vehicle.brakes.records import NO_LIMIT_NM
+from tests.unit.vehicle.brakes.test_hydraulics import of
 
 CAR = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0, tcs=True)
 INTERVAL_S = 0.005

@@ -14,9 +14,7 @@ from llvmlite import ir
 from numba import carray, from_dtype, types
 from numba.extending import intrinsic, overload
 
-from activesteer.compilation import address_of, call_at, compiled_call, inlined
-from activesteer.native_records import NativeBlock, record_type, table
-from activesteer.signals import (
+from activesteer.core.signals import (
     ActuatorCommand,
     DriverCommand,
     Estimate,
@@ -25,6 +23,8 @@ from activesteer.signals import (
     record_fields,
     widths_of,
 )
+from activesteer.native.compilation import address_of, call_at, compiled_call, inlined
+from activesteer.native.records import NativeBlock, record_type, table
 
 
 def pointer_to(numba_type: types.Type) -> Any:
@@ -50,7 +50,7 @@ word_pointer = pointer_to(types.intp)
 
 @inlined
 def array_of(memory):
-    """Return the array of float64 of a record of `native_records.ARRAY`."""
+    """Return the array of float64 of a record of `records.ARRAY`."""
     return carray(f64_pointer(memory.address), (memory.size,))
 
 

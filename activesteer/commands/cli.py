@@ -74,7 +74,7 @@ def command_line() -> CommandLine:
     """Return the command line with all commands, in the groups in which `--help` lists them."""
     from activesteer.commands import car, drive, recordings, studying, verify
     from activesteer.commands.arguments import CommandLine
-    from activesteer.version import __version__
+    from activesteer.core.version import __version__
 
     groups = [module.command for module in (drive, recordings, car, studying, verify)]
     return CommandLine(f"activesteer {__version__}", groups)

@@ -12,8 +12,8 @@ import math
 from enum import StrEnum
 from typing import Final, NamedTuple
 
+from activesteer.core.units import DisplayUnit, display_unit
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.units import DisplayUnit, display_unit
 
 STEER_RAD: Final = math.radians(0.05)
 """Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to some 3 minutes of arc. A demand

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from activesteer.brakes.antilock import antilock
-from activesteer.brakes.records import NO_LIMIT_NM
-from activesteer.compilation import compiled, inlined
+from activesteer.native.compilation import compiled, inlined
+from activesteer.vehicle.brakes.antilock import antilock
+from activesteer.vehicle.brakes.records import NO_LIMIT_NM
 
 
 @inlined

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from activesteer.brakes import Brakes
-from activesteer.brakes.antilock import BUILD, HOLD, OFF, RECOVER, RELEASE, antilock
-from activesteer.brakes.records import Antilock
-from tests.unit.brakes.test_hydraulics import of
+from activesteer.vehicle.brakes import Brakes
+from activesteer.vehicle.brakes.antilock import BUILD, HOLD, OFF, RECOVER, RELEASE, antilock
+from activesteer.vehicle.brakes.records import Antilock
+from tests.unit.vehicle.brakes.test_hydraulics import of
 
 CAR = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0)
 INTERVAL_S = 0.005

@@ -30,7 +30,7 @@ from numba.core.ccallback import CFunc
 from numba.extending import intrinsic, register_jitable
 from numba.np import linalg
 
-from activesteer.shared_laws import MARKED
+from activesteer.native.shared_laws import MARKED
 
 _VERSIONS: Final = ("numba", "llvmlite", "numpy", "mujoco")
 _KEPT: Final = 4

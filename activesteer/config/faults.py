@@ -9,9 +9,9 @@ from itertools import combinations
 from typing import Annotated, Any, Final, NamedTuple
 
 from activesteer.config import Range, Source, build
-from activesteer.conventions import CORNERS
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import Measurement, numbers_of
 from activesteer.errors import ManeuverError, ParameterError, nearest_names, shown
-from activesteer.signals import Measurement, numbers_of
 
 
 class Actuator(NamedTuple):

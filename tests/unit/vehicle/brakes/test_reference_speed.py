@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.brakes import Brakes
-from activesteer.brakes.brake_control_unit import follow_car, follow_wheels
-from tests.unit.brakes.test_hydraulics import of
+from activesteer.vehicle.brakes import Brakes
+from activesteer.vehicle.brakes.brake_control_unit import follow_car, follow_wheels
+from tests.unit.vehicle.brakes.test_hydraulics import of
 
 CAR = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0)
 

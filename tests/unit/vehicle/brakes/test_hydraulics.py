@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.brakes import Brakes, Hydraulics
-from activesteer.brakes.brake_control_unit import ask, flow
-from activesteer.brakes.records import BRAKE_STATE, brake_setup, reset
+from activesteer.vehicle.brakes import Brakes, Hydraulics
+from activesteer.vehicle.brakes.brake_control_unit import ask, flow
+from activesteer.vehicle.brakes.records import BRAKE_STATE, brake_setup, reset
 
 BAR = 1e5
 NOTHING = np.zeros(4)

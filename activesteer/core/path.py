@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from activesteer.conventions import Array
+from activesteer.core.conventions import Array
 from activesteer.errors import ManeuverError
 
 SPACING_M: Final = 0.5

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NoReturn, get_origin, ge
 
 import numpy as np
 
+from activesteer.core.signals import PerWheel
 from activesteer.errors import ParameterError
-from activesteer.signals import PerWheel
 
 if TYPE_CHECKING:
     Table = array[float]
@@ -55,7 +55,7 @@ class NativeBlock:
 
 
 def table(numbers: Table) -> Table:
-    """Return a block's numbers. Compiled code makes an array of the record of their memory (`native_memory`)."""
+    """Return a block's numbers. Compiled code makes an array of the record of their memory (`native.memory`)."""
     return numbers
 
 

@@ -10,7 +10,7 @@ import math
 import re
 from typing import Final, NamedTuple
 
-from activesteer.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2
 
 _DEG, _G, _TURN = math.radians(1.0), GRAVITY_MPS2, 2.0 * math.pi
 

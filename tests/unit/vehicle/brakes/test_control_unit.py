@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.brakes import Brakes
-from activesteer.brakes.antilock import BUILD, HOLD, OFF, RECOVER, antilock
-from activesteer.brakes.brake_control_unit import follow_car, follow_wheels, step_brakes
-from activesteer.brakes.records import NO_LIMIT_NM
-from tests.unit.brakes.test_hydraulics import of
+from activesteer.vehicle.brakes import Brakes
+from activesteer.vehicle.brakes.antilock import BUILD, HOLD, OFF, RECOVER, antilock
+from activesteer.vehicle.brakes.brake_control_unit import follow_car, follow_wheels, step_brakes
+from activesteer.vehicle.brakes.records import NO_LIMIT_NM
+from tests.unit.vehicle.brakes.test_hydraulics import of
 
 CAR = Brakes(front_torque_Nm=2200.0, rear_torque_Nm=700.0)
 RADIUS_M, INTERVAL_S = 0.3, 0.005

@@ -18,7 +18,7 @@ def shared(function: _Function) -> _Function:
     """Decorator: let compiled code call a Python function, which then becomes part of it. Python still calls it as is.
 
     The function is the law of a block. Its first argument is the block itself in Python, and a record of the block's
-    attributes in compiled code; see `native_records`.
+    attributes in compiled code; see `native.records`.
     """
     MARKED.append(function)
     return function
