@@ -20,7 +20,7 @@ PACKAGE = "activesteer"
 
 def modules_of(arguments: list[str]) -> list[str]:
     """Drive a run and return the modules."""
-    from activesteer import cli  # noqa: PLC0415
+    from activesteer.commands import cli  # noqa: PLC0415
     from activesteer.commands import drive as command  # noqa: PLC0415
     from activesteer.simulation import runner  # noqa: PLC0415
 

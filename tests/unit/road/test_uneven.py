@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.errors import ManeuverError
 from activesteer.core import path as lines
+from activesteer.errors import ManeuverError
 from activesteer.road.course import ProfileTable
 from activesteer.road.crg import CrgRoad, packed, read_crg, referenced, unpacked
 from activesteer.road.drawn import DrawnSurface, places_to_draw
