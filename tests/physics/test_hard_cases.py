@@ -47,16 +47,20 @@ def test_superposition_does_not_stay_against_a_driver_who_steers_more_after_snow
         "factors.mass": 1.26, "factors.front_cornering_stiffness": 0.87, "road.mu": 0.98, "road.patches.0.mu": 0.4,
         "speed_kmh": 86.9, "duration_s": 9.58,
     }  # fmt: skip
-    run = simulate("mu_jump", "lqr", overrides=SENSORS | changes, driver="expert")
-    against = (run["superposition_rad"] * run["steering_wheel_rad"] < 0.0) & (
-        np.abs(run["superposition_rad"]) > math.radians(0.5)
-    )
-    # 3.5 s before; the gains hold it for 0.9 s and let it decay in 0.3 s, and the servo follows.
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], against.astype(int), [0]))))
-    longest = max(np.diff(edges)[::2], default=0)  # it may never be against the driver
-    assert longest * 0.001 < 1.6
-    # 4.8 m before; 2.9 m without control and with `esc`.
-    assert run.metrics["track_deviation_max_m"] < 2.9
+    deviations_m = []
+    for seed in range(3):
+        run = simulate("mu_jump", "lqr", overrides=SENSORS | changes | {"sensors.seed": seed}, driver="expert")
+        against = (run["superposition_rad"] * run["steering_wheel_rad"] < 0.0) & (
+            np.abs(run["superposition_rad"]) > math.radians(0.5)
+        )
+        # 3.5 s before; the gains hold it for 0.9 s and let it decay in 0.3 s, and the servo follows.
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], against.astype(int), [0]))))
+        longest = max(np.diff(edges)[::2], default=0)  # it may never be against the driver
+        assert longest * 0.001 < 1.6
+        deviations_m.append(run.metrics["track_deviation_max_m"])
+    # 4.8 m before; 2.87 m without control. The target of harm is 0.10 m of track.
+    assert max(deviations_m) < 2.87 + 0.10
+    assert np.mean(deviations_m) < 2.87
 
 
 @pytest.mark.parametrize(
