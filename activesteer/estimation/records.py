@@ -86,9 +86,9 @@ KNOWN: Final = np.dtype(
 )  # fmt: skip
 """Knowledge of an estimator; see `known_of`."""
 
-_RATE_FLOOR_RADPS: Final = math.radians(0.02)
 _OFFSET_S: Final = 100.0
-"""Time constant of the offset of the lateral accelerometer [s]."""
+"""Time constant of the offset of the lateral accelerometer [s]: longer than any manoeuvre."""
+_RATE_FLOOR_RADPS: Final = math.radians(0.02)
 _AY_FLOOR_MPS2: Final = 0.03
 """Smallest standard deviations of a measurement, even if a data sheet gives less."""
 _ENGINE_STEP_S: Final = 0.001

@@ -44,8 +44,8 @@ class EstimatorParameters:
     slip_angle_s: _Positive = 1.0
     """Time constant of the slip angle error [s]."""
     bank_std_mps2: _Positive = 0.3
-    """Standard deviation of the gravity across an inclined road [m/s2]: 3 %. Crossfall is 2.5 %, the superelevation of
-    curves up to 8 %."""
+    """Standard deviation of the gravity across an inclined road [m/s2]: 3 %. By the guideline RAS-L (1995), roads fall
+    by 2.5 % across, and curves by 8 % at most."""
     bank_s: _Positive = 10.0
     """Time constant of this gravity [s]."""
     lateral_density_m2ps3: _Positive = 0.0002

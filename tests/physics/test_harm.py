@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from activesteer import simulate
@@ -40,8 +42,8 @@ def test_stability_control_keeps_the_car_in_the_largest_sine_of_the_law(directio
         assert (pressure[1:] - pressure[:-1]).max() <= 3.0e4 * 1.001
 
 
-@pytest.mark.parametrize(("controller", "more_rad"), [("esc", 0.009), ("tv", 0.045)])
-def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(controller: str, more_rad: float):
+@pytest.mark.parametrize("controller", ["esc", "tv"])
+def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(controller: str):
     none, controlled = (
         simulate("mu_jump", name, vehicle="compact_electric", overrides={"sensors.preset": "production"}).metrics
         for name in ("none", controller)
@@ -49,7 +51,7 @@ def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(contro
     # A brake that acts for 40 ms where the wheels leave the snow moves the car by 1 mm.
     assert controlled["track_deviation_max_m"] < none["track_deviation_max_m"] + 0.01
     # With a desired yaw rate that only the estimated friction limits, esc had 7 deg and tv 11.5; none has 2.5.
-    assert controlled["sideslip_peak_abs_rad"] < none["sideslip_peak_abs_rad"] + more_rad
+    assert controlled["sideslip_peak_abs_rad"] < none["sideslip_peak_abs_rad"] + math.radians(0.5)
 
 
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])

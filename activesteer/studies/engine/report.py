@@ -69,6 +69,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     who = {name: _codes(table[name]) for name in ("maneuver", "vehicle", "controller")}
     groups = sorted(set(zip(who["maneuver"][1].tolist(), who["vehicle"][1].tolist(), strict=True)))
     shown = _shown_rows(table)
+    shown_table = table.take(pa.array(shown))
     return {
         "controllers": who["controller"][0],
         "places": [run_looks(who["controller"][0])[name].place for name in who["controller"][0]],
@@ -81,7 +82,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
             "controller": who["controller"][1][shown].tolist(),
             "sample": table["sample"].to_numpy()[shown].tolist(),
             "run": table["run"].to_numpy()[shown].tolist(),
-            "factors": {key: _acting(study, key, table.take(pa.array(shown))) for key in study.keys},
+            "factors": {key: _acting(study, key, shown_table) for key in study.keys},
             "metrics": {name: _json(column[shown]) for name, column in values.items()},
         },
         "all": table.num_rows,
