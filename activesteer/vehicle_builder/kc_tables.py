@@ -1,6 +1,6 @@
 """A folder of K&C tables of a laboratory: files, units, names and signs become samples of the left wheel.
 
-Each file is AXLE_TEST.csv, or AXLE_TEST.toml with the columns as lists (`rigs.kc.tables.TESTS` names the tests). The
+Each file is AXLE_TEST.csv, or AXLE_TEST.toml with the columns as lists (`rigs.kc.result.TESTS` names the tests). The
 samples of the right wheel are mirrored and added to those of the left wheel. Both branches of a loop are kept, and the
 fitted curve averages them. `names.toml` gives the channel names of a laboratory and the signs that differ:
 
@@ -246,7 +246,7 @@ def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
         wheel = {key.removeprefix(f"{side}_"): value for key, value in columns.items() if key.startswith(f"{side}_")}
         if not wheel:
             continue
-        mirror = -1.0 if side == "right" and test.mirror == "opposed" else 1.0
+        mirror = -1.0 if side == "right" and not test.mirrored else 1.0
         if test.variable == "travel":
             if "travel" not in wheel:
                 raise ParameterError("was not measured", file=file.name, key=f"{side}_travel")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -82,13 +82,6 @@ class Sweep:
     def zero(self) -> int:
         """Index of the point of the standing car, x = 0."""
         return int(np.abs(self.x).argmin())
-
-    def as_table(self) -> dict[str, object]:
-        """Return all arrays as lists for JSON, with the angles of the wheels."""
-        table: dict[str, object] = {"title": self.title, "variable": self.variable, "unit": self.unit}
-        arrays = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in table}
-        arrays |= {"toe_rad": self.toe_rad, "camber_rad": self.camber_rad, "steer_rad": self.steer_rad}
-        return table | {name: value.tolist() for name, value in arrays.items()}
 
 
 def _read(car: HeldCar) -> dict[str, Array]:
