@@ -7,7 +7,7 @@ from typing import Any
 
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.standards.standard import StandardRun, StandardRunner
-from activesteer.studies.engine.workers import ThisProcess
+from activesteer.studies.engine.workers import Workers
 
 Driven = Callable[[str, Mapping[str, Any]], Mapping[str, float] | str | StandardRun]
 """Series, case -> metrics, or why there are none; a whole run where channels are looked at."""
@@ -17,7 +17,7 @@ class PrescribedRunner(StandardRunner):
     """A test runner that returns prescribed runs and records the requests."""
 
     def __init__(self, driven: Driven, changed: Mapping[str, Any] | None = None) -> None:
-        super().__init__("", "compact", "typical", "none", changed or {}, None, ThisProcess(), lambda *_: None)
+        super().__init__("", "compact", "typical", "none", changed or {}, None, Workers(), lambda *_: None)
         self.driven = driven
         self.asked: dict[str, list[dict[str, Any]]] = {}
 
