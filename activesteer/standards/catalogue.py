@@ -13,25 +13,16 @@ from activesteer.resources import DEFAULT_DRIVER
 
 @dataclass(frozen=True)
 class Standard:
-    """A standard.
-
-    Attributes:
-        title: Its title.
-        edition: Its edition, and the source of the text.
-        implemented: The implemented parts, a sentence each.
-        left_out: The parts that are not implemented, or are implemented differently.
-        driver: Default driver.
-        overlaid: Whether the page lays the pictures of the controllers over each other; they must have the same panels.
-        name: Its name on the command line.
-    """
+    """A standard."""
 
     title: str
-    edition: str
-    implemented: tuple[str, ...]
-    left_out: tuple[str, ...]
+    edition: str  # its edition, and the source of the text
+    implemented: tuple[str, ...]  # the implemented parts, a sentence each
+    left_out: tuple[str, ...]  # the parts that are not implemented, or are implemented differently
     driver: str = DEFAULT_DRIVER
+    # Whether the page lays the pictures of the controllers over each other; they must have the same panels
     overlaid: bool = False
-    name: str = ""
+    name: str = ""  # its name on the command line
 
 
 def _read() -> dict[str, Standard]:

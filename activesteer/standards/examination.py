@@ -42,25 +42,15 @@ without any result the function raises `NoResult`."""
 
 @dataclass(frozen=True)
 class Examination:
-    """Result of a test.
-
-    Attributes:
-        standard: The standard.
-        vehicle: Name of the vehicle.
-        driver: Name of the driver.
-        overrides: Overrides of the user.
-        findings: Controller -> findings.
-        versions: Versions of the program and its libraries.
-        date: Date of the test [UTC].
-    """
+    """Result of a test."""
 
     standard: Standard
     vehicle: str
     driver: str
     overrides: Mapping[str, Any]
-    findings: Mapping[str, Findings]
-    versions: Mapping[str, str]
-    date: datetime.date
+    findings: Mapping[str, Findings]  # controller -> findings
+    versions: Mapping[str, str]  # versions of the program and its libraries
+    date: datetime.date  # date of the test [UTC]
 
     @property
     def failed(self) -> list[str]:

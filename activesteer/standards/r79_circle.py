@@ -32,17 +32,11 @@ from activesteer.studies.engine.workers import in_parallel
 
 
 class Effort(NamedTuple):
-    """A line of table 2 for cars (M1).
+    """A line of table 2 for cars (M1)."""
 
-    Attributes:
-        radius_m: Radius to reach [m].
-        limit_N: Greatest force at the rim until then [N].
-        case: Condition of the car: dotted key -> value.
-    """
-
-    radius_m: float
-    limit_N: float
-    case: Mapping[str, Any]
+    radius_m: float  # radius to reach [m]
+    limit_N: float  # greatest force at the rim until then [N]
+    case: Mapping[str, Any]  # condition of the car: dotted key -> value
 
 
 EFFORTS: Final = {

@@ -34,19 +34,12 @@ class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test
 
 @dataclass(frozen=True)
 class StandardRun:
-    """A finished run. The analysis reads it like a recording.
+    """A finished run. The analysis reads it like a recording."""
 
-    Attributes:
-        case: Values in which it differs from the other runs of its series.
-        metrics: Its metrics; empty if it failed or could not be evaluated.
-        channels: Kept channels over time, every `CURVE_STEP_S`.
-        error: Reason for missing metrics; empty if there are metrics.
-    """
-
-    case: Mapping[str, Any]
-    metrics: Mapping[str, float]
-    channels: Mapping[str, Array]
-    error: str
+    case: Mapping[str, Any]  # values in which it differs from the other runs of its series
+    metrics: Mapping[str, float]  # its metrics; empty if it failed or could not be evaluated
+    channels: Mapping[str, Array]  # kept channels over time, every `CURVE_STEP_S`
+    error: str  # reason for missing metrics; empty if there are metrics
 
     @property
     def time_s(self) -> Array:
@@ -88,27 +81,16 @@ class StandardRun:
 
 @dataclass
 class StandardRunner:
-    """A car with a controller and a driver, whose series of runs share one set of workers.
-
-    Attributes:
-        standard: Name of the standard.
-        vehicle: Name, path or table of the vehicle.
-        driver: Name, path or table of the driver, or the file of a driver plug-in.
-        controller: Name or file of the controller.
-        overrides: Overrides of the car: dotted key -> value.
-        folder: Folder for the studies, which can be resumed; None if they are not kept.
-        workers: Processes that make the runs.
-        progress: Called with the series, number of finished runs, and number of all runs.
-    """
+    """A car with a controller and a driver, whose series of runs share one set of workers."""
 
     standard: str
-    vehicle: FileOrTable
-    driver: FileOrTable
-    controller: str
-    overrides: Mapping[str, Any]
-    folder: Path | None
-    workers: Workers
-    progress: Callable[[str, int, int], None]
+    vehicle: FileOrTable  # name, path or table of the vehicle
+    driver: FileOrTable  # name, path or table of the driver, or the file of a driver plug-in
+    controller: str  # name or file of the controller
+    overrides: Mapping[str, Any]  # overrides of the car: dotted key -> value
+    folder: Path | None  # folder for the studies, which can be resumed; None if they are not kept
+    workers: Workers  # processes that make the runs
+    progress: Callable[[str, int, int], None]  # called with the series, number of finished runs, and number of all runs
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
         """Resolve the car and a manoeuvre."""
@@ -158,17 +140,10 @@ def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> StandardRun:
 
 @dataclass(frozen=True)
 class Findings:
-    """Findings of a test of one car with one controller.
+    """Findings of a test of one car with one controller."""
 
-    Attributes:
-        values: Values that `--json` prints, with `pass` if the standard has limits.
-        summary: Verdict or findings in a sentence.
-        tables: Tables of the page.
-        pictures: Pictures of the page.
-    """
-
-    values: dict[str, Any]
-    summary: str
+    values: dict[str, Any]  # values that `--json` prints, with `pass` if the standard has limits
+    summary: str  # verdict or findings in a sentence
     tables: Sequence[Table] = field(default_factory=tuple)
     pictures: Sequence[Picture] = field(default_factory=tuple)
 

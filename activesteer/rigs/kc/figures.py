@@ -33,15 +33,10 @@ _FURTHEST: Final = 0.6
 
 
 class Row(NamedTuple):
-    """A row of panels.
+    """A row of panels."""
 
-    Attributes:
-        label: Name and unit of its ordinate.
-        values: Function from a sweep to the values of each wheel, shape (n, 4).
-    """
-
-    label: str
-    values: Callable[[Sweep], Array]
+    label: str  # name and unit of its ordinate
+    values: Callable[[Sweep], Array]  # function from a sweep to the values of each wheel, shape (n, 4)
 
 
 _TOE: Final = Row("toe [deg]\n(+ toe-in)", lambda sweep: _DEG * sweep.toe_rad)
@@ -136,23 +131,14 @@ def _wheels(x: Array, values: Array, label: str = "", *, both: bool = True) -> l
 
 
 class Grid(NamedTuple):
-    """A picture with one row per quantity and one column per axle.
-
-    Attributes:
-        title: Title of the picture.
-        rows: The rows.
-        both: Name and word for the legend of the sweep that is drawn of both wheels.
-        left: The same of a sweep that is drawn of the left wheel.
-        x_label: Label of the abscissa.
-        factor: From the sweep's SI unit to the label's unit.
-    """
+    """A picture with one row per quantity and one column per axle."""
 
     title: str
     rows: Sequence[Row]
-    both: tuple[str, str]
-    left: tuple[str, str] | None
+    both: tuple[str, str]  # name and word for the legend of the sweep that is drawn of both wheels
+    left: tuple[str, str] | None  # the same of a sweep that is drawn of the left wheel
     x_label: str
-    factor: float
+    factor: float  # from the sweep's SI unit to the label's unit
 
 
 _GRIDS: Final = {

@@ -30,29 +30,17 @@ from activesteer.vehicle.parameters import Friction
 
 @dataclass(frozen=True)
 class KcMetric:
-    """One metric of the car.
-
-    Attributes:
-        name: Name.
-        axle: `front`, `rear` or `car`.
-        value: Value; nan if the car has none.
-        unit: Unit.
-        band: Target band; None without a target.
-        inside: Whether the value is inside the band; None without a target.
-        source: Source of the band; empty without a target.
-        definition: Definition, sign, source.
-        remark: Remark of the target file about a value outside the band.
-    """
+    """One metric of the car."""
 
     name: str
-    axle: str
-    value: float
+    axle: str  # `front`, `rear` or `car`
+    value: float  # value; nan if the car has none
     unit: str
-    band: tuple[float, float] | None
-    inside: bool | None
-    source: str
-    definition: str
-    remark: str = ""
+    band: tuple[float, float] | None  # target band; None without a target
+    inside: bool | None  # whether the value is inside the band; None without a target
+    source: str  # source of the band; empty without a target
+    definition: str  # definition, sign, source
+    remark: str = ""  # remark of the target file about a value outside the band
 
 
 @dataclass(frozen=True)
@@ -127,22 +115,15 @@ def _number(value: float) -> str:
 
 @dataclass(frozen=True)
 class Test:
-    """One test of an axle.
+    """One test of an axle."""
 
-    Attributes:
-        sweep: Name of our own sweep.
-        variable: Channel of the variable.
-        sign: Sign from the variable to the load of the left wheel: its travel; forwards, to the left; a turn to the
-            left.
-        mirrored: Whether the load of the right wheel is the mirror image of the left wheel's load, or its opposite.
-        front_only: Whether only the front axle has the test.
-    """
-
-    sweep: str
-    variable: str
+    sweep: str  # name of our own sweep
+    variable: str  # channel of the variable
+    # Sign from the variable to the load of the left wheel: its travel; forwards, to the left; a turn to the left
     sign: float = 1.0
+    # Whether the load of the right wheel is the mirror image of the left wheel's load, or its opposite
     mirrored: bool = True
-    front_only: bool = False
+    front_only: bool = False  # whether only the front axle has the test
 
 
 TESTS: Final = {

@@ -43,12 +43,9 @@ class DesignTable:
 
 @dataclass(frozen=True)
 class Samples:
-    """Combinations, stored as columns so that a million of them need little memory.
+    """Combinations, stored as columns so that a million of them need little memory."""
 
-    Attributes:
-        columns: Key -> value in every combination; None for a key that a case of a list does not name.
-    """
-
+    # Key -> value in every combination; None for a key that a case of a list does not name
     columns: dict[str, list[Value]]
     count: int
 

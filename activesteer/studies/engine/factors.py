@@ -30,37 +30,24 @@ Value = Any
 
 @dataclass(frozen=True)
 class Factor:
-    """A factor: a key and its values.
+    """A factor: a key and its values."""
 
-    Attributes:
-        key: Dotted key, as for `--set`.
-        kind: One of `KINDS`.
-        values: Values of a grid or a choice.
-        weights: Probability of each value of a choice.
-        low: Lower end of a range.
-        high: Upper end of a range.
-        mean: Mean of a normal distribution before truncation.
-        deviation: Standard deviation of a normal distribution before truncation.
-        nominal: One of `NOMINAL` if the values multiply the value of the files or are added to it; else empty.
-        of: Earlier factor to whose value the values are relative, in place of the value of the files; empty for none.
-        grows_with: Other factor -> exponent. The value is also multiplied by that factor, over its value in the
-            files, to the power of the exponent.
-        maneuvers: Names of the manoeuvres in which the factor varies; empty for all.
-        when: Other factor -> its values with which the factor varies; empty for all.
-    """
-
-    key: str
-    kind: str
-    values: tuple[Value, ...] = ()
-    weights: tuple[float, ...] = ()
-    low: float = 0.0
-    high: float = 0.0
-    mean: float = 0.0
-    deviation: float = 0.0
-    nominal: str = ""
+    key: str  # dotted key, as for `--set`
+    kind: str  # one of `KINDS`
+    values: tuple[Value, ...] = ()  # values of a grid or a choice
+    weights: tuple[float, ...] = ()  # probability of each value of a choice
+    low: float = 0.0  # lower end of a range
+    high: float = 0.0  # upper end of a range
+    mean: float = 0.0  # mean of a normal distribution before truncation
+    deviation: float = 0.0  # standard deviation of a normal distribution before truncation
+    nominal: str = ""  # one of `NOMINAL` if the values multiply the value of the files or are added to it; else empty
+    # Earlier factor to whose value the values are relative, in place of the value of the files; empty for none
     of: str = ""
+    # Other factor -> exponent. The value is also multiplied by that factor, over its value in the files, to the power
+    # of the exponent.
     grows_with: Mapping[str, float] = field(default_factory=dict)
-    maneuvers: tuple[str, ...] = ()
+    maneuvers: tuple[str, ...] = ()  # names of the manoeuvres in which the factor varies; empty for all
+    # Other factor -> its values with which the factor varies; empty for all
     when: Mapping[str, Value] = field(default_factory=dict)
 
     def acts(self, values: Mapping[str, Value]) -> bool:

@@ -122,26 +122,18 @@ _VERSION: Final = "version of "
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that all runs of a study share; small, because every task carries them.
+    """Settings that all runs of a study share; small, because every task carries them."""
 
-    Attributes:
-        study: The study without its cases and searches.
-        maneuvers: Label and name, path or table of each manoeuvre.
-        vehicles: Label and name, path or table of each vehicle.
-        controllers: Label and name or file of each controller.
-        folder: Folder of the recordings.
-        named: Indices of manoeuvre and vehicle with overrides, one for each combination of text factors, which may name
-            other files.
-        expected: Hashes at the start of the study: of the files of each pair of manoeuvre and vehicle with each
-            combination of texts, of each controller, and of the versions.
-    """
-
-    study: StudyFile
-    maneuvers: tuple[tuple[str, FileOrTable], ...]
-    vehicles: tuple[tuple[str, FileOrTable], ...]
-    controllers: tuple[tuple[str, str], ...]
+    study: StudyFile  # the study without its cases and searches
+    maneuvers: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each manoeuvre
+    vehicles: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each vehicle
+    controllers: tuple[tuple[str, str], ...]  # label and name or file of each controller
     folder: Path | None
+    # Indices of manoeuvre and vehicle with overrides, one for each combination of text factors, which may name other
+    # files.
     named: tuple[tuple[int, int, dict[str, Any]], ...]
+    # Hashes at the start of the study: of the files of each pair of manoeuvre and vehicle with each combination of
+    # texts, of each controller, and of the versions.
     expected: dict[str, str]
 
 

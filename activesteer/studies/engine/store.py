@@ -93,23 +93,14 @@ _KEY_CHARACTERS: Final = 200
 
 
 class Progress(NamedTuple):
-    """Progress of a study.
+    """Progress of a study."""
 
-    Attributes:
-        total: Runs of the study.
-        done: Runs that have a row.
-        by_status: Status -> number of runs.
-        errors: The most frequent errors, with their numbers.
-        running: Whether a process works on the study.
-        without_effect: Factors that change no metric of any run, once the study is complete.
-    """
-
-    total: int
-    done: int
-    by_status: dict[str, int]
-    errors: dict[str, int]
-    running: bool
-    without_effect: list[str]
+    total: int  # runs of the study
+    done: int  # runs that have a row
+    by_status: dict[str, int]  # status -> number of runs
+    errors: dict[str, int]  # the most frequent errors, with their numbers
+    running: bool  # whether a process works on the study
+    without_effect: list[str]  # factors that change no metric of any run, once the study is complete
 
     def to_json(self) -> dict[str, Any]:
         """Return the progress as JSON values."""

@@ -51,46 +51,25 @@ def label_of(item: FileOrTable) -> str:
 
 @dataclass(frozen=True)
 class StudyFile:
-    """A study as in its file, with absolute paths.
+    """A study as in its file, with absolute paths."""
 
-    Attributes:
-        maneuvers: Names, paths or tables of manoeuvres.
-        controllers: Names or files of controllers.
-        vehicles: Names, paths or tables of vehicles.
-        driver: Name, path or table of the driver, or a driver class.
-        overrides: Overrides of all runs: dotted key -> value.
-        factors: Varied keys.
-        design: Design of the combinations.
-        case_list: Cases of a list design; None for other designs.
-        seed: Seed of the samples.
-        metrics: Patterns of the metrics to keep, such as `yaw_rate_*`; empty for all.
-        recordings: `none`, `failed`, `all`, or a number n for every n-th sample.
-        curves: Channels to keep of every run, every `conventions.CURVE_STEP_S`.
-        claims: Whether to check the paper's claims for every sample; this needs its three systems.
-        timestep_s: Step of engine, driver and controller [s].
-        tune: The table [tune], unparsed; see `tuning`.
-        fit: The table [fit], unparsed; see `measured.fit_file`.
-        title: One line for the report.
-        source: For error messages.
-    """
-
-    maneuvers: tuple[FileOrTable, ...]
-    controllers: tuple[str, ...] = ("none",)
-    vehicles: tuple[FileOrTable, ...] = ("compact",)
-    driver: FileOrTable = DEFAULT_DRIVER
-    overrides: dict[str, Any] = field(default_factory=dict)
+    maneuvers: tuple[FileOrTable, ...]  # names, paths or tables of manoeuvres
+    controllers: tuple[str, ...] = ("none",)  # names or files of controllers
+    vehicles: tuple[FileOrTable, ...] = ("compact",)  # names, paths or tables of vehicles
+    driver: FileOrTable = DEFAULT_DRIVER  # name, path or table of the driver, or a driver class
+    overrides: dict[str, Any] = field(default_factory=dict)  # overrides of all runs: dotted key -> value
     factors: tuple[Factor, ...] = ()
     design: DesignTable = DesignTable()
-    case_list: Samples | None = None
+    case_list: Samples | None = None  # cases of a list design; None for other designs
     seed: int = 0
-    metrics: tuple[str, ...] = ()
-    recordings: str | int = "none"
-    curves: tuple[str, ...] = ()
-    claims: bool = False
-    timestep_s: float = DEFAULT_TIMESTEP_S
-    tune: dict[str, Any] | None = None
-    fit: dict[str, Any] | None = None
-    title: str = ""
+    metrics: tuple[str, ...] = ()  # patterns of the metrics to keep, such as `yaw_rate_*`; empty for all
+    recordings: str | int = "none"  # `none`, `failed`, `all`, or a number n for every n-th sample
+    curves: tuple[str, ...] = ()  # channels to keep of every run, every `conventions.CURVE_STEP_S`
+    claims: bool = False  # whether to check the paper's claims for every sample; this needs its three systems
+    timestep_s: float = DEFAULT_TIMESTEP_S  # step of engine, driver and controller [s]
+    tune: dict[str, Any] | None = None  # the table [tune], unparsed; see `tuning`
+    fit: dict[str, Any] | None = None  # the table [fit], unparsed; see `measured.fit_file`
+    title: str = ""  # one line for the report
     source: Source = Source("study")
 
     def samples(self) -> tuple[Samples, ...]:

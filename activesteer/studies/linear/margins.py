@@ -77,19 +77,12 @@ Response = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop, or nan if a margin does not exist, such as the gain margin of a loop above -180 deg.
+    """Margins of one loop, or nan if a margin does not exist, such as the gain margin of a loop above -180 deg."""
 
-    Attributes:
-        gain_dB: Smallest factor on the gain, up or down, that makes the loop marginal [dB].
-        phase_rad: Smallest phase that makes it marginal [rad].
-        delay_s: Smallest delay that makes it marginal [s].
-        disk: alpha of the balanced disk [-]; 0 if the closed loop is unstable.
-    """
-
-    gain_dB: float
-    phase_rad: float
-    delay_s: float
-    disk: float
+    gain_dB: float  # smallest factor on the gain, up or down, that makes the loop marginal [dB]
+    phase_rad: float  # smallest phase that makes it marginal [rad]
+    delay_s: float  # smallest delay that makes it marginal [s]
+    disk: float  # alpha of the balanced disk [-]; 0 if the closed loop is unstable
 
 
 def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) -> Margins:
@@ -189,22 +182,15 @@ def is_stable(returned: Response) -> bool:
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Margins of one loop of a controller at a speed.
-
-    Attributes:
-        controller: The controller.
-        loop: Point at which the loop is opened: one of `LOOPS`, or `BOTH`.
-        speed_kmh: Speed [km/h].
-        margins: The margins.
-        factors: Factors of the car with the smallest disk margin, if there are many cars: key -> value.
-        curves: Loop gains at `FREQUENCIES_RADPS`; empty for many cars.
-    """
+    """Margins of one loop of a controller at a speed."""
 
     controller: str
-    loop: str
+    loop: str  # point at which the loop is opened: one of `LOOPS`, or `BOTH`
     speed_kmh: float
     margins: Margins
+    # Factors of the car with the smallest disk margin, if there are many cars: key -> value
     factors: Mapping[str, Any] = field(default_factory=dict)
+    # Loop gains at `FREQUENCIES_RADPS`; empty for many cars
     curves: tuple[Response, ...] = field(default=(), compare=False, repr=False)
 
     def to_json(self) -> dict[str, Any]:
