@@ -12,6 +12,7 @@ import numpy as np
 
 from activesteer.config import to_table
 from activesteer.core.conventions import Array
+from activesteer.core.units import unit_of
 from activesteer.errors import ParameterError
 from activesteer.sensors.parameters import Sensors
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -142,11 +143,11 @@ class Log:
     def __init__(self) -> None:
         self.assumptions: list[Assumption] = []
 
-    def take(self, key: str, given: float | None, default: float, rule: str, unit: str = "") -> float:
-        """Return the given value, or the default, which is then noted."""
-        if given is not None:
+    def take(self, path: str, part: Any, name: str, default: float, rule: str) -> float:
+        """Return a value of a part of the table, or the default, which is then noted."""
+        if (given := getattr(part, name)) is not None:
             return given
-        self.note(key, f"{default:.4g} {unit}".strip(), rule)
+        self.note(f"{path}.{name}" if path else name, f"{default:.4g} {unit_of(name)}".strip(), rule)
         return default
 
     def angle(self, key: str, given_rad: float | None, default_deg: float, rule: str) -> float:

@@ -342,11 +342,9 @@ def _first_guess(
     if axle.kind.strut and axle.table.anti_roll_bar_Nmprad is not None:
         # The bar acts along the strut, whose travel is smaller than the wheel travel.
         axle.anti_roll_bar_Npm /= damper**2
-    bump, rebound = axle.table.bump_stop_m, axle.table.rebound_stop_m
-    axle_trim.bump_stop_m = log.take(f"{axle.name}.bump_stop_m", bump, _STOPS_M[0] * damper, "35 mm at the wheel", "m")
-    axle_trim.rebound_stop_m = log.take(
-        f"{axle.name}.rebound_stop_m", rebound, _STOPS_M[1] * damper, "65 mm at the wheel", "m"
-    )
+    name, table = axle.name, axle.table
+    axle_trim.bump_stop_m = log.take(name, table, "bump_stop_m", _STOPS_M[0] * damper, "35 mm at the wheel")
+    axle_trim.rebound_stop_m = log.take(name, table, "rebound_stop_m", _STOPS_M[1] * damper, "65 mm at the wheel")
     if measured is not None and axle.table.stop_stiffness is None:
         # The measured wheel load includes them.
         axle_trim.stop_stiffness = (0.0, 0.0, 0.0)
@@ -359,10 +357,7 @@ def _first_guess(
         log.note(f"{axle.name}.stop_stiffness", words, "cellular rubber, at the wheel as the compact's")
     else:
         axle_trim.stop_stiffness = axle.table.stop_stiffness
-    friction = axle.table.damper_friction_N
-    axle_trim.friction_N = log.take(
-        f"{axle.name}.damper_friction_N", friction, round(30.0 / damper), "30 N at the wheel", "N"
-    )
+    axle_trim.friction_N = log.take(name, table, "damper_friction_N", round(30.0 / damper), "30 N at the wheel")
 
 
 def _stand(vehicle_file: Path) -> _Stand:
