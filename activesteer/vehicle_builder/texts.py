@@ -29,38 +29,15 @@ from activesteer.vehicle_builder.trim import Trimmed
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
 """Ratio of the effective cornering stiffness of an axle to the stiffness of its tyres, in the compact: compliance and
 roll steer."""
-_REMARKS: Final = {
-    "dampers.front": "Compression positive.",
-    "curves.front": (
-        "Cubic splines through the points. Toe-in, camber with the top outwards, caster with the top to the rear,\n"
-        "bump and a rack that steers left are positive. Curves of the unloaded guide; under load the car has the "
-        "measured curves."
-    ),
-    "curves.rear": "As for the front axle, without a rack.",
-    "friction": "Dry friction; vibration as in the compact's file (a road of class A at 80 km/h).",
-    "brakes": "Torque per wheel at full pedal.",
-    "rear_actuator": "Replaces the hinges of the model.",
-    "superposition_actuator": "Replaces the servo of the model.",
-    "battery": "Limits at the terminals.",
-    "sensors": "Sensors that the controllers read.",
-    "powertrain": (
-        "At the wheels: torques in first gear, power, rev limit in top gear; of axles with motors, limits of the pedal."
-    ),
-    "two_track": "For estimators, from drives of the car: steps of the steering wheel at 80 km/h, 2 m/s2, and braking.",
-    "controllers.desired_yaw_rate": (
-        "Controllers of the compact as a start; their gains belong to that car. Adapt them to the lateral acceleration "
-        "that\nthis car reaches without control (max_lateral_acceleration_mps2) and to the lags of its servos; see the "
-        "comments\nin the compact's file."
-    ),
-}
-"""Comments above tables, equal for every car."""
+_TEMPLATES: Final = Path(__file__).resolve().parent / "templates"
 
 
 def vehicle_text(
     car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None = None
 ) -> str:
     """Return the text of the vehicle file."""
-    remarks = _REMARKS | {
+    remarks, _ = read_toml(_TEMPLATES / "remarks.toml")
+    remarks |= {
         "steering": f"Ratio at the centre without load; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
         "single_track": (
             f"Estimated: {_LEFT_OF_STIFFNESS['front']:g} (front) and {_LEFT_OF_STIFFNESS['rear']:g} (rear) times the "
@@ -165,15 +142,12 @@ def vec(values: Iterable[float], digits: int = 6) -> str:
     return " ".join(num(value, digits) for value in values)
 
 
-_TEMPLATE: Final = Path(__file__).resolve().parent / "templates" / "README.md"
-
-
 def readme_text(car: CarDesign, trimmed: Trimmed, table_name: str) -> str:
     """Return the text of README.md."""
     kinds = " and ".join(f"{axle.kind.name.replace('_', ' ')} {axle.name}" for axle in car.axles)
     rows = [f"| `{item.key}` | {item.value} | {item.rule} |" for item in car.assumptions]
     trim_rows = [_trim_row(trimmed, axle.name) for axle in car.axles]
-    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
+    return Template((_TEMPLATES / "README.md").read_text(encoding="utf-8")).substitute(
         name=car.name,
         kinds=kinds,
         table=table_name,
