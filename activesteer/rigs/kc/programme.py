@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from activesteer.config import read_toml
 from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
@@ -182,11 +184,6 @@ def steering_axis(right: WheelPose, left: WheelPose, standing: WheelPose, inward
     )
 
 
-_TRAVEL_M: Final = np.linspace(-0.08, 0.08, 33)
-_SIDE_FORCE_N: Final = np.linspace(-4000.0, 4000.0, 17)
-_PATCH_FORCE_N: Final = np.linspace(-5000.0, 3000.0, 17)
-_CENTRE_FORCE_N: Final = np.linspace(-3000.0, 5000.0, 17)
-_MOMENT_NM: Final = np.linspace(-150.0, 150.0, 13)
 _STEERING_POINTS: Final = 24
 """Points of the steering sweep to either side."""
 _AXIS_STEER_RAD: Final = math.radians(5.0)
@@ -237,86 +234,42 @@ def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> M
 def _sweeps(
     vehicle: Vehicle, car: HeldCar, load_N: Array, tyres: tuple[TyreStiffness, TyreStiffness]
 ) -> dict[str, Sweep]:
+    table, _ = read_toml(Path(__file__).with_name("sweeps.toml"))
     free = HeldCar(vehicle, springs="out")
-    both, opposed = np.ones(4), INWARDS
-    travel = "wheel travel, positive in bump"
-    steering = "steering wheel angle, positive to the left"
+    sweeps = {}
+    for name, row in table.items():
+        signs = INWARDS if row.get("opposed") else np.ones(4)
+        unit = np.outer(signs, row["direction"]) if "direction" in row else signs
+        first, last, count = row["points"]
+        cases = {x: Case(**{row["load"]: x * unit}) for x in np.linspace(first, last, count).tolist()}
+        sweeps[name] = run(car if row.get("springs", True) else free, row["title"], row["variable"], row["unit"], cases)
     scrub = np.repeat(
         [parking_moment_Nm(load_N[:2].mean(), tyres[0]), parking_moment_Nm(load_N[2:].mean(), tyres[1])], 2
     )
     scrub *= [1.0, 1.0, 0.0, 0.0]
-    angles = _steering_angles(vehicle)
-    rear = np.linspace(-1.0, 1.0, 13) * _rear_range(vehicle)
-
-    def sweep(
-        title: str, variable: str, unit: str, points: Array, case: Callable[[float], Case], on: HeldCar = car
-    ) -> Sweep:
-        return run(on, title, variable, unit, {float(x): case(float(x)) for x in points})
-
-    def push(x: float, y: float) -> Callable[[float], Array]:
-        return lambda force: np.outer(both, [x * force, y * force, 0.0])
-
-    along, across = push(1.0, 0.0), push(0.0, 1.0)
-    inwards = [np.outer(opposed, axis) for axis in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0])]
-    return {
-        "parallel_travel": sweep("parallel wheel travel", travel, "m", _TRAVEL_M, lambda z: Case(height_m=z * both)),
-        "opposite_travel": sweep(
-            "opposite wheel travel", "travel of the right wheels, positive in bump; the left wheels move the other way",
-            "m", _TRAVEL_M, lambda z: Case(height_m=z * opposed),
-        ),
-        "parallel_kinematic": sweep(
-            "parallel wheel travel, without springs", travel, "m", _TRAVEL_M, lambda z: Case(height_m=z * both), free
-        ),
-        "lateral_in_phase": sweep(
-            "side force in phase", "side force at each contact point, positive to the left", "N", _SIDE_FORCE_N,
-            lambda force: Case(patch_N=across(force)),
-        ),
-        "lateral_opposed": sweep(
-            "side force out of phase", "side force at each contact point, positive towards the middle of the car", "N",
-            _SIDE_FORCE_N, lambda force: Case(patch_N=force * inwards[0]),
-        ),
-        "longitudinal_patch": sweep(
-            "longitudinal force at the contact points, wheels locked to their knuckles",
-            "force at each wheel, positive forwards: brakes are negative", "N", _PATCH_FORCE_N,
-            lambda force: Case(patch_N=along(force)),
-        ),
-        "longitudinal_centre": sweep(
-            "longitudinal force at the wheel centres", "force at each wheel, positive forwards: drive is positive", "N",
-            _CENTRE_FORCE_N, lambda force: Case(centre_N=along(force)),
-        ),
-        "aligning_in_phase": sweep(
-            "aligning moment in phase", "moment about the vertical on each wheel, positive to the left", "Nm",
-            _MOMENT_NM,
-            lambda moment: Case(moment_Nm=np.outer(both, [0.0, 0.0, moment])),
-        ),
-        "aligning_opposed": sweep(
-            "aligning moment out of phase", "moment about the vertical on each wheel, positive towards toe-in", "Nm",
-            _MOMENT_NM, lambda moment: Case(moment_Nm=moment * inwards[1]),
-        ),
-        "steering_rolling": sweep(
-            "steering wheel sweep, pads without friction", steering, "rad", angles,
-            lambda angle: Case("contact", steering_wheel_rad=angle),
-        ),
-        "steering_at_rest_left": sweep(
-            "steering wheel turned to the left on a dry road, at rest", steering, "rad", angles,
-            lambda angle: Case("contact", steering_wheel_rad=angle, moment_Nm=np.outer(-scrub, [0.0, 0.0, 1.0])),
-        ),
-        "steering_at_rest_right": sweep(
-            "steering wheel turned to the right on a dry road, at rest", steering, "rad", angles,
-            lambda angle: Case("contact", steering_wheel_rad=angle, moment_Nm=np.outer(scrub, [0.0, 0.0, 1.0])),
-        ),
-        "rear_steering": sweep(
-            "rear steering", "angle of the rear steering actuators, positive to the left", "rad", rear,
-            lambda angle: Case("contact", rear_steer_rad=angle),
-        ),
-        **({
-            f"rear_steering_{name}": sweep(
-                f"rear steering with {name} of {1e3 * abs(height):.0f} mm",
-                "angle of the rear steering actuators, positive to the left", "rad", rear,
-                lambda angle, height=height: Case("contact", height * both, rear_steer_rad=angle),
-            ) for name, height in (("bump", _STEERED_BUMP_M), ("rebound", -_STEERED_BUMP_M))
-        } if vehicle.parameters.rear_actuator.is_screw else {}),
-    }  # fmt: skip
+    for ending, title, moment in (
+        ("rolling", "steering wheel sweep, pads without friction", 0.0 * scrub),
+        ("at_rest_left", "steering wheel turned to the left on a dry road, at rest", -scrub),
+        ("at_rest_right", "steering wheel turned to the right on a dry road, at rest", scrub),
+    ):
+        moment_Nm = np.outer(moment, [0.0, 0.0, 1.0])
+        cases = {
+            angle: Case("contact", steering_wheel_rad=angle, moment_Nm=moment_Nm)
+            for angle in _steering_angles(vehicle).tolist()
+        }
+        sweeps[f"steering_{ending}"] = run(car, title, "steering wheel angle, positive to the left", "rad", cases)
+    heights = {"": 0.0}
+    if vehicle.parameters.rear_actuator.is_screw:
+        heights |= {"_bump": _STEERED_BUMP_M, "_rebound": -_STEERED_BUMP_M}
+    for ending, height_m in heights.items():
+        title = "rear steering" + (f" with {ending[1:]} of {1e3 * abs(height_m):.0f} mm" if ending else "")
+        cases = {
+            angle: Case("contact", height_m * np.ones(4), rear_steer_rad=angle)
+            for angle in (np.linspace(-1.0, 1.0, 13) * _rear_range(vehicle)).tolist()
+        }
+        variable = "angle of the rear steering actuators, positive to the left"
+        sweeps[f"rear_steering{ending}"] = run(car, title, variable, "rad", cases)
+    return sweeps
 
 
 def rear_screw_travel_m(vehicle: Vehicle, angles_rad: Array) -> Array:

@@ -32,7 +32,7 @@ from activesteer.plotting import Curve, Panel, Picture, draw
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, check_gains, resolve
 from activesteer.simulation.runner import simulate
-from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_cars
+from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_car
 from activesteer.theory.single_track import SingleTrack
 
 if TYPE_CHECKING:
@@ -294,7 +294,8 @@ def driver_loops(
     known = SingleTrack(setup.single_track)
     found = []
     of_car = {key: value for key, value in (overrides or {}).items() if not key.startswith("driver.")}
-    for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], of_car):
+    for speed_kmh in speeds_kmh:
+        car = linear_car(vehicle, speed_kmh / 3.6, of_car)
         gains = steering_gains(car.speed_mps, known.matrices, who, setup.steering_ratio)
         for name in controllers:
             linear = linear_controller(name, setup, car.speed_mps)

@@ -58,7 +58,7 @@ from activesteer.studies.engine.plan import Plan, task_size
 from activesteer.studies.engine.study import StudyProgress
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import in_parallel, workers_for
-from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_cars
+from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_car
 
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 """Default speeds [km/h]."""
@@ -242,7 +242,8 @@ def margins_of_cars(
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
     for overrides in cars:
         found: list[LoopMargins] = []
-        for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides, controllers):
+        for speed_kmh in speeds_kmh:
+            car = linear_car(vehicle, speed_kmh / 3.6, overrides, controllers)
             scenario = resolve(straight_on(car.speed_mps), vehicle, overrides, controllers=controllers)
             for number, plugin in enumerate(plugins):
                 unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
