@@ -27,18 +27,12 @@ class LinkKind:
     """One link between chassis (or rack) and knuckle of the left side, with its elasticity."""
 
     name: str
-    inner: str
-    """Point on the chassis, or on the rack."""
-    outer: str
-    """Point on the knuckle; the two links of an arm share it."""
-    stiffness_Npm: float
-    """Rod and both bushings in series, unloaded [N/m]."""
-    hardening_Npm3: float
-    """Cubic part of the force [N/m3]."""
-    damping_Nspm: float
-    """Damping of the rubber [N s/m]."""
-    reason: str
-    """Meaning or source of these values."""
+    inner: str  # point on the chassis, or on the rack
+    outer: str  # point on the knuckle; the two links of an arm share it
+    stiffness_Npm: float  # rod and both bushings in series, unloaded [N/m]
+    hardening_Npm3: float  # cubic part of the force [N/m3]
+    damping_Nspm: float  # damping of the rubber [N s/m]
+    reason: str  # meaning or source of these values
 
 
 @dataclass(frozen=True)

@@ -111,19 +111,14 @@ class Usual:
     """Usual and possible range of a value. Keys of a table in usual.toml, which has the sources."""
 
     topic: str
-    words: str
-    """Name in the report."""
-    usual: tuple[float, ...]
-    """Lowest and highest usual value. A value outside is a warning."""
-    advice: str
-    """Advice for a value outside."""
-    unit: str = ""
-    """Unit, or empty for a pure number or a metric of the rig, which has its own."""
+    words: str  # name in the report
+    usual: tuple[float, ...]  # lowest and highest usual value. A value outside is a warning
+    advice: str  # advice for a value outside
+    unit: str = ""  # unit, or empty for a pure number or a metric of the rig, which has its own
+    # Lowest and highest possible value. A value outside is an error
     possible: tuple[float, ...] = (-math.inf, math.inf)
-    """Lowest and highest possible value. A value outside is an error."""
     axle: str = ""
-    name: str = ""
-    """Axle and name of a metric of the rig."""
+    name: str = ""  # axle and name of a metric of the rig
 
     def judged(self, value: float, unit: str = "", **words: str) -> Finding:
         """Return the finding about a value. Nan counts as a warning."""

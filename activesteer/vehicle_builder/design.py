@@ -74,11 +74,9 @@ class Axle:
     carrier: Solid | None
     spring: Mount
     damper: Mount
-    top_mount: TopMount | None
-    """Elasticity of the top mount, or None if it is rigid."""
+    top_mount: TopMount | None  # elasticity of the top mount, or None if it is rigid
     anti_roll_bar_Npm: float
-    measured: MeasuredAxle | None
-    """Measurements that an axle of curves has to match."""
+    measured: MeasuredAxle | None  # measurements that an axle of curves has to match
     ride_frequency_Hz: float | None
     damping_ratio: float | None
 
@@ -110,8 +108,7 @@ class CarDesign:
     rack_mass_kg: float
     rack_limit_m: float
     rack_friction_N: float
-    rack_sign: float
-    """-1 if the rack moves to the right to steer left (tie rods behind the steering axis), else 1."""
+    rack_sign: float  # -1 if the rack moves to the right to steer left (tie rods behind the steering axis), else 1
     column_stiffness_Npm: float
     kingpin_m: tuple[Array, Array]
     rear_limit_rad: float

@@ -91,8 +91,7 @@ class KcTables:
     """All tests of a car: axle -> test -> samples; and the ratio of its steering if measured."""
 
     tests: dict[str, dict[str, Samples]] = field(default_factory=dict)
-    rack_per_steering_wheel_m: float | None = None
-    """Rack travel per angle of the steering wheel [m/rad]."""
+    rack_per_steering_wheel_m: float | None = None  # rack travel per angle of the steering wheel [m/rad]
 
 
 def read_kc(folder: Path, axles: list[str]) -> KcTables:

@@ -430,12 +430,9 @@ DEFINITIONS: Final = tuple(
 class Target:
     """Target band of a metric."""
 
-    band: tuple[float, ...]
-    """Lowest and highest value, in the metric's unit."""
-    source: str
-    """Source of the band."""
-    remark: str = ""
-    """Remark about a value outside the band."""
+    band: tuple[float, ...]  # lowest and highest value, in the metric's unit
+    source: str  # source of the band
+    remark: str = ""  # remark about a value outside the band
 
 
 def load_targets(vehicle: str, path: str | os.PathLike[str] | None = None) -> dict[tuple[str, str], Target]:

@@ -31,34 +31,20 @@ class Sweep:
     Arrays have the shape (n, 4) or (n, 4, 3), by corner.
     """
 
-    title: str
-    """Title of the sweep."""
-    variable: str
-    """Variable of the sweep, with its sign."""
-    unit: str
-    """SI unit of the variable."""
-    x: Array
-    """Values of the variable, shape (n,)."""
-    centre_m: Array
-    """Wheel centres."""
-    axle: Array
-    """Unit vectors along the wheels' axles, to the left."""
-    contact_m: Array
-    """Contact points: the lowest points of the wheels."""
-    patch_m: Array
-    """Points of the wheels, locked to their knuckles, that are the contact points at x = 0."""
-    load_N: Array
-    """Vertical forces of the pads."""
-    wind_up_rad: Array
-    """Rotation of the knuckles about y, positive in the sense of forward rolling."""
-    damper_m: Array
-    """Lengths of the dampers; for a strut its extension from the design position."""
-    rack_m: Array
-    """Travel of the rack, positive steers left, shape (n,)."""
-    steering_wheel_rad: Array
-    """Steering wheel angle, shape (n,)."""
-    steering_wheel_torque_Nm: Array
-    """Torque that holds the steering wheel, positive to the left, shape (n,)."""
+    title: str  # title of the sweep
+    variable: str  # variable of the sweep, with its sign
+    unit: str  # SI unit of the variable
+    x: Array  # values of the variable, shape (n,)
+    centre_m: Array  # wheel centres
+    axle: Array  # unit vectors along the wheels' axles, to the left
+    contact_m: Array  # contact points: the lowest points of the wheels
+    patch_m: Array  # points of the wheels, locked to their knuckles, that are the contact points at x = 0
+    load_N: Array  # vertical forces of the pads
+    wind_up_rad: Array  # rotation of the knuckles about y, positive in the sense of forward rolling
+    damper_m: Array  # lengths of the dampers; for a strut its extension from the design position
+    rack_m: Array  # travel of the rack, positive steers left, shape (n,)
+    steering_wheel_rad: Array  # steering wheel angle, shape (n,)
+    steering_wheel_torque_Nm: Array  # torque that holds the steering wheel, positive to the left, shape (n,)
 
     @property
     def steer_rad(self) -> Array:
@@ -131,23 +117,17 @@ def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float
 class SteeringAxis:
     """A steering axis, and its distances from the wheel of the standing car."""
 
-    point_m: Array
-    """Point of the axis at the height of the contact point, vehicle axes, shape (3,)."""
-    direction: Array
-    """Unit vector along it, upwards, shape (3,)."""
-    caster_rad: float
-    """Angle to the vertical in side view, positive with the top to the rear (ISO 8855)."""
+    point_m: Array  # point of the axis at the height of the contact point, vehicle axes, shape (3,)
+    direction: Array  # unit vector along it, upwards, shape (3,)
+    caster_rad: float  # angle to the vertical in side view, positive with the top to the rear (ISO 8855)
+    # Angle to the vertical in front view, positive with the top towards the middle of the car (ISO 8855)
     inclination_rad: float
-    """Angle to the vertical in front view, positive with the top towards the middle of the car (ISO 8855)."""
-    trail_m: float
-    """Distance from the contact point forwards to the axis on the ground: positive if the axis is ahead."""
+    trail_m: float  # distance from the contact point forwards to the axis on the ground: positive if the axis is ahead
+    # Distance from the axis on the ground outwards to the contact point: positive if the axis is inside
     scrub_radius_m: float
-    """Distance from the axis on the ground outwards to the contact point: positive if the axis is inside."""
-    centre_trail_m: float
-    """Distance from the wheel centre forwards to the axis, at the height of the wheel centre."""
+    centre_trail_m: float  # distance from the wheel centre forwards to the axis, at the height of the wheel centre
+    # Distance from the axis outwards to the wheel centre, at the height of the wheel centre (disturbing force lever)
     centre_offset_m: float
-    """Distance from the axis outwards to the wheel centre, at the height of the wheel centre (disturbing force
-    lever)."""
 
 
 def steering_axis(right: WheelPose, left: WheelPose, standing: WheelPose, inwards: float) -> SteeringAxis:
@@ -199,12 +179,9 @@ class Measured:
 
     vehicle: Vehicle
     sweeps: dict[str, Sweep]
-    axes: tuple[SteeringAxis, ...]
-    """Steering axes by corner; at the rear the axes of the steering hinges."""
-    tyres: tuple[TyreStiffness, TyreStiffness]
-    """Front and rear tyres."""
-    static_load_N: Array
-    """Wheel loads of the standing car, shape (4,)."""
+    axes: tuple[SteeringAxis, ...]  # steering axes by corner; at the rear the axes of the steering hinges
+    tyres: tuple[TyreStiffness, TyreStiffness]  # front and rear tyres
+    static_load_N: Array  # wheel loads of the standing car, shape (4,)
     modes: Modes
 
     @property
