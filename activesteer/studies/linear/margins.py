@@ -29,7 +29,7 @@ import functools
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
@@ -218,7 +218,7 @@ def loop_margins(
     If a controller uses both actuators, the margins of both together come last.
     """
     check_gains(overrides or {}, controllers)
-    return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}], keep_curves=True))
+    return _margins(controllers, vehicle, speeds_kmh, [overrides or {}], keep_curves=True)[0]
 
 
 def straight_on(speed_mps: float) -> dict[str, Any]:
@@ -226,20 +226,21 @@ def straight_on(speed_mps: float) -> dict[str, Any]:
     return {"kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0}
 
 
-def margins_of_cars(
+def _margins(
     controllers: Sequence[Any],
     vehicle: FileOrTable,
     speeds_kmh: Sequence[float],
     cars: Iterable[Mapping[str, Any]],
     *,
     keep_curves: bool = False,
-) -> Iterator[list[LoopMargins]]:
-    """Yield the margins of several cars, given by their overrides.
+) -> list[list[LoopMargins]]:
+    """Return the margins of several cars, given by their overrides.
 
     A controller that knows the same about two cars is evaluated once. With `keep_curves` the loop gains are kept too.
     """
     plugins = [controller_spec(given) for given in controllers]
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
+    every: list[list[LoopMargins]] = []
     for overrides in cars:
         found: list[LoopMargins] = []
         for speed_kmh in speeds_kmh:
@@ -254,7 +255,8 @@ def margins_of_cars(
                 returned = round_trip(car, answers[key], scenario, unit_s, FREQUENCIES_RADPS)
                 loops = _of_loops(plugin.label, 3.6 * car.speed_mps, returned)
                 found += loops if keep_curves else [replace(loop, curves=()) for loop in loops]
-        yield found
+        every.append(found)
+    return every
 
 
 def _of_loops(controller: str, speed_kmh: float, returned: Response) -> list[LoopMargins]:
@@ -466,12 +468,3 @@ def worst_margins(
             replace(row[least], margins=weakest([each.margins for each in row]), factors=requests[least].factors)
         )
     return worst
-
-
-def _margins(
-    controllers: Sequence[Any],
-    vehicle: FileOrTable,
-    speeds_kmh: Sequence[float],
-    cars: Sequence[Mapping[str, Any]],
-) -> list[list[LoopMargins]]:
-    return list(margins_of_cars(controllers, vehicle, speeds_kmh, cars))
