@@ -50,12 +50,22 @@ class _Corner(NamedTuple):
 
 def mjcf_files(car: CarDesign, trimmed: Trimmed) -> dict[str, str]:
     """Return the files of the model as name to text. The keyframe is empty."""
+    front, corners = car.front, _corners(*car.axles)
+    half_width_m = 0.5 * float(front.tyre_parameters["WIDTH"])
+    scale = np.array([car.wheelbase_m / 2.637, car.width_m / 1.8, 1.0])
+    shell = [(kind, scale * np.array(at), scale * np.array(size)) for kind, at, size in _SHELL]
+    main = {"car": car, "front": front, "corners": corners, "trimmed": trimmed, "half_width_m": half_width_m}
+    left_m = front.points["tie_rod_inner"]
+    steering = {"left_m": left_m, "right_m": left_m * np.array([1.0, -1.0, 1.0])}
+    # Springs without a shape of their own, or on an arm.
+    viewed = [one for one in corners if one.axle.spring.start_m is None or one.axle.spring.on_arm]
+    scene = {"corners": corners, "viewed": viewed, "guides": _GUIDES, "rack_per_steer": rack_per_steer_m(front)}
     return {
-        f"{car.name}.xml": _main(car, trimmed),
-        "front_axle.xml": _axle_file(car, car.front, trimmed),
+        f"{car.name}.xml": _fill("car.xml", **main, shell=shell),
+        "front_axle.xml": _axle_file(car, front, trimmed),
         "rear_axle.xml": _axle_file(car, car.rear, trimmed),
-        "steering.xml": _steering(car),
-        "scene.xml": _scene(car),
+        "steering.xml": _fill("steering.xml", car=car, **steering, bar_kgm2=car.rack_mass_kg * left_m[1] ** 2 / 5.0),
+        "scene.xml": _fill("scene.xml", car=car, **scene),
         "keyframes.xml": _NO_KEYFRAMES,
     }
 
@@ -71,6 +81,7 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
     )
     environment.globals |= {"num": num, "sig": sig, "vec": vec, "rack_joint": rack_joint}
+    environment.globals |= {"round": round, "sqrt": math.sqrt, "radians": math.radians}
     environment.filters["sig"] = sig
     return environment
 
@@ -87,87 +98,6 @@ def rack_joint(axle: Axle, lever: float) -> str:
     """Return the joint that lengthens a spring of a guided axle as the rack raises its wheel."""
     lift = 0.0 if axle.measured is None else axle.measured.rack_lift
     return f'<joint joint="rack" coef="{num(lever * lift)}"/>' if lift else ""
-
-
-def _main(car: CarDesign, trimmed: Trimmed) -> str:
-    front = car.front
-    half_width = 0.5 * float(front.tyre_parameters["WIDTH"])
-    rim = 0.65 * front.radius_m
-    mass = car.rack_mass_kg + 40.0
-    scale = np.array([car.wheelbase_m / 2.637, car.width_m / 1.8, 1.0])
-    return _fill(
-        "car.xml",
-        axles=car.axles,
-        front=front,
-        corners=_corners(*car.axles),
-        trimmed=trimmed,
-        name=car.name,
-        table=car.table.source or "a table",
-        front_words=front.kind.name.replace("_", " "),
-        rear_words=car.rear.kind.name.replace("_", " "),
-        middle=num(-0.5 * car.wheelbase_m, 2),
-        radius=num(front.radius_m),
-        half_width=num(half_width),
-        rim_radius=num(rim, 3),
-        rim_half_width=num(half_width + 0.0015, 4),
-        spoke_radius=num(rim - 0.01, 3),
-        spoke_half_width=num(half_width + 0.003, 4),
-        valve_radius=num(0.775 * front.radius_m, 3),
-        valve_half_width=num(half_width + 0.002, 4),
-        rear_limit=num(car.rear_limit_rad, 10),
-        rear_stiffness=sig(car.rear_stiffness_Nmprad),
-        rear_damping=sig(350.0 * math.sqrt(car.rear_stiffness_Nmprad / 1e5), 4),
-        rack_words=f"tie rods {'behind' if car.rack_sign < 0.0 else 'ahead of'} the steering axis",
-        rack_sign=num(car.rack_sign),
-        rack_limit=num(car.rack_limit_m),
-        chassis_words=(
-            "What is left of the whole car's mass and inertia when all other bodies are taken away."
-            if car.table.mass.total_kg is not None
-            else "The chassis as the table gives it."
-        ),
-        chassis_cg=vec(trimmed.chassis.cg_m),
-        chassis_mass=num(trimmed.chassis.mass_kg, 3),
-        chassis_inertia=vec(trimmed.chassis.inertia_kgm2, 2),
-        front_height=num(front.wheel_centre_m[2]),
-        cg=vec((trimmed.cg_m[0], 0.0, trimmed.cg_m[1]), 4),
-        shell=[(kind, scale * np.array(at), scale * np.array(size)) for kind, at, size in _SHELL],
-        front_bar=sig(front.anti_roll_bar_Npm),
-        rear_bar=sig(car.rear.anti_roll_bar_Npm),
-        front_travel="jounce" if front.kind.strut else "z",
-        pinion=num(trimmed.pinion_radius_m, 7),
-        column_stiffness=sig(car.column_stiffness_Npm),
-        column_damping=sig(round(1.2 * math.sqrt(car.column_stiffness_Npm * mass), -2)),
-        wheel_limit=num(0.993 * car.rack_limit_m / trimmed.pinion_radius_m, 3),
-        superposition_limit=num(math.radians(3.0) * trimmed.ratio, 3),
-    )
-
-
-def _steering(car: CarDesign) -> str:
-    left = car.front.points["tie_rod_inner"]
-    right = left * np.array([1.0, -1.0, 1.0])
-    bar = car.rack_mass_kg * left[1] ** 2 / 5.0
-    return _fill(
-        "steering.xml",
-        rack_pos=vec((left[0], 0.0, left[2])),
-        rack_mass=num(car.rack_mass_kg),
-        rack_inertia=vec((bar, 0.002, bar), 4),
-        left=vec(left),
-        right=vec(right),
-    )
-
-
-def _scene(car: CarDesign) -> str:
-    corners = _corners(*car.axles)
-    return _fill(
-        "scene.xml",
-        name=car.name,
-        middle=num(-0.42 * car.wheelbase_m, 2),
-        corners=corners,
-        # Springs without a shape of their own, or on an arm.
-        viewed=[one for one in corners if one.axle.spring.start_m is None or one.axle.spring.on_arm],
-        guides=_GUIDES,
-        rack_per_steer=rack_per_steer_m(car.front),
-    )
 
 
 def _axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
