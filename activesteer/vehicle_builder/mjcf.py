@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from activesteer.core.conventions import Array
 from activesteer.vehicle_builder.completion import rack_per_steer_m
 from activesteer.vehicle_builder.design import Axle, CarDesign
-from activesteer.vehicle_builder.texts import num, sig, vec
+from activesteer.vehicle_builder.texts import filled, num, vec
 from activesteer.vehicle_builder.trim import Trimmed
 
 _NO_KEYFRAMES = "<mujocoinclude>\n  <keyframe/>\n</mujocoinclude>\n"
@@ -61,40 +58,20 @@ def mjcf_files(car: CarDesign, trimmed: Trimmed) -> dict[str, str]:
     viewed = [one for one in corners if one.axle.spring.start_m is None or one.axle.spring.on_arm]
     scene = {"corners": corners, "viewed": viewed, "guides": _GUIDES, "rack_per_steer": rack_per_steer_m(front)}
     return {
-        f"{car.name}.xml": _fill("car.xml", **main, shell=shell),
+        f"{car.name}.xml": filled("car.xml", **main, shell=shell, rack_joint=_rack_joint),
         "front_axle.xml": _axle_file(car, front, trimmed),
         "rear_axle.xml": _axle_file(car, car.rear, trimmed),
-        "steering.xml": _fill("steering.xml", car=car, **steering, bar_kgm2=car.rack_mass_kg * left_m[1] ** 2 / 5.0),
-        "scene.xml": _fill("scene.xml", car=car, **scene),
+        "steering.xml": filled("steering.xml", car=car, **steering, bar_kgm2=car.rack_mass_kg * left_m[1] ** 2 / 5.0),
+        "scene.xml": filled("scene.xml", car=car, **scene),
         "keyframes.xml": _NO_KEYFRAMES,
     }
-
-
-@cache
-def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("activesteer.vehicle_builder"),
-        autoescape=False,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.globals |= {"num": num, "sig": sig, "vec": vec, "rack_joint": rack_joint}
-    environment.globals |= {"round": round, "sqrt": math.sqrt, "radians": math.radians}
-    environment.filters["sig"] = sig
-    return environment
-
-
-def _fill(file: str, **values: Any) -> str:
-    return _environment().get_template(file).render(values)
 
 
 def _corners(*axles: Axle) -> list[_Corner]:
     return [_Corner(f"{axle.name[0]}{end}", axle, side) for axle in axles for end, side in (("l", 1.0), ("r", -1.0))]
 
 
-def rack_joint(axle: Axle, lever: float) -> str:
+def _rack_joint(axle: Axle, lever: float) -> str:
     """Return the joint that lengthens a spring of a guided axle as the rack raises its wheel."""
     lift = 0.0 if axle.measured is None else axle.measured.rack_lift
     return f'<joint joint="rack" coef="{num(lever * lift)}"/>' if lift else ""
@@ -107,7 +84,7 @@ def _axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
     drawn = [point for point in drawn if np.linalg.norm(point - middle) > 0.01]
     lower, upper = (_in_design(axle, point) for point in car.kingpin_m)
     axis = (upper - lower) / np.linalg.norm(upper - lower)
-    return _fill(
+    return filled(
         "axle.xml",
         axle=axle,
         words=axle.kind.name.replace("_", " ").capitalize(),

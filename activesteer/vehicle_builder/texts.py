@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
-from string import Template
 from typing import Any, Final
 
 import mujoco
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from activesteer.config import read_toml, to_table, toml_text
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
@@ -24,7 +25,7 @@ from activesteer.theory.single_track import TwoTrackParameters
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.design import CarDesign, hardware_tables, in_degrees
-from activesteer.vehicle_builder.trim import Trimmed
+from activesteer.vehicle_builder.trim import Trimmed, TrimmedAxle
 
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
 """Ratio of the effective cornering stiffness of an axle to the stiffness of its tyres, in the compact: compliance and
@@ -142,58 +143,43 @@ def vec(values: Iterable[float], digits: int = 6) -> str:
     return " ".join(num(value, digits) for value in values)
 
 
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("activesteer.vehicle_builder"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.globals |= {"num": num, "sig": sig, "vec": vec, "round": round, "sqrt": math.sqrt}
+    environment.globals |= {"radians": math.radians, "pi": math.pi}
+    environment.filters["sig"] = sig
+    return environment
+
+
+def filled(template: str, **values: Any) -> str:
+    """Return the text of a template."""
+    return _environment().get_template(template).render(values)
+
+
 def readme_text(car: CarDesign, trimmed: Trimmed, table_name: str) -> str:
     """Return the text of README.md."""
-    kinds = " and ".join(f"{axle.kind.name.replace('_', ' ')} {axle.name}" for axle in car.axles)
-    rows = [f"| `{item.key}` | {item.value} | {item.rule} |" for item in car.assumptions]
-    trim_rows = [_trim_row(trimmed, axle.name) for axle in car.axles]
-    return Template((_TEMPLATES / "README.md").read_text(encoding="utf-8")).substitute(
-        name=car.name,
-        kinds=kinds,
-        table=table_name,
-        source=car.table.source or "not said in the table",
-        trimmed="\n".join(trim_rows),
-        rack=num(2e3 * math.pi * trimmed.pinion_radius_m, 2),
-        ratio=num(trimmed.ratio, 2),
-        chassis=num(trimmed.chassis.mass_kg, 1),
-        cg_x=num(trimmed.cg_m[0], 3),
-        cg_height=num(trimmed.cg_m[1], 3),
-        measured=_measured(car),
-        open=_open(rows),
-    )
+    measured = [
+        (axle, *max(axle.measured.roughness.items(), key=lambda item: item[1], default=("", 0.0)))
+        for axle in car.axles
+        if axle.measured is not None
+    ]
+    damping = {axle.name: _damping_Nspm(trimmed.axle(axle.name)) for axle in car.axles}
+    return filled("README.md", car=car, trimmed=trimmed, table=table_name, measured=measured, damping=damping)
 
 
-def _measured(car: CarDesign) -> str:
-    """Return the section on the measurements of the K&C rig, their roughness, and unusual ones."""
-    lines = []
-    for axle in car.axles:
-        if axle.measured is None:
-            continue
-        rough = max(axle.measured.roughness.items(), key=lambda item: item[1], default=("", 0.0))
-        lines += [
-            f"- {axle.name}: cubic splines by least squares, one interval for each two points and at most 16; greatest "
-            f"distance of a sample {rough[1]:.2g} m or rad ({rough[0]}). Compliance: {axle.measured.stiffness_remark}.",
-            *(f"- **{line}**" for line in axle.measured.questions),
-        ]
-    return "\n".join(["## Measured", "", *lines, "", ""]) if lines else ""
-
-
-def _open(rows: list[str]) -> str:
-    if not rows:
-        return "The table gives all values, so that no rule was used.\n"
-    head = "Values by rules, because the table lacks them. Replace what you know, by these keys of the table.\n\n"
-    return head + "| Key | Value | Rule |\n|---|---|---|\n" + "\n".join(rows) + "\n"
-
-
-def _trim_row(trimmed: Trimmed, name: str) -> str:
-    trim = trimmed.axle(name)
+def _damping_Nspm(trim: TrimmedAxle) -> float:
+    """Return the mean damping around rest."""
     speeds, forces = trim.damper_velocity_mps, trim.damper_force_N
     at = next(index for index, speed in enumerate(speeds) if speed >= 0.0)
     first, last = max(at - 1, 0), min(at + 1, len(speeds) - 1)
-    damping = (forces[last] - forces[first]) / (speeds[last] - speeds[first])
-    stops = f"{num(1e3 * trim.bump_stop_m, 1)} bump, {num(1e3 * trim.rebound_stop_m, 1)} rebound"
-    spring = f"{num(1e-3 * trim.spring_rate_Npm, 2)} | {num(trim.spring_force_N, 0)}"
-    return f"| {name} | {spring} | {sig(damping, 3)} | {stops} |"
+    return (forces[last] - forces[first]) / (speeds[last] - speeds[first])
 
 
 _REMARK = (
