@@ -28,7 +28,7 @@ from activesteer.scenario import CarSpec, load_car
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.statics import mass_properties
-from activesteer.vehicle_builder.corner_motion import corner_motion
+from activesteer.vehicle_builder.corner_motion import corner_motion, wheel_travel_m
 
 Level = Literal["ok", "warning", "error"]
 _ROUNDING: Final = 1e-7
@@ -415,7 +415,7 @@ def _standing(vehicle: Vehicle, car: CarSpec) -> Iterator[Finding]:
     for axle, left, right in (("front", 0, 1), ("rear", 2, 3)):
         difference = 100.0 * abs(load_N[left] - load_N[right]) / load_N[left : right + 1].mean()
         yield judged("wheel_load_difference", difference, axle=axle)
-    yield from _height(vehicle, design)
+    yield from _height(vehicle)
     wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
     y_m, height_m = data.xpos[wheels, 1], float(data.subtree_com[0, 2])
     track = 0.5 * (y_m[0] - y_m[1] + y_m[2] - y_m[3])
@@ -446,23 +446,14 @@ def _standing(vehicle: Vehicle, car: CarSpec) -> Iterator[Finding]:
         yield judged("tyre_reserve", float(tyre["FZMAX"]) / float(load), axle=axle)
 
 
-def _height(vehicle: Vehicle, design: mujoco.MjData) -> Iterator[Finding]:
-    """Check the distance of the wheels from their design position."""
-    model, data = vehicle.model, vehicle.data
-    chassis = model.body("chassis").id
-    turn = data.xmat[chassis].reshape(3, 3).T
-    for axle, corners in (("front", CORNERS[:2]), ("rear", CORNERS[2:])):
-        travel = 0.0
-        for corner in corners:
-            wheel = model.body(f"{corner}_wheel").id
-            now = (turn @ (data.xpos[wheel] - data.xpos[chassis]))[2]
-            travel += 500.0 * float(now - (design.xpos[wheel, 2] - design.xpos[chassis, 2]))
-        yield judged("wheel_travel", travel, axle=axle)
-    w, x, y, z = data.qpos[3:7]
-    pitch = math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))))
-    roll = math.degrees(2.0 * math.atan2(x, w))
-    yield judged("pitch", pitch)
-    yield judged("roll", roll)
+def _height(vehicle: Vehicle) -> Iterator[Finding]:
+    """Check the distance of the wheels from their design position, and the attitude of the chassis."""
+    travel_mm = 1e3 * wheel_travel_m(vehicle)
+    yield judged("wheel_travel", float(travel_mm[:2].mean()), axle="front")
+    yield judged("wheel_travel", float(travel_mm[2:].mean()), axle="rear")
+    w, x, y, z = vehicle.data.qpos[3:7]
+    yield judged("pitch", math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))))
+    yield judged("roll", math.degrees(2.0 * math.atan2(x, w)))
 
 
 def _stays(vehicle: Vehicle) -> Finding:

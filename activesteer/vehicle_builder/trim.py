@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.rigs.kc.modes import tyre_stiffness
@@ -33,7 +33,7 @@ from activesteer.vehicle.curve_axles import OVER_RACK, OVER_TRAVEL, AxleCurves
 from activesteer.vehicle.parameters import Friction
 from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.completion import rack_per_steer_m
-from activesteer.vehicle_builder.corner_motion import corner_motion
+from activesteer.vehicle_builder.corner_motion import corner_motion, wheel_travel_m
 from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, chassis_of
 
 
@@ -354,22 +354,14 @@ def _first_guess(
 def _stand(vehicle_file: Path) -> _Stand:
     car = load_car(vehicle_file)
     vehicle = dataclasses.replace(car, config=dataclasses.replace(car.config, friction=Friction())).on()
-    design = mujoco.MjData(vehicle.model)
-    mujoco.mj_kinematics(vehicle.model, design)
-    chassis = vehicle.model.body("chassis").id
-    turn = vehicle.data.xmat[chassis].reshape(3, 3).T
     held = HeldCar(vehicle)
-    travel, toe, camber = [], [], []
-    for index, corner in enumerate(CORNERS):
-        wheel = vehicle.model.body(f"{corner}_wheel").id
-        now = turn @ (vehicle.data.xpos[wheel] - vehicle.data.xpos[chassis])
-        travel.append(now[2] - design.xpos[wheel, 2])
+    toe, camber = [], []
+    for corner, inwards in enumerate(INWARDS):
         # On the rig, without the moments of asymmetric tyres: static toe and camber are those that `kc` measures.
-        x, y, z = held.wheel(index).rotation[:, 1]
-        inwards = -1.0 if corner.endswith("l") else 1.0
+        x, y, z = held.wheel(corner).rotation[:, 1]
         toe.append(math.atan2(-x, y) * inwards)
         camber.append(math.asin(z) * inwards)
-    return _Stand(vehicle, held, np.array(travel), np.array(toe), np.array(camber))
+    return _Stand(vehicle, held, wheel_travel_m(vehicle), np.array(toe), np.array(camber))
 
 
 def wheel_rates_Npm(held: HeldCar) -> dict[str, float]:
