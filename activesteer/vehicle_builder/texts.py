@@ -1,6 +1,6 @@
-"""Text files of a built car: vehicle file, README and table.
+"""Text files of a built car: MJCF, vehicle file, README, and the table of a measured car.
 
-With it, `activesteer vehicle new NAME --kc DIR` makes the same car again, with curves instead of links.
+With the table, `activesteer vehicle new NAME --kc DIR` makes the same car again, with curves instead of links.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,7 +24,8 @@ from activesteer.simulation.two_track_search import two_track_lines
 from activesteer.theory.single_track import TwoTrackParameters
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle.statics import mass_properties
-from activesteer.vehicle_builder.design import CarDesign, hardware_tables, in_degrees
+from activesteer.vehicle_builder.completion import rack_per_steer_m
+from activesteer.vehicle_builder.design import Axle, CarDesign, hardware_tables, in_degrees
 from activesteer.vehicle_builder.trim import Trimmed, TrimmedAxle
 
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
@@ -163,6 +164,85 @@ def filled(template: str, **values: Any) -> str:
     return _environment().get_template(template).render(values)
 
 
+_NO_KEYFRAMES = "<mujocoinclude>\n  <keyframe/>\n</mujocoinclude>\n"
+
+
+class _Corner(NamedTuple):
+    name: str
+    axle: Axle
+    side: float  # 1 on the left, -1 on the right
+
+    def at(self, point: Array) -> str:
+        """Return a point of the left side on this side."""
+        return vec((point[0], self.side * point[1], point[2]))
+
+
+def mjcf_files(car: CarDesign, trimmed: Trimmed) -> dict[str, str]:
+    """Return the files of the model as name to text. The keyframe is empty."""
+    front, corners = car.front, _corners(*car.axles)
+    half_width_m = 0.5 * float(front.tyre_parameters["WIDTH"])
+    main = {"car": car, "front": front, "corners": corners, "trimmed": trimmed, "half_width_m": half_width_m}
+    left_m = front.points["tie_rod_inner"]
+    steering = {"left_m": left_m, "right_m": left_m * np.array([1.0, -1.0, 1.0])}
+    # Springs without a shape of their own, or on an arm.
+    viewed = [one for one in corners if one.axle.spring.start_m is None or one.axle.spring.on_arm]
+    scene = {"corners": corners, "viewed": viewed, "rack_per_steer": rack_per_steer_m(front)}
+    return {
+        f"{car.name}.xml": filled("car.xml", **main, rack_joint=_rack_joint),
+        "front_axle.xml": _axle_file(car, front, trimmed),
+        "rear_axle.xml": _axle_file(car, car.rear, trimmed),
+        "steering.xml": filled("steering.xml", car=car, **steering, bar_kgm2=car.rack_mass_kg * left_m[1] ** 2 / 5.0),
+        "scene.xml": filled("scene.xml", car=car, **scene),
+        "keyframes.xml": _NO_KEYFRAMES,
+    }
+
+
+def _corners(*axles: Axle) -> list[_Corner]:
+    return [_Corner(f"{axle.name[0]}{end}", axle, side) for axle in axles for end, side in (("l", 1.0), ("r", -1.0))]
+
+
+def _rack_joint(axle: Axle, lever: float) -> str:
+    """Return the joint that lengthens a spring of a guided axle as the rack raises its wheel."""
+    lift = 0.0 if axle.measured is None else axle.measured.rack_lift
+    return f'<joint joint="rack" coef="{num(lever * lift)}"/>' if lift else ""
+
+
+def _axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
+    """Return the text of front_axle.xml or rear_axle.xml."""
+    middle = axle.wheel_centre_m - np.array([0.0, 0.06, 0.0])
+    drawn = [axle.points[point] for point in dict.fromkeys(link.outer for link in axle.links)]
+    drawn = [point for point in drawn if np.linalg.norm(point - middle) > 0.01]
+    lower, upper = (_in_design(axle, point) for point in car.kingpin_m)
+    axis = (upper - lower) / np.linalg.norm(upper - lower)
+    return filled(
+        "axle.xml",
+        axle=axle,
+        words=axle.kind.name.replace("_", " ").capitalize(),
+        trim=trimmed.axle(axle.name),
+        corners=_corners(axle),
+        directions={} if axle.top_mount is None else axle.top_mount.directions,
+        rod=None if axle.top_mount is None else axle.top_mount.rod,
+        half_width_m=0.5 * float(axle.tyre_parameters["WIDTH"]),
+        middle_m=middle,
+        drawn=[*drawn, *([axle.points["strut_bottom"]] if axle.kind.strut else [])],
+        kingpin={
+            "lower": lower, "upper": upper, "axis": axis,
+            "middle": lower + axis * (axle.wheel_centre_m[2] - lower[2]) / axis[2],
+        },
+    )  # fmt: skip
+
+
+def _in_design(axle: Axle, point: Array) -> Array:
+    """Return a point of the knuckle at zero joints. In the standing car curves turn it by the static angles."""
+    if axle.measured is None:
+        return point
+    curves = axle.measured.curves
+    camber, toe = (-float(np.interp(0.0, curves.travel_m, over)) for over in (curves.camber_rad, curves.toe_rad))
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(camber), -np.sin(camber)], [0.0, np.sin(camber), np.cos(camber)]])
+    about_z = np.array([[np.cos(toe), -np.sin(toe), 0.0], [np.sin(toe), np.cos(toe), 0.0], [0.0, 0.0, 1.0]])
+    return axle.wheel_centre_m + (about_z @ about_x).T @ (point - axle.wheel_centre_m)
+
+
 def readme_text(car: CarDesign, trimmed: Trimmed, table_name: str) -> str:
     """Return the text of README.md."""
     measured = [
@@ -223,7 +303,7 @@ def car_table(car: CarSpec, result: KcResult) -> str:
             "column_stiffness_Npm": float(model.tendon_stiffness[steering.id]),
         },
         **_rear_steering(result, centres[2]),
-        **{axle: _axle(car, model, data, centres, axle) for axle in ("front", "rear")},
+        **{axle: _axle_table(car, model, data, centres, axle) for axle in ("front", "rear")},
         "brakes": to_table(config.brakes, defaults=False),
         "powertrain": to_table(config.powertrain, defaults=False),
         "aerodynamics": to_table(config.aerodynamics, defaults=False),
@@ -256,7 +336,7 @@ def _point(point: Array) -> list[float]:
     return [round(float(value), 5) for value in point]
 
 
-def _axle(car: CarSpec, model: mujoco.MjModel, data: mujoco.MjData, centres: Array, axle: str) -> dict[str, Any]:
+def _axle_table(car: CarSpec, model: mujoco.MjModel, data: mujoco.MjData, centres: Array, axle: str) -> dict[str, Any]:
     corner, front = f"{axle[0]}l", axle == "front"
     curve = getattr(car.config.dampers, axle)
     friction = car.config.friction
