@@ -12,6 +12,7 @@ Files are written under another name and renamed, so that they appear completely
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import platform
 import shutil
@@ -78,11 +79,6 @@ def joined(tables: Sequence[pa.Table]) -> pa.Table:
         fitted.append(table.cast(pa.schema(fields)))
     return pa.concat_tables(fitted, promote_options="permissive")
 
-
-try:
-    import fcntl
-except ImportError:  # not available on Windows
-    fcntl = None
 
 RESULTS: Final = "results.parquet"
 LOCK: Final = ".lock"
@@ -248,18 +244,17 @@ def locked(path: Path) -> Iterator[None]:
     with writing(path, StudyError):
         file = path.open("w")
     with file:
-        if fcntl is not None:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as reason:
-                raise StudyError(f"{path.parent}: another process works on this study", value=path.parent) from reason
-            except OSError:
-                pass
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as reason:
+            raise StudyError(f"{path.parent}: another process works on this study", value=path.parent) from reason
+        except OSError:
+            pass
         yield
 
 
 def _is_locked(path: Path) -> bool:
-    if fcntl is None or not path.exists():
+    if not path.exists():
         return False
     with contextlib.suppress(OSError), path.open("r+") as file:
         try:
