@@ -97,10 +97,9 @@ def examine(runner: StandardRunner) -> Findings:
 def _reference_angle(runner: StandardRunner) -> tuple[float, dict[str, list[float]]]:
     """Return A [deg], the mean of six slow ramps, and the angles of the ramps by side, rounded to 0.1 deg."""
     sensors = runner.scenario("slowly_increasing_steer").car.config.sensors
-    signs = {"left": 1.0, "right": -1.0}
     # Repetitions differ only by the noise of the sensors.
     noise = [{} if sensors.seed is None else {"sensors.seed": sensors.seed + number} for number in range(RAMPS)]
-    cases = [{"steer.rate_degps": sign * RAMP_DEGPS, **other} for sign in signs.values() for other in noise]
+    cases = [{"steer.rate_degps": sign * RAMP_DEGPS, **other} for sign in SIDES.values() for other in noise]
     runs = runner.drive("slowly_increasing_steer", "slowly_increasing_steer", cases, _RAMP)
     found = [math.degrees(abs(run.metric("steering_wheel_at_0_3g_rad"))) for run in runs]
     for run, angle in zip(runs, found, strict=True):
@@ -109,7 +108,7 @@ def _reference_angle(runner: StandardRunner) -> tuple[float, dict[str, list[floa
             rate = f"{run.case['steer.rate_degps']:g} deg/s"
             raise NoResult(f"cannot be determined from the slow ramp at {rate}: {why}", key="A")
     rounded = [round(angle, 1) for angle in found]
-    sides = {side: rounded[RAMPS * number :][:RAMPS] for number, side in enumerate(signs)}
+    sides = {side: rounded[RAMPS * number :][:RAMPS] for number, side in enumerate(SIDES)}
     return round(sum(rounded) / len(rounded), 1), sides
 
 

@@ -352,14 +352,10 @@ def _reach(points: dict[str, Array]) -> Iterator[Finding]:
     yield _any("points not outside the middle of the wheel", outside, advice)
 
 
-_KINDS: Final = {
-    "body": (mujoco.mjtObj.mjOBJ_BODY, "nbody"),
-    "joint": (mujoco.mjtObj.mjOBJ_JOINT, "njnt"),
-    "site": (mujoco.mjtObj.mjOBJ_SITE, "nsite"),
-    "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
-    "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nu"),
-    "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, "nsensor"),
-}
+_COUNTS: Final = {
+    "body": "nbody", "joint": "njnt", "site": "nsite", "tendon": "ntendon", "actuator": "nu", "sensor": "nsensor",
+}  # fmt: skip
+"""Kind of a part -> the model's number of them."""
 
 
 def _each(*parts: str) -> tuple[str, ...]:
@@ -387,8 +383,8 @@ _NEEDED: Final = {
 def missing_parts(model: mujoco.MjModel) -> Iterator[Finding]:
     """Return one error for each missing part, or one line if none is missing."""
     complete = True
-    for word, (kind, count) in _KINDS.items():
-        there = [mujoco.mj_id2name(model, kind, index) or "" for index in range(getattr(model, count))]
+    for word, count in _COUNTS.items():
+        there = [getattr(model, word)(index).name for index in range(getattr(model, count))]
         for name in _NEEDED[word]:
             if name not in there:
                 complete = False
