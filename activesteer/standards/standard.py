@@ -1,4 +1,4 @@
-"""What the standards share: the test runner, its runs, the findings, and the parts of the pages."""
+"""Shared parts of the standards: test runner, runs, findings, tables and panels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `activesteer bench` measures: time of a step, of many cars, of a tyre.
+"""Time of a step, of many cars and of a tyre, as `activesteer bench` measures it.
 
 All times of a table come from one process, interleaved, so that their ratios are meaningful.
 """
