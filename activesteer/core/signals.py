@@ -299,7 +299,7 @@ class Estimate(NamedTuple):
         lateral_speed_mps: Speed across the longitudinal axis, left positive [m/s].
         sideslip_rad: Sideslip angle [rad], left positive; 0 at walking speed.
         yaw_rate_radps: Yaw rate [rad/s], left positive, without the sensor's offset and delay.
-        friction: Friction of the road relative to the friction in the tyre files.
+        friction: Friction of the road relative to the friction in the tyre files, at the axle where it is lower.
         speed_std_mps: Standard deviation of the speed [m/s].
         lateral_speed_std_mps: Standard deviation of the lateral speed [m/s].
         sideslip_std_rad: Standard deviation of the sideslip angle [rad].
@@ -315,7 +315,7 @@ class Estimate(NamedTuple):
     lateral_speed_mps: Annotated[float, Recorded("m/s", "speed across the car, left positive")]
     sideslip_rad: Annotated[float, Recorded("rad", "sideslip angle")]
     yaw_rate_radps: Annotated[float, Recorded("rad/s", "yaw rate")]
-    friction: Annotated[float, Recorded("", "friction of the road relative to the friction in the tyre files")]
+    friction: Annotated[float, Recorded("", "friction of the weaker axle relative to the friction in the tyre files")]
     speed_std_mps: Annotated[float, Recorded("m/s", "standard deviation of the speed")]
     lateral_speed_std_mps: Annotated[float, Recorded("m/s", "standard deviation of the lateral speed")]
     sideslip_std_rad: Annotated[float, Recorded("rad", "standard deviation of the sideslip angle")]

@@ -17,6 +17,7 @@ from activesteer.estimation.records import (
     FRONT_STIFFNESS,
     LATERAL_SPEED,
     N_STATES,
+    REAR_RATIO,
     REAR_STIFFNESS,
     SAID_AX,
     SAID_AY,
@@ -112,12 +113,18 @@ def _write_estimate(known, memory):
     rolls = speed > SLOWEST_MPS
     out[0], out[1] = speed, now[LATERAL_SPEED]
     out[2] = math.atan2(now[LATERAL_SPEED], speed) if rolls else 0.0
-    out[3], out[4] = now[YAW_RATE], now[FRICTION]
+    # The weaker axle decides what the car can do.
+    friction, ratio = now[FRICTION], min(now[REAR_RATIO], 1.0)
+    friction_variance = ratio * ratio * covariance[FRICTION, FRICTION]
+    if ratio < 1.0:
+        friction_variance += friction * friction * covariance[REAR_RATIO, REAR_RATIO]
+        friction_variance += 2.0 * friction * ratio * covariance[FRICTION, REAR_RATIO]
+    out[3], out[4] = now[YAW_RATE], friction * ratio
     out[5] = math.hypot(math.sqrt(memory.speed_variance), known.radius_std * speed)
     out[6] = lateral_std
     out[7] = math.atan2(lateral_std, max(speed, 0.0))
     out[8] = math.hypot(math.sqrt(covariance[YAW_RATE, YAW_RATE]), turning_radps)
-    out[9] = math.hypot(math.sqrt(covariance[FRICTION, FRICTION]), known.friction_fraction * now[FRICTION])
+    out[9] = math.hypot(math.sqrt(max(friction_variance, 0.0)), known.friction_fraction * friction * ratio)
     out[10], out[11] = now[FRONT_STIFFNESS], now[REAR_STIFFNESS]
     out[12] = math.sqrt(covariance[FRONT_STIFFNESS, FRONT_STIFFNESS])
     out[13] = math.sqrt(covariance[REAR_STIFFNESS, REAR_STIFFNESS])

@@ -10,6 +10,7 @@ leans with the body. Differences give the derivatives of the model. The unknowns
     b_y     offset of the lateral accelerometer, likewise
     g_y     gravity across an inclined road, likewise: it moves the car, and the accelerometer does not feel it
     u       friction, likewise, about its assumed value; it is observable only from forces near the limit
+    w       friction of the rear tyres relative to that of the front tyres, likewise, about 1 for `stiffness_s`
     b_r     offset of the yaw rate sensor, a random walk
     forces  errors of `force_std_N` + `force_fraction` |F| for `force_s`, longitudinal errors of `along_fraction` |X|
     noise   of lateral and yaw acceleration
@@ -48,14 +49,17 @@ from activesteer.estimation.records import (
     N_STATES,
     RATE_OFFSET,
     REAR_ERROR,
+    REAR_RATIO,
     REAR_SLIP,
     REAR_STIFFNESS,
     YAW_RATE,
 )
 from activesteer.estimation.two_track_model import (
     LARGEST_FRICTION,
+    LARGEST_RATIO,
     LARGEST_STIFFNESS,
     LEAST_FRICTION,
+    LEAST_RATIO,
     LEAST_STIFFNESS,
     SLOWEST_MPS,
     follow,
@@ -64,7 +68,7 @@ from activesteer.estimation.two_track_model import (
 )
 from activesteer.native.compilation import compiled, inlined
 
-_DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 1.0, 0.01, 0.01, 0.01])
+_DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 1.0, 0.01, 0.01, 0.01, 0.01])
 """Steps of the differences, in the units of the states."""
 _MOST_BRAKED: Final = 0.25
 """Fraction of the front axle's friction force above which lateral forces give no information on friction and stiffness:
@@ -89,11 +93,12 @@ def begin(known, memory):
     state, covariance = memory.state, memory.covariance
     state[:] = 0.0
     state[FRICTION] = known.friction
-    state[FRONT_STIFFNESS] = state[REAR_STIFFNESS] = 1.0
+    state[FRONT_STIFFNESS] = state[REAR_STIFFNESS] = state[REAR_RATIO] = 1.0
     covariance[:] = 0.0
     sizes = (
         0.1, 0.02, 0.005, 0.005, known.slip_angle_std_rad, known.slip_angle_std_rad, known.rate_offset_std_radps,
         known.ay_offset_std_mps2, known.bank_std_mps2, known.friction_std, known.stiffness_std, known.stiffness_std,
+        known.rear_ratio_std,
     )  # fmt: skip
     for place in range(N_STATES):
         covariance[place, place] = sizes[place] ** 2
@@ -153,6 +158,7 @@ def _forget(known, memory, duration_s, moved, slope, added):
         (FRICTION, known.friction, known.friction_std, known.friction_s),
         (FRONT_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
         (REAR_STIFFNESS, 1.0, known.stiffness_std, known.stiffness_s),
+        (REAR_RATIO, 1.0, known.rear_ratio_std, known.stiffness_s),
     ):
         kept = math.exp(-duration_s / time_s)
         moved[place] = mean + kept * (moved[place] - mean)
@@ -306,7 +312,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     if not braked:
         here_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
         row[FRICTION], bend_mps2 = _over_friction(known, tyres, memory, here_mps2)
-    for place in (FRONT_SLIP, REAR_SLIP, FRONT_STIFFNESS, REAR_STIFFNESS):
+    for place in (FRONT_SLIP, REAR_SLIP, FRONT_STIFFNESS, REAR_STIFFNESS, REAR_RATIO):
         if place > FRICTION and braked:
             continue
         kept, step = state[place], _step_of(state, place)
@@ -326,4 +332,5 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     for place in (FRONT_STIFFNESS, REAR_STIFFNESS):
         state[place] = min(max(state[place], LEAST_STIFFNESS), LARGEST_STIFFNESS)
+    state[REAR_RATIO] = min(max(state[REAR_RATIO], LEAST_RATIO), LARGEST_RATIO)
     return innovation

@@ -31,6 +31,8 @@ class EstimatorParameters:
     """Assumed friction of the road, relative to the road of the tyre files, until it is observed [-]: dry asphalt."""
     friction_std: _Positive = 0.25
     """Standard deviation of this friction: wet asphalt, 0.6, is likely enough; snow, 0.3, is possible."""
+    rear_ratio_std: _Positive = 0.1
+    """Standard deviation of the friction of the rear tyres relative to that of the front tyres: other tyres, wear."""
     friction_fraction: _NotNegative = 0.05
     """Standard deviation of the observed friction per friction, in the estimate only: the model's tyre is upright and
     rolls straight ahead. On a ramp of the steering wheel (56 m radius) camber and turn slip take 4 to 8 % of the

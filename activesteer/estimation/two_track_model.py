@@ -10,8 +10,9 @@ For the axles i = f, r:
 
 with the steer angles d, the gravity g_y across an inclined road, the longitudinal forces X and their moment M_x, slip
 angles a that build up over the relaxation lengths s, the car's own tyre F_y under the wheel's load, the friction u of
-the road by similarity, and the stiffness k_i of the tyres of an axle relative to new ones: u F_y(k_i a_i / u, F_z),
-which changes the slope of the curve and not its peak, as LKY does in the Magic Formula. With a longitudinal force, a
+the road by similarity (u w at the rear axle, which may have other tyres), and the stiffness k_i of the tyres of an axle
+relative to new ones: u F_y(k_i a_i / u, F_z), which changes the slope of the curve and not its peak, as LKY does in the
+Magic Formula. With a longitudinal force, a
 friction circle reduces u. That lowers the largest force but hardly the force at small slip angles, as in the Magic
 Formula of combined slip (0.7 of the friction for the brake take 8 % at 2 deg). The body rolls by p as a mass on a
 spring, about an axis that lies h below the centre of gravity, so that the axles also move sideways by h p'. Springs and
@@ -46,6 +47,7 @@ from activesteer.estimation.records import (
     LATERAL_SPEED,
     N_STATES,
     REAR_ERROR,
+    REAR_RATIO,
     REAR_SLIP,
     REAR_STIFFNESS,
     YAW_RATE,
@@ -55,6 +57,9 @@ from activesteer.native.compilation import compiled, inlined
 LEAST_FRICTION: Final = 0.05
 LARGEST_FRICTION: Final = 1.5
 """Bounds of the estimated friction [-]."""
+LEAST_RATIO: Final = 0.5
+LARGEST_RATIO: Final = 1.5
+"""Bounds of the friction of the rear tyres relative to that of the front tyres [-]."""
 LEAST_STIFFNESS: Final = 0.3
 LARGEST_STIFFNESS: Final = 2.0
 """Bounds of the estimated stiffness of the tyres relative to new ones [-]."""
@@ -128,7 +133,8 @@ def forces_of(known, tyres, memory, state):
     )  # fmt: skip
     rear_N = axle_force(
         tyres[1], known.angle_step_rad, known.rear_load_step_N, state[REAR_SLIP], known.rear_load_N + forward_N,
-        known.rear_load_kg * memory.loading_mps2, along_N[2], along_N[3], friction,
+        known.rear_load_kg * memory.loading_mps2, along_N[2], along_N[3],
+        friction * min(max(state[REAR_RATIO], LEAST_RATIO), LARGEST_RATIO),
         state[REAR_STIFFNESS],
     )  # fmt: skip
     return front_N, rear_N

@@ -167,6 +167,16 @@ def test_packed_snow_is_found_as_soon_as_the_tyres_slide_on_it_and_is_not_taken_
     assert run["estimated_front_stiffness"][later].min() > 0.6
 
 
+@pytest.mark.parametrize(("front", "rear"), [(1.0, 0.75), (0.75, 1.0)])
+def test_the_friction_is_that_of_the_axle_with_the_worse_tyres(front, rear):
+    changes = {"factors.front_tyre_friction": front, "factors.rear_tyre_friction": rear, "road.mu": 0.9}
+    run = drive("step_steer", **changes, **{"steer.steering_wheel_deg": 75.0, "duration_s": 3.0}).recording
+    # With the worse tyres at the rear the car spins.
+    shows = (run.time_s > 1.5) & (np.abs(run["sideslip_rad"]) < math.radians(10.0))
+    assert shows.any()
+    assert np.abs(run["estimated_friction"][shows] - 0.9 * 0.75).max() < 0.1
+
+
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
 def test_the_stiffness_of_the_tyres_does_not_drift_on_a_straight_rough_road(vehicle):
     """No force shows the stiffness, so the estimate and its deviation say that nothing is known."""

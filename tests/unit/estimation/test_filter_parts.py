@@ -21,6 +21,7 @@ from activesteer.estimation.records import (
     MEMORY,
     N_STATES,
     RATE_OFFSET,
+    REAR_RATIO,
     REAR_SLIP,
     REAR_STIFFNESS,
     SAID,
@@ -100,13 +101,14 @@ def test_a_steady_turn_has_the_identified_stiffness_with_any_roll_steer(setup):
 
 
 @pytest.mark.parametrize(
-    ("place", "least", "largest"), [(FRICTION, 0.05, 1.5), (FRONT_STIFFNESS, 0.3, 2.0), (REAR_STIFFNESS, 0.3, 2.0)]
+    ("place", "least", "largest"),
+    [(FRICTION, 0.05, 1.5), (FRONT_STIFFNESS, 0.3, 2.0), (REAR_STIFFNESS, 0.3, 2.0), (REAR_RATIO, 0.5, 1.5)],
 )
 def test_friction_and_stiffness_beyond_their_bounds_count_as_the_bounds(setup, known, place, least, largest):
     tyres, memory = np.array([tyre.force_N for tyre in setup.estimation.tyres]), np.zeros(1, MEMORY)[0]
     state = np.zeros(N_STATES)
     state[[FRONT_SLIP, REAR_SLIP]] = 0.06
-    state[[FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS]] = 1.0
+    state[[FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS, REAR_RATIO]] = 1.0
 
     def force(value: float) -> float:
         state[place] = value
@@ -208,7 +210,7 @@ def test_driven_wheels_also_carry_the_drag_of_the_steered_wheels(setup, known, m
     """In a steady turn the lateral force of the front wheels points backwards by the sine of their angle."""
     memory["speed_mps"], memory["front_angle_rad"] = 20.0, 0.15
     memory.state[FRONT_SLIP], memory.state[FRICTION] = 0.1, 0.9
-    memory.state[FRONT_STIFFNESS] = memory.state[REAR_STIFFNESS] = 1.0
+    memory.state[[FRONT_STIFFNESS, REAR_STIFFNESS, REAR_RATIO]] = 1.0
     tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
     said = np.zeros(len(SAID))
     said[SAID.index("fl_spin_radps") :][:4] = memory["last_spin_radps"] = 20.0 / known.rolling_radius_m
@@ -248,6 +250,7 @@ def test_said_errors_are_those_of_the_filters_and_of_the_way_to_the_present(know
     memory = np.zeros(1, MEMORY)[0]
     memory["speed_mps"], memory["ax_mps2"], memory["loading_mps2"] = 20.0, -3.0, 5.0
     memory["now"][[LATERAL_SPEED, YAW_RATE, FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS]] = 0.6, 0.25, 0.8, 1.1, 0.7
+    memory["now"][REAR_RATIO] = 1.2  # the front axle is the weaker one
     memory["speed_variance"], memory["waited_s"] = 0.04, 0.003
     memory["covariance"] = np.diag(0.001 * np.arange(1.0, N_STATES + 1.0))
     advance._write_estimate(known, memory)
