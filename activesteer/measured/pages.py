@@ -110,8 +110,6 @@ def _outside(found: Compared, factor: float) -> list[Curve]:
 
 _HEAD: Final = ["run", "window", "quantity", "rms of the residual", "tolerance", "share inside", ""]
 _BAND_COLOUR: Final = "#b3a369"
-_ORIGINS: Final = {"geometry": "#8a9097", "measured": RUN_COLOURS[2], "assumed": RUN_COLOURS[1]}
-"""Origin of a step -> colour."""
 
 
 def measured_page(result: MeasuredValidation | CircleValidation) -> Page:
@@ -193,54 +191,25 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
         ("measured", f"{measured.mean():.1f} +- {measured.std(ddof=1):.1f}", f"{len(measured)} values"),
         ("predicted", f"{ours.mean():.1f} +- {ours.std(ddof=1):.1f}", f"{len(ours)} samples, nominal "
          f"{result.nominal_deg:.1f}"),
-        ("predicted, with assumed effects", f"{result.assumed_deg:.1f}", "nominal"),
     ]  # fmt: skip
+    if two := result.assumed_deg != result.nominal_deg:
+        rows.append(("second prediction, without [circle.prediction]", f"{result.assumed_deg:.1f}", "nominal"))
     sections = [Section("", (), [_distributions(result)], [_table(["steering wheel", "deg", ""], rows)])]
     if result.ends:
+        low, high = result.box_deg
         text = (
-            f"From {result.low_deg:.1f} to {result.high_deg:.1f} deg, {result.high_deg - result.low_deg:.1f} deg wide: "
-            f"{result.measured_inside} of {len(measured)} measured angles lie inside. Values with one unknown true "
-            "value are intervals; the others vary from lap to lap. The table gives the second prediction with the ends "
-            "of each interval alone."
+            f"From {low:.1f} to {high:.1f} deg, {high - low:.1f} deg wide: {result.measured_inside} of {len(measured)} "
+            "measured angles lie inside. Values with one unknown true value are intervals; the others vary from lap to "
+            f"lap. The table gives the {'second ' * two}prediction with the ends of each interval alone."
         )
         ends = [(name, f"{low:.1f}", f"{high:.1f}", source) for name, source, low, high in result.ends]
         head = ["interval", "low end, deg", "high end, deg", "source"]
         sections.append(Section("Probability box", [text], tables=[_table(head, ends)]))
-    if result.steps:
-        steps = [(name, origin, f"{angle:.1f}") for name, origin, angle in result.steps]
-        sections.append(
-            Section(
-                "From geometry to the second prediction", (), [_waterfall(result)],
-                [_table(["with", "origin", "deg"], steps)],
-            )
-        )  # fmt: skip
-    for title, head, angles in (
-        ("Decrease of the second prediction without one effect", "effect",
-         {name: f"{result.assumed_deg - angle:+.1f}" for name, angle in result.effects.items()}),
-        ("Second prediction with one open decision reversed", "decision",
-         {name: f"{angle:.1f}" for name, angle in result.decisions.items()}),
-    ):  # fmt: skip
-        if angles:
-            sections.append(Section(title, tables=[_table([head, "deg"], list(angles.items()))]))
     return lead, sections
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[Text]]) -> Table:
     return Table("", columns, rows, kind="comparisons")
-
-
-def _waterfall(result: CircleValidation) -> Picture:
-    """Draw the angle of each step as a bar from the angle of the step before."""
-    measured = float(result.measured_deg.mean())
-    areas, before = [], min(measured, result.steps[0][2])
-    labels = {origin: origin for _, origin, _ in result.steps}
-    for place, (_, origin, angle) in enumerate(result.steps):
-        low, high = sorted((before, angle))
-        areas.append(Area([place + 0.1, place + 0.9], low, high, labels.pop(origin, ""), _ORIGINS[origin]))
-        before = angle
-    line = Curve([0.0, float(len(result.steps))], [measured, measured], "measured mean", "#777777")
-    panel = Panel("step of the table", "steering wheel angle [deg]", [line], areas=areas)
-    return Picture("", [panel], width_in=7.0, height_in=3.2)
 
 
 def _distributions(result: CircleValidation) -> Picture:
