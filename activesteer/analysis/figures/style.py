@@ -6,13 +6,11 @@ The figures can be printed at their own width and in grey: text of 8 pt, and lin
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.claims.scorecard import Band, bands_of
 from activesteer.analysis.harm import LOST_SIDESLIP_RAD
 from activesteer.analysis.series import counted_sideslip
 from activesteer.analysis.source import RecordingLike
@@ -36,9 +34,6 @@ TEXT_PT: Final = 8.0
 LINE_PT: Final = 1.3
 DOTTED: Final[LineStyle] = (0.0, (1.0, 1.6))
 """Style of a further line of a run."""
-BAND_ALPHA: Final = 0.16
-BAND_LABEL: Final = "80 % of the population"
-"""The band lies between 10 and 90 %."""
 FRONT_LABEL: Final = "added in front"
 """Legend of the dotted line of a run that adds angles at both axles."""
 PATCH_COLOUR: Final = "#c3d9ec"
@@ -52,8 +47,6 @@ class DrawnRun(NamedTuple):
 
     recording: RecordingLike  # the run
     look: RunLook  # label, colour and dashes
-    # bands of the population, by channel; empty if no population belongs to the run
-    bands: Mapping[str, Band] = MappingProxyType({})
 
     @property
     def linestyle(self) -> LineStyle:
@@ -70,9 +63,7 @@ def curves(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
     """Return the runs in the paper's order. The three systems always have the same colours."""
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
-    return [
-        DrawnRun(recordings[name], look, bands_of(recordings[name])) for name, look in run_looks(recordings).items()
-    ]
+    return [DrawnRun(recordings[name], look) for name, look in run_looks(recordings).items()]
 
 
 def draw(
@@ -80,7 +71,6 @@ def draw(
     style: LineStyle | None = None,
 ) -> None:  # fmt: skip
     """Draw a channel of a run over time: without a label outside the legend, by default in the run's own style."""
-    draw_band(axis, curve, shown.channel, shown.factor)
     values = thinned(drawn_values(curve.recording, shown.channel)) * shown.factor
     # A leading underscore keeps a line out of the legend.
     axis.plot(
@@ -97,14 +87,6 @@ def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width
     for place, line in enumerate(shown):
         quantity = panel.quantity._replace(channel=line.channel)
         draw(axis, curve, quantity, f"_{FRONT_LABEL}" if place else label, width, DOTTED if place else None)
-
-
-def draw_band(axis: Axes, curve: DrawnRun, channel: str, factor: float = 1.0) -> None:
-    """Draw the band of a channel in the population, behind all curves."""
-    band = curve.bands.get(channel)
-    if band is not None:
-        look = {"color": curve.look.colour, "alpha": BAND_ALPHA, "linewidth": 0.0, "zorder": 1.5}
-        axis.fill_between(band.at, band.low * factor, band.high * factor, label=f"_{BAND_LABEL}", **look)
 
 
 def friction_label(low: float, high: float) -> str:
@@ -137,7 +119,7 @@ def plain(axis: Axes, title: str = "") -> None:
 
 def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, LineStyle]] = ()) -> None:
     """Draw the legend of the runs above all axes, with further kinds of line by text, width and style."""
-    # Angles added in front, places with another friction and bands of the population get an entry if they are drawn.
+    # Angles added in front and places with another friction get an entry if they are drawn.
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Patch  # noqa: PLC0415
 
@@ -154,9 +136,6 @@ def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, Li
     for label in sorted(label for label in hidden if label.startswith("_friction ")):
         handles.append(Patch(color=PATCH_COLOUR, linewidth=0.0))
         labels.append(label[1:])
-    if any(collection.get_label() == f"_{BAND_LABEL}" for collection in axis.collections):
-        handles.append(Patch(color="#777777", alpha=2.0 * BAND_ALPHA, linewidth=0.0))
-        labels.append(BAND_LABEL)
     columns = 2 if figure.get_figwidth() < PAGE_IN else 3
     figure.legend(
         handles, labels, loc="outside upper center", ncols=min(len(labels), columns), frameon=False, fontsize=TEXT_PT,

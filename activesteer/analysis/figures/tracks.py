@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis import lanes
-from activesteer.analysis.claims.scorecard import TRACK
 from activesteer.analysis.figures import over_time, style
 from activesteer.analysis.figures.style import DrawnRun
 from activesteer.analysis.lanes import CourseView, view_of
@@ -86,7 +85,6 @@ def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
     """Draw the course, and the track of the front axle centre of every run."""
     drawn = style.curves(recordings)
     for curve in drawn:
-        style.draw_band(axis, curve, TRACK[1])
         x, y = (style.thinned(values) for values in lanes.front_axle(curve.recording))
         axis.plot(
             x, y, color=curve.look.colour, linewidth=style.LINE_PT, linestyle=curve.linestyle, label=curve.look.label
