@@ -107,28 +107,18 @@ class Filter(NamedTuple):
     """A low-pass filter without phase."""
 
     poles: int  # poles of both passes together
-    cut_off_Hz: tuple[float, float]  # cut-off frequency of the steering wheel angle, and of all other channels [Hz]
+    steering_cut_off_Hz: float  # cut-off frequency of the steering wheel angle [Hz]
+    cut_off_Hz: float  # cut-off frequency of all other channels [Hz]
     source: str  # standard
 
     def of(self, channel: str) -> float:
         """Return the cut-off frequency of a channel [Hz]."""
-        return self.cut_off_Hz[0 if channel == "steering_wheel_rad" else 1]
-
-    def words(self) -> str:
-        """Describe the filter."""
-        wheel, others = self.cut_off_Hz
-        cut = f"{others:g} Hz" if wheel == others else f"{others:g} Hz, steering wheel {wheel:g} Hz"
-        return f"Butterworth, {self.poles} poles, zero phase, {cut} ({self.source})"
-
-    def to_json(self) -> dict[str, Any]:
-        """Return JSON values."""
-        wheel, others = self.cut_off_Hz
-        return {"poles": self.poles, "steering_cut_off_Hz": wheel, "cut_off_Hz": others, "source": self.source}
+        return self.steering_cut_off_Hz if channel == "steering_wheel_rad" else self.cut_off_Hz
 
 
 FILTERS: Final[dict[str, Filter | None]] = {
-    "iso15037": Filter(8, (10.1, 10.1), "ISO 15037-1, as ISO 7401 requires"),
-    "fmvss126": Filter(12, (10.0, 6.0), "FMVSS 126, UN R140: 12 poles"),
+    "iso15037": Filter(8, 10.1, 10.1, "ISO 15037-1, as ISO 7401 requires"),
+    "fmvss126": Filter(12, 10.0, 6.0, "FMVSS 126, UN R140: 12 poles"),
     "none": None,
 }
 """Name -> filter. ISO 15037-1 requires a filter of fourth order or higher with -3 dB at 9 Hz or above, and at most
@@ -260,7 +250,7 @@ class Comparison(NamedTuple):
             "standard": self.standard,
             "time_shift_s": float(np.mean(self.shifts_s)),
             "time_shifts_s": list(self.shifts_s),
-            "filter": {"name": self.filtered} | (chosen.to_json() if (chosen := FILTERS[self.filtered]) else {}),
+            "filter": {"name": self.filtered} | (chosen._asdict() if (chosen := FILTERS[self.filtered]) else {}),
             "unfiltered": list(self.unfiltered),
             "quantities": [quantity.to_json() for quantity in self.quantities],
             "inside": self.inside,
@@ -384,7 +374,11 @@ def assumptions(found: Comparison) -> list[str]:
     if assumed:
         lines.append(f"Tolerances of {', '.join(assumed)} are assumptions.")
     if (chosen := FILTERS[found.filtered]) is not None:
-        lines.append(f"Both sides are filtered alike: {chosen.words()}.")
+        wheel = f", steering wheel {chosen.steering_cut_off_Hz:g} Hz"
+        cut = f"{chosen.cut_off_Hz:g} Hz" + wheel * (chosen.steering_cut_off_Hz != chosen.cut_off_Hz)
+        lines.append(
+            f"Both sides are filtered alike: Butterworth, {chosen.poles} poles, zero phase, {cut} ({chosen.source})."
+        )
     lines += [f"Not filtered: {problem}." for problem in found.unfiltered]
     if any(each.noise for each in found.quantities):
         lines.append(

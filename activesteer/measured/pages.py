@@ -18,7 +18,7 @@ from activesteer.core.files import json_text, make_folder, write_text
 from activesteer.core.units import parameter_title, quantity_of, typeset
 from activesteer.errors import StudyError
 from activesteer.measured.circle import CircleValidation
-from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
+from activesteer.measured.comparison import STANDARDS, Compared, Comparison, Tolerance, assumptions, words
 from activesteer.measured.fit_result import Compared as FitCompared
 from activesteer.measured.fit_result import Fit, rests_on
 from activesteer.measured.folder import MeasuredValidation, Part
@@ -27,6 +27,7 @@ from activesteer.pages import Page, Section, Table, Text, failed, passed, render
 from activesteer.plotting import Area, Curve, Panel, Picture
 
 _EDGE: Final = "#9bbbd4"
+_START: Final = "#888888"
 
 
 def comparison_page(found: Comparison, measured: list[str], simulated: str) -> Page:
@@ -51,61 +52,51 @@ def _shift(shift_s: float) -> str:
     return f"{1e3 * abs(shift_s):.1f} ms {'earlier' if shift_s < 0.0 else 'later'}"
 
 
-def picture(found: Compared, standard: str, runs: int, more: Sequence[Area] = ()) -> Picture:
-    """Return the overlay with its corridor and more areas, and the residual in the same corridor."""
+def picture(
+    found: Compared, standard: str = "iso19365", runs: int = 1, areas: Sequence[Area] = (), start: Array | None = None
+) -> Picture:
+    """Return the overlay with its corridor and more areas, and the residual in the same corridor.
+
+    `start` has the simulated values at the start of a fit.
+    """
     across = standard == "iso19364"
     x_label = "lateral acceleration [m/s²]" if across else "time of the simulation [s]"
     shown = quantity_of(found.channel)
-    overlay, residual = (_across if across else _over_time)(
-        found, shown.factor, "measured" if runs == 1 else f"measured, mean of {runs}"
-    )
-    panels = overlay._replace(areas=[*more, *overlay.areas]), residual
-    titles = (shown.title, f"Measured less simulated [{shown.unit.name}]")
-    return Picture(
-        "", [panel._replace(x_label=x_label, title=title) for panel, title in zip(panels, titles, strict=True)],
-        columns=2, height_in=2.6,
-    )  # fmt: skip
 
+    def line(values: Array, label: str = "", colour: str = RUN_COLOURS[0], dashes: str = "-") -> Curve:
+        curve = Curve(found.x, shown.factor * values, label, colour, dashes)
+        # The points of a cross plot are in no order.
+        return curve._replace(dashes="", marker=".", size=2.0) if across else curve
 
-def _over_time(found: Compared, factor: float, measured: str) -> tuple[Panel, Panel]:
-    areas = [Area(found.x, factor * found.low, factor * found.high, "corridor")]
-    if found.confidence.any():
-        low, high = found.measured - found.confidence, found.measured + found.confidence
-        areas.append(Area(found.x, factor * low, factor * high, "its 95 % interval", RUN_COLOURS[1], 0.3))
-    curves = [
-        Curve(found.x, factor * found.simulated, "simulated", RUN_COLOURS[2]),
-        Curve(found.x, factor * found.measured, measured, RUN_COLOURS[1], "--"),
-    ]
-    around = Area(found.x, factor * (found.low - found.simulated), factor * (found.high - found.simulated))
-    residual = Curve(found.x, factor * found.residual, colour=RUN_COLOURS[0])
-    return Panel("", "", curves, areas=areas), Panel("", "", [residual, *_outside(found, factor)], areas=[around])
-
-
-def _across(found: Compared, factor: float, measured: str) -> tuple[Panel, Panel]:
-    def dots(values: Array, label: str = "", colour: str = _EDGE, size: float = 1.5) -> Curve:
-        return Curve(found.x, factor * values, label, colour, "", marker=".", size=size)
+    def panel(title: str, middle: Array | float, curves: list[Curve], more: Sequence[Area], label: str = "") -> Panel:
+        low, high = found.low - middle, found.high - middle
+        if across:
+            curves = [line(low, label, _EDGE), line(high, "", _EDGE), *curves]
+        else:
+            more = [*more, Area(found.x, shown.factor * low, shown.factor * high, label)]
+        return Panel(x_label, "", curves, title, more)
 
     overlay = [
-        dots(found.low, "corridor of the simulation"),
-        dots(found.high),
-        dots(found.simulated, "simulated, nearest point", RUN_COLOURS[2], 2.0),
-        dots(found.measured, measured, RUN_COLOURS[1], 2.0),
+        line(found.simulated, "simulated, nearest point" if across else "simulated", RUN_COLOURS[2]),
+        line(found.measured, "measured" if runs == 1 else f"measured, mean of {runs}", RUN_COLOURS[1], "--"),
     ]
-    residual = [
-        dots(found.low - found.simulated),
-        dots(found.high - found.simulated),
-        dots(found.residual, colour=RUN_COLOURS[0], size=2.0),
-        *_outside(found, factor),
+    residual = [line(found.residual)]
+    if start is not None:
+        overlay.append(line(start, "at the start", _START, ":"))
+        residual.append(line(found.measured - start, "", _START, ":"))
+    if (outside := ~found.within).any():
+        points = shown.factor * found.residual[outside]
+        residual.append(Curve(found.x[outside], points, "outside", "#b3261e", "", marker="."))
+    if found.confidence.any() and not across:
+        low, high = found.measured - found.confidence, found.measured + found.confidence
+        interval = Area(found.x, shown.factor * low, shown.factor * high, "its 95 % interval", RUN_COLOURS[1], 0.3)
+        areas = [*areas, interval]
+    corridor = "corridor of the simulation" if across else "corridor"
+    panels = [
+        panel(shown.title, 0.0, overlay, areas, corridor),
+        panel(f"Measured less simulated [{shown.unit.name}]", found.simulated, residual, ()),
     ]
-    return Panel("", "", overlay), Panel("", "", residual)
-
-
-def _outside(found: Compared, factor: float) -> list[Curve]:
-    outside = ~found.within
-    if not outside.any():
-        return []
-    residual = factor * found.residual[outside]
-    return [Curve(found.x[outside], residual, "outside", "#b3261e", "", marker=".")]
+    return Picture("", panels, columns=2, height_in=2.6)
 
 
 _HEAD: Final = ["run", "window", "quantity", "rms of the residual", "tolerance", "share inside", ""]
@@ -170,12 +161,12 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
 
 
 def _picture(result: MeasuredValidation, one: Part) -> Picture:
-    band = next((band for band in result.bands if band.part is one), None)
-    if band is None:
-        return picture(one.compared, "iso19365", 1)
-    factor = quantity_of(one.compared.channel).factor
-    area = Area(one.compared.x, factor * band.low, factor * band.high, "band of the intervals", _BAND_COLOUR, 0.25)
-    return picture(one.compared, "iso19365", 1, [area])
+    areas = [
+        Area(one.compared.x, factor * band.low, factor * band.high, "band of the intervals", _BAND_COLOUR, 0.25)
+        for band in result.bands
+        if band.part is one and (factor := quantity_of(one.compared.channel).factor)
+    ]
+    return picture(one.compared, areas=areas)
 
 
 def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
@@ -271,7 +262,7 @@ def fit_page(found: Fit, name: str) -> Page:
         rows.append((each.recording, shown.label, *numbers, *samples))
     sections.append(Section("Remaining differences", tables=[Table("", columns, rows)]))
     for recording, compared in groupby(found.compared, lambda each: each.recording):
-        sections.append(Section(recording, pictures=[_fit_picture(list(compared))]))
+        sections.append(Section(recording, pictures=[*map(_fit_picture, compared)]))
     sections.append(Section("Assumptions", points=rests_on(found)))
     return Page(f"activesteer fit: {name}", f"Parameters from recordings: {name}", lead, sections)
 
@@ -298,24 +289,11 @@ def _correlation_table(found: Fit) -> Table:
     return Table("", ["", *(str(number) for number in range(1, len(rows) + 1))], rows)
 
 
-def _fit_picture(compared: list[FitCompared]) -> Picture:
-    """Return the channels of one recording: measured and simulated values, and beside them their difference."""
-    panels = []
-    for each in compared:
-        shown = quantity_of(each.channel)
-        noise = shown.factor * each.noise
-        measured = shown.factor * each.measured
-        over = "time of the recording [s]"
-        curves = [
-            Curve(each.time_s, measured, "measured", RUN_COLOURS[1], "", marker=".", size=2.0),
-            Curve(each.time_s, measured + noise * each.before, "at the start", "#888888", "--", 1.0),
-            Curve(each.time_s, measured + noise * each.after, "fitted", RUN_COLOURS[2]),
-        ]
-        rest = [
-            Curve(each.time_s, noise * each.before, "", "#888888", "--", 0.8),
-            Curve(each.time_s, noise * each.after, "", RUN_COLOURS[2], width=0.8),
-        ]
-        band = Area(each.time_s[[0, -1]], -2.0 * noise, 2.0 * noise, "2 standard deviations of the noise")
-        panels.append(Panel(over, "", curves, shown.title))
-        panels.append(Panel(over, "", rest, f"Simulated less measured [{shown.unit.name}]", [band]))
-    return Picture("", panels, columns=2, width_in=11.0, height_in=2.5 * len(compared))
+def _fit_picture(found: FitCompared) -> Picture:
+    """Return the overlay and the difference of a channel of a recording, with twice its noise as the corridor."""
+    start, end = (found.measured + found.noise * each for each in (found.before, found.after))
+    twice = Tolerance(2.0 * found.noise, 0.0, "")
+    low, high = end - twice.offset, end + twice.offset
+    zero, all_of_them = np.zeros(len(end)), np.ones(len(end), np.bool_)
+    compared = Compared(found.channel, twice, found.time_s, found.measured, zero, end, low, high, all_of_them)
+    return picture(compared, start=start)
