@@ -16,6 +16,7 @@ Source: 49 CFR 571.126 (FMVSS 126), S5.2 and S7.11; UN Regulation 140.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from activesteer.analysis.series import (
 from activesteer.analysis.source import RecordingLike
 from activesteer.core.conventions import Array
 from activesteer.errors import RecordingError
+from activesteer.recording.contents import events_of
 
 STEERING_CUT_OFF_Hz: Final = 10.0
 """Cut-off frequency for the steering wheel angle [Hz]."""
@@ -44,6 +46,7 @@ PEAK_PROMINENCE: Final = 0.02
 """Least prominence of a peak of the yaw rate, as a fraction of the largest one."""
 INSTANTS_S: Final = (1.0, 1.75)
 """Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
+END_OF_STEER: Final = "end of steer"
 DISPLACEMENT_TIME_S: Final = 1.07
 """Time after the beginning of steer at which the lateral displacement is taken [s]. FMVSS 126 requires 1.83 m from a
 car up to 3500 kg, from 5 A on."""
@@ -104,6 +107,19 @@ def steering(recording: RecordingLike) -> Steering:
     reversal_s = _crossing_before(time_s, -side * angle, int(other[0]))
     completion_s = _completion(time_s, -side * angle, int(other[0]))
     return Steering(side, begin_s, reversal_s, completion_s, straight)
+
+
+def marks(recording: RecordingLike) -> list[tuple[float, str]]:
+    """Return the times that plots over time mark, with their words: instants of the criterion, or phases that begin."""
+    maneuver = recording.metadata.get("maneuver")
+    if not isinstance(maneuver, Mapping) or maneuver.get("kind") != "sine_with_dwell":
+        return [(event.time_s, event.what) for event in events_of(recording.metadata) if event.kind == "phase"]
+    try:
+        completion_s = steering(recording).completion_s
+    except RecordingError:
+        # An incomplete run has no such instants, but it can be shown.
+        return []
+    return [(completion_s, END_OF_STEER), *((completion_s + s, f"+{s:.2f} s") for s in INSTANTS_S)]
 
 
 def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:

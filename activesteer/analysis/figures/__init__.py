@@ -39,9 +39,9 @@ Draw = Callable[[Mapping[str, RecordingLike]], "Figure"]
 """Function from recordings by system to a figure."""
 
 
-def _over_time(*panels: str, instants: bool = False) -> Draw:
+def _over_time(*panels: str) -> Draw:
     """Return the function that draws panels over one time axis."""
-    return partial(time_figure, panels=[PANELS[name] for name in panels], instants=instants)
+    return partial(time_figure, panels=[PANELS[name] for name in panels])
 
 
 FORMATS: Final = (".png", ".svg", ".pdf")
@@ -49,8 +49,8 @@ FORMATS: Final = (".png", ".svg", ".pdf")
 BY_SCENARIO: Final[dict[str, dict[str, Draw]]] = {
     "step_steer": {"figure_11_step_steer": figure_11},
     "sine_with_dwell": {
-        "figure_12_sine_with_dwell_input": _over_time("steering_wheel", instants=True),
-        "figure_13_sine_with_dwell": _over_time("yaw_rate", "added", "lateral", "sideslip", instants=True),
+        "figure_12_sine_with_dwell_input": _over_time("steering_wheel"),
+        "figure_13_sine_with_dwell": _over_time("yaw_rate", "added", "lateral", "sideslip"),
     },
     "double_lane_change": {
         "figure_14_double_lane_change_course": tracks.course_figure,
@@ -174,7 +174,7 @@ OF_ANY_RUN: Final = {
 
 BY_KIND: Final[dict[str, Draw]] = {
     "step_steer": figure_11,
-    "sine_with_dwell": _over_time("steering_wheel", "yaw_rate", "added", "lateral", "sideslip", instants=True),
+    "sine_with_dwell": _over_time("steering_wheel", "yaw_rate", "added", "lateral", "sideslip"),
     "lane_change": tracks.overview,
     "slalom": tracks.overview,
     "follow_path": tracks.overview,

@@ -13,16 +13,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.figures import style
 from activesteer.analysis.figures.style import DrawnRun
+from activesteer.analysis.sine_with_dwell import END_OF_STEER, marks
 from activesteer.analysis.source import RecordingLike
 from activesteer.core.conventions import CORNERS, RUN_COLOURS, RUN_DASHES, Array, RunLook
 from activesteer.core.units import quantity_of
 from activesteer.drawing.panels import FIGURE, PANELS, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.plotting import new_figure, save
-from activesteer.recording.contents import events_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,6 +42,8 @@ _SETTLED: Final = 0.05
 _SAME_BORDER: Final = 0.002
 """Largest distance between borders of runs that share a line, as a fraction of the time shown."""
 _SAME_FRICTION: Final = 1e-3
+_AFTER_MARK: Final = 0.12
+"""Time shown after the last instant of a criterion, as a fraction of the time before it."""
 _LETTER_IN: Final = 0.066
 """Mean width of a letter of 8 pt, with some room [in]."""
 _SIDES_IN: Final = 0.6
@@ -138,31 +139,33 @@ def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> Non
     inset.grid(visible=True, axis="y", color="#dddddd", linewidth=0.5)
 
 
-def mark_phases(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Draw the borders of the manoeuvre's phases, with their names above the first axis."""
-    # Runs that reach a border at different times have their own lines. The figure is as wide as a column.
-    listed = [[e for e in events_of(curve.recording.metadata) if e.kind == "phase"] for curve in drawn]
+def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
+    """Draw the times of `sine_with_dwell.marks`, with their words above the first axis."""
+    # Runs that reach a mark at different times have their own lines. The figure is as wide as a column.
+    listed = [marks(curve.recording) for curve in drawn]
     left, right = axes[0].get_xlim()
-    for curve, events in zip(drawn, listed, strict=True):
-        for place, event in enumerate(events):
-            times = [others[place].time_s for others in listed if place < len(others)]
-            same = max(times) - min(times) <= _SAME_BORDER * (right - left)
-            if left < event.time_s < right and not (same and curve is not drawn[0]):
+    if listed[0] and listed[0][0][1] == END_OF_STEER and listed[0][-1][0] >= right:
+        right = listed[0][-1][0] + _AFTER_MARK * (right - left)
+        axes[0].set_xlim(left, right)
+    for curve, times in zip(drawn, listed, strict=True):
+        for place, (at_s, _) in enumerate(times):
+            all_s = [others[place][0] for others in listed if place < len(others)]
+            same = max(all_s) - min(all_s) <= _SAME_BORDER * (right - left)
+            if left < at_s < right and not (same and curve is not drawn[0]):
                 for axis in axes:
                     axis.axvline(
-                        event.time_s, color="#777777" if same else curve.look.colour, linewidth=0.8, linestyle=":",
-                        zorder=1,
-                    )  # fmt: skip
+                        at_s, color="#777777" if same else curve.look.colour, linewidth=0.8, linestyle=":", zorder=1
+                    )
     width_in = style.COLUMN_IN - _SIDES_IN
     ends: list[float] = []
-    for event in (event for event in listed[0] if event.time_s < right):
-        at_in = max(0.0, (event.time_s - left) / (right - left)) * width_in
+    for at_s, words in (mark for mark in listed[0] if mark[0] < right):
+        at_in = max(0.0, (at_s - left) / (right - left)) * width_in
         row = next((row for row, end in enumerate(ends) if end <= at_in), len(ends))
-        ends[row : row + 1] = [at_in + _LETTER_IN * (len(event.what) + 1)]
+        ends[row : row + 1] = [at_in + _LETTER_IN * (len(words) + 1)]
         axes[0].annotate(
-            event.what, (max(event.time_s, left), 1.0), (0, 2 + (style.TEXT_PT + 1.0) * row),
-            xycoords=("data", "axes fraction"), textcoords="offset points", va="bottom", fontsize=style.TEXT_PT,
-            color="#555555", ha="right" if ends[row] > width_in + _LETTER_IN else "left",
+            words, (max(at_s, left), 1.0), (0, 2 + (style.TEXT_PT + 1.0) * row), xycoords=("data", "axes fraction"),
+            textcoords="offset points", va="bottom", fontsize=style.TEXT_PT, color="#555555",
+            ha="right" if ends[row] > width_in + _LETTER_IN else "left",
         )  # fmt: skip
 
 
@@ -185,46 +188,18 @@ def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
                 )  # fmt: skip
 
 
-def time_figure(
-    recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE), *, instants: bool = False
-) -> Figure:
-    """Draw panels over one time axis, as wide as a column; a sine with dwell shows when it is judged."""
+def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE)) -> Figure:
+    """Draw panels over one time axis, as wide as a column, with phases or instants of a standard's criterion."""
     drawn = style.curves(recordings)
     shown = style.present(panels, drawn)
     figure = new_figure(width_in=style.COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))
     axes: list[Axes] = list(figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0])
     fill_panels(axes, drawn, shown)
     shade_friction(axes, drawn)
-    mark_phases(axes, drawn)
+    mark_times(axes, drawn)
     figure.align_ylabels(axes)
     style.name_curves(figure, axes[0])
-    if instants:
-        _mark_instants(figure, recordings)
     return figure
-
-
-def _mark_instants(figure: Figure, recordings: Mapping[str, RecordingLike]) -> None:
-    """Draw vertical lines at the completion of steer and at the two instants after it."""
-    try:
-        completion_s = sine_with_dwell.steering(next(iter(recordings.values()))).completion_s
-    except RecordingError:
-        # An incomplete run has no such instants, but it can be drawn.
-        return
-    axes = figure.get_axes()
-    instants = (("end of steer", 0.0), *((f"+{s:.2f} s", s) for s in sine_with_dwell.INSTANTS_S))
-    left, right = axes[0].get_xlim()
-    # Room for the last text.
-    axes[0].set_xlim(left, max(right, completion_s + max(sine_with_dwell.INSTANTS_S) + 0.12 * (right - left)))
-    for text, later_s in instants:
-        for axis in axes:
-            axis.axvline(completion_s + later_s, color="#999999", linewidth=0.9, linestyle=":", zorder=1)
-        # Only the last text stands right of its line, so that the texts do not overlap.
-        before = later_s < max(sine_with_dwell.INSTANTS_S)
-        axes[0].annotate(
-            text, (completion_s + later_s, 1.0), (-2 if before else 2, -1), xycoords=("data", "axes fraction"),
-            textcoords="offset points", va="top", ha="right" if before else "left",
-            fontsize=style.TEXT_PT, color="#555555",
-        )  # fmt: skip
 
 
 def figure_11(recordings: Mapping[str, RecordingLike]) -> Figure:
