@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from activesteer.analysis.figures import style, tracks
+from activesteer.analysis.figures import over_time, tracks
 from activesteer.analysis.figures.over_time import figure_2, figure_11, time_figure
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Source, build
@@ -82,7 +82,7 @@ def figure_7(recording: RecordingLike) -> Figure:
     gain = _number(_parameters(recording, "controllers", "ars"), "prediction_gain", 1.0)
     speed_mps = np.linspace(0.0, TOP_SPEED_MPS, 400)
     ratio, _, _ = single_track.rear_prediction(speed_mps)
-    figure = new_figure(width_in=style.COLUMN_IN, height_in=2.6)
+    figure = new_figure(width_in=over_time.COLUMN_IN, height_in=2.6)
     axis: Axes = figure.subplots()
     axis.axhline(0.0, color="#999999", linewidth=0.8)
     axis.plot(3.6 * speed_mps, ratio, color=RUN_COLOURS[1], linewidth=1.6, label="keeps sideslip at zero (eq. 5)")
@@ -94,18 +94,18 @@ def figure_7(recording: RecordingLike) -> Figure:
         at = 3.6 * float(np.interp(0.0, ratio[zero[0] : zero[0] + 2], speed_mps[zero[0] : zero[0] + 2]))
         axis.annotate(
             f"{at:.0f} km/h", (at, 0.0), (10, -16), textcoords="offset points", color="#555555",
-            fontsize=style.TEXT_PT,
+            fontsize=over_time.TEXT_PT,
             arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.8},
         )  # fmt: skip
     for text, offset in (("in phase", 6), ("opposed", -12)):
         axis.annotate(
             text, (0.0, 0.0), (4, offset), textcoords="offset points", ha="left", color="#555555",
-            fontsize=style.TEXT_PT,
+            fontsize=over_time.TEXT_PT,
         )  # fmt: skip
-    style.plain(axis, "rear angle over front angle,\nsteady [deg/deg]")
+    over_time.plain(axis, "rear angle over front angle,\nsteady [deg/deg]")
     axis.set_xlabel("speed [km/h]")
     axis.set_xlim(0.0, 3.6 * TOP_SPEED_MPS)
-    style.name_curves(figure, axis)
+    over_time.name_curves(figure, axis)
     return figure
 
 
@@ -118,7 +118,7 @@ def figure_9(recording: RecordingLike) -> Figure:
         bands.setdefault(band, []).append(system)
     end = 1.6 * max(full for _, full in bands)
     error_radps = np.linspace(-end, end, 1001)
-    figure = new_figure(width_in=style.COLUMN_IN, height_in=2.6)
+    figure = new_figure(width_in=over_time.COLUMN_IN, height_in=2.6)
     axis: Axes = figure.subplots()
     for (off, full), systems in bands.items():
         colour = RUN_COLOURS[list(SYSTEM_LABELS).index(systems[0])] if len(systems) == 1 else RUN_COLOURS[0]
@@ -129,13 +129,13 @@ def figure_9(recording: RecordingLike) -> Figure:
             axis.axvline(math.degrees(value), color=colour, linewidth=0.8, linestyle=":")
             axis.annotate(
                 f"$c_{{{name}}}$ = {math.degrees(value):.3g} deg/s", (math.degrees(value), 0.5), (3, 0), rotation=90,
-                textcoords="offset points", va="center", fontsize=style.TEXT_PT, color="#555555",
+                textcoords="offset points", va="center", fontsize=over_time.TEXT_PT, color="#555555",
             )  # fmt: skip
-    style.plain(axis, "activity of the corrector [-]")
+    over_time.plain(axis, "activity of the corrector [-]")
     axis.set_xlabel("yaw rate error, desired less actual [deg/s]")
     axis.set_xlim(-math.degrees(end), math.degrees(end))
     axis.set_ylim(-0.05, 1.12)
-    style.name_curves(figure, axis)
+    over_time.name_curves(figure, axis)
     return figure
 
 

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.analysis import general, step_response
-from activesteer.analysis.general import weighted, weighting
-from activesteer.analysis.metrics import EVALUATIONS, metrics
+from activesteer.analysis import step_response
+from activesteer.analysis.metrics import EVALUATIONS, general_metrics, metrics, weighted, weighting
 from activesteer.core.conventions import CORNERS
 from activesteer.core.metric_table import METRICS
 from activesteer.errors import ParameterError, RecordingError
@@ -43,7 +42,7 @@ def test_step_steer_gets_the_metrics_of_iso_7401():
 
 @pytest.mark.parametrize("kind", ["open_loop", "random_steer"])
 def test_kinds_without_metrics_of_their_own_get_the_general_ones(kind):
-    assert metrics(wave(kind)) == general.general_metrics(wave(kind))
+    assert metrics(wave(kind)) == general_metrics(wave(kind))
 
 
 def test_a_kind_without_an_evaluation_is_an_error():
