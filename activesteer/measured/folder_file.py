@@ -10,8 +10,6 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-import numpy as np
-
 from activesteer.config import Range, Source, build, field_in_unit, read_toml
 from activesteer.core.conventions import Array
 from activesteer.core.files import is_file, is_folder, make_folder, shown_path, user_path, write_text
@@ -19,7 +17,6 @@ from activesteer.errors import ActiveSteerError, ParameterError, nearest_names
 from activesteer.measured.comparison import TOLERANCES, Tolerance
 from activesteer.resources import models_dir
 from activesteer.scenario import load_car, resolve, value_of
-from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.factors import Factor, read_factor
 
 NAME: Final = "validation.toml"
@@ -365,36 +362,10 @@ def is_measured(name: str) -> bool:
     )
 
 
-_EXAMPLE: Final = Path(__file__).with_name("example")
-_STEERING: Final = {
-    "time_s": [0.5, 0.8, 1.3, 1.8, 2.2, 3.5, 3.8, 4.3, 4.8, 5.2],
-    "steering_wheel_deg": [0, 40, 40, -40, 0, 0, -50, 0, 50, 0],
-}
-_CAR: Final = {"factors.front_cornering_stiffness": 0.9}
-_SCALE: Final = 0.8
-"""Scale of the steering signal."""
-_COLUMNS: Final = {
-    "Steering [deg]": ("steering_wheel_rad", _SCALE * np.degrees(1.0), 0.02),
-    "v [km/h]": ("speed_mps", 3.6, 0.05),
-    "Yaw rate [deg/s]": ("yaw_rate_radps", np.degrees(1.0), 0.2),
-    "a_y [m/s2]": ("ay_mps2", 1.0, 0.1),
-}
-"""Column -> channel, factor to its unit, and standard deviation of its noise."""
-
-
 def write_template(folder: Path) -> list[Path]:
     """Write a folder that `activesteer compare` and `fit` can run, and return its files."""
     make_folder(folder, ParameterError)
     if any(folder.iterdir()):
         raise ParameterError(f"{shown_path(folder)} is not empty; give a new folder", value=str(folder))
-    table = {"kind": "open_loop", "speed_kmh": 80.0, "duration_s": 6.5, "hold_last": True, "steering": _STEERING}
-    run = simulate(table, overrides=_CAR)
-    rng = np.random.default_rng(1)
-    columns = {"Time [s]": run.time_s[::10]}
-    for name, (channel, factor, noise) in _COLUMNS.items():
-        values = factor * run[channel][::10]
-        columns[name] = values + noise * rng.standard_normal(len(values))
-    rows = "\n".join(",".join(f"{value:.6g}" for value in row) for row in np.column_stack(list(columns.values())))
-    texts = {"run.csv": f"{','.join(columns)}\n{rows}\n"}
-    texts |= {name: (_EXAMPLE / name).read_text(encoding="utf-8") for name in ("map.toml", NAME)}
-    return [write_text(folder / name, text, ParameterError) for name, text in texts.items()]
+    files = sorted(Path(__file__).with_name("example").iterdir())
+    return [write_text(folder / file.name, file.read_text(encoding="utf-8"), ParameterError) for file in files]
