@@ -19,7 +19,7 @@ from activesteer.core.conventions import Array
 from activesteer.driver import is_driver_file
 from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
 from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, notes_of, told_apart, without_effect
-from activesteer.measured.signals import at_sensor
+from activesteer.measured.signals import at_sensor, by_channel
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
 from activesteer.scenario.scenario import is_recording, led, open_loop_of
@@ -91,21 +91,6 @@ class Measured(NamedTuple):
     begin_s: float  # time of the recording at which the manoeuvre starts [s]
     time_s: Array  # times at which channels are compared [s], shape (n,)
     channels: dict[str, Array]  # measured values there, SI; not finite where missing
-
-
-def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[str, float]:
-    """Return the standard deviation of the noise of each channel of the table [fit], SI."""
-    found: dict[str, float] = {}
-    for key, value in table.noise.items():
-        name, factor = field_in_unit(key, known)
-        if name is None:
-            raise study.source.fail(
-                ("fit", "noise", key), f"there is no such channel; {nearest_names(key, known)}", key
-            )
-        if name in found:
-            raise study.source.fail(("fit", "noise", key), "is given twice, in two units", key)
-        found[name] = value * factor
-    return found
 
 
 def measured_of(
@@ -262,7 +247,9 @@ class _Problem:
         inputs = open_loop_of(recordings[0], names[0])
         first = resolve(inputs, study.vehicles[0], known, study.driver, study.controllers)
         car = first.car.on(first.maneuver.ground, study.timestep_s)
-        self._noise = noise_of(study, table, [channel.name for channel in car.channels.channels])
+        channels = [channel.name for channel in car.channels.channels]
+        noise = by_channel(table.noise, channels, study.source, ("fit", "noise"))
+        self._noise = {name: factor * size for name, (_, factor, size) in noise.items()}
         self._measured = [
             measured_of(recording, name, study, table, self._noise)
             for recording, name in zip(recordings, names, strict=True)

@@ -10,11 +10,12 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from activesteer.config import Range, Source, build, field_in_unit, read_toml
+from activesteer.config import Range, Source, build, read_toml
 from activesteer.core.conventions import Array
 from activesteer.core.files import is_file, is_folder, make_folder, shown_path, user_path, write_text
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names
 from activesteer.measured.comparison import TOLERANCES, Tolerance
+from activesteer.measured.signals import by_channel
 from activesteer.resources import models_dir
 from activesteer.scenario import load_car, resolve, value_of
 from activesteer.studies.engine.factors import Factor, read_factor
@@ -188,7 +189,7 @@ def read_measured(folder: Path) -> MeasuredFile:
     except ActiveSteerError as reason:
         raise source.fail(("vehicle",), reason.problem, table.vehicle, reason.allowed) from reason
     for key, value in table.overrides.items():
-        _check_key(vehicle, key, value, source, ("overrides", key))
+        _value(vehicle, key, source, ("overrides", key), {key: value})
     file = MeasuredFile(table, folder, vehicle, (), *_quantities(table, source, names), (), source)
     return _with_runs(file) if table.circle is None else _with_circle(file, table.circle)
 
@@ -202,13 +203,13 @@ def _with_runs(file: MeasuredFile) -> MeasuredFile:
         _check_run(run, file.folder, source, ("runs", str(number)), [other.name for other in table.runs[:number]])
     if not any(run.check_s for run in table.runs):
         raise source.fail(("runs",), "a verdict needs a run with check_s = [start, end]")
-    channels = tuple(_channel(key, file.noise, source, ("predict", "channels")) for key in table.predict.channels)
+    channels = tuple(by_channel(dict.fromkeys(table.predict.channels), file.noise, source, ("predict", "channels")))
     factors = _factors(table, file.vehicle, source)
     if factors and not file.noise:
         raise source.fail(("quantities",), "a fit needs a channel with noise = its standard deviation")
     for key, interval in table.intervals.items():
         _check_ends(interval, source, key)
-        _check_key(file.vehicle, key, interval.ends[0], source, ("intervals", key))
+        _value(file.vehicle, key, source, ("intervals", key), {key: interval.ends[0]})
     return replace(file, factors=factors, predict_channels=channels or tuple(file.noise))
 
 
@@ -251,7 +252,7 @@ def _factors(table: MeasuredTable, vehicle: str, source: Source) -> tuple[Factor
         where = ("factors", factor.key)
         if factor.kind != "uniform":
             raise source.fail(where, "a fit needs a range: uniform = [low, high]")
-        _check_key(vehicle, factor.key, factor.low, source, where, relative=bool(factor.nominal))
+        _value(vehicle, factor.key, source, where, {} if factor.nominal else {factor.key: factor.low})
     keys = [factor.key for factor in factors]
     for key in table.predict.factors:
         if key not in keys:
@@ -277,13 +278,6 @@ def _check_run(run: RunTable, folder: Path, source: Source, where: tuple[str, ..
         raise source.fail((*where, "check_s"), "the run is used for nothing; give fit_s, check_s or both")
 
 
-def _channel(key: str, known: Iterable[str], source: Source, where: tuple[str, ...]) -> str:
-    name, _ = field_in_unit(key, known := list(known))
-    if name is None:
-        raise source.fail(where, f"there is no such channel; {nearest_names(key, known)}", key, known)
-    return name
-
-
 def _quantities(
     table: MeasuredTable, source: Source, names: list[str]
 ) -> tuple[dict[str, Tolerance], dict[str, float]]:
@@ -293,15 +287,12 @@ def _quantities(
     quantities = table.quantities or ({} if table.circle is None else {STEERING: QuantityTable()})
     if not quantities:
         raise source.fail(("quantities",), "at least one channel is needed")
-    for key, given in quantities.items():
-        where = ("quantities", key)
-        name = _channel(key, names, source, where)
-        factor = field_in_unit(key, names)[1]
-        if name in tolerances:
-            raise source.fail(where, "is given twice, in two units", key)
+    for name, (key, factor, given) in by_channel(quantities, names, source, ("quantities",)).items():
         usual = TOLERANCES.get(name)
         if usual is None and (given.offset is None or given.gain is None):
-            raise source.fail(where, "has no usual tolerance; give offset, gain and source", key, list(TOLERANCES))
+            raise source.fail(
+                ("quantities", key), "has no usual tolerance; give offset, gain and source", key, list(TOLERANCES)
+            )
         if given.offset is not None or given.gain is not None:
             usual = usual or Tolerance(0.0, 0.0, "")
             offset = usual.offset if given.offset is None else given.offset * factor
@@ -313,25 +304,15 @@ def _quantities(
     return tolerances, noise
 
 
-def _check_key(
-    vehicle: str, key: str, value: Any, source: Source, where: tuple[str, ...], *, relative: bool = False
-) -> None:
-    """Refuse a key that neither the car nor a repeated measurement has."""
-    _value(vehicle, key, source, where, {} if relative else {key: value}, value)
-
-
-def _value(
-    vehicle: str, key: str, source: Source, where: tuple[str, ...], overrides: Mapping[str, Any] | None = None,
-    given: Any = None,
-) -> Any:  # fmt: skip
+def _value(vehicle: str, key: str, source: Source, where: tuple[str, ...], overrides: Mapping[str, Any]) -> Any:
     """Return the value of a key of the car or of a repeated measurement. Without a key, check the overrides only."""
     steering = {"time_s": [0.0, 1.0], "steering_wheel_rad": [0.0, 0.1]}
     inputs = {"kind": "open_loop", "name": "inputs", "duration_s": 1.0, "speed_mps": 20.0, "steering": steering}
     try:
-        scenario = resolve(inputs, vehicle, overrides or {})
+        scenario = resolve(inputs, vehicle, overrides)
         return value_of(scenario, key) if key else None
     except ActiveSteerError as reason:
-        raise source.fail(where, reason.problem, given, reason.allowed) from reason
+        raise source.fail(where, reason.problem, overrides.get(key), reason.allowed) from reason
 
 
 def measured_folder(name: str) -> Path:

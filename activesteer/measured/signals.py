@@ -7,20 +7,38 @@ import math
 import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
-from activesteer.config import field_in_unit, read_toml
+from activesteer.config import Source, field_in_unit, read_toml
 from activesteer.core.conventions import Array
 from activesteer.core.units import Unit, find_unit, known_unit, unit_of
-from activesteer.errors import RecordingError
+from activesteer.errors import RecordingError, nearest_names
 from activesteer.recording import Poses, Recording
 from activesteer.vehicle import Vehicle
 
 _NAMES: Final = read_toml(Path(__file__).with_name("names.toml"), RecordingError)[0]
 TURNED_IN_SAE: Final = frozenset(_NAMES["turned_in_sae_j670"])
 _BY_WORD: Final = {word: channel for channel, words in _NAMES["words"].items() for word in words.split()}
+
+
+Entry = TypeVar("Entry")
+
+
+def by_channel(
+    table: Mapping[str, Entry], known: Collection[str], source: Source, where: tuple[str, ...]
+) -> dict[str, tuple[str, float, Entry]]:
+    """Return the entries of a table of a file by channel, each with its key and the factor of the key's unit to SI."""
+    found: dict[str, tuple[str, float, Entry]] = {}
+    for key, entry in table.items():
+        name, factor = field_in_unit(key, known)
+        if name is None:
+            raise source.fail((*where, key), f"there is no such channel; {nearest_names(key, known)}", key, list(known))
+        if name in found:
+            raise source.fail((*where, key), "is given twice, in two units", key)
+        found[name] = key, factor, entry
+    return found
 
 
 def written_unit(unit: str) -> Unit | None:
