@@ -129,23 +129,23 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
             tables.append(_parameter_table(found))
             if len(found.parameters) > 1:
                 tables.append(_correlation_table(found))
-        pictures = [_picture(result, one) for one in shown if one.part == "check"]
+        pictures = [_picture(one) for one in shown if one.part == "check"]
         lines, points = ["no value comes from the data"], []
         if found is not None:
             free = f"free in the fit windows: {', '.join(one.key for one in found.parameters)}"
             lines, points = [free, *(f"! {note}" for note in found.notes)], rests_on(found)
         sections.append(Section(name.capitalize(), lines, pictures, tables, points))
-    if result.bands:
+    if result.ends:
         text = (
             "The band contains the prediction with each value at either end of its interval. Before that, the free "
             "factors of the prediction are found again. Effects of several intervals add up."
         )
         widths, ends = [], []
-        for band in result.bands:
-            shown = quantity_of(band.part.compared.channel)
-            width = f"{shown.factor * band.width:.3g} {shown.unit.name} wide"
-            inside = f"{100.0 * band.share_inside:.1f} % of the measured samples inside"
-            widths.append((band.part.run, shown.label, width, inside))
+        for box in (one.box() for one in result.parts if one.band):
+            shown = quantity_of(box["channel"])
+            width = f"{shown.factor * box['width']:.3g} {shown.unit.name} wide"
+            inside = f"{100.0 * box['share_inside']:.1f} % of the measured samples inside"
+            widths.append((box["run"], shown.label, width, inside))
         for end in result.ends:
             quantities = [(quantity_of(channel), value) for channel, value in end.effect.items()]
             effects = [f"{one.label} {one.factor * value:.2g} {one.unit.name}" for one, value in quantities]
@@ -160,12 +160,11 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
     return lead, sections
 
 
-def _picture(result: MeasuredValidation, one: Part) -> Picture:
-    areas = [
-        Area(one.compared.x, factor * band.low, factor * band.high, "band of the intervals", _BAND_COLOUR, 0.25)
-        for band in result.bands
-        if band.part is one and (factor := quantity_of(one.compared.channel).factor)
-    ]
+def _picture(one: Part) -> Picture:
+    areas = []
+    if one.band is not None:
+        low, high = (quantity_of(one.compared.channel).factor * edge for edge in one.band)
+        areas = [Area(one.compared.x, low, high, "band of the intervals", _BAND_COLOUR, 0.25)]
     return picture(one.compared, areas=areas)
 
 
