@@ -43,11 +43,16 @@ class FrequencyResponse(NamedTuple):
         frequency_Hz: Frequencies [Hz], shape (n,).
         response: Output over input, complex, shape (n,).
         coherence: Coherence, 0 to 1, shape (n,).
+        gain_error: Relative standard error of the gain by coherence and number of averages, shape (n,), or empty for
+            one run; it is also the standard error of the phase [rad].
+        averages: Number of independent segments.
     """
 
     frequency_Hz: Array
     response: NDArray[np.complex128]
     coherence: Array
+    gain_error: Array = np.zeros(0)
+    averages: float = 1.0
 
 
 def frequency_response(
@@ -155,24 +160,9 @@ _HANN_OVERLAP: Final = 1.0 + 2.0 / 36.0
 """Segments with Hann windows that overlap by half, for each independent segment (Welch, 1967)."""
 
 
-class RandomResponse(NamedTuple):
-    """An averaged frequency response.
-
-    Attributes:
-        response: The response, and its coherence.
-        gain_error: Relative standard error of the gain by coherence and number of averages, shape (n,); it is also the
-            standard error of the phase [rad].
-        averages: Number of independent segments.
-    """
-
-    response: FrequencyResponse
-    gain_error: Array
-    averages: float
-
-
 def random_response(
     recordings: Sequence[RecordingLike], output: str, lowest_Hz: float, highest_Hz: float
-) -> RandomResponse:
+) -> FrequencyResponse:
     """Return the response of a channel to random steering, at all lines of a range.
 
     The segments are finite, and the response to the end of a segment is lost. The gain is therefore low by some per
@@ -209,4 +199,4 @@ def random_response(
     found = _response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], largest)
     with np.errstate(divide="ignore"):
         error = np.sqrt(0.5 * np.maximum(1.0 / found.coherence - 1.0, 0.0) / averages)
-    return RandomResponse(found, error, averages)
+    return found._replace(gain_error=error, averages=averages)

@@ -333,17 +333,18 @@ class _Problem:
         """Return the result of the search."""
         free: NDArray[np.bool_] = (found.place > AT_END) & (found.place < 1.0 - AT_END)
         self.check(found.slopes)
-        known = intervals(found.after, found.slopes, free, stated=self._table.intervals == "noise")
+        half_widths, correlations, samples, freedom = intervals(
+            found.after, found.slopes, free, stated=self._table.intervals == "noise"
+        )
         values, start = self._factor_values(found.place), self._factor_values(self.start)
-        half_widths = (self._high - self._low) * known.half_widths
         parameters = tuple(
             Parameter(factor.key, values[factor.key], float(half), start[factor.key], factor.low, factor.high)
-            for factor, half in zip(self._factors, half_widths, strict=True)
+            for factor, half in zip(self._factors, (self._high - self._low) * half_widths, strict=True)
         )
         places = [(measured, name) for measured in self._measured for name in self._noise]
         compared = []
         for (measured, name), before, after, independent in zip(
-            places, found.before, found.after, known.independent, strict=True
+            places, found.before, found.after, samples, strict=True
         ):
             kept = np.isfinite(measured.channels[name])
             compared.append(
@@ -355,7 +356,7 @@ class _Problem:
         everywhere = {factor.key for factor in self._factors if not factor.maneuvers}
         overrides = [self._values.overrides(number, 0, values) for number in range(len(self._measured))]
         made = Fit(
-            parameters, known.correlations, tuple(compared), self._table.intervals, known.freedom, _misfit(found.after),
+            parameters, correlations, tuple(compared), self._table.intervals, freedom, _misfit(found.after),
             found.rounds, self.runs, found.settled,
             {key: value for key, value in overrides[0].items() if key in everywhere},
             {measured.name: own for measured, each in zip(self._measured, overrides, strict=True)
