@@ -17,11 +17,12 @@ import numpy as np
 import pyarrow as pa
 
 from activesteer.analysis.claims.judge import Claim
-from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity
+from activesteer.analysis.harm import SIZES, harms, has_spun, is_lost, severity
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.core.conventions import Array
 from activesteer.core.files import finite, reading
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
+from activesteer.core.units import DisplayUnit, display_unit
 from activesteer.errors import ManeuverError, ModelError, ParameterError, StudyError
 from activesteer.resources import studies_dir
 from activesteer.scenario import FileOrTable
@@ -55,6 +56,13 @@ CHANGES: Final = (
     STEERING_EFFORT,
 )
 """Metrics whose change by a system is reported: peak sideslip angle, remaining oscillation, steering effort."""
+UNITS: Final = {
+    **dict.fromkeys(("lane", "path", "stopping", "stopping_elsewhere", "displacement"), display_unit("path_m")),
+    **dict.fromkeys(("heading", "heading_open_loop", "steering"), display_unit("heading_rad")),
+    **dict.fromkeys(("cones", "lost"), DisplayUnit("", 1.0)),
+    "yaw_rate": display_unit("yaw_rate_radps"),
+}
+"""Measure of harm -> its unit for display."""
 _RANGE: Final = (0.05, 0.5, 0.95)
 _WORST: Final = 10
 """Number of the worst runs of a controller."""
@@ -70,7 +78,7 @@ class Change:
     """Change of the magnitude of a metric or a measure by a system, relative to the same sample without control.
 
     Attributes:
-        metric: The metric, or the name of one of `harm.MEASURES`.
+        metric: The metric, or the name of one of `harm.SIZES`.
         number: Number of samples in which both runs have the metric.
         low: 5 % quantile of the changes.
         median: Median of the changes.
@@ -567,7 +575,7 @@ def _distribution(name: str, values: Sequence[float] | Array) -> Change:
         median,
         high,
         largest,
-        sum(bool(harms({name: one})) for one in values) if name in MEASURES else 0,
+        sum(bool(harms({name: one})) for one in values) if name in SIZES else 0,
     )
 
 

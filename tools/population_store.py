@@ -19,7 +19,6 @@ import pyarrow.parquet as pq
 
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, SYSTEMS, Claim, Kind
 from activesteer.analysis.claims.scorecard import PAPER, read_setting
-from activesteer.analysis.harm import MEASURES
 from activesteer.commands.terminal import Progress
 from activesteer.core.files import atomic_write, make_folder, write_text
 from activesteer.core.metric_table import metric
@@ -37,6 +36,7 @@ from tools.population_results import (
     REQUIRED,
     STUDY,
     SUMMARY,
+    UNITS,
     Change,
     Population,
     SystemEffect,
@@ -186,7 +186,7 @@ def _worst(effect: SystemEffect, measures: Sequence[str]) -> str:
     values = [value for value in map(effect.worst, measures) if not math.isnan(value)]
     if not values:
         return "-"
-    worst = max(values) * MEASURES[measures[0]].unit.factor
+    worst = max(values) * UNITS[measures[0]].factor
     return f"{worst:.2f}" if math.isfinite(worst) else "lost"
 
 
