@@ -10,7 +10,7 @@ angle; the angle is taken to be monotonic in each.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -34,84 +34,58 @@ class CircleValidation(NamedTuple):
     """Result of the comparison with a measured circle; angles of the steering wheel [deg]."""
 
     file: MeasuredFile  # the checked file
-    measured_deg: Array  # measured angles, shape (n,)
-    nominal_deg: float  # prediction
-    assumed_deg: float  # prediction without the overrides of `circle.prediction`, from which the intervals start
-    # name and source of each interval, and the second prediction at its ends, the smaller angle first
-    ends: tuple[tuple[str, str, float, float], ...]
-    samples_deg: Array  # prediction for samples of the values that vary from lap to lap, shape (m,)
-    # second prediction for samples, with all intervals at the ends with the smaller angles, shape (m/2,)
-    lower_deg: Array
-    upper_deg: Array  # the same at the other ends
-
-    @property
-    def difference_deg(self) -> float:
-        """Mean of our samples minus mean of the measured angles."""
-        return float(self.samples_deg.mean() - self.measured_deg.mean())
-
-    @property
-    def tolerance_deg(self) -> float:
-        """Tolerance of the mean."""
-        return math.degrees(self.file.tolerances[STEERING].width(np.radians(self.measured_deg.mean())))
+    distributions: Sequence[Array]  # measured and predicted angles; second prediction at either end of all intervals
+    numbers: dict[str, Any]  # JSON values
 
     @property
     def inside(self) -> bool:
         """True if the difference of the means is within the tolerance."""
-        return abs(self.difference_deg) <= self.tolerance_deg
-
-    @property
-    def area_metric_deg(self) -> float:
-        """Area between the two cumulative distributions (Ferson, Oberkampf, Ginzburg 2008)."""
-        from scipy.stats import wasserstein_distance  # noqa: PLC0415 - slow to import
-
-        return float(wasserstein_distance(self.samples_deg, self.measured_deg))
-
-    @property
-    def overlap(self) -> float:
-        """Common area of the two densities, 0 to 1."""
-        from scipy.stats import gaussian_kde  # noqa: PLC0415 - slow to import
-
-        both = np.concatenate([self.samples_deg, self.measured_deg])
-        grid = np.linspace(both.min() - 10.0, both.max() + 10.0, 2000)
-        least = np.minimum(gaussian_kde(self.samples_deg)(grid), gaussian_kde(self.measured_deg)(grid))
-        return float(least.sum() * (grid[1] - grid[0]))
-
-    @property
-    def box_deg(self) -> tuple[float, float]:
-        """Box: 2.5 % quantile of the lower distribution, and 97.5 % quantile of the upper one."""
-        low, high = (np.percentile(each, end) for each, end in zip(self[-2:], _QUANTILES, strict=True))
-        return float(low), float(high)
-
-    @property
-    def measured_inside(self) -> int:
-        """Number of measured angles in the box."""
-        low, high = self.box_deg
-        return int(((self.measured_deg >= low) & (self.measured_deg <= high)).sum())
+        return self.numbers["inside"]
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""
+        return self.numbers
 
-        def spread(values: Array) -> dict[str, Any]:
-            return {"mean": values.mean(), "std": values.std(ddof=1), "n": len(values)}
 
-        box = None
-        if self.ends:
-            low, high = self.box_deg
-            ends = [dict(zip(("name", "source", "low_deg", "high_deg"), end, strict=True)) for end in self.ends]
-            box = {
-                "low_deg": low, "high_deg": high, "width_deg": high - low,
-                "measured_deg": float(self.measured_deg.mean()), "measured_inside": self.measured_inside,
-                "measured_values": len(self.measured_deg), "intervals": ends,
-            }  # fmt: skip
-        return {
-            "vehicle": self.file.table.vehicle, "title": self.file.table.title, "inside": self.inside,
-            "measured_deg": spread(self.measured_deg),
-            "ours_deg": {"nominal": self.nominal_deg, **spread(self.samples_deg)},
-            "with_assumptions_deg": self.assumed_deg, "box": box,
-            "difference_deg": self.difference_deg, "tolerance_deg": self.tolerance_deg,
-            "area_metric_deg": self.area_metric_deg, "overlap": self.overlap,
-            "assumptions": list(self.file.table.assumptions),
+def judged(
+    file: MeasuredFile, nominal_deg: float, assumed_deg: float, ends: Sequence[tuple[str, str, float, float]],
+    distributions: Sequence[Array],
+) -> CircleValidation:  # fmt: skip
+    """Compare the distributions of measured and predicted angles.
+
+    The second prediction, `assumed_deg`, is without the overrides of `circle.prediction`; the intervals start from it.
+    `ends` has name and source of each interval, and the second prediction at its ends, the smaller angle first.
+    """
+    from scipy.stats import gaussian_kde, wasserstein_distance  # noqa: PLC0415 - slow to import
+
+    measured, samples, lower, upper = distributions
+    difference_deg = float(samples.mean() - measured.mean())
+    tolerance_deg = math.degrees(file.tolerances[STEERING].width(np.radians(measured.mean())))
+    both = np.concatenate([samples, measured])
+    grid = np.linspace(both.min() - 10.0, both.max() + 10.0, 2000)
+    least = np.minimum(gaussian_kde(samples)(grid), gaussian_kde(measured)(grid))
+    box = None
+    if ends:
+        low, high = (float(np.percentile(each, end)) for each, end in zip((lower, upper), _QUANTILES, strict=True))
+        box = {
+            "low_deg": low, "high_deg": high, "width_deg": high - low, "measured_deg": float(measured.mean()),
+            "measured_inside": int(((measured >= low) & (measured <= high)).sum()), "measured_values": len(measured),
+            "intervals": [dict(zip(("name", "source", "low_deg", "high_deg"), end, strict=True)) for end in ends],
         }  # fmt: skip
+
+    def spread(values: Array) -> dict[str, Any]:
+        return {"mean": values.mean(), "std": values.std(ddof=1), "n": len(values)}
+
+    numbers = {
+        "vehicle": file.table.vehicle, "title": file.table.title, "inside": abs(difference_deg) <= tolerance_deg,
+        "measured_deg": spread(measured), "ours_deg": {"nominal": nominal_deg, **spread(samples)},
+        "with_assumptions_deg": assumed_deg, "box": box, "difference_deg": difference_deg,
+        "tolerance_deg": tolerance_deg,
+        # Area between the cumulative distributions (Ferson, Oberkampf, Ginzburg 2008), common area of the densities.
+        "area_metric_deg": float(wasserstein_distance(samples, measured)),
+        "overlap": float(least.sum() * (grid[1] - grid[0])), "assumptions": list(file.table.assumptions),
+    }  # fmt: skip
+    return CircleValidation(file, distributions, numbers)
 
 
 def validate_circle(
@@ -152,12 +126,9 @@ def validate_circle(
         ends = [side[place] for side in ordered]
         cases += [file.changed(file.drawn(full, draw), *ends) for draw in half]
     found = np.split(np.array(drive(cases, 0.15, 1.0)), [samples, samples + len(half)])
-    return CircleValidation(
-        file, np.degrees(circle.steering_wheel_rad), nominal, assumed,
-        tuple((name, each.source, min(pair), max(pair))
-              for (name, each), pair in zip(intervals.items(), pairs, strict=True)),
-        *found,
-    )  # fmt: skip
+    named = [(name, each.source, min(pair), max(pair))
+             for (name, each), pair in zip(intervals.items(), pairs, strict=True)]  # fmt: skip
+    return judged(file, nominal, assumed, named, [np.degrees(circle.steering_wheel_rad), *found])
 
 
 def steering_wheel_deg(vehicle: str, case: Mapping[str, Any], roll_per_ay: float = 0.0) -> float:

@@ -169,30 +169,36 @@ def _picture(one: Part) -> Picture:
 
 
 def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
-    ours, measured = result.samples_deg, result.measured_deg
+    found, ours, measured = result.numbers, result.numbers["ours_deg"], result.numbers["measured_deg"]
     lead: list[Text] = [
         Markup("The mean difference of <b>{} deg</b> is {} the tolerance of {} deg ({}).").format(
-            typeset(f"{result.difference_deg:+.1f}"), passed("inside") if result.inside else failed("outside"),
-            f"{result.tolerance_deg:.1f}", result.file.tolerances[STEERING].source,
+            typeset(f"{found['difference_deg']:+.1f}"), passed("inside") if result.inside else failed("outside"),
+            f"{found['tolerance_deg']:.1f}", result.file.tolerances[STEERING].source,
         ),
-        f"Area metric {result.area_metric_deg:.1f} deg, overlap of the distributions {100.0 * result.overlap:.0f} %.",
+        f"Area metric {found['area_metric_deg']:.1f} deg, overlap of the distributions {100 * found['overlap']:.0f} %.",
     ]  # fmt: skip
     rows = [
-        ("measured", f"{measured.mean():.1f} +- {measured.std(ddof=1):.1f}", f"{len(measured)} values"),
-        ("predicted", f"{ours.mean():.1f} +- {ours.std(ddof=1):.1f}", f"{len(ours)} samples, nominal "
-         f"{result.nominal_deg:.1f}"),
-    ]  # fmt: skip
-    if two := result.assumed_deg != result.nominal_deg:
-        rows.append(("second prediction, without [circle.prediction]", f"{result.assumed_deg:.1f}", "nominal"))
-    sections = [Section("", (), [_distributions(result)], [_table(["steering wheel", "deg", ""], rows)])]
-    if result.ends:
-        low, high = result.box_deg
-        text = (
-            f"From {low:.1f} to {high:.1f} deg, {high - low:.1f} deg wide: {result.measured_inside} of {len(measured)} "
-            "measured angles lie inside. Values with one unknown true value are intervals; the others vary from lap to "
-            f"lap. The table gives the {'second ' * two}prediction with the ends of each interval alone."
+        (words, f"{one['mean']:.1f} +- {one['std']:.1f}", more)
+        for words, one, more in (
+            ("measured", measured, f"{measured['n']} values"),
+            ("predicted", ours, f"{ours['n']} samples, nominal {ours['nominal']:.1f}"),
         )
-        ends = [(name, f"{low:.1f}", f"{high:.1f}", source) for name, source, low, high in result.ends]
+    ]
+    if two := found["with_assumptions_deg"] != ours["nominal"]:
+        second = f"{found['with_assumptions_deg']:.1f}"
+        rows.append(("second prediction, without [circle.prediction]", second, "nominal"))
+    sections = [Section("", (), [_distributions(result)], [_table(["steering wheel", "deg", ""], rows)])]
+    if box := found["box"]:
+        text = (
+            f"From {box['low_deg']:.1f} to {box['high_deg']:.1f} deg, {box['width_deg']:.1f} deg wide: "
+            f"{box['measured_inside']} of {measured['n']} measured angles lie inside. Values with one unknown true "
+            "value are intervals; the others vary from lap to lap. The table gives the "
+            f"{'second ' * two}prediction with the ends of each interval alone."
+        )
+        ends = [
+            (each["name"], f"{each['low_deg']:.1f}", f"{each['high_deg']:.1f}", each["source"])
+            for each in box["intervals"]
+        ]
         head = ["interval", "low end, deg", "high end, deg", "source"]
         sections.append(Section("Probability box", [text], tables=[_table(head, ends)]))
     return lead, sections
@@ -203,16 +209,17 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[Text]]) -> Table:
 
 
 def _distributions(result: CircleValidation) -> Picture:
-    middle = float(result.measured_deg.mean())
-    tolerance = [middle - result.tolerance_deg, middle + result.tolerance_deg]
-    shown = [(result.measured_deg, "measured", "#777777"), (result.samples_deg, "predicted", RUN_COLOURS[2])]
-    if result.ends:
-        shown += [(result.lower_deg, "probability box", RUN_COLOURS[1]), (result.upper_deg, "", RUN_COLOURS[1])]
+    measured, tolerance = (result.numbers[key] for key in ("measured_deg", "tolerance_deg"))
+    around = [measured["mean"] - tolerance, measured["mean"] + tolerance]
+    box = RUN_COLOURS[1]
+    looks = [("measured", "#777777"), ("predicted", RUN_COLOURS[2]), ("probability box", box), ("", box)]
     curves = []
-    for values, label, colour in shown:
+    for values, (label, colour) in zip(result.distributions, looks, strict=True):
+        if not len(values):  # without intervals
+            continue
         fraction = np.repeat(np.arange(len(values) + 1) / len(values), 2)[1:-1]
         curves.append(Curve(np.repeat(np.sort(values), 2), fraction, label, colour))
-    area = Area(tolerance, 0.0, 1.0, "tolerance", "#777777", 0.15)
+    area = Area(around, 0.0, 1.0, "tolerance", "#777777", 0.15)
     panel = Panel("steering wheel angle [deg]", "cumulative fraction", curves, areas=[area])
     return Picture("", [panel], width_in=7.0, height_in=3.2)
 

@@ -16,7 +16,7 @@ import pytest
 
 from activesteer.config import read_toml
 from activesteer.errors import ActiveSteerError, ParameterError
-from activesteer.measured.circle import CircleValidation, steering_wheel_deg, validate_circle
+from activesteer.measured.circle import judged, steering_wheel_deg, validate_circle
 from activesteer.measured.folder_file import MeasuredFile, read_measured
 from activesteer.measured.pages import measured_page
 from activesteer.resources import find_vehicle
@@ -48,28 +48,27 @@ def file() -> MeasuredFile:
     return read_measured(FOLDER)
 
 
-def result(file: MeasuredFile, ours: np.ndarray, measured: np.ndarray) -> CircleValidation:
-    lower, upper = np.linspace(80.0, 90.0, 101), np.linspace(110.0, 120.0, 101)
-    ends = (("ratio", "source", 80.0, 120.0),)
-    return CircleValidation(file, measured, float(ours.mean()), 0.0, ends, ours, lower, upper)
+def result(file: MeasuredFile, ours: np.ndarray, measured: np.ndarray) -> dict[str, Any]:
+    box = np.linspace(80.0, 90.0, 101), np.linspace(110.0, 120.0, 101)
+    return judged(file, float(ours.mean()), 0.0, [("ratio", "source", 80.0, 120.0)], [measured, ours, *box]).to_json()
 
 
 def test_the_area_between_shifted_distributions_is_the_shift(file: MeasuredFile, rng: np.random.Generator) -> None:
     values = rng.normal(94.0, 1.3, 200)
-    assert result(file, values + 5.0, values).area_metric_deg == pytest.approx(5.0, abs=1e-9)
-    assert result(file, values, values).area_metric_deg == pytest.approx(0.0, abs=1e-9)
+    assert result(file, values + 5.0, values)["area_metric_deg"] == pytest.approx(5.0, abs=1e-9)
+    assert result(file, values, values)["area_metric_deg"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_distributions_apart_do_not_overlap_and_alike_ones_do(file: MeasuredFile, rng: np.random.Generator) -> None:
     values = rng.normal(94.0, 1.3, 200)
-    assert result(file, values + 30.0, values).overlap < 1e-3
-    assert result(file, values, values).overlap == pytest.approx(1.0, abs=0.01)
+    assert result(file, values + 30.0, values)["overlap"] < 1e-3
+    assert result(file, values, values)["overlap"] == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_tolerance_is_that_of_iso_19364(file: MeasuredFile) -> None:
     measured = np.array([99.0, 101.0])
-    assert result(file, measured + 7.9, measured).inside
-    assert not result(file, measured + 8.1, measured).inside
+    assert result(file, measured + 7.9, measured)["inside"]
+    assert not result(file, measured + 8.1, measured)["inside"]
 
 
 def test_too_few_samples_are_an_error(file: MeasuredFile) -> None:
@@ -126,12 +125,14 @@ def test_a_circle_of_any_car_needs_no_effects_and_its_intervals_may_be_keys(tmp_
     (tmp_path / "validation.toml").write_text(text, encoding="utf-8")
     found = validate_circle(read_measured(tmp_path), 10, 1)
     by_hand = 2.57 / 40.0 * 16.0  # wheelbase and ratio of some such car, within a half
-    assert found.nominal_deg == found.assumed_deg == pytest.approx(math.degrees(by_hand), rel=0.5)
+    numbers = found.numbers
+    nominal_deg, box = numbers["ours_deg"]["nominal"], numbers["box"]
+    assert nominal_deg == numbers["with_assumptions_deg"] == pytest.approx(math.degrees(by_hand), rel=0.5)
     # A smaller radius and softer front tyres both need more angle: the lower ends of these keys are the upper angles.
-    for (_, _, low, high), larger in zip(found.ends, ("39.0", "0.9"), strict=True):
-        assert low < found.nominal_deg < high, larger
-    assert found.box_deg[0] < min(end[2] for end in found.ends)
-    assert found.box_deg[1] > max(end[3] for end in found.ends)
+    for end, larger in zip(box["intervals"], ("39.0", "0.9"), strict=True):
+        assert end["low_deg"] < nominal_deg < end["high_deg"], larger
+    assert box["low_deg"] < min(end["low_deg"] for end in box["intervals"])
+    assert box["high_deg"] > max(end["high_deg"] for end in box["intervals"])
     lines = "\n".join(measured_page(found).lines())
     assert "factors.front_cornering_stiffness" in lines
 
@@ -235,10 +236,10 @@ def test_with_the_settings_of_the_source_the_angle_is_that_of_its_own_model(
 
 
 def test_the_box_lies_between_the_ends_of_the_intervals_and_counts_what_is_inside(file: MeasuredFile) -> None:
-    box = result(file, np.array([94.0, 95.0]), np.array([80.0, 81.0, 100.0, 119.0, 120.0]))
-    assert box.box_deg == pytest.approx((80.25, 119.75))
-    assert box.measured_inside == 3
-    assert box.to_json()["box"]["measured_deg"] == 100.0
+    box = result(file, np.array([94.0, 95.0]), np.array([80.0, 81.0, 100.0, 119.0, 120.0]))["box"]
+    assert (box["low_deg"], box["high_deg"]) == pytest.approx((80.25, 119.75))
+    assert box["measured_inside"] == 3
+    assert box["measured_deg"] == 100.0
 
 
 @pytest.mark.slow
