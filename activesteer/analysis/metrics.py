@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -26,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis import braking, frequency_response, handling, path_following, sine_with_dwell, step_response
-from activesteer.analysis.series import sizes
+from activesteer.analysis.series import peak, sizes
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 from activesteer.config import read_toml
 from activesteer.core.conventions import CORNERS, Array
@@ -34,8 +35,12 @@ from activesteer.core.metric_table import Metric, metric
 from activesteer.errors import RecordingError, nearest_names
 from activesteer.road.road import road_of
 
-SIGNALS: Final = ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad")
-"""Channels that are evaluated."""
+_MEASURABLE: Final[tuple[Callable[[RecordingLike], dict[str, float]], ...]] = (
+    *(partial(sizes, channel=channel) for channel in ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad")),
+    partial(peak, channel="steering_wheel_rad"),
+    lambda recording: {"speed_end_mps": float(recording["speed_mps"][-1])},
+)
+"""Functions that evaluate what a test car can measure."""
 
 
 def general_metrics(recording: RecordingLike) -> dict[str, float]:
@@ -49,27 +54,17 @@ def general_metrics(recording: RecordingLike) -> dict[str, float]:
     Raises:
         RecordingError: a channel is missing.
     """
-    values: dict[str, float] = {}
-    for channel in SIGNALS:
-        values |= sizes(recording, channel)
-    values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
-    values["friction_utilisation_max"] = max(
-        float(recording[f"{corner}_friction_utilisation"].max()) for corner in CORNERS
-    )
-    values["speed_end_mps"] = float(recording["speed_mps"][-1])
-    return values
+    use = max(float(recording[f"{corner}_friction_utilisation"].max()) for corner in CORNERS)
+    *values, end = (part(recording) for part in _MEASURABLE)
+    return {name: value for part in (*values, {"friction_utilisation_max": use}, end) for name, value in part.items()}
 
 
 def measured_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics whose channels were measured. A car on a proving ground has no sensors of tyre forces."""
     values: dict[str, float] = {}
-    for channel in SIGNALS:
+    for part in _MEASURABLE:
         with suppress(RecordingError):
-            values |= sizes(recording, channel)
-    with suppress(RecordingError):
-        values["steering_wheel_peak_abs_rad"] = float(np.abs(recording["steering_wheel_rad"]).max())
-    with suppress(RecordingError):
-        values["speed_end_mps"] = float(recording["speed_mps"][-1])
+            values |= part(recording)
     return values
 
 

@@ -22,15 +22,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.series import (
-    THRESHOLD_RAD,
-    counted,
-    crossing_time,
-    low_pass,
-    offset,
-    timestep,
-    zeroing_range,
-)
+from activesteer.analysis.series import THRESHOLD_RAD, crossing_time, low_pass, offset, peak, timestep, zeroing_range
 from activesteer.analysis.source import RecordingLike
 from activesteer.core.conventions import Array
 from activesteer.errors import RecordingError
@@ -148,21 +140,21 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
         - offset(recording[name], times.straight)
         for name in ("yaw_rate_radps", "ay_mps2")
     )
-    peak_s, peak = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
+    top_s, top = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
     values = {
         "steer_begin_time_s": times.begin_s,
         "steer_reversal_time_s": times.reversal_s,
         "steer_completion_time_s": times.completion_s,
-        "yaw_rate_reversal_peak_radps": -times.side * peak,
-        "yaw_rate_reversal_peak_time_s": peak_s,
+        "yaw_rate_reversal_peak_radps": -times.side * top,
+        "yaw_rate_reversal_peak_time_s": top_s,
     }
     for instant_s in INSTANTS_S:
         later = -times.side * _at(time_s, yaw_rate, times.completion_s + instant_s)
-        values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / peak
+        values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / top
     values["lateral_displacement_m"] = _displacement(recording, times)
     values["lateral_displacement_by_ay_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
-    for name, _, unit in (channel.rpartition("_") for channel in PEAKS):
-        values[f"{name}_peak_abs_{unit}"] = float(np.abs(counted(recording, f"{name}_{unit}")).max())
+    for channel in PEAKS:
+        values |= peak(recording, channel)
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     values["heading_end_rad"] = float(recording["yaw_rad"][-1] - recording["yaw_rad"][0])
     return values

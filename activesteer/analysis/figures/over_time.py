@@ -7,7 +7,6 @@ a path) have a time axis.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -223,14 +222,15 @@ def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> Non
         return
     quantity = panel.quantity
     left, right = axis.get_xlim()
+
+    def between(begin: float, curve: DrawnRun) -> Array:
+        time_s = curve.recording.time_s
+        return quantity.factor * curve.recording[quantity.channel][(time_s >= begin) & (time_s <= right)]
+
     corner = right - _INSET_WIDTH * (right - left)
-    low, high, corner_low, corner_high = math.inf, -math.inf, math.inf, -math.inf
-    for curve in kept:
-        values, time_s = curve.recording[quantity.channel] * quantity.factor, curve.recording.time_s
-        seen, beside = values[(time_s >= left) & (time_s <= right)], values[(time_s >= corner) & (time_s <= right)]
-        low, high = min(low, float(seen.min())), max(high, float(seen.max()))
-        corner_low = min(corner_low, float(beside.min(initial=0.0)))
-        corner_high = max(corner_high, float(beside.max(initial=0.0)))
+    seen = np.concatenate([between(left, curve) for curve in kept])
+    beside = np.concatenate([np.zeros(1), *(between(corner, curve) for curve in kept)])
+    low, high, corner_low, corner_high = map(float, (seen.min(), seen.max(), beside.min(), beside.max()))
     whole = max(float(np.abs(curve.recording[quantity.channel]).max()) for curve in drawn) * quantity.factor
     if whole < _INSET_FROM * max(abs(low), abs(high)):
         return
