@@ -92,16 +92,10 @@ def figure_7(recording: RecordingLike) -> Figure:
     zero = np.flatnonzero((ratio[:-1] < 0.0) & (ratio[1:] >= 0.0))
     if zero.size:
         at = 3.6 * float(np.interp(0.0, ratio[zero[0] : zero[0] + 2], speed_mps[zero[0] : zero[0] + 2]))
-        axis.annotate(
-            f"{at:.0f} km/h", (at, 0.0), (10, -16), textcoords="offset points", color="#555555",
-            fontsize=over_time.TEXT_PT,
-            arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.8},
-        )  # fmt: skip
+        arrow = {"arrowstyle": "-", "color": "#999999", "linewidth": 0.8}
+        over_time.note(axis, f"{at:.0f} km/h", (at, 0.0), (10, -16), arrowprops=arrow)
     for text, offset in (("in phase", 6), ("opposed", -12)):
-        axis.annotate(
-            text, (0.0, 0.0), (4, offset), textcoords="offset points", ha="left", color="#555555",
-            fontsize=over_time.TEXT_PT,
-        )  # fmt: skip
+        over_time.note(axis, text, (0.0, 0.0), (4, offset), ha="left")
     over_time.plain(axis, "rear angle over front angle,\nsteady [deg/deg]")
     axis.set_xlabel("speed [km/h]")
     axis.set_xlim(0.0, 3.6 * TOP_SPEED_MPS)
@@ -127,10 +121,8 @@ def figure_9(recording: RecordingLike) -> Figure:
         axis.plot(np.degrees(error_radps), activity, color=colour, linewidth=1.6, label=label)
         for name, value in (("off", off), ("in", full)):
             axis.axvline(math.degrees(value), color=colour, linewidth=0.8, linestyle=":")
-            axis.annotate(
-                f"$c_{{{name}}}$ = {math.degrees(value):.3g} deg/s", (math.degrees(value), 0.5), (3, 0), rotation=90,
-                textcoords="offset points", va="center", fontsize=over_time.TEXT_PT, color="#555555",
-            )  # fmt: skip
+            text = f"$c_{{{name}}}$ = {math.degrees(value):.3g} deg/s"
+            over_time.note(axis, text, (math.degrees(value), 0.5), (3, 0), rotation=90, va="center")
     over_time.plain(axis, "activity of the corrector [-]")
     axis.set_xlabel("yaw rate error, desired less actual [deg/s]")
     axis.set_xlim(-math.degrees(end), math.degrees(end))

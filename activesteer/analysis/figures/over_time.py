@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +120,12 @@ def plain(axis: Axes, title: str = "") -> None:
     axis.tick_params(labelsize=TEXT_PT, length=2.5, pad=2.0)
     for label in (axis.xaxis.label, axis.yaxis.label):
         label.set_fontsize(TEXT_PT)
+
+
+def note(axis: Axes, text: str, at: tuple[float, float], offset_pt: tuple[float, float], **look: Any) -> None:
+    """Write a small grey text beside a point."""
+    look = {"color": "#555555", **look}
+    axis.annotate(text, at, offset_pt, textcoords="offset points", fontsize=TEXT_PT, **look)
 
 
 def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, LineStyle]] = ()) -> None:
@@ -253,11 +259,9 @@ def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> Non
     inset.locator_params(axis="y", nbins=3, min_n_ticks=2)
     for label in inset.get_yticklabels():
         label.set_horizontalalignment("left")
-    axis.annotate(
-        "whole run", (place[0], place[1] + (0.0 if above else place[3])), (0, -2 if above else 2),
-        xycoords="axes fraction", textcoords="offset points", va="top" if above else "bottom", fontsize=TEXT_PT,
-        color="#555555", bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
-    )  # fmt: skip
+    below, white = place[1] + (0.0 if above else place[3]), {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
+    at, side = (place[0], below), "top" if above else "bottom"
+    note(axis, "whole run", at, (0, -2 if above else 2), xycoords="axes fraction", va=side, bbox=white)
     inset.grid(visible=True, axis="y", color="#dddddd", linewidth=0.5)
 
 
@@ -284,11 +288,9 @@ def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
         at_in = max(0.0, (at_s - left) / (right - left)) * width_in
         row = next((row for row, end in enumerate(ends) if end <= at_in), len(ends))
         ends[row : row + 1] = [at_in + _LETTER_IN * (len(words) + 1)]
-        axes[0].annotate(
-            words, (max(at_s, left), 1.0), (0, 2 + (TEXT_PT + 1.0) * row), xycoords=("data", "axes fraction"),
-            textcoords="offset points", va="bottom", fontsize=TEXT_PT, color="#555555",
-            ha="right" if ends[row] > width_in + _LETTER_IN else "left",
-        )  # fmt: skip
+        aligned = "right" if ends[row] > width_in + _LETTER_IN else "left"
+        above, high = (max(at_s, left), 1.0), 2 + (TEXT_PT + 1.0) * row
+        note(axes[0], words, above, (0, high), xycoords=("data", "axes fraction"), va="bottom", ha=aligned)
 
 
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:

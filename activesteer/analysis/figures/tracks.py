@@ -43,11 +43,9 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     _draw_course(axis, course, COURSE_ASPECT)
     for lane in course.lanes:
         text = f"{lane.name}\n" if lane.name else ""
-        axis.annotate(
-            f"{text}{lane.end_x_m - lane.start_x_m:.1f} m x {lane.left_y_m - lane.right_y_m:.2f} m",
-            (0.5 * (lane.start_x_m + lane.end_x_m), lane.left_y_m), (0, 5), textcoords="offset points",
-            ha="center", va="bottom", fontsize=TEXT_PT, color="#444444",
-        )  # fmt: skip
+        size = f"{lane.end_x_m - lane.start_x_m:.1f} m x {lane.left_y_m - lane.right_y_m:.2f} m"
+        middle = 0.5 * (lane.start_x_m + lane.end_x_m), lane.left_y_m
+        over_time.note(axis, text + size, middle, (0, 5), ha="center", va="bottom", color="#444444")
     return figure
 
 
