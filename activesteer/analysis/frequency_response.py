@@ -37,42 +37,19 @@ HIGHEST_Hz: Final = 4.0
 
 
 class FrequencyResponse(NamedTuple):
-    """Response of one output to the input.
+    """Response of one output to the input."""
 
-    Attributes:
-        frequency_Hz: Frequencies [Hz], shape (n,).
-        response: Output over input, complex, shape (n,).
-        coherence: Coherence, 0 to 1, shape (n,).
-        gain_error: Relative standard error of the gain by coherence and number of averages, shape (n,), or empty for
-            one run; it is also the standard error of the phase [rad].
-        averages: Number of independent segments.
-    """
-
-    frequency_Hz: Array
-    response: NDArray[np.complex128]
-    coherence: Array
+    frequency_Hz: Array  # frequencies [Hz], shape (n,)
+    response: NDArray[np.complex128]  # output over input, complex, shape (n,)
+    coherence: Array  # coherence, 0 to 1, shape (n,)
+    # relative standard error of the gain by coherence and number of averages, shape (n,), or empty for one run; it is
+    # also the standard error of the phase [rad]
     gain_error: Array = np.zeros(0)
-    averages: float = 1.0
+    averages: float = 1.0  # number of independent segments
 
 
-def frequency_response(
-    recording: RecordingLike,
-    output: str,
-    frequency_Hz: Array,
-) -> FrequencyResponse:
-    """Return the response of a channel to the steering.
-
-    Args:
-        recording: A run that begins and ends straight, with all frequencies in its steering.
-        output: Channel.
-        frequency_Hz: Frequencies [Hz]; the nearest lines of the spectrum are returned.
-
-    Returns:
-        Response and coherence at these lines.
-
-    Raises:
-        RecordingError: a channel is missing, or the steering does not contain a frequency.
-    """
+def frequency_response(recording: RecordingLike, output: str, frequency_Hz: Array) -> FrequencyResponse:
+    """Return the response of a channel to the steering, at the lines of the spectrum nearest to frequencies [Hz]."""
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     step_s = timestep(time_s)
     u = np.fft.rfft(np.asarray(recording[INPUT], dtype=np.float64))
@@ -163,17 +140,9 @@ _HANN_OVERLAP: Final = 1.0 + 2.0 / 36.0
 def random_response(
     recordings: Sequence[RecordingLike], output: str, lowest_Hz: float, highest_Hz: float
 ) -> FrequencyResponse:
-    """Return the response of a channel to random steering, at all lines of a range.
-
-    The segments are finite, and the response to the end of a segment is lost. The gain is therefore low by some per
-    mille if the response dies away within a second. The error holds for small deviations: coherence above some 0.3.
-
-    Args:
-        recordings: Runs with different random steering, of at least `SEGMENT_S` each, all with one time step.
-        output: Channel.
-        lowest_Hz: Least frequency [Hz].
-        highest_Hz: Greatest frequency [Hz].
-    """
+    """Return the response of a channel to random steering, at all lines of a range, from runs with one time step."""
+    # The segments are finite, and the response to the end of a segment is lost. The gain is therefore low by some per
+    # mille if the response dies away within a second. The error holds for small deviations: coherence above some 0.3.
     if not recordings:
         raise RecordingError("there is no run with random steering")
     from scipy import signal  # noqa: PLC0415 - slow to import, and lists of standards do not need it

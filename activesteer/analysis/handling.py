@@ -67,31 +67,7 @@ def car_of(recording: RecordingLike) -> CarGeometry:
 
 
 def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[str, float]:
-    """Return the steady-state handling from a test.
-
-    Args:
-        recording: A slow ramp to either side, from straight ahead: of the steering wheel at constant speed, or of the
-            speed on a circle.
-        car: Geometry of the car; by default from the recording's metadata.
-
-    Returns:
-        Gradients are over lateral acceleration, in rad/(m/s2), or nan if not defined.
-
-        - `understeer_gradient_radpmps2`: EG, at the road wheel; `steer_gradient_...` of steering wheel over ratio,
-          `ackermann_gradient_...` of l/R.
-        - `linear_range_mps2`: lateral acceleration at which the steer angle is 5 % off the line.
-        - `characteristic_speed_mps`: sqrt(l/EG); nan for a car that does not understeer.
-        - `roll_gradient_...`: roll angle, outwards positive. `sideslip_gradient_...`: sideslip angle at the centre of
-          gravity, in a left turn.
-        - `front_slip_gradient_...`, `rear_slip_gradient_...`: effective slip angles of the axles, that of the front one
-          with steering and roll steer.
-        - At constant speed `yaw_rate_gain_1ps` and `steering_wheel_gain_mps2prad`: yaw rate and lateral acceleration
-          per steering wheel angle.
-        - `limit_acceleration_mps2`: largest lateral acceleration.
-
-    Raises:
-        RecordingError: a channel is missing, or the run does not cover the range of the fit.
-    """
+    """Return the steady-state handling from a slow ramp; by default with the car in the recording's metadata."""
     car = car or car_of(recording)
 
     def channel(name: str) -> Array:
@@ -147,7 +123,30 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[s
 
 
 def handling_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the values of `evaluate`, and the speed at the end."""
+    """Return the steady-state handling from a test.
+
+    Args:
+        recording: A slow ramp to either side, from straight ahead: of the steering wheel at constant speed, or of the
+            speed on a circle. Its metadata describe the car.
+
+    Returns:
+        Gradients are over lateral acceleration, in rad/(m/s2), or nan if not defined.
+
+        - `understeer_gradient_radpmps2`: EG, at the road wheel; `steer_gradient_...` of steering wheel over ratio,
+          `ackermann_gradient_...` of l/R.
+        - `linear_range_mps2`: lateral acceleration at which the steer angle is 5 % off the line.
+        - `characteristic_speed_mps`: sqrt(l/EG); nan for a car that does not understeer.
+        - `roll_gradient_...`: roll angle, outwards positive. `sideslip_gradient_...`: sideslip angle at the centre of
+          gravity, in a left turn.
+        - `front_slip_gradient_...`, `rear_slip_gradient_...`: effective slip angles of the axles, that of the front one
+          with steering and roll steer.
+        - At constant speed `yaw_rate_gain_1ps` and `steering_wheel_gain_mps2prad`: yaw rate and lateral acceleration
+          per steering wheel angle.
+        - `limit_acceleration_mps2`: largest lateral acceleration; `speed_end_mps`.
+
+    Raises:
+        RecordingError: a channel is missing, or the run does not cover the range of the fit.
+    """
     return {**evaluate(recording), "speed_end_mps": float(recording["speed_mps"][-1])}
 
 

@@ -50,29 +50,17 @@ PEAKS: Final = ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad", "steeri
 
 
 class Steering(NamedTuple):
-    """Times and side of a sine with dwell.
+    """Times and side of a sine with dwell."""
 
-    Attributes:
-        side: 1 for a sine that begins to the left, -1 to the right.
-        begin_s: Time at which the wheel first passes 5 deg [s].
-        reversal_s: Time at which it passes the centre between the two halves [s].
-        completion_s: Time at which it is back at the centre after the second half [s].
-        straight: Samples before the sine in which every signal shall be zero.
-    """
-
-    side: float
-    begin_s: float
-    reversal_s: float
-    completion_s: float
-    straight: slice
+    side: float  # 1 for a sine that begins to the left, -1 to the right
+    begin_s: float  # time at which the wheel first passes 5 deg [s]
+    reversal_s: float  # time at which it passes the centre between the two halves [s]
+    completion_s: float  # time at which it is back at the centre after the second half [s]
+    straight: slice  # samples before the sine in which every signal shall be zero
 
 
 def steering(recording: RecordingLike) -> Steering:
-    """Return beginning, reversal and completion of a sine with dwell, interpolated between samples.
-
-    Raises:
-        RecordingError: the run holds no sine with dwell: the wheel does not turn to both sides and come back.
-    """
+    """Return beginning, reversal and completion of a sine with dwell, interpolated between samples."""
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     angle = low_pass(np.asarray(recording["steering_wheel_rad"]), timestep(time_s), STEERING_CUT_OFF_Hz)
     if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
