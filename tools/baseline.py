@@ -20,7 +20,7 @@ import numpy as np
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
-from activesteer.analysis.metrics import evaluation_of
+from activesteer.analysis.metrics import KEY_METRICS, evaluated_kind
 from activesteer.core.files import read_text, write_json
 from activesteer.core.metric_table import recorded_metric
 from activesteer.errors import ActiveSteerError, RecordingError
@@ -59,7 +59,7 @@ class Drift(NamedTuple):
 
 def key_metrics(recording: Recording) -> dict[str, float]:
     """Return the key metrics of a run, rounded to six digits."""
-    names = [metric.name for metric in evaluation_of(recording).key_metrics]
+    names = KEY_METRICS[evaluated_kind(recording)]
     if missing := [name for name in names if name not in recording.metrics]:
         raise RecordingError(f"{recording.metadata['maneuver']['name']}: there is no key metric {missing[0]}")
     return {name: float(f"{recording.metrics[name]:.6g}") for name in names}

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from activesteer.analysis.series import peak, sizes
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 from activesteer.config import read_toml
 from activesteer.core.conventions import CORNERS, Array
-from activesteer.core.metric_table import Metric, metric
+from activesteer.core.metric_table import metric
 from activesteer.errors import RecordingError, nearest_names
 from activesteer.road.road import road_of
 
@@ -185,16 +185,8 @@ def rollover_metrics(recording: RecordingLike) -> dict[str, float]:
     return values | general_metrics(recording)
 
 
-class Evaluation(NamedTuple):
-    """Evaluation of the runs of one kind of manoeuvre."""
-
-    metrics: Callable[[RecordingLike], dict[str, float]]  # function from a run to its metrics
-    # the metrics that are printed first and held against the baseline, the most telling first
-    key_metrics: tuple[Metric, ...]
-
-
 _TABLE: Final = read_toml(Path(__file__).with_name("key_metrics.toml"), RecordingError)[0]
-_METRICS: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
+EVALUATIONS: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "step_steer": step_response.step_response_metrics,
     "open_loop": general_metrics,
     "random_steer": general_metrics,
@@ -210,17 +202,17 @@ _METRICS: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "straight_braking": braking.straight_braking_metrics,
     "measured": measured_metrics,
 }
-EVALUATIONS: Final = {
-    kind: Evaluation(metrics, tuple(map(metric, _TABLE["key_metrics"].get(kind, _TABLE["key_metrics"]["open_loop"]))))
-    for kind, metrics in _METRICS.items()
+"""Kind of manoeuvre -> function from a run to its metrics."""
+KEY_METRICS: Final[dict[str, tuple[str, ...]]] = {
+    kind: tuple(_TABLE["key_metrics"].get(kind, _TABLE["key_metrics"]["open_loop"])) for kind in EVALUATIONS
 }
-"""Kind of manoeuvre -> its evaluation."""
+"""Kind of manoeuvre -> metrics that are printed first and held against the baseline, the most telling first."""
 KEY_FIGURES: Final = {title: tuple(metrics) for title, metrics in _TABLE["key_figures"].items()}
 """Title of a key figure -> names of metrics, of which the first one that a run has is shown."""
 
 
-def evaluation_of(recording: RecordingLike) -> Evaluation:
-    """Return the evaluation of a run's kind of manoeuvre."""
+def evaluated_kind(recording: RecordingLike) -> str:
+    """Return the kind of a run's manoeuvre, which must have an evaluation."""
     kind = maneuver_kind(recording)
     if kind not in EVALUATIONS:
         raise RecordingError(
@@ -229,7 +221,7 @@ def evaluation_of(recording: RecordingLike) -> Evaluation:
             key="maneuver.kind",
             value=kind,
         )
-    return EVALUATIONS[kind]
+    return kind
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
@@ -246,7 +238,7 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
             than two rows, or the run is not what its kind promises.
         ParameterError: the evaluation returns a metric that `metric_table` does not declare.
     """
-    values = evaluation_of(recording).metrics(Evaluable(recording)) | energy_metrics(recording)
+    values = EVALUATIONS[evaluated_kind(recording)](Evaluable(recording)) | energy_metrics(recording)
     if is_uneven(recording):
         values |= ride_metrics(Evaluable(recording))
     for name in values:

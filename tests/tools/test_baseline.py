@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from activesteer.analysis.metrics import EVALUATIONS
+from activesteer.analysis.metrics import KEY_METRICS
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tools import baseline
@@ -18,7 +18,7 @@ RUN = "slalom", "ars"
 
 def driven(**changed: float) -> dict[tuple[str, str], dict[str, float]]:
     """Return a slalom whose key metrics are all 2, except for the changed ones."""
-    return {RUN: {metric.name: 2.0 for metric in EVALUATIONS["slalom"].key_metrics} | changed}
+    return {RUN: dict.fromkeys(KEY_METRICS["slalom"], 2.0) | changed}
 
 
 def test_unchanged_metrics_do_not_drift():
