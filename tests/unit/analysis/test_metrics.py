@@ -10,7 +10,6 @@ import pytest
 from activesteer.analysis import step_response
 from activesteer.analysis.metrics import EVALUATIONS, KEY_METRICS, general_metrics, metrics, weighted, weighting
 from activesteer.core.conventions import CORNERS
-from activesteer.core.metric_table import METRICS
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.maneuver.kinds import KINDS
 from tests.raising import raises
@@ -58,13 +57,6 @@ def test_every_kind_of_manoeuvre_has_an_evaluation():
 @pytest.mark.parametrize("kind", EVALUATIONS)
 def test_a_kind_has_ten_different_key_metrics(kind):
     assert len(set(KEY_METRICS[kind])) == 10
-
-
-def test_the_tolerance_of_a_key_metric_grows_with_its_value():
-    metric = METRICS["ay_peak_abs_mps2"]
-    assert metric.tolerance_of(0.5) == 0.02
-    assert metric.tolerance_of(-8.0) == pytest.approx(0.08)
-    assert METRICS["cones_hit"].tolerance_of(300.0) == 0.0
 
 
 def test_peaks_and_root_mean_squares_of_a_sine():
