@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 import pyarrow as pa
 
-from activesteer.analysis.claims.judge import Claim
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
 from activesteer.analysis.harm import SIZES, harms, has_spun, is_lost, severity
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.core.conventions import Array
@@ -25,15 +25,16 @@ from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.core.units import DisplayUnit, display_unit
 from activesteer.errors import ManeuverError, ModelError, ParameterError, StudyError
 from activesteer.resources import studies_dir
-from activesteer.scenario import FileOrTable
-from activesteer.studies.engine.analysis import strongest
+from activesteer.scenario import FileOrTable, resolve
+from activesteer.simulation.preparation import with_amplitude_found
+from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.runs import CLAIM, CURVE, Row, run_command, versions
 from activesteer.studies.engine.study import StudyProgress, study
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.reproduction import nominal_claims
-from tools.proportions import Proportion, ProportionVerdict, percent, proportion_verdict
+from activesteer.studies.engine.workers import in_parallel
+from tools.proportions import Proportion, ProportionVerdict, percent, proportion_verdict, strongest
 
 SUMMARY: Final = "summary.json"
 NO_FACTOR: Final = "none"
@@ -414,6 +415,17 @@ def population(
         planned = comparison_study(controllers, samples, seed, vehicle)
     table = study(planned, output=output, jobs=jobs, scheduler=scheduler, progress=progress)
     return summarise(table, planned, nominal_claims(planned.vehicles[0], jobs=jobs) if planned.claims else ())
+
+
+def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None) -> list[Claim]:
+    """Return the claims of the nominal scenarios, without files."""
+    found = in_parallel(_claims_of, [(name, vehicle) for name in SCENARIOS], jobs)
+    return [claim for claims in found for claim in claims]
+
+
+def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
+    scenario = with_amplitude_found(resolve(name, vehicle))
+    return SCENARIOS[name]({system: run_scenario(scenario, system) for system in SYSTEMS})
 
 
 def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()) -> Population:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
+from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.claims.scorecard import LITERATURE, PAPER, VEHICLE, Scorecard, read_setting, scorecard
 from activesteer.analysis.figures import FORMATS, figure_2
 from activesteer.analysis.figures import draw_all as draw_runs
@@ -29,7 +29,7 @@ from activesteer.rigs.kc import rear_camber_figure
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.engine.workers import TaskQueue, in_parallel, workers_for
+from activesteer.studies.engine.workers import TaskQueue, workers_for
 from activesteer.studies.linear.identification import single_track_response
 from activesteer.studies.linear.linearisation import linear_response, linearise
 
@@ -144,17 +144,6 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
     except ActiveSteerError as error:
         return "; ".join([str(error), *getattr(error, "__notes__", [])])
     return ""
-
-
-def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None) -> list[Claim]:
-    """Return the claims of the nominal scenarios, without files."""
-    found = in_parallel(_claims_of, [(name, vehicle) for name in SCENARIOS], jobs)
-    return [claim for claims in found for claim in claims]
-
-
-def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
-    scenario = with_amplitude_found(resolve(name, vehicle))
-    return SCENARIOS[name]({system: run_scenario(scenario, system) for system in SYSTEMS})
 
 
 def write_page(results: Iterable[Reproduction], folder: Path) -> Path | None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from activesteer.studies.engine.analysis import strongest
+from tools.proportions import strongest
 
 Factors = dict[str, NDArray[np.float64]]
 
