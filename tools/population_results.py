@@ -30,7 +30,7 @@ from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.runs import CLAIM, CURVE, Row, run_command, versions
+from activesteer.studies.engine.runs import CLAIM, Row, run_command, versions
 from activesteer.studies.engine.study import StudyProgress, study
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import in_parallel
@@ -430,7 +430,7 @@ def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
 
 def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()) -> Population:
     """Count the results of a population's runs as far as it is. A comparison has no nominal claims."""
-    rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
+    rows = table.to_pylist()
     names = [label_of(controller) for controller in planned.controllers]
     failed = sum(row["status"] != "ok" for row in rows)
     samples = len({row["sample"] for row in rows})

@@ -25,7 +25,7 @@ from activesteer.core.metric_table import metric
 from activesteer.errors import StudyError
 from activesteer.resources import find_study, studies_dir
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.runs import CLAIM, CURVE, DISTANCE, drive
+from activesteer.studies.engine.runs import CLAIM, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import read_study
@@ -321,7 +321,7 @@ def _in_short(table: pa.Table) -> pa.Table:
             columns[name] = table[name].cast(pa.int16()) if name == "sample" else table[name].dictionary_encode()
         elif (
             name not in factors
-            and not name.startswith((CURVE, DISTANCE))
+            and not name.startswith(DISTANCE)
             and pa.types.is_floating(table.schema.field(name).type)
         ):
             columns[name] = table[name].cast(pa.float32())

@@ -307,8 +307,11 @@ def compare(
     found = []
     for name in names:
         if standard == "iso19365":
+            tolerance, (mean, confidence) = tolerances[name], mean_of(name)
             values = np.interp(time_s, simulated.time_s, simulated_of[name])
-            found.append(_timed(name, tolerances[name], time_s, *mean_of(name), values, allowed[name]))
+            low, high = corridor(time_s, values, tolerance.width(values) + allowed[name])
+            sides = mean, confidence, values, low, high, (mean >= low) & (mean <= high)
+            found.append(Compared(name, tolerance, time_s, *sides, allowed[name]))
         elif name not in (_ACROSS, "speed_mps"):
             width = tolerances[_ACROSS].width(simulated_of[_ACROSS]) + allowed[_ACROSS]
             curve = simulated_of[_ACROSS], width, simulated_of[name]
@@ -324,14 +327,6 @@ def _confidence(values: Array) -> Array:
     if count < 2:
         return np.zeros(values.shape[1])
     return t.ppf(0.975, count - 1) * values.std(axis=0, ddof=1) / math.sqrt(count)
-
-
-def _timed(
-    name: str, tolerance: Tolerance, time_s: Array, measured: Array, confidence: Array, simulated: Array, noise: float
-) -> Compared:
-    low, high = corridor(time_s, simulated, tolerance.width(simulated) + noise)
-    within = (measured >= low) & (measured <= high)
-    return Compared(name, tolerance, time_s, measured, confidence, simulated, low, high, within, noise)
 
 
 def _crossed(
