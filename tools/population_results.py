@@ -34,7 +34,8 @@ from activesteer.studies.engine.runs import CLAIM, Row, run_command, versions
 from activesteer.studies.engine.study import StudyProgress, study
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import in_parallel
-from tools.proportions import Proportion, ProportionVerdict, percent, proportion_verdict, strongest
+from tools.dependence import strongest
+from tools.proportions import Proportion, ProportionVerdict, percent, proportion_verdict
 
 SUMMARY: Final = "summary.json"
 NO_FACTOR: Final = "none"
@@ -414,11 +415,11 @@ def population(
     else:
         planned = comparison_study(controllers, samples, seed, vehicle)
     table = study(planned, output=output, jobs=jobs, scheduler=scheduler, progress=progress)
-    return summarise(table, planned, nominal_claims(planned.vehicles[0], jobs=jobs) if planned.claims else ())
+    return summarise(table, planned, _nominal_claims(planned.vehicles[0], jobs) if planned.claims else ())
 
 
-def nominal_claims(vehicle: FileOrTable = "compact", *, jobs: int | None = None) -> list[Claim]:
-    """Return the claims of the nominal scenarios, without files."""
+def _nominal_claims(vehicle: FileOrTable, jobs: int | None) -> list[Claim]:
+    """Return the claims of the nominal scenarios."""
     found = in_parallel(_claims_of, [(name, vehicle) for name in SCENARIOS], jobs)
     return [claim for claims in found for claim in claims]
 

@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from activesteer.core.metric_table import (
     CONES_HIT,
@@ -23,6 +25,9 @@ from activesteer.core.metric_table import (
     STAYS_IN_LANES,
     recorded_metric,
 )
+
+if TYPE_CHECKING:
+    from activesteer.recording import Recording
 
 Metrics = Mapping[str, float | None]
 """Metrics of a run. A value that is not defined is None or nan."""
@@ -72,6 +77,23 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
         yield f"hits {_cones(hit)}"
 
 
+def actuators_at_limit(recording: Recording) -> Iterator[str]:
+    """Describe for how long the steering actuators of a car that spins were at their limits before."""
+    sideslip_rad = np.abs(recording["sideslip_rad"])
+    if not len(sideslip_rad) or not sideslip_rad.max() > LOST_SIDESLIP_RAD:
+        return
+    before = slice(0, int(np.argmax(sideslip_rad > LOST_SIDESLIP_RAD)))
+    step_s = float(recording.time_s[1] - recording.time_s[0])
+    waited = {
+        words: step_s * float(np.any([recording[channel][before] for channel in limited], axis=0).sum())
+        for words, demand, limited in _STEERED
+        if all(channel in recording for channel in (demand, *limited)) and recording[demand][before].any()
+    }
+    said = [f"{words} for {seconds:.1f} s" for words, seconds in waited.items() if seconds >= _WORTH_SAYING_S]
+    if said:
+        yield f"before at a limit of angle, rate or torque: {' and '.join(said)}"
+
+
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
     """Describe the requirements that a run with these metrics met, or empty if the manoeuvre has none."""
     if metrics.get(STAYS_IN_LANES) == 1.0:
@@ -96,6 +118,11 @@ def _cones(count: float) -> str:
 
 FREE_SIDE_M: Final = 0.6
 """Path error that is no harm, where no lanes limit the path [m]: a car 1.8 m wide in a lane of 3.0 m. Chosen."""
+_STEERED: Final = (
+    ("rear steering", "rear_steer_demand_rad", ("rl_steer_saturated", "rr_steer_saturated")),
+    ("front superposition", "superposition_demand_rad", ("superposition_saturated",)),
+)
+_WORTH_SAYING_S: Final = 0.1
 NEEDED_DISPLACEMENT_M: Final = 1.83
 """Displacement of a sine with dwell below which a car turns too little [m]; FMVSS 126, S5.2.3."""
 _DEGREE: Final = math.pi / 180.0

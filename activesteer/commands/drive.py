@@ -213,7 +213,7 @@ def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
     names = KEY_METRICS[evaluated_kind(next(iter(recordings.values())))]
     chosen = {run: {name: found[name] for name in names if name in found} for run, found in metrics.items()}
     print(comparison(metrics if every else chosen, partial(_paint, metrics)))
-    _print_outcomes(metrics)
+    _print_outcomes(recordings)
     total = len({name for found in metrics.values() for name in found})
     if not every and total > len(names):
         print(f"{len(names)} of {total} metrics; --all prints all")
@@ -232,12 +232,13 @@ def _paint(
     return text if colour is None else terminal.painted(text, colour)
 
 
-def _print_outcomes(metrics: Mapping[str, Mapping[str, float]]) -> None:
+def _print_outcomes(recordings: Mapping[str, Any]) -> None:
     """Print in words for each run a loss of control, or that the car kept its lane."""
-    from activesteer.analysis.harm import kept, losses
+    from activesteer.analysis.harm import actuators_at_limit, kept, losses
 
-    for label, found in metrics.items():
-        for words, colour in ((losses(found), terminal.BAD), (kept(found), terminal.GOOD)):
+    for label, recording in recordings.items():
+        lost = [*losses(recording.metrics), *actuators_at_limit(recording)]
+        for words, colour in ((lost, terminal.BAD), (kept(recording.metrics), terminal.GOOD)):
             if text := ", ".join(words):
                 print(f"{label}: {terminal.painted(text, colour)}")
 

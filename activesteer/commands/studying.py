@@ -335,7 +335,7 @@ def _linearise(options: argparse.Namespace) -> None:
 
 def _modes(options: argparse.Namespace) -> None:
     from activesteer.scenario import check_gains
-    from activesteer.studies.linear.linearisation import eigenvalue_table, linear_car, linear_cars
+    from activesteer.studies.linear.linearisation import eigenvalue_table, linear_car
 
     speeds_kmh = options.speeds_kmh or [80.0]
     if len(speeds_kmh) > 1:
@@ -349,7 +349,7 @@ def _modes(options: argparse.Namespace) -> None:
         from activesteer.studies.linear.linearisation import draw_bode, draw_root_locus
 
         speeds = [speed / 3.6 for speed in _LOCUS_KMH]
-        systems = [each.state_space() for each in linear_cars(options.vehicle, speeds, overrides)]
+        systems = [linear_car(options.vehicle, speed, overrides).state_space() for speed in speeds]
         figures = [
             draw_bode(label, car.state_space(), options.output / "bode.png"),
             draw_root_locus(systems, speeds, options.output / "root_locus.png"),

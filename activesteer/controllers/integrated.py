@@ -25,8 +25,8 @@ steering compensates the moment of the brakes (see `lqr`), so the sides may diff
 pressure difference: a limit that falls with the errors of the car, and at most what the remaining angles can hold with
 the tyres in their present state.
 
-If an actuator does not follow its demand (`SupervisedActuator`), its measured position becomes its bounds. The state
-feedback is then computed for the other actuator alone, about the turn that is still possible. The controller gets no
+If an actuator does not follow its demand (`SupervisedActuator`), it holds its position. The state feedback is then
+computed for the other actuator alone, about the turn that is still possible. The controller gets no
 message about a fault.
 
 On a car whose electric axles can split their torque (`tv`), the difference of each axle is a further unknown, as the
@@ -87,13 +87,14 @@ def _solve(solve_once: Any, h: Array, f: Array, a: Array, lower: Array, upper: A
 class SupervisedActuator:
     """An actuator that must approach its demand.
 
-    An actuator is suspected if its distance from the demand was larger than a tolerance and it has not approached by a
-    tenth of this distance within a window. It counts as failed, until the end of the run, once it is suspected for as
-    long as the window. A slow actuator, a weak supply or a delayed bus still approach; an actuator that is stuck,
-    floats or runs away does not.
+    An actuator is suspected if all demands of a window were on the same side of its position, by more than a tolerance,
+    and it has not moved there by a tenth of the least distance. It counts as failed, until the end of the run, once it
+    is suspected for as long as the window. A slow actuator, a weak supply or a delayed bus still approach; an actuator
+    that is stuck, floats or runs away does not. An actuator that follows a demand that has turned back is sound.
 
     Attributes:
         failed: Whether the actuator has failed.
+        held_rad: Position in which it failed [rad]; its demand from then on, as a measured one would creep.
     """
 
     def __init__(self, tolerance_rad: float, window_s: float, interval_s: float) -> None:
@@ -108,26 +109,31 @@ class SupervisedActuator:
         self._steps = max(1, round(window_s / interval_s))
         self._seen: deque[tuple[float, float]] = deque(maxlen=self._steps + 1)
         self._suspected = 0
-        self.failed = False
+        self.failed, self.held_rad = False, 0.0
 
     def step(self, demand_rad: float, position_rad: float) -> bool:
         """Add a sample of demand and position [rad], and return whether the actuator has failed."""
         self._seen.append((demand_rad, position_rad))
         if len(self._seen) <= self._steps:
             return self.failed
-        demand_then_rad, position_then_rad = self._seen[0]
-        gap_rad = demand_then_rad - position_then_rad
+        position_then_rad = self._seen[0][1]
+        demands_rad = [demand for demand, _ in self._seen]
+        gap_rad = min(demands_rad) - position_then_rad
         moved_rad = position_rad - position_then_rad
         if gap_rad < 0.0:
-            gap_rad, moved_rad = -gap_rad, -moved_rad
+            gap_rad, moved_rad = position_then_rad - max(demands_rad), -moved_rad
         if gap_rad > self._tolerance_rad and moved_rad < 0.1 * gap_rad:
             self._suspected += 1
-            self.failed = self.failed or self._suspected > self._steps
+            if self._suspected > self._steps and not self.failed:
+                self.failed, self.held_rad = True, position_rad
         else:
             self._suspected = 0
         return self.failed
 
 
+_FROZEN_S = 0.1
+"""Time without any change after which a yaw rate sensor counts as frozen [s]: in a slide, yaw rate and noise change it
+in every sample."""
 _BRAKES = 4
 """Number of brake forces; after them come the differences of electric axles."""
 _LEAST_KN = 0.01
@@ -172,6 +178,7 @@ class Integrated:
         self._effects = self._per_moment * _KILO * np.concatenate([self._arms_m, tracks_m])
         self._no_rows = np.zeros((0, forces))
         self._demand_rad, self._brakes_Nm = (0.0, 0.0), NO_BRAKES
+        self._interval_s, self._yaw_rate_radps, self._unchanged_s = setup.timestep_s, 0.0, 0.0
         per_pressure_Nm = np.array(known.brake_torque_per_pressure_NmpPa) / known.rolling_radius_m
         self._side_moment_m3 = float(per_pressure_Nm @ np.abs(self._arms_m)) / 2.0
 
@@ -193,6 +200,11 @@ class Integrated:
             self._demand_rad, self._brakes_Nm = (0.0, 0.0), NO_BRAKES
             return ActuatorCommand(estimate=now)
         added, rear, steered_Nm = self._lqr.allocate(turn, command, measurement, works)
+        added = added if works[0] else self._supervised[0].held_rad
+        rear = rear if works[1] else self._supervised[1].held_rad
+        changed = measurement.yaw_rate_radps != self._yaw_rate_radps
+        self._yaw_rate_radps = measurement.yaw_rate_radps
+        self._unchanged_s = 0.0 if changed else self._unchanged_s + self._interval_s
         missing_Nm = self._missing_moment(now, driver, measurement.ay_mps2, steered_Nm)
         front_angle_rad = driver + measurement.superposition_rad
         used = self._slopes.used(now, front_angle_rad, measurement.rear_steer_rad)
@@ -243,7 +255,10 @@ class Integrated:
         if now.speed_mps < self._stability.least_speed_mps:
             return 0.0
         demand = stabilising(self._stability, borne - now.yaw_rate_radps, now.sideslip_rad)
-        demand *= self._lqr.authority * self._car.yaw_inertia_kgm2
+        # As with `esc`, the measured yaw rate is enough for the brakes where the estimator's model does not explain the
+        # car, as behind a jump of friction; but not a frozen one.
+        certain = self._lqr.authority if self._unchanged_s > _FROZEN_S else 1.0
+        demand *= certain * self._car.yaw_inertia_kgm2
         side, part = math.copysign(1.0, demand), min(abs(demand) / self._parameters.brake_threshold_Nm, 1.0)
         return part * side * max(side * (demand - steered_Nm), 0.0)
 

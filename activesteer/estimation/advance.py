@@ -70,7 +70,7 @@ def _filter(known, tyres, memory, said, line):
     memory.ax_mps2 = (said[SAID_AX] - memory.ax_offset_mps2) / (1.0 + known.pitch_gain)
     rate_mps2 = said[SAID_AX] / (1.0 + known.pitch_gain) + state[YAW_RATE] * state[LATERAL_SPEED]
     predict_speed(known, memory, rate_mps2, duration_s)
-    read_wheels(known, memory, line[(count - known.wheel_age) % length], duration_s)
+    read_wheels(known, tyres, memory, line[(count - known.wheel_age) % length], duration_s)
     predict(known, tyres, memory, duration_s)
     front_N, rear_N = forces_of(known, tyres, memory, state)
     follow_roll(known, memory, (front_N + rear_N) / known.mass_kg, duration_s)
@@ -117,7 +117,7 @@ def _write_estimate(known, memory):
     out[6] = lateral_std
     out[7] = math.atan2(lateral_std, max(speed, 0.0))
     out[8] = math.hypot(math.sqrt(covariance[YAW_RATE, YAW_RATE]), turning_radps)
-    out[9] = math.sqrt(covariance[FRICTION, FRICTION])
+    out[9] = math.hypot(math.sqrt(covariance[FRICTION, FRICTION]), known.friction_fraction * now[FRICTION])
     out[10], out[11] = now[FRONT_STIFFNESS], now[REAR_STIFFNESS]
     out[12] = math.sqrt(covariance[FRONT_STIFFNESS, FRONT_STIFFNESS])
     out[13] = math.sqrt(covariance[REAR_STIFFNESS, REAR_STIFFNESS])

@@ -3,7 +3,8 @@
 It measures the yaw rate r + b_r and the lateral acceleration a_y + g p + b_y with the roll angle p: an accelerometer
 leans with the body. Differences give the derivatives of the model. The unknowns of the model are
 
-    e_i     slip angle errors: Gauss-Markov processes of the size `slip_angle_std_rad` + `slip_angle_fraction` |a_i|
+    e_i     slip angle errors: Gauss-Markov processes of the size
+            `slip_angle_std_rad` + `slip_angle_fraction` |a_i| + `slip_angle_braking_s2radpm` |a_x|
     k_i     stiffness of the tyres of an axle relative to new ones, of the size `stiffness_std`, for `stiffness_s`: it
             shows at small slip angles, where the friction does not
     b_y     offset of the lateral accelerometer, likewise
@@ -141,8 +142,9 @@ def _forget(known, memory, duration_s, moved, slope, added):
     """Return the Gauss-Markov processes towards their means, and add their process noise."""
     vx_mps = max(memory.speed_mps, SLOWEST_MPS)
     front_rad, rear_rad = slip_angles(known, memory, memory.state, vx_mps)
-    front = known.slip_angle_std_rad + known.slip_angle_fraction * abs(front_rad)
-    rear = known.slip_angle_std_rad + known.slip_angle_fraction * abs(rear_rad)
+    toe_rad = known.slip_angle_std_rad + known.slip_angle_braking_s2radpm * abs(memory.ax_mps2)
+    front = toe_rad + known.slip_angle_fraction * abs(front_rad)
+    rear = toe_rad + known.slip_angle_fraction * abs(rear_rad)
     for place, mean, size, time_s in (
         (FRONT_ERROR, 0.0, front, known.slip_angle_s),
         (REAR_ERROR, 0.0, rear, known.slip_angle_s),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 
 from activesteer.config import Range
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.theory.single_track import SingleTrackParameters, TwoTrackParameters
 
 _Positive = Annotated[float, Range(1e-9)]
@@ -30,12 +31,20 @@ class EstimatorParameters:
     """Assumed friction of the road, relative to the road of the tyre files, until it is observed [-]: dry asphalt."""
     friction_std: _Positive = 0.25
     """Standard deviation of this friction: wet asphalt, 0.6, is likely enough; snow, 0.3, is possible."""
+    friction_fraction: _NotNegative = 0.05
+    """Standard deviation of the observed friction per friction, in the estimate only: the model's tyre is upright and
+    rolls straight ahead. On a ramp of the steering wheel (56 m radius) camber and turn slip take 4 to 8 % of the
+    Tesla's lateral forces. Such an error does not average out."""
     friction_s: _Positive = 10.0
     """Time constant with which the friction returns to the assumed value [s]."""
     slip_angle_std_rad: _Positive = math.radians(0.05)
     """Standard deviation of the slip angle error of an axle: toe, offset of the steering angle sensor [rad]."""
     slip_angle_fraction: _NotNegative = 0.05
     """Slip angle error per slip angle: camber, combined slip, curves that are not similar."""
+    slip_angle_braking_s2radpm: _NotNegative = math.radians(0.5) / GRAVITY_MPS2
+    """Slip angle error per longitudinal acceleration [rad s2/m]: 0.5 deg per g. Dive and brake forces change the toe of
+    the wheels of four cars by 0.03 to 1.5 deg per g, 0.55 deg on average. On a split road the wheel with more grip
+    decides."""
     stiffness_std: _Positive = 0.2
     """Standard deviation of the stiffness of the tyres of an axle, relative to new tyres under the known load: wear,
     temperature, winter tyres, load."""

@@ -4,7 +4,8 @@
     X   = (drive - brake - J w') / R
 
 The brake torque follows from the pressure. There is no measurement of the engine: while no brake works, the drive force
-is the force that accelerates the car plus its drag, distributed by the fractions of the driven wheels.
+is the force that accelerates the car plus its drag and the drag of steered wheels in a turn, F sin d, distributed by
+the fractions of the driven wheels.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from activesteer.estimation.records import (
     SAID_SPINS,
     YAW_RATE,
 )
+from activesteer.estimation.two_track_model import forces_of
 from activesteer.native.compilation import compiled
 
 STANDING_MPS: Final = 0.5
@@ -28,11 +30,12 @@ _BRAKING_NM: Final = 100.0
 
 
 @compiled
-def read_wheels(known, memory, said, duration_s):
+def read_wheels(known, tyres, memory, said, duration_s):
     """Compute loads, forces and speeds of the wheels.
 
     Args:
         known: Record of `known_of`.
+        tyres: Grids of front and rear tyres' lateral force [N].
         memory: Record of `MEMORY`; its values of the wheels, their forces and moment are changed.
         said: Measurement at the time of the filters.
         duration_s: Time since the last call [s].
@@ -48,7 +51,9 @@ def read_wheels(known, memory, said, duration_s):
         memory.last_spin_radps[wheel] = spin
     drive_N = 0.0
     if braking_Nm < _BRAKING_NM:
+        front_N, rear_N = forces_of(known, tyres, memory, state)
         drive_N = known.mass_kg * memory.ax_mps2 + known.drag_kgpm * memory.speed_mps**2
+        drive_N += front_N * math.sin(memory.front_angle_rad) + rear_N * math.sin(memory.rear_angle_rad)
     memory.moment_Nm = 0.0
     for wheel in range(4):
         front, side = wheel < 2, math.copysign(1.0, known.left_m[wheel])

@@ -1,36 +1,42 @@
-"""The available standards."""
+"""The available standards: what each page says about its scope, from standards.toml."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
+from activesteer.config import build, read_toml
 from activesteer.errors import ParameterError, nearest_names
-from activesteer.standards import (
-    fmvss126,
-    iso3888_2,
-    iso4138,
-    iso7401,
-    iso7975,
-    iso13674,
-    iso14512,
-    iso21994,
-    r79_circle,
-)
-from activesteer.standards.standard import Standard
+from activesteer.resources import DEFAULT_DRIVER
 
-STANDARDS: Final[dict[str, Standard]] = {
-    module.STANDARD.name: module.STANDARD
-    for module in (fmvss126, iso3888_2, iso4138, iso7401, iso7975, iso13674, iso14512, iso21994, r79_circle)
-}
+
+@dataclass(frozen=True)
+class Standard:
+    """A standard."""
+
+    title: str
+    edition: str  # its edition, and the source of the text
+    implemented: tuple[str, ...]  # the implemented parts, a sentence each
+    left_out: tuple[str, ...]  # the parts that are not implemented, or are implemented differently
+    driver: str = DEFAULT_DRIVER
+    # Whether the page lays the pictures of the controllers over each other; they must have the same panels
+    overlaid: bool = False
+    name: str = ""  # its name on the command line
+
+
+def _read() -> dict[str, Standard]:
+    tables, source = read_toml(Path(__file__).with_name("standards.toml"))
+    return {name: build(Standard, table | {"name": name}, source, (name,)) for name, table in tables.items()}
+
+
+STANDARDS: Final = _read()
 """Name -> standard."""
 
 
 def standard_of(name: str) -> Standard:
     """Return a standard by its name."""
-    if not name:
-        raise ParameterError(f"which standard? {nearest_names('', STANDARDS)}", value=name, allowed=tuple(STANDARDS))
     if name not in STANDARDS:
-        raise ParameterError(
-            f"there is no standard {name!r}; {nearest_names(name, STANDARDS)}", value=name, allowed=tuple(STANDARDS)
-        )
+        problem = f"there is no standard {name!r};" if name else "which standard?"
+        raise ParameterError(f"{problem} {nearest_names(name, STANDARDS)}", value=name, allowed=tuple(STANDARDS))
     return STANDARDS[name]

@@ -18,35 +18,39 @@ from activesteer.drawing.cars import bytes_of
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Panel, Picture
 from activesteer.scenario import FileOrTable, check_gains, check_parts, read_by, resolve
-from activesteer.standards.catalogue import standard_of
-from activesteer.standards.standard import Findings, NoResult, Standard
-from activesteer.standards.study_test_runner import StudyTestRunner
+from activesteer.standards import braking, fmvss126, iso3888_2, iso4138, iso7401, iso13674, r79_circle
+from activesteer.standards.catalogue import Standard, standard_of
+from activesteer.standards.standard import Findings, NoResult, StandardRunner
 from activesteer.studies.engine.factor_values import label_of
 from activesteer.studies.engine.runs import versions
 from activesteer.studies.engine.workers import workers_for
 
+EXAMINED_BY: Final[dict[str, Callable[[StandardRunner], Findings]]] = {
+    "fmvss126": fmvss126.examine,
+    "iso3888-2": iso3888_2.examine,
+    "iso4138": iso4138.examine,
+    "iso7401": iso7401.examine,
+    "iso7975": braking.in_a_turn,
+    "iso13674": iso13674.examine,
+    "iso14512": braking.on_split_friction,
+    "iso21994": braking.stop,
+    "r79-circle": r79_circle.examine,
+}
+"""Name of a standard -> function that drives and evaluates one car with one controller. A run that fails is a row;
+without any result the function raises `NoResult`."""
+
 
 @dataclass(frozen=True)
 class Examination:
-    """Result of a test.
-
-    Attributes:
-        standard: The standard.
-        vehicle: Name of the vehicle.
-        driver: Name of the driver.
-        overrides: Overrides of the user.
-        findings: Controller -> findings.
-        versions: Versions of the program and its libraries.
-        date: Date of the test [UTC].
-    """
+    """Result of a test."""
 
     standard: Standard
     vehicle: str
     driver: str
     overrides: Mapping[str, Any]
-    findings: Mapping[str, Findings]
-    versions: Mapping[str, str]
-    date: datetime.date
+    findings: Mapping[str, Findings]  # controller -> findings
+    versions: Mapping[str, str]  # versions of the program and its libraries
+    date: datetime.date  # date of the test [UTC]
 
     @property
     def failed(self) -> list[str]:
@@ -100,9 +104,9 @@ def examine(
                     progress(label, series, done, total)
 
             read = read_by(given, controller)
-            runner = StudyTestRunner(standard.name, vehicle, driver, controller, read, folder, workers, tell)
+            runner = StandardRunner(standard.name, vehicle, driver, controller, read, folder, workers, tell)
             try:
-                found[label] = standard.examine(runner)
+                found[label] = EXAMINED_BY[standard.name](runner)
             except NoResult as reason:
                 found[label] = Findings.without_result(reason)
     today = datetime.datetime.now(tz=datetime.UTC).date()

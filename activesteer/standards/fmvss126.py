@@ -10,7 +10,7 @@ from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S
 from activesteer.analysis.step_response import FIT, REFERENCE_MPS2
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.standard import SIDES, Findings, NoResult, Standard, StandardRun, TestRunner, cell
+from activesteer.standards.standard import SIDES, Findings, NoResult, StandardRun, StandardRunner, cell
 
 RAMP_DEGPS: Final = 13.5
 """Rate of the slowly increasing steer [deg/s]; S7.6."""
@@ -58,7 +58,8 @@ def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
     return broken
 
 
-def _examine(runner: TestRunner) -> Findings:
+def examine(runner: StandardRunner) -> Findings:
+    """Drive and evaluate one car with one controller."""
     a_deg, ramps_deg = _reference_angle(runner)
     mass_kg = runner.scenario("sine_with_dwell").car.config.single_track.mass_kg
     least_m = LEAST_DISPLACEMENT_M if mass_kg <= HEAVY_KG else LEAST_HEAVY_DISPLACEMENT_M
@@ -93,13 +94,12 @@ def _examine(runner: TestRunner) -> Findings:
     return Findings(values, _summary(series, broken), tables, _pictures(series, runs, least_m))
 
 
-def _reference_angle(runner: TestRunner) -> tuple[float, dict[str, list[float]]]:
+def _reference_angle(runner: StandardRunner) -> tuple[float, dict[str, list[float]]]:
     """Return A [deg], the mean of six slow ramps, and the angles of the ramps by side, rounded to 0.1 deg."""
     sensors = runner.scenario("slowly_increasing_steer").car.config.sensors
-    signs = {"left": 1.0, "right": -1.0}
     # Repetitions differ only by the noise of the sensors.
     noise = [{} if sensors.seed is None else {"sensors.seed": sensors.seed + number} for number in range(RAMPS)]
-    cases = [{"steer.rate_degps": sign * RAMP_DEGPS, **other} for sign in signs.values() for other in noise]
+    cases = [{"steer.rate_degps": sign * RAMP_DEGPS, **other} for sign in SIDES.values() for other in noise]
     runs = runner.drive("slowly_increasing_steer", "slowly_increasing_steer", cases, _RAMP)
     found = [math.degrees(abs(run.metric("steering_wheel_at_0_3g_rad"))) for run in runs]
     for run, angle in zip(runs, found, strict=True):
@@ -108,7 +108,7 @@ def _reference_angle(runner: TestRunner) -> tuple[float, dict[str, list[float]]]
             rate = f"{run.case['steer.rate_degps']:g} deg/s"
             raise NoResult(f"cannot be determined from the slow ramp at {rate}: {why}", key="A")
     rounded = [round(angle, 1) for angle in found]
-    sides = {side: rounded[RAMPS * number :][:RAMPS] for number, side in enumerate(signs)}
+    sides = {side: rounded[RAMPS * number :][:RAMPS] for number, side in enumerate(SIDES)}
     return round(sum(rounded) / len(rounded), 1), sides
 
 
@@ -180,34 +180,3 @@ def _pictures(series: list[dict[str, Any]], runs: list[StandardRun], least_m: fl
             ],
         ),
     ]
-
-
-STANDARD: Final = Standard(
-    name="fmvss126",
-    title="FMVSS 126 / UN R140: electronic stability control, sine with dwell",
-    edition=(
-        "49 CFR 571.126, S5.2 and S7.6 to S7.11, in the text of 2008 and later; UN Regulation 140 has the same "
-        "requirements. Written from knowledge of the public text; the range of the regression is that of NHTSA TP-126."
-    ),
-    implemented=(
-        "Slowly increasing steer at 13.5 deg/s and 80 km/h, three runs left and three right, of the car with its "
-        "controller. A is the steering wheel angle at 0.3 g by linear regression from 0.1 to 0.375 g, to 0.1 deg.",
-        "Sine of 0.7 Hz with a dwell of 500 ms at the second peak; the throttle is released at 80 km/h when it begins. "
-        "Amplitudes from 1.5 A in steps of 0.5 A to the greater of 6.5 A and 270 deg, at most 300 deg; left first and "
-        "right first.",
-        "Steering wheel angle filtered at 10 Hz, yaw rate and lateral acceleration at 6 Hz, by 12-pole phaseless "
-        "Butterworth filters, and zeroed over the second before the wheel turns at more than 75 deg/s for 200 ms.",
-        "Limits: 1.00 and 1.75 s after completion of steer, the yaw rate is at most 35 and 20 % of its first peak "
-        "after the reversal, in magnitude. The displacement 1.07 s after the beginning of steer, the double integral "
-        "of the lateral acceleration, is at least 1.83 m (1.52 m above 3500 kg) at 5 A and more.",
-    ),
-    left_out=(
-        "Check of the system against the definition in S5.1, detection of malfunctions, telltales (S5.3).",
-        "Brake and tyre conditioning (S7.4, S7.5): the model has no warm-up. Ambient conditions; outriggers.",
-        "With ideal sensors, the default, the three repetitions to each side are identical.",
-        "The car is driven as in its file; add driver and measuring equipment with --set load.* keys. The "
-        "choice between 1.83 and 1.52 m uses the mass of the car as driven, not its gross vehicle weight rating.",
-        "Road: even, 0.9 times the friction of the tyre file instead of a peak friction of 0.9 of a reference tyre.",
-    ),
-    examine=_examine,
-)

@@ -16,9 +16,8 @@ from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.standard import (
     Findings,
     NoResult,
-    Standard,
     StandardRun,
-    TestRunner,
+    StandardRunner,
     axis_label,
     cell,
     steering_wheel_at,
@@ -96,7 +95,8 @@ def weave_loops(signals: Signals) -> list[dict[str, Any]]:
     return found
 
 
-def _examine(runner: TestRunner) -> Findings:
+def examine(runner: StandardRunner) -> Findings:
+    """Drive and evaluate one car with one controller."""
     angle_deg = steering_wheel_at(runner, SPEED_KMH, AY_MPS2)
     [weave] = runner.drive("weave", _weave(angle_deg), [{"speed_kmh": SPEED_KMH}], curves=_CHANNELS)
     transition = runner.drive(
@@ -186,22 +186,3 @@ def transition_lines(signals: Signals) -> list[dict[str, Any]]:
 def _panels(signals: Signals) -> list[Panel]:
     shown = {name: quantity_of(name).factor * values for name, values in signals.items()}
     return [Panel(axis_label(x), axis_label(y), [Curve(shown[x], shown[y])]) for x, y in _PLOTS]
-
-
-STANDARD: Final = Standard(
-    name="iso13674",
-    title="ISO 13674: on-centre handling, weave and transition test",
-    edition="ISO 13674-1:2010 and ISO 13674-2:2016, as known from the literature; the texts were not available.",
-    implemented=(
-        "Weave: 0.2 Hz at 100 km/h with peaks of 2 m/s² of lateral acceleration, six periods, of which the last four "
-        "are evaluated. Gradients around zero and dead bands of lateral acceleration, yaw rate and hand torque over "
-        "steering wheel angle, and of hand torque over lateral acceleration.",
-        "Transition: from straight ahead at 5 deg/s of the steering wheel to 2 m/s², left and right. Slopes of lateral "
-        "acceleration and yaw rate within 0.5 m/s² of the centre; intercepts of the hand torque lines beyond 0.5 m/s².",
-    ),
-    left_out=(
-        "Polynomials fitted to measured loops. Deceleration, crosswind, crown and unevenness of the road.",
-        "The power assist is a constant fraction of the column's torque; its boost curve is not modelled.",
-    ),
-    examine=_examine,
-)

@@ -9,10 +9,8 @@ from typing import Final
 
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, cell, time_panels
+from activesteer.standards.standard import SIDES, Findings, StandardRun, StandardRunner, cell, time_panels
 
-DRIVER: Final = "expert"
-"""The standard requires a skilled driver."""
 MARGINS_M: Final = (0.1, 0.15, 0.2)
 """Margins of the lines at every speed [m]. The best one depends on car and speed."""
 THROTTLE_OFF_M: Final = 2.0
@@ -56,7 +54,8 @@ def best_run(runs: Sequence[StandardRun], highest_kmh: float | None) -> Standard
     return min(good, key=lambda run: run.metric("lane_overstep_m"), default=None)
 
 
-def _examine(runner: TestRunner) -> Findings:
+def examine(runner: StandardRunner) -> Findings:
+    """Drive and evaluate one car with one controller."""
     speeds: dict[str, float | None] = {}
     driven: dict[str, list[StandardRun]] = {side: [] for side in SIDES}
     for side in SIDES:
@@ -118,7 +117,7 @@ def _room(run: StandardRun) -> str:
 
 
 def _pictures(
-    runner: TestRunner, speeds: dict[str, float | None], driven: dict[str, list[StandardRun]]
+    runner: StandardRunner, speeds: dict[str, float | None], driven: dict[str, list[StandardRun]]
 ) -> list[Picture]:
     """Return pictures of the best run to each side: its track between the cones, and its channels over time."""
     best = {side: run for side, runs in driven.items() if (run := best_run(runs, speeds[side])) is not None}
@@ -143,27 +142,3 @@ def _pictures(
         Picture("Fastest clean runs, or the runs closest to clean", tracks),
         Picture("The same over time", time_panels(labelled, _SHOWN, 0.0, "the start")),
     ]
-
-
-STANDARD: Final = Standard(
-    name="iso3888-2",
-    title="ISO 3888-2: obstacle avoidance, highest entry speed without a cone hit",
-    edition=(
-        "ISO 3888-2:2011, as known from the literature; the text was not available. Sources differ on the "
-        "exit lane: it is 3 m wide here."
-    ),
-    implemented=(
-        "Lanes of 12, 13.5, 11, 12.5 and 12 m on a dry road (0.9 times the friction of the tyre file), the obstacle to "
-        "the left and to the right. The speed is held until 2 m into the entry lane, then the car coasts.",
-        "Highest entry speed at which the whole body stays in the lanes and no cone is hit: first every 5 km/h from 35 "
-        "to 80, then every 1 km/h above the highest clean one. Three lines are driven at each speed, with margins of "
-        "0.1, 0.15 and 0.2 m to the cones; one clean run suffices.",
-    ),
-    left_out=(
-        "Learning from run to run: the driver expert follows paths of least jerk and steers by the same rule at every "
-        "speed. Choose another driver with --driver.",
-        "Engine drag: the clutch is open while the car coasts. The distance of 2 m is measured at the front axle.",
-    ),
-    examine=_examine,
-    driver=DRIVER,
-)

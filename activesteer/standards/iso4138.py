@@ -13,7 +13,7 @@ from activesteer.core.metric_table import metric
 from activesteer.core.units import quantity_of
 from activesteer.errors import RecordingError
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.standards.standard import SIDES, Findings, Standard, StandardRun, TestRunner, axis_label, metrics_table
+from activesteer.standards.standard import SIDES, Findings, StandardRun, StandardRunner, axis_label, metrics_table
 
 RADIUS_M: Final = 100.0
 """Radius of the first method [m]."""
@@ -32,7 +32,8 @@ _DURATION_S: Final = 90.0
 _RESULT: Final = "understeer_gradient_radpmps2"
 
 
-def _examine(runner: TestRunner) -> Findings:
+def examine(runner: StandardRunner) -> Findings:
+    """Drive and evaluate one car with one controller."""
     config = runner.scenario("constant_radius").car.config
     single_track = config.single_track
     car = CarGeometry(single_track.cg_to_front_m, single_track.cg_to_rear_m, config.steering.ratio)
@@ -69,7 +70,7 @@ def _examine(runner: TestRunner) -> Findings:
     return Findings({"methods": values}, "; ".join(words), tables, pictures)
 
 
-def _fixed_angle(runner: TestRunner, car: CarGeometry) -> list[StandardRun]:
+def _fixed_angle(runner: StandardRunner, car: CarGeometry) -> list[StandardRun]:
     """Drive with the steering wheel at the Ackermann angle of the radius while the speed rises."""
     angle_deg = math.degrees(car.steering_ratio * car.wheelbase_m / FIXED_RADIUS_M)
     speed_mps = _START_KMH / 3.6
@@ -128,23 +129,3 @@ def _smooth(values: Array) -> Array:
     """Return the mean over half a second, for the picture."""
     width = 25
     return np.convolve(values, np.full(width, 1.0 / width), mode="valid") if len(values) > width else values
-
-
-STANDARD: Final = Standard(
-    name="iso4138",
-    title="ISO 4138: steady-state circular driving behaviour",
-    edition="ISO 4138:2021, as known from the literature; the text was not available.",
-    implemented=(
-        f"Constant radius {RADIUS_M:g} m at slowly rising speed; constant steering wheel angle, the Ackermann angle "
-        f"for {FIXED_RADIUS_M:g} m, at slowly rising speed; constant speed {SPEED_KMH:g} km/h at slowly rising "
-        "steering wheel angle. Each to the left and to the right, up to the limit of the car.",
-        "Gradients of steering, understeer, sideslip and roll over lateral acceleration, from 0.5 to 2 m/s²; lateral "
-        "acceleration at which the steer angle deviates by 5 % from the line; largest lateral acceleration.",
-    ),
-    left_out=(
-        "Discrete steady states: the speed or the angle rises slowly and continuously.",
-        "Steering wheel torque. Constant speed with constant radius (variation of the radius on fixed circles).",
-    ),
-    examine=_examine,
-    overlaid=True,
-)

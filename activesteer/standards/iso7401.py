@@ -24,9 +24,8 @@ from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.standard import (
     SIDES,
     Findings,
-    Standard,
     StandardRun,
-    TestRunner,
+    StandardRunner,
     metrics_table,
     steering_wheel_at,
     time_panels,
@@ -56,7 +55,8 @@ COHERENCE: Final = 0.95
 Responses = dict[str, FrequencyResponse]
 
 
-def _examine(runner: TestRunner) -> Findings:
+def examine(runner: StandardRunner) -> Findings:
+    """Drive and evaluate one car with one controller."""
     angle_deg = steering_wheel_at(runner, SPEED_KMH, STEP_MPS2)
     driven = runner.drive(
         "step_steer",
@@ -183,26 +183,3 @@ def _bode(name: str, found: Responses) -> Picture:
         panel("coherence [-]", lambda each: each.coherence, [(COHERENCE, f"bound {COHERENCE:g}")]),
     ]
     return Picture(f"{_NAMES[name][0].upper()}{_NAMES[name][1:]} over steering wheel angle", panels)
-
-
-STANDARD: Final = Standard(
-    name="iso7401",
-    title="ISO 7401: lateral transient response to step, continuous sinusoidal and random input",
-    edition="ISO 7401:2011, as known from the literature; the text was not available.",
-    implemented=(
-        "Step input at 80 km/h and 400 deg/s to the angle at which the tested car reaches 4 m/s² in a slow ramp, left "
-        "and right: steady state, response times to 90 %, peak response times, overshoot, TB.",
-        "Continuous sinusoidal input with rising frequency, 0.1 to 5 Hz, 9 deg: frequency responses of yaw rate, "
-        "lateral acceleration and roll angle from 0.2 to 4 Hz with phase and coherence, bandwidth, phase at 1 Hz.",
-        "Random input, 0.1 to 5 Hz with the same power at all frequencies, 12 runs of a minute, with a root mean "
-        "square of a fifth of the step's angle: the same frequency responses from averaged spectra (Hann windows of "
-        "20 s that overlap by half, estimate H1), with coherence and standard error.",
-        f"Ranges with a coherence below {COHERENCE:g} are listed. The bound is an assumption.",
-    ),
-    left_out=(
-        "Pulse and single-sine input. Speeds other than 80 km/h. Random steering by a driver, which has less power at "
-        "high frequencies.",
-        "Filters: the signals are those of the model, without noise.",
-    ),
-    examine=_examine,
-)

@@ -1,11 +1,12 @@
-"""A standard, its findings, the parts of its page, and the interface of its test runner."""
+"""Shared parts of the standards: test runner, runs, findings, tables and panels."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,11 +17,10 @@ from activesteer.core.units import quantity_of
 from activesteer.errors import ManeuverError, RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
-from activesteer.resources import DEFAULT_DRIVER
-
-if TYPE_CHECKING:
-    from activesteer.scenario import FileOrTable, Scenario
-
+from activesteer.scenario import FileOrTable, Scenario, resolve
+from activesteer.studies.engine.runs import CURVE, Status
+from activesteer.studies.engine.study import study
+from activesteer.studies.engine.workers import Workers
 
 _LEAD_S: Final = 0.2
 """Time by which a curve begins before time zero [s]."""
@@ -34,19 +34,12 @@ class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test
 
 @dataclass(frozen=True)
 class StandardRun:
-    """A finished run. The analysis reads it like a recording.
+    """A finished run. The analysis reads it like a recording."""
 
-    Attributes:
-        case: Values in which it differs from the other runs of its series.
-        metrics: Its metrics; empty if it failed or could not be evaluated.
-        channels: Kept channels over time, every `CURVE_STEP_S`.
-        error: Reason for missing metrics; empty if there are metrics.
-    """
-
-    case: Mapping[str, Any]
-    metrics: Mapping[str, float]
-    channels: Mapping[str, Array]
-    error: str
+    case: Mapping[str, Any]  # values in which it differs from the other runs of its series
+    metrics: Mapping[str, float]  # its metrics; empty if it failed or could not be evaluated
+    channels: Mapping[str, Array]  # kept channels over time, every `CURVE_STEP_S`
+    error: str  # reason for missing metrics; empty if there are metrics
 
     @property
     def time_s(self) -> Array:
@@ -86,12 +79,23 @@ class StandardRun:
         return Curve(time_s[shown], quantity_of(channel).factor * values[shown], **words)
 
 
-class TestRunner(Protocol):
-    """Interface of a test runner. `study_test_runner.StudyTestRunner` implements it."""
+@dataclass
+class StandardRunner:
+    """A car with a controller and a driver, whose series of runs share one set of workers."""
+
+    standard: str
+    vehicle: FileOrTable  # name, path or table of the vehicle
+    driver: FileOrTable  # name, path or table of the driver, or the file of a driver plug-in
+    controller: str  # name or file of the controller
+    overrides: Mapping[str, Any]  # overrides of the car: dotted key -> value
+    folder: Path | None  # folder for the studies, which can be resumed; None if they are not kept
+    workers: Workers  # processes that make the runs
+    progress: Callable[[str, int, int], None]  # called with the series, number of finished runs, and number of all runs
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
         """Resolve the car and a manoeuvre."""
-        ...
+        changes = {**(overrides or {}), **self.overrides}
+        return resolve(maneuver, self.vehicle, changes, self.driver, [self.controller])
 
     def drive(
         self,
@@ -102,26 +106,44 @@ class TestRunner(Protocol):
         curves: Sequence[str] = (),
     ) -> list[StandardRun]:
         """Drive a series of runs."""
-        ...
+        table = study(
+            {
+                "title": f"{self.standard}: {series}",
+                "maneuvers": [maneuver],
+                "vehicles": [self.vehicle],
+                "driver": self.driver,
+                "controllers": [self.controller],
+                "overrides": {**(overrides or {}), **self.overrides},
+                "design": {"kind": "list", "cases": [dict(case) for case in cases]},
+                **({"curves": list(curves)} if curves else {}),
+            },
+            output=None if self.folder is None else self.folder / series,
+            workers=self.workers,
+            progress=lambda counted: self.progress(series, counted.done, counted.total),
+        )
+        return [_run(row, case) for row, case in zip(table.to_pylist(), cases, strict=True)]
 
-    def fault_circles(self) -> list[dict[str, Any]]:
-        """Drive the faults of the controller's actuators and sensors (see `fault_circle.fault_circles`)."""
-        ...
+
+def _run(row: Mapping[str, Any], case: Mapping[str, Any]) -> StandardRun:
+    told = {*case, "run", "sample"}
+    return StandardRun(
+        case,
+        {name: value for name, value in row.items() if isinstance(value, float) and name not in told},
+        {
+            name.removeprefix(CURVE): np.asarray(value, dtype=np.float64)
+            for name, value in row.items()
+            if name.startswith(CURVE) and value is not None
+        },
+        "" if row["status"] == Status.OK else row["error"] or row["status"],
+    )
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Findings of a test of one car with one controller.
+    """Findings of a test of one car with one controller."""
 
-    Attributes:
-        values: Values that `--json` prints, with `pass` if the standard has limits.
-        summary: Verdict or findings in a sentence.
-        tables: Tables of the page.
-        pictures: Pictures of the page.
-    """
-
-    values: dict[str, Any]
-    summary: str
+    values: dict[str, Any]  # values that `--json` prints, with `pass` if the standard has limits
+    summary: str  # verdict or findings in a sentence
     tables: Sequence[Table] = field(default_factory=tuple)
     pictures: Sequence[Picture] = field(default_factory=tuple)
 
@@ -141,38 +163,12 @@ class Findings:
         return self.values.get("pass")
 
 
-@dataclass(frozen=True)
-class Standard:
-    """A standard.
-
-    Attributes:
-        name: Its name on the command line.
-        title: Its title.
-        edition: Its edition, and the source of the text.
-        implemented: The implemented parts, a sentence each.
-        left_out: The parts that are not implemented, or are implemented differently.
-        examine: Function that drives and evaluates one car with one controller. A run that fails is a row; without any
-            result it raises `NoResult`.
-        driver: Default driver.
-        overlaid: Whether the page lays the pictures of the controllers over each other; they must have the same panels.
-    """
-
-    name: str
-    title: str
-    edition: str
-    implemented: Sequence[str]
-    left_out: Sequence[str]
-    examine: Callable[[TestRunner], Findings]
-    driver: str = DEFAULT_DRIVER
-    overlaid: bool = False
-
-
 _RATE_DEGPS: Final = 5.0
 """Rate of the ramp [deg/s]. The car lags by some 0.1 s, which is half a degree."""
 _LONGEST_S: Final = 30.0
 
 
-def steering_wheel_at(runner: TestRunner, speed_kmh: float, ay_mps2: float) -> float:
+def steering_wheel_at(runner: StandardRunner, speed_kmh: float, ay_mps2: float) -> float:
     """Return the angle from a slow ramp to the left at constant speed."""
     [run] = runner.drive(
         f"ramp_{speed_kmh:g}kmh",
@@ -212,15 +208,7 @@ def axis_label(name: str) -> str:
     return f"{shown.label} [{shown.unit.name}]"
 
 
-class OverTime(Protocol):
-    """A run whose channels can be drawn."""
-
-    def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
-        """Return a channel over the time from an instant [s]."""
-        ...
-
-
-def time_panels(runs: Mapping[str, OverTime], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
+def time_panels(runs: Mapping[str, StandardRun], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
     """Return channels of runs over time, a panel each. Time counts from an instant, which is also given in words."""
     return [
         Panel(

@@ -1,4 +1,4 @@
-"""What `activesteer bench` measures: time of a step, of many cars, of a tyre.
+"""Time of a step, of many cars and of a tyre, as `activesteer bench` measures it.
 
 All times of a table come from one process, interleaved, so that their ratios are meaningful.
 """
@@ -9,21 +9,17 @@ import importlib.util
 import multiprocessing
 import os
 import tempfile
-import threading
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Final
 
 import mujoco
 import numpy as np
 
-from activesteer.core.conventions import CORNERS
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
-from activesteer.native.compilation import compiled
 from activesteer.scenario import Scenario, resolve
-from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
 from activesteer.simulation.batch import Batch
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
@@ -32,7 +28,6 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.simulation import Simulation
 from activesteer.tyre.report import bench as tyre_bench
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.brakes.brake_control_unit import step_brakes
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 
 ROUNDS: Final = 5
@@ -45,7 +40,7 @@ _PRODUCTION: Final = {"sensors.preset": "production"}
 
 
 def bench(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure one step at several stages, and the blocks of the loop; `docs/performance.md` explains the results."""
+    """Measure one step at several stages; `docs/performance.md` explains the results."""
     scenario, along_path = with_amplitude_found(resolve("step_steer")), resolve("slalom")
     sedan = with_amplitude_found(resolve("step_steer", "sedan"))
     sensed = with_amplitude_found(resolve("step_steer", overrides=_PRODUCTION))
@@ -63,18 +58,13 @@ def bench(rounds: int = ROUNDS) -> dict[str, float]:
             "own_controller_us": lambda: _closed_loop(scenario, _Nothing),
             "estimator_lqr_us": lambda: _closed_loop(sensed, "lqr"),
             "production_step_us": lambda: _closed_loop(sensed),
-            "sensors_and_brakes_us": DrivenStop().step_us,
             "two_threads_step_us": lambda: _closed_loop(scenario, threads=2),
         }
         if importlib.util.find_spec("daqp") is not None:
-            # Less a loop that replays its commands: a car with moving actuators costs the engine more.
-            asked = _asked(sensed, "integrated")
             stages["integrated_us"] = lambda: _closed_loop(sensed, "integrated")
-            stages["given_us"] = lambda: _closed_loop(sensed, "integrated", _Given(asked))
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
-    if "given_us" in best:
-        best["integrated_us"] -= best.pop("given_us")
-    best["estimator_lqr_us"] -= best["production_step_us"]
+    for name in {"integrated_us", "estimator_lqr_us"} & best.keys():
+        best[name] -= best["production_step_us"]
     best["own_controller_us"] -= best["closed_loop_step_us"]
     step_us = 1e6 * driven.vehicle.timestep_s
     for stage in ("closed_loop", "path_following", "with_file"):
@@ -87,7 +77,7 @@ def bench(rounds: int = ROUNDS) -> dict[str, float]:
     best["sedan_real_time_factor"] = step_us / best["sedan_step_us"]
     best["threads_2_speedup"] = best["closed_loop_step_us"] / best.pop("two_threads_step_us")
     best["step_steers_per_min"] = _runs_per_min()
-    return best | _blocks(scenario)
+    return best
 
 
 def _interleaved(stages: dict[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
@@ -98,7 +88,8 @@ def _interleaved(stages: dict[str, Callable[[], float]], rounds: int) -> dict[st
     return results
 
 
-def _per_call_us(function: Callable[..., object], count: int, *arguments: Any) -> float:
+def per_call_us(function: Callable[..., object], count: int, *arguments: Any) -> float:
+    """Return the mean time of a call [us]."""
     start = time.perf_counter()
     for _ in range(count):
         function(*arguments)
@@ -114,14 +105,14 @@ def _engine(scenario: Scenario, *, forces: bool) -> float:
     loop = ClosedLoop(scenario, _CONTROLLER)
     model, data = loop.vehicle.model, loop.vehicle.data
     if forces:
-        return _per_call_us(mujoco.mj_step, loop.steps, model, data)
+        return per_call_us(mujoco.mj_step, loop.steps, model, data)
     mujoco.mj_forward(model, data)
     carried = data.qfrc_passive.copy()
     remove_native_forces()
     try:
         mujoco.mj_forward(model, data)
         data.qfrc_applied[:] = carried - data.qfrc_passive
-        return _per_call_us(mujoco.mj_step, loop.steps, model, data)
+        return per_call_us(mujoco.mj_step, loop.steps, model, data)
     finally:
         install_native_forces()
 
@@ -141,16 +132,7 @@ class _KeptInputs:
     def replay_us(self) -> float:
         """Return the time of the engine alone per step of the same drive [us], all in one native call."""
         self.vehicle.restore_state(self._start)
-        return _per_call_us(self.vehicle.replay, 1, self._inputs) / len(self._inputs)
-
-
-def _asked(scenario: Scenario, controller: str) -> list[ActuatorCommand]:
-    """Return the commands of a controller in each step, without its estimates."""
-    loop, asked = ClosedLoop(scenario, controller), []
-    for _ in range(loop.steps):
-        loop.advance(1)
-        asked.append(loop.commands[1]._replace(estimate=None))
-    return asked
+        return per_call_us(self.vehicle.replay, 1, self._inputs) / len(self._inputs)
 
 
 class _Nothing:
@@ -160,41 +142,21 @@ class _Nothing:
         return ActuatorCommand()
 
 
-class _Given:
-    """Controller that replays commands."""
-
-    def __init__(self, asked: Sequence[ActuatorCommand]) -> None:
-        self._next = iter(asked).__next__
-
-    def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        return self._next()
-
-
-def _closed_loop(
-    scenario: Scenario, controller: Any = _CONTROLLER, given: _Given | None = None, threads: int = 0
-) -> float:
+def _closed_loop(scenario: Scenario, controller: Any = _CONTROLLER, threads: int = 0) -> float:
     """Return the time per step of a run, or of several together, each in a thread of its own [us]."""
     loops = [ClosedLoop(scenario, controller) for _ in range(max(threads, 1))]
     recorders = [Recorder(loop.vehicle, loop.steps) for loop in loops]
 
-    def drive(loop: ClosedLoop, recorder: Recorder) -> None:
-        if given is not None:
-            loop.controller = given
-        loop.advance(loop.steps, recorder)
-
     def run() -> None:
         if threads:
-            started = [threading.Thread(target=drive, args=pair) for pair in zip(loops, recorders, strict=True)]
-            for thread in started:
-                thread.start()
-            for thread in started:
-                thread.join()
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(lambda loop, recorder: loop.advance(loop.steps, recorder), loops, recorders))
         else:
-            drive(loops[0], recorders[0])
+            loops[0].advance(loops[0].steps, recorders[0])
         for recorder in recorders:
             recorder.flush()
 
-    return _per_call_us(run, 1) / sum(loop.steps for loop in loops)
+    return per_call_us(run, 1) / sum(loop.steps for loop in loops)
 
 
 def _runs_per_min() -> float:
@@ -224,89 +186,6 @@ def _with_file(scenario: Scenario, path: Path) -> float:
     return (time.perf_counter() - start) / simulation.steps * 1e6
 
 
-def _blocks(scenario: Scenario) -> dict[str, float]:
-    """Measure each block of the loop on its own, in the order of the data. The vehicle writes the rows."""
-    loop = ClosedLoop(scenario, _CONTROLLER)
-    vehicle = loop.vehicle
-    measurement, motion, setpoint = vehicle.measure(), vehicle.motion(), loop.maneuver.setpoint(0.6)
-    command = loop.driver.step(setpoint, measurement, motion)
-    steer = loop.controller.step(command, measurement)
-    found = {
-        "maneuver_us": _per_call_us(loop.maneuver.setpoint, _CALLS, 0.6),
-        "driver_us": _per_call_us(loop.driver.step, _CALLS, setpoint, measurement, motion),
-        "controller_us": _per_call_us(loop.controller.step, _CALLS, command, measurement),
-        "vehicle_us": 0.0,
-        "recorder_us": 0.0,
-    }
-    recorder = Recorder(vehicle, _CALLS)
-    vehicle.record_on(recorder.tape)
-    while recorder.rows < _CALLS:
-        start = time.perf_counter()
-        recorder.make_room()
-        found["recorder_us"] += (time.perf_counter() - start) / _CALLS * 1e6
-        steps = min(recorder.room, _CALLS - recorder.rows)
-        found["vehicle_us"] += _per_call_us(vehicle.step, steps, command, steer) * steps / _CALLS
-    found["recorder_us"] += _per_call_us(recorder.flush, 1) / _CALLS
-    return found
-
-
-_SCALARS: Final = (
-    "speed_mps", "yaw_rate_radps", "ay_mps2", "ax_mps2", "steering_wheel_rad", "rear_steer_rad", "superposition_rad",
-)  # fmt: skip
-_WHEELS: Final = 1 + len(_SCALARS)
-_PEDAL: Final = _WHEELS + len(CORNERS)
-
-
-class DrivenStop:
-    """A stop from 100 km/h with a working anti-lock system and the sensors of production cars.
-
-    Sensors, brakes and anti-lock system alone repeat it in native code.
-    """
-
-    def __init__(self) -> None:
-        scenario = resolve("straight_braking", overrides=_PRODUCTION)
-        recording = run_scenario(scenario)
-        speeds = [recording[f"{corner}_wheel_speed_radps"] for corner in CORNERS]
-        scalars = [recording[name] for name in _SCALARS]
-        self._rows = np.column_stack([recording.time_s, *scalars, *speeds, recording["brake_pedal"]])
-        # Use the state at the beginning of the recording, so that the brakes decide as they did.
-        self._vehicle = ClosedLoop(scenario).vehicle
-        self.anti_lock_fraction = self._drive()[1] / len(self._rows)
-
-    def _drive(self) -> tuple[float, int]:
-        """Return the duration of the work [s] and the number of steps with pressure reduced by the anti-lock system."""
-        (setup, state), sensors = self._vehicle.brakes, self._vehicle.sensors
-        assert sensors is not None
-        work = (
-            self._rows, sensors.chains, sensors.memory.copy(), setup["rolling_radius_m"][0] / len(CORNERS),
-            self._vehicle.timestep_s, *(record.copy().view(np.recarray)[0] for record in (setup, state)),
-        )  # fmt: skip
-        start = time.perf_counter()
-        held = _sense_and_brake(*work)
-        return time.perf_counter() - start, held
-
-    def step_us(self) -> float:
-        """Return the time of sensors, brakes and anti-lock system together in a step of the stop [us]."""
-        return 1e6 * self._drive()[0] / len(self._rows)
-
-
-@compiled
-def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
-    """Step sensors and brakes as `native_step.step` does. Return the number of steps with reduced pressure."""
-    asked_Nm, held = np.zeros(4), 0
-    for row in rows:
-        speeds = memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4]
-        step_brakes(setup, state, speeds, memory[AX], row[_PEDAL], 0.0, asked_Nm, 0.0)
-        held += state.allowed_Pa[0] < state.demand_Pa[0]
-        wheels, p = row[_WHEELS:_PEDAL], state.pressure_Pa
-        truth = (
-            row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7],
-            (wheels[0], wheels[1], wheels[2], wheels[3]), (p[0], p[1], p[2], p[3]),
-        )  # fmt: skip
-        measured(chains, memory, radii_m, timestep_s, truth)
-    return held
-
-
 def bench_tyre(rounds: int = ROUNDS) -> dict[str, float]:
     """Measure the cost of the tyres: one evaluation of the front tyre, and all four in the engine.
 
@@ -320,7 +199,7 @@ def bench_tyre(rounds: int = ROUNDS) -> dict[str, float]:
 
     def passive_us(present: float) -> float:
         header["n_wheels"] = present
-        return _per_call_us(mujoco.mj_passive, _CALLS, vehicle.model, vehicle.data)
+        return per_call_us(mujoco.mj_passive, _CALLS, vehicle.model, vehicle.data)
 
     found = _interleaved({"with": lambda: passive_us(wheels), "without": lambda: passive_us(0.0)}, rounds)
     four_us = min(found["with"]) - min(found["without"])

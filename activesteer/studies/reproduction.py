@@ -39,17 +39,12 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass
 class Reproduction:
-    """Result of a reproduction.
+    """Result of a reproduction."""
 
-    Attributes:
-        paths: Scenario -> system -> MCAP file.
-        failures: (scenario, system) -> reason why that run ended early; its file holds the rows up to then.
-        scorecard: Claims of the scenarios whose three runs are complete.
-        setting: Setting of all runs.
-    """
-
-    paths: dict[str, dict[str, Path]] = field(default_factory=dict)
+    paths: dict[str, dict[str, Path]] = field(default_factory=dict)  # scenario -> system -> MCAP file
+    # (scenario, system) -> reason why that run ended early; its file holds the rows up to then
     failures: dict[tuple[str, str], str] = field(default_factory=dict)
+    # Claims of the scenarios whose three runs are complete
     scorecard: Scorecard = field(default_factory=lambda: scorecard([]))
     setting: str = LITERATURE
 

@@ -10,11 +10,14 @@ arm.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from activesteer.config import read_toml
 from activesteer.core.conventions import Array
 from activesteer.errors import ParameterError, nearest_names
 
@@ -24,18 +27,12 @@ class LinkKind:
     """One link between chassis (or rack) and knuckle of the left side, with its elasticity."""
 
     name: str
-    inner: str
-    """Point on the chassis, or on the rack."""
-    outer: str
-    """Point on the knuckle; the two links of an arm share it."""
-    stiffness_Npm: float
-    """Rod and both bushings in series, unloaded [N/m]."""
-    hardening_Npm3: float
-    """Cubic part of the force [N/m3]."""
-    damping_Nspm: float
-    """Damping of the rubber [N s/m]."""
-    reason: str
-    """Meaning or source of these values."""
+    inner: str  # point on the chassis, or on the rack
+    outer: str  # point on the knuckle; the two links of an arm share it
+    stiffness_Npm: float  # rod and both bushings in series, unloaded [N/m]
+    hardening_Npm3: float  # cubic part of the force [N/m3]
+    damping_Nspm: float  # damping of the rubber [N s/m]
+    reason: str  # meaning or source of these values
 
 
 @dataclass(frozen=True)
@@ -43,11 +40,11 @@ class AxleKind:
     """One kind of suspension."""
 
     name: str
-    axles: tuple[str, ...]  # that can have it
+    axles: Sequence[str]  # that can have it
     links: tuple[LinkKind, ...]
-    points: tuple[str, ...]  # in addition to the ends of the links
+    points: Sequence[str]  # in addition to the ends of the links
     # Of a spring or damper: `strut`, `knuckle`, the `travel` of the wheel, or an arm with its one or two inner points.
-    carriers: dict[str, tuple[str, ...]]
+    carriers: Mapping[str, Sequence[str]]
     spring_on: str  # default carrier of the spring
 
     @property
@@ -67,7 +64,7 @@ class AxleKind:
         return tuple(dict.fromkeys((*self.points, *ends)))
 
     @property
-    def arms(self) -> dict[str, tuple[tuple[str, ...], str]]:
+    def arms(self) -> dict[str, tuple[Sequence[str], str]]:
         """Swinging parts: name -> inner points (one or two) and outer point."""
         arms = {}
         for name, inner in self.carriers.items():
@@ -77,85 +74,16 @@ class AxleKind:
         return arms
 
 
-def _link(name: str, stiffness: float, hardening: float, damping: float, reason: str, outer: str = "") -> LinkKind:
-    return LinkKind(name, f"{name}_inner", outer or f"{name}_outer", stiffness, hardening, damping, reason)
+def _read() -> Iterator[AxleKind]:
+    for table in read_toml(Path(__file__).with_name("axle_kinds.toml"))[0]["kind"]:
+        links = tuple(
+            LinkKind(name, f"{name}_inner", **({"outer": f"{name}_outer", "hardening_Npm3": 0.0} | link))
+            for name, link in table.pop("links", {}).items()
+        )
+        yield AxleKind(links=links, **table)
 
 
-_SPRINGS: Final = ("spring_inner", "spring_outer", "damper_inner", "damper_outer")
-_HANDLING, _COMFORT = "two hard handling bushings", "a hard and a soft comfort bushing, hardening"
-_ROD: Final = "rod, ball joints, and the rubber mounts of rack and subframe"
-_TIE_ROD: Final = _link("tie_rod", 1e6, 0.0, 3000.0, _ROD)
-_TOE_LINK: Final = _link("toe_link", 1.64e6, 0.0, 3000.0, "two bushings of 3.3 kN/mm")
-_TRAILING: Final = "two soft comfort bushings, hardening"
-
-MCPHERSON: Final = AxleKind(
-    "mcpherson",
-    ("front",),
-    (
-        _link("lca_front", 8.5e6, 0.0, 3000.0, _HANDLING, "lca_outer"),
-        _link("lca_rear", 1e6, 8e9, 2000.0, _COMFORT, "lca_outer"),
-        _link("tie_rod", 1.2e6, 0.0, 3000.0, _ROD),
-    ),
-    ("wheel_centre", "strut_top", "strut_bottom"),
-    {"strut": ()},
-    "strut",
-)
-
-_WISHBONES: Final = (
-    _link("uca_front", 5e6, 0.0, 3000.0, _HANDLING, "uca_outer"),
-    _link("uca_rear", 5e6, 0.0, 3000.0, _HANDLING, "uca_outer"),
-    _link("lca_front", 8.5e6, 0.0, 3000.0, _HANDLING, "lca_outer"),
-    _link("lca_rear", 2e6, 8e9, 2000.0, _COMFORT, "lca_outer"),
-)
-_ARMS: Final = {
-    "knuckle": (),
-    "lca": ("lca_front_inner", "lca_rear_inner"),
-    "uca": ("uca_front_inner", "uca_rear_inner"),
-}
-DOUBLE_WISHBONE: Final = AxleKind(
-    "double_wishbone", ("front",), (*_WISHBONES, _TIE_ROD), ("wheel_centre", *_SPRINGS), _ARMS, "lca"
-)
-DOUBLE_WISHBONE_REAR: Final = AxleKind(
-    "double_wishbone", ("rear",), (*_WISHBONES, _TOE_LINK), ("wheel_centre", *_SPRINGS), _ARMS, "lca"
-)
-FIVE_LINK: Final = AxleKind(
-    "five_link",
-    ("rear",),
-    (
-        _link("spring_link", 5.2e6, 0.0, 3000.0, _HANDLING),
-        _TOE_LINK,
-        _link("camber_link", 5.7e6, 0.0, 3000.0, _HANDLING),
-        _link("trailing_lower", 2.4e5, 3e9, 1500.0, _TRAILING),
-        _link("trailing_upper", 2.5e5, 3e9, 1500.0, _TRAILING),
-    ),
-    ("wheel_centre", *_SPRINGS),
-    {"knuckle": (), "spring_link": ("spring_link_inner",)},
-    "knuckle",
-)
-MULTILINK: Final = AxleKind(
-    "multilink",
-    ("rear",),
-    (
-        _link("upper_front", 5e6, 0.0, 3000.0, _HANDLING, "upper_outer"),
-        _link("upper_rear", 5e6, 0.0, 3000.0, _HANDLING, "upper_outer"),
-        _link("lateral_link", 5.2e6, 0.0, 3000.0, _HANDLING),
-        _link("trailing_link", 5e5, 3e9, 1500.0, _TRAILING),
-        _TOE_LINK,
-    ),
-    ("wheel_centre", *_SPRINGS),
-    {
-        "knuckle": (),
-        "lateral_link": ("lateral_link_inner",),
-        "trailing_link": ("trailing_link_inner",),
-        "upper": ("upper_front_inner", "upper_rear_inner"),
-    },
-    "knuckle",
-)
-
-CURVES: Final = AxleKind("curves", ("front", "rear"), (), ("wheel_centre",), {"travel": ()}, "travel")
-"""Measurements of a K&C rig guide the wheel instead of links. Springs and dampers act along its travel."""
-
-KINDS: Final = (MCPHERSON, DOUBLE_WISHBONE, DOUBLE_WISHBONE_REAR, FIVE_LINK, MULTILINK, CURVES)
+KINDS: Final = tuple(_read())
 DEFAULTS: Final = {"front": "mcpherson", "rear": "five_link"}
 
 

@@ -23,9 +23,8 @@ from activesteer.vehicle_builder.axle_kinds import AxleKind
 from activesteer.vehicle_builder.completion import DEFAULT_TYRE, check_origin, complete
 from activesteer.vehicle_builder.design import Assumption, CarDesign, Log
 from activesteer.vehicle_builder.kc_tables import KcTables, read_kc
-from activesteer.vehicle_builder.mjcf import mjcf_files
 from activesteer.vehicle_builder.table import CarTable, check_points, chosen_kinds, in_vehicle_axes, read_table
-from activesteer.vehicle_builder.texts import readme_text, vehicle_text
+from activesteer.vehicle_builder.texts import mjcf_files, readme_text, vehicle_text
 from activesteer.vehicle_builder.trim import Trimmed, compiled_model, trim
 
 

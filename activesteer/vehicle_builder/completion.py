@@ -92,12 +92,12 @@ def top_mount(
     else:
         upper, lower = points["damper_inner"], points["damper_outer"]
     along = (upper - lower) / np.linalg.norm(upper - lower)
-    axial = log.take(f"{key}.axial_Npm", table.axial_Npm, _AXIAL_NPM, "as in the compact", "N/m")
+    axial = log.take(key, table, "axial_Npm", _AXIAL_NPM, "as in the compact")
     directions, stiffness, rod = {"z": along}, {"z": axial}, None
     if kind.strut:
         if table.rod_mass_kg is not None:
             raise ParameterError(f"a strut has {axle}.strut_mass_kg instead", key=f"{key}.rod_mass_kg")
-        radial = log.take(f"{key}.radial_Npm", table.radial_Npm, _RADIAL_NPM, "as in the compact", "N/m")
+        radial = log.take(key, table, "radial_Npm", _RADIAL_NPM, "as in the compact")
         forward = np.array([1.0, 0.0, 0.0]) - along[0] * along
         forward /= np.linalg.norm(forward)
         directions = {"x": forward, "y": np.cross(along, forward), "z": along}
@@ -106,7 +106,7 @@ def top_mount(
         for name in ("radial_Npm", "radial_damping_Nspm"):
             if getattr(table, name) is not None:
                 raise ParameterError("a damper between two joints has no force across its axis", key=f"{key}.{name}")
-        kg = log.take(f"{key}.rod_mass_kg", table.rod_mass_kg, _ROD_KG, "piston and rod", "kg")
+        kg = log.take(key, table, "rod_mass_kg", _ROD_KG, "piston and rod")
         rod = Solid(kg, upper - _BELOW_MOUNT_M * along, np.array(_ROD_INERTIA_KGM2) * kg / _ROD_KG)
     damping = {}
     for name, value in stiffness.items():
@@ -142,10 +142,7 @@ def complete(
 ) -> CarDesign:
     """Make a car from a table in vehicle coordinates."""
     steering, brakes = table.steering, table.brakes
-    column_Npm = log.take(
-        "steering.column_stiffness_Npm", steering.column_stiffness_Npm, 4e6, "the compact's: torsion bar and assist",
-        "N/m",
-    )  # fmt: skip
+    column_Npm = log.take("steering", steering, "column_stiffness_Npm", 4e6, "the compact's: torsion bar and assist")
     servo_Nmprad = table.rear_steering.stiffness_Nmprad or _SERVO_NMPRAD
     kingpin_m = _kingpin(table, np.array(table.rear.points["wheel_centre"]), log)
     front, rear = (
@@ -175,10 +172,10 @@ def complete(
         table,
         front,
         rear,
-        log.take("width_m", table.width_m, round(float(track) + 0.27, 2), "greatest track + 0.27 m", "m"),
-        log.take("steering.rack_mass_kg", steering.rack_mass_kg, 3.0, "rack bar and half of the tie rods", "kg"),
-        log.take("steering.rack_limit_m", steering.rack_limit_m, rack_limit_m(front), "36 deg of steer angle", "m"),
-        log.take("steering.rack_friction_N", steering.rack_friction_N, 150.0, "the compact's, electric assist", "N"),
+        log.take("", table, "width_m", round(float(track) + 0.27, 2), "greatest track + 0.27 m"),
+        log.take("steering", steering, "rack_mass_kg", 3.0, "rack bar and half of the tie rods"),
+        log.take("steering", steering, "rack_limit_m", rack_limit_m(front), "36 deg of steer angle"),
+        log.take("steering", steering, "rack_friction_N", 150.0, "the compact's, electric assist"),
         rack_sign(front),
         column_Npm,
         kingpin_m,
@@ -215,10 +212,8 @@ def _axle(
     points = {name: np.array(point) for name, point in table.points.items()}
     front = axle == "front"
     centre, radius = points["wheel_centre"], float(parameters["UNLOADED_RADIUS"])
-    wheel_kg = log.take(
-        f"{axle}.wheel_mass_kg", table.wheel_mass_kg, round(18.5 * (radius / 0.316) ** 2, 1),
-        "18.5 kg at a tyre radius of 0.316 m, as its square", "kg",
-    )  # fmt: skip
+    usual_kg, rule = round(18.5 * (radius / 0.316) ** 2, 1), "18.5 kg at a tyre radius of 0.316 m, as its square"
+    wheel_kg = log.take(axle, table, "wheel_mass_kg", usual_kg, rule)
     if kind.guided:
         points |= {name: centre + np.array(beside) for name, beside in _DRAWN.items()}
     outer = np.mean([points[link.outer] for link in kind.links] or [points["damper_outer"]], axis=0)
@@ -235,14 +230,10 @@ def _axle(
     if not front:
         inside, inertia = centre - np.array([0.0, 0.04, 0.0]), (0.04, 0.05, 0.04)
         carrier = _solid(axle, "carrier", table, 6.0, inside, inertia, 6.0, "40 mm inside the wheel centre", log)
-    spin = log.take(
-        f"{axle}.wheel_spin_inertia_kgm2", table.wheel_spin_inertia_kgm2, wheel_kg * (0.736 * radius) ** 2,
-        "radius of gyration 0.736 of the tyre's radius", "kg m2",
-    )  # fmt: skip
-    across = log.take(
-        f"{axle}.wheel_inertia_kgm2", table.wheel_inertia_kgm2, wheel_kg * (0.56 * radius) ** 2,
-        "radius of gyration 0.56 of the tyre's radius", "kg m2",
-    )  # fmt: skip
+    spin, across = (
+        log.take(axle, table, key, wheel_kg * (of * radius) ** 2, f"radius of gyration {of} of the tyre's radius")
+        for key, of in (("wheel_spin_inertia_kgm2", 0.736), ("wheel_inertia_kgm2", 0.56))
+    )
     if spin > 2.0 * across:
         raise ParameterError(
             f"is {spin:.3g} and wheel_inertia_kgm2, about a diameter, {across:.3g} kg m2; no body has more than twice "
@@ -310,8 +301,8 @@ def _solid(
 ) -> Solid:
     """Return the mass properties of one part; a missing inertia scales with the mass."""
     key = f"{axle}.{part}"
-    mass_kg, cg, inertia = (getattr(table, f"{part}_{name}") for name in ("mass_kg", "cg", "inertia_kgm2"))
-    kg = log.take(f"{key}_mass_kg", mass_kg, default_kg, "a part of this kind in the compact's class", "kg")
+    cg, inertia = (getattr(table, f"{part}_{name}") for name in ("cg", "inertia_kgm2"))
+    kg = log.take(axle, table, f"{part}_mass_kg", default_kg, "a part of this kind in the compact's class")
     if cg is None:
         log.note(f"{key}_cg", " ".join(f"{value:.3f}" for value in default_cg) + " m", where)
     if inertia is None:
@@ -356,8 +347,9 @@ def _link(axle: str, kind: LinkKind, table: LinkTable, log: Log) -> LinkKind:
 def _damper_ratio(axle: str, table: AxleTable, measured: MeasuredAxle | None, log: Log) -> float:
     if measured is None:
         return 1.0
-    given = table.damper_ratio if table.damper_ratio is not None else measured.damper_ratio
-    return log.take(f"{axle}.damper_ratio", given, 1.0, "damper and stops as they act at the wheel")
+    if table.damper_ratio is None and measured.damper_ratio is not None:
+        return measured.damper_ratio
+    return log.take(axle, table, "damper_ratio", 1.0, "damper and stops as they act at the wheel")
 
 
 def _anti_roll_bar(axle: str, table: AxleTable, measured: MeasuredAxle | None, half_track: float, log: Log) -> float:
@@ -366,7 +358,7 @@ def _anti_roll_bar(axle: str, table: AxleTable, measured: MeasuredAxle | None, h
         return table.anti_roll_bar_Nmprad / (2.0 * half_track) ** 2
     if table.anti_roll_bar_Npm is None and measured is not None and measured.anti_roll_bar_Npm is not None:
         return measured.anti_roll_bar_Npm
-    return log.take(f"{axle}.anti_roll_bar_Npm", table.anti_roll_bar_Npm, 0.0, "no anti-roll bar", "N/m")
+    return log.take(axle, table, "anti_roll_bar_Npm", 0.0, "no anti-roll bar")
 
 
 def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:

@@ -1,15 +1,26 @@
-"""First-order motion of a corner at the design position: its travel, and the shortening of its tendons."""
+"""Motion of a corner: at the design position to first order, and from there to the standing car."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
-from activesteer.core.conventions import Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import ModelError
+from activesteer.vehicle import Vehicle
 
 _ROTATION_M = 0.3
 """Length that makes a rotation comparable with a displacement: the size of a knuckle."""
+
+
+def wheel_travel_m(vehicle: Vehicle) -> Array:
+    """Return the travel of each wheel from the design position to the standing car [m], shape (4,)."""
+    model, data, design = vehicle.model, vehicle.data, mujoco.MjData(vehicle.model)
+    mujoco.mj_kinematics(model, design)
+    chassis, wheels = model.body("chassis").id, [model.body(f"{corner}_wheel").id for corner in CORNERS]
+    turn = data.xmat[chassis].reshape(3, 3).T
+    now = [(turn @ (data.xpos[wheel] - data.xpos[chassis]))[2] for wheel in wheels]
+    return np.array(now) - (design.xpos[wheels, 2] - design.xpos[chassis, 2])
 
 
 def corner_motion(model: mujoco.MjModel, corner: str) -> tuple[dict[str, float], float]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from activesteer.config import to_table
 from activesteer.core.conventions import Array
+from activesteer.core.units import unit_of
 from activesteer.errors import ParameterError
 from activesteer.sensors.parameters import Sensors
 from activesteer.tyre.tyre_parameters import TyreParameters
@@ -73,11 +74,9 @@ class Axle:
     carrier: Solid | None
     spring: Mount
     damper: Mount
-    top_mount: TopMount | None
-    """Elasticity of the top mount, or None if it is rigid."""
+    top_mount: TopMount | None  # elasticity of the top mount, or None if it is rigid
     anti_roll_bar_Npm: float
-    measured: MeasuredAxle | None
-    """Measurements that an axle of curves has to match."""
+    measured: MeasuredAxle | None  # measurements that an axle of curves has to match
     ride_frequency_Hz: float | None
     damping_ratio: float | None
 
@@ -109,8 +108,7 @@ class CarDesign:
     rack_mass_kg: float
     rack_limit_m: float
     rack_friction_N: float
-    rack_sign: float
-    """-1 if the rack moves to the right to steer left (tie rods behind the steering axis), else 1."""
+    rack_sign: float  # -1 if the rack moves to the right to steer left (tie rods behind the steering axis), else 1
     column_stiffness_Npm: float
     kingpin_m: tuple[Array, Array]
     rear_limit_rad: float
@@ -142,11 +140,11 @@ class Log:
     def __init__(self) -> None:
         self.assumptions: list[Assumption] = []
 
-    def take(self, key: str, given: float | None, default: float, rule: str, unit: str = "") -> float:
-        """Return the given value, or the default, which is then noted."""
-        if given is not None:
+    def take(self, path: str, part: Any, name: str, default: float, rule: str) -> float:
+        """Return a value of a part of the table, or the default, which is then noted."""
+        if (given := getattr(part, name)) is not None:
             return given
-        self.note(key, f"{default:.4g} {unit}".strip(), rule)
+        self.note(f"{path}.{name}" if path else name, f"{default:.4g} {unit_of(name)}".strip(), rule)
         return default
 
     def angle(self, key: str, given_rad: float | None, default_deg: float, rule: str) -> float:

@@ -1,6 +1,6 @@
 """A folder of K&C tables of a laboratory: files, units, names and signs become samples of the left wheel.
 
-Each file is AXLE_TEST.csv, or AXLE_TEST.toml with the columns as lists (`rigs.kc.tables.TESTS` names the tests). The
+Each file is AXLE_TEST.csv, or AXLE_TEST.toml with the columns as lists (`rigs.kc.result.TESTS` names the tests). The
 samples of the right wheel are mirrored and added to those of the left wheel. Both branches of a loop are kept, and the
 fitted curve averages them. `names.toml` gives the channel names of a laboratory and the signs that differ:
 
@@ -15,8 +15,9 @@ question.
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -91,8 +92,7 @@ class KcTables:
     """All tests of a car: axle -> test -> samples; and the ratio of its steering if measured."""
 
     tests: dict[str, dict[str, Samples]] = field(default_factory=dict)
-    rack_per_steering_wheel_m: float | None = None
-    """Rack travel per angle of the steering wheel [m/rad]."""
+    rack_per_steering_wheel_m: float | None = None  # rack travel per angle of the steering wheel [m/rad]
 
 
 def read_kc(folder: Path, axles: list[str]) -> KcTables:
@@ -246,7 +246,7 @@ def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
         wheel = {key.removeprefix(f"{side}_"): value for key, value in columns.items() if key.startswith(f"{side}_")}
         if not wheel:
             continue
-        mirror = -1.0 if side == "right" and test.mirror == "opposed" else 1.0
+        mirror = -1.0 if side == "right" and not test.mirrored else 1.0
         if test.variable == "travel":
             if "travel" not in wheel:
                 raise ParameterError("was not measured", file=file.name, key=f"{side}_travel")
@@ -284,50 +284,31 @@ def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
 _NEAR: Final = {"travel": 0.02, "rack": 0.02, "force": 1500.0, "moment": 100.0}
 """Variable -> range about zero within which a slope counts [m, N, N m]."""
 _HINT: Final = f" ({NAMES_FILE} turns the sign of a channel)"
-_MUST_RISE: Final = (
-    ("parallel_travel", "load", "the wheel load falls in bump: is travel positive in bump?"),
-    ("steering", "-toe", "the left wheel turns to the right as the rack steers left: signs of rack and toe?"),
-    # The force does work at the contact point; a wheel that leans over may move its centre the other way.
-    ("side_force", "contact_outwards", "the contact moves against the side force: sign of force or way outwards?"),
-    ("braking_force", "contact_forward", "the contact moves against the longitudinal force: sign of force or way?"),
-    ("drive_force", "centre_forward", "the wheel moves against the longitudinal force: sign of force or way?"),
-    ("aligning_moment", "-toe", "the wheel turns against the moment: sign of moment or toe?"),
-)
-"""Test, channel that has to rise with the variable, and message if it falls."""
+_UNITS: Final = {"deg/m": np.degrees(1.0), "mm/m": 1e3, "deg/kN": np.degrees(1e3)}
+_CHECKS: Final = read_toml(Path(__file__).with_name("kc_checks.toml"))[0]
 
 
 def check_signs(tests: dict[str, Samples]) -> None:
     """Check the signs of the slopes."""
-    for name, channel, words in ((name + end, *rest) for name, *rest in _MUST_RISE for end in ("", "_opposed")):
+    for row, end in itertools.product(_CHECKS["must_rise"], ("", "_opposed")):
+        name, channel = row["test"] + end, row["channel"]
         if name not in tests or (slope := _slope(name, tests[name], channel)) is None:
             continue
         if slope < -_least(name, channel, tests[name]):
-            raise ParameterError(words + _HINT, file=tests[name].file, key=channel.removeprefix("-"))
+            raise ParameterError(row["words"] + _HINT, file=tests[name].file, key=channel.removeprefix("-"))
 
 
 def unusual(axle: str, tests: dict[str, Samples]) -> Iterator[str]:
     """Return questions about unusual measurements."""
-    per_m, per_kN = np.degrees(1.0), np.degrees(1e3)
-    front = axle == "front"
-    rows: tuple[tuple[str, str, float, Callable[[float], bool], str], ...] = (
-        ("parallel_travel", "toe", per_m, lambda x: not front and x < -1.0,
-         "toe-out in bump at the rear: is the sign of the file ISO (toe-in positive)?"),
-        ("parallel_travel", "toe", per_m, lambda x: front and x > 3.0,
-         "toe-in in bump at the front: is the sign of the file ISO (toe-in positive)?"),
-        ("parallel_travel", "toe", per_m, lambda x: abs(x) > 40.0, "is toe in degrees, or travel in millimetres?"),
-        ("parallel_travel", "camber", per_m, lambda x: x > 3.0,
-         "the top leans out in bump: is camber negative with the top inwards in the file?"),
-        ("parallel_travel", "centre_forward", 1e3, lambda x: not front and x > 30.0,
-         "the rear wheel moves forwards in bump: does x point forwards in the file?"),
-        ("side_force", "toe", per_kN, lambda x: (x < -0.03) if front else (x > 0.03),
-         "side force steers into the turn in front or out of it behind: sign of the force or of toe?"),
-        ("side_force", "camber", per_kN, lambda x: x > 0.05,
-         "a force outwards at the road leans the top outwards: sign of the force or of camber?"),
-    )  # fmt: skip
-    for name, channel, factor, odd, words in rows:
-        if name in tests and (slope := _slope(name, tests[name], channel)) is not None and odd(factor * slope):
-            unit = "deg/kN" if factor == per_kN else "deg/m" if factor == per_m else "mm/m"
-            yield f"{tests[name].file}: {channel} {factor * slope:+.3g} {unit}: {words}"
+    for row in _CHECKS["unusual"]:
+        name, channel, unit = row["test"], row["channel"], row["unit"]
+        if axle not in row.get("axles", (axle,)) or name not in tests:
+            continue
+        if (slope := _slope(name, tests[name], channel)) is None:
+            continue
+        value = _UNITS[unit] * slope
+        if value < row.get("below", -np.inf) or value > row.get("above", np.inf):
+            yield f"{tests[name].file}: {channel} {value:+.3g} {unit}: {row['words']}"
 
 
 def _slope(name: str, samples: Samples, channel: str) -> float | None:

@@ -1,18 +1,19 @@
-"""Text files of a built car: vehicle file, README and table.
+"""Text files of a built car: MJCF, vehicle file, README, and the table of a measured car.
 
-With it, `activesteer vehicle new NAME --kc DIR` makes the same car again, with curves instead of links.
+With the table, `activesteer vehicle new NAME --kc DIR` makes the same car again, with curves instead of links.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
-from string import Template
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from activesteer.config import read_toml, to_table, toml_text
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
@@ -23,44 +24,22 @@ from activesteer.simulation.two_track_search import two_track_lines
 from activesteer.theory.single_track import TwoTrackParameters
 from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle.statics import mass_properties
-from activesteer.vehicle_builder.design import CarDesign, hardware_tables, in_degrees
-from activesteer.vehicle_builder.trim import Trimmed
+from activesteer.vehicle_builder.completion import rack_per_steer_m
+from activesteer.vehicle_builder.design import Axle, CarDesign, hardware_tables, in_degrees
+from activesteer.vehicle_builder.trim import Trimmed, TrimmedAxle
 
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
 """Ratio of the effective cornering stiffness of an axle to the stiffness of its tyres, in the compact: compliance and
 roll steer."""
-_REMARKS: Final = {
-    "dampers.front": "Compression positive.",
-    "curves.front": (
-        "Cubic splines through the points. Toe-in, camber with the top outwards, caster with the top to the rear,\n"
-        "bump and a rack that steers left are positive. Curves of the unloaded guide; under load the car has the "
-        "measured curves."
-    ),
-    "curves.rear": "As for the front axle, without a rack.",
-    "friction": "Dry friction; vibration as in the compact's file (a road of class A at 80 km/h).",
-    "brakes": "Torque per wheel at full pedal.",
-    "rear_actuator": "Replaces the hinges of the model.",
-    "superposition_actuator": "Replaces the servo of the model.",
-    "battery": "Limits at the terminals.",
-    "sensors": "Sensors that the controllers read.",
-    "powertrain": (
-        "At the wheels: torques in first gear, power, rev limit in top gear; of axles with motors, limits of the pedal."
-    ),
-    "two_track": "For estimators, from drives of the car: steps of the steering wheel at 80 km/h, 2 m/s2, and braking.",
-    "controllers.desired_yaw_rate": (
-        "Controllers of the compact as a start; their gains belong to that car. Adapt them to the lateral acceleration "
-        "that\nthis car reaches without control (max_lateral_acceleration_mps2) and to the lags of its servos; see the "
-        "comments\nin the compact's file."
-    ),
-}
-"""Comments above tables, equal for every car."""
+_TEMPLATES: Final = Path(__file__).resolve().parent / "templates"
 
 
 def vehicle_text(
     car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None = None
 ) -> str:
     """Return the text of the vehicle file."""
-    remarks = _REMARKS | {
+    remarks, _ = read_toml(_TEMPLATES / "remarks.toml")
+    remarks |= {
         "steering": f"Ratio at the centre without load; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
         "single_track": (
             f"Estimated: {_LEFT_OF_STIFFNESS['front']:g} (front) and {_LEFT_OF_STIFFNESS['rear']:g} (rear) times the "
@@ -165,61 +144,122 @@ def vec(values: Iterable[float], digits: int = 6) -> str:
     return " ".join(num(value, digits) for value in values)
 
 
-_TEMPLATE: Final = Path(__file__).resolve().parent / "templates" / "README.md"
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("activesteer.vehicle_builder"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.globals |= {"num": num, "sig": sig, "vec": vec, "round": round, "sqrt": math.sqrt}
+    environment.globals |= {"radians": math.radians, "pi": math.pi}
+    environment.filters["sig"] = sig
+    return environment
+
+
+def filled(template: str, **values: Any) -> str:
+    """Return the text of a template."""
+    return _environment().get_template(template).render(values)
+
+
+_NO_KEYFRAMES = "<mujocoinclude>\n  <keyframe/>\n</mujocoinclude>\n"
+
+
+class _Corner(NamedTuple):
+    name: str
+    axle: Axle
+    side: float  # 1 on the left, -1 on the right
+
+    def at(self, point: Array) -> str:
+        """Return a point of the left side on this side."""
+        return vec((point[0], self.side * point[1], point[2]))
+
+
+def mjcf_files(car: CarDesign, trimmed: Trimmed) -> dict[str, str]:
+    """Return the files of the model as name to text. The keyframe is empty."""
+    front, corners = car.front, _corners(*car.axles)
+    half_width_m = 0.5 * float(front.tyre_parameters["WIDTH"])
+    main = {"car": car, "front": front, "corners": corners, "trimmed": trimmed, "half_width_m": half_width_m}
+    left_m = front.points["tie_rod_inner"]
+    steering = {"left_m": left_m, "right_m": left_m * np.array([1.0, -1.0, 1.0])}
+    # Springs without a shape of their own, or on an arm.
+    viewed = [one for one in corners if one.axle.spring.start_m is None or one.axle.spring.on_arm]
+    scene = {"corners": corners, "viewed": viewed, "rack_per_steer": rack_per_steer_m(front)}
+    return {
+        f"{car.name}.xml": filled("car.xml", **main, rack_joint=_rack_joint),
+        "front_axle.xml": _axle_file(car, front, trimmed),
+        "rear_axle.xml": _axle_file(car, car.rear, trimmed),
+        "steering.xml": filled("steering.xml", car=car, **steering, bar_kgm2=car.rack_mass_kg * left_m[1] ** 2 / 5.0),
+        "scene.xml": filled("scene.xml", car=car, **scene),
+        "keyframes.xml": _NO_KEYFRAMES,
+    }
+
+
+def _corners(*axles: Axle) -> list[_Corner]:
+    return [_Corner(f"{axle.name[0]}{end}", axle, side) for axle in axles for end, side in (("l", 1.0), ("r", -1.0))]
+
+
+def _rack_joint(axle: Axle, lever: float) -> str:
+    """Return the joint that lengthens a spring of a guided axle as the rack raises its wheel."""
+    lift = 0.0 if axle.measured is None else axle.measured.rack_lift
+    return f'<joint joint="rack" coef="{num(lever * lift)}"/>' if lift else ""
+
+
+def _axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
+    """Return the text of front_axle.xml or rear_axle.xml."""
+    middle = axle.wheel_centre_m - np.array([0.0, 0.06, 0.0])
+    drawn = [axle.points[point] for point in dict.fromkeys(link.outer for link in axle.links)]
+    drawn = [point for point in drawn if np.linalg.norm(point - middle) > 0.01]
+    lower, upper = (_in_design(axle, point) for point in car.kingpin_m)
+    axis = (upper - lower) / np.linalg.norm(upper - lower)
+    return filled(
+        "axle.xml",
+        axle=axle,
+        words=axle.kind.name.replace("_", " ").capitalize(),
+        trim=trimmed.axle(axle.name),
+        corners=_corners(axle),
+        directions={} if axle.top_mount is None else axle.top_mount.directions,
+        rod=None if axle.top_mount is None else axle.top_mount.rod,
+        half_width_m=0.5 * float(axle.tyre_parameters["WIDTH"]),
+        middle_m=middle,
+        drawn=[*drawn, *([axle.points["strut_bottom"]] if axle.kind.strut else [])],
+        kingpin={
+            "lower": lower, "upper": upper, "axis": axis,
+            "middle": lower + axis * (axle.wheel_centre_m[2] - lower[2]) / axis[2],
+        },
+    )  # fmt: skip
+
+
+def _in_design(axle: Axle, point: Array) -> Array:
+    """Return a point of the knuckle at zero joints. In the standing car curves turn it by the static angles."""
+    if axle.measured is None:
+        return point
+    curves = axle.measured.curves
+    camber, toe = (-float(np.interp(0.0, curves.travel_m, over)) for over in (curves.camber_rad, curves.toe_rad))
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(camber), -np.sin(camber)], [0.0, np.sin(camber), np.cos(camber)]])
+    about_z = np.array([[np.cos(toe), -np.sin(toe), 0.0], [np.sin(toe), np.cos(toe), 0.0], [0.0, 0.0, 1.0]])
+    return axle.wheel_centre_m + (about_z @ about_x).T @ (point - axle.wheel_centre_m)
 
 
 def readme_text(car: CarDesign, trimmed: Trimmed, table_name: str) -> str:
     """Return the text of README.md."""
-    kinds = " and ".join(f"{axle.kind.name.replace('_', ' ')} {axle.name}" for axle in car.axles)
-    rows = [f"| `{item.key}` | {item.value} | {item.rule} |" for item in car.assumptions]
-    trim_rows = [_trim_row(trimmed, axle.name) for axle in car.axles]
-    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
-        name=car.name,
-        kinds=kinds,
-        table=table_name,
-        source=car.table.source or "not said in the table",
-        trimmed="\n".join(trim_rows),
-        rack=num(2e3 * math.pi * trimmed.pinion_radius_m, 2),
-        ratio=num(trimmed.ratio, 2),
-        chassis=num(trimmed.chassis.mass_kg, 1),
-        cg_x=num(trimmed.cg_m[0], 3),
-        cg_height=num(trimmed.cg_m[1], 3),
-        measured=_measured(car),
-        open=_open(rows),
-    )
+    measured = [
+        (axle, *max(axle.measured.roughness.items(), key=lambda item: item[1], default=("", 0.0)))
+        for axle in car.axles
+        if axle.measured is not None
+    ]
+    damping = {axle.name: _damping_Nspm(trimmed.axle(axle.name)) for axle in car.axles}
+    return filled("README.md", car=car, trimmed=trimmed, table=table_name, measured=measured, damping=damping)
 
 
-def _measured(car: CarDesign) -> str:
-    """Return the section on the measurements of the K&C rig, their roughness, and unusual ones."""
-    lines = []
-    for axle in car.axles:
-        if axle.measured is None:
-            continue
-        rough = max(axle.measured.roughness.items(), key=lambda item: item[1], default=("", 0.0))
-        lines += [
-            f"- {axle.name}: cubic splines by least squares, one interval for each two points and at most 16; greatest "
-            f"distance of a sample {rough[1]:.2g} m or rad ({rough[0]}). Compliance: {axle.measured.stiffness_remark}.",
-            *(f"- **{line}**" for line in axle.measured.questions),
-        ]
-    return "\n".join(["## Measured", "", *lines, "", ""]) if lines else ""
-
-
-def _open(rows: list[str]) -> str:
-    if not rows:
-        return "The table gives all values, so that no rule was used.\n"
-    head = "Values by rules, because the table lacks them. Replace what you know, by these keys of the table.\n\n"
-    return head + "| Key | Value | Rule |\n|---|---|---|\n" + "\n".join(rows) + "\n"
-
-
-def _trim_row(trimmed: Trimmed, name: str) -> str:
-    trim = trimmed.axle(name)
+def _damping_Nspm(trim: TrimmedAxle) -> float:
+    """Return the mean damping around rest."""
     speeds, forces = trim.damper_velocity_mps, trim.damper_force_N
     at = next(index for index, speed in enumerate(speeds) if speed >= 0.0)
     first, last = max(at - 1, 0), min(at + 1, len(speeds) - 1)
-    damping = (forces[last] - forces[first]) / (speeds[last] - speeds[first])
-    stops = f"{num(1e3 * trim.bump_stop_m, 1)} bump, {num(1e3 * trim.rebound_stop_m, 1)} rebound"
-    spring = f"{num(1e-3 * trim.spring_rate_Npm, 2)} | {num(trim.spring_force_N, 0)}"
-    return f"| {name} | {spring} | {sig(damping, 3)} | {stops} |"
+    return (forces[last] - forces[first]) / (speeds[last] - speeds[first])
 
 
 _REMARK = (
@@ -263,7 +303,7 @@ def car_table(car: CarSpec, result: KcResult) -> str:
             "column_stiffness_Npm": float(model.tendon_stiffness[steering.id]),
         },
         **_rear_steering(result, centres[2]),
-        **{axle: _axle(car, model, data, centres, axle) for axle in ("front", "rear")},
+        **{axle: _axle_table(car, model, data, centres, axle) for axle in ("front", "rear")},
         "brakes": to_table(config.brakes, defaults=False),
         "powertrain": to_table(config.powertrain, defaults=False),
         "aerodynamics": to_table(config.aerodynamics, defaults=False),
@@ -296,7 +336,7 @@ def _point(point: Array) -> list[float]:
     return [round(float(value), 5) for value in point]
 
 
-def _axle(car: CarSpec, model: mujoco.MjModel, data: mujoco.MjData, centres: Array, axle: str) -> dict[str, Any]:
+def _axle_table(car: CarSpec, model: mujoco.MjModel, data: mujoco.MjData, centres: Array, axle: str) -> dict[str, Any]:
     corner, front = f"{axle[0]}l", axle == "front"
     curve = getattr(car.config.dampers, axle)
     friction = car.config.friction

@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.rigs.kc.modes import tyre_stiffness
@@ -33,7 +33,7 @@ from activesteer.vehicle.curve_axles import OVER_RACK, OVER_TRAVEL, AxleCurves
 from activesteer.vehicle.parameters import Friction
 from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder.completion import rack_per_steer_m
-from activesteer.vehicle_builder.corner_motion import corner_motion
+from activesteer.vehicle_builder.corner_motion import corner_motion, wheel_travel_m
 from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, chassis_of
 
 
@@ -42,25 +42,19 @@ class TrimmedAxle:
     """One axle; values of the left side."""
 
     spring_rate_Npm: float = 25000.0
-    spring_force_N: float = 4000.0
-    """Spring force in the design position [N]."""
-    wheel_x_rad: float = 0.0
-    """First Euler angle of the wheel: minus camber, less the contribution of the loaded links."""
-    wheel_z_rad: float = 0.0
-    """Third Euler angle of the wheel: minus toe-in, less the contribution of the loaded links."""
+    spring_force_N: float = 4000.0  # spring force in the design position [N]
+    wheel_x_rad: float = 0.0  # first Euler angle of the wheel: minus camber, less the contribution of the loaded links
+    wheel_z_rad: float = 0.0  # third Euler angle of the wheel: minus toe-in, less the contribution of the loaded links
+    # Spring length of the top mount in each direction. The standing car's load closes it [m]
     mount_m: dict[str, float] = field(default_factory=dict)
-    """Spring length of the top mount in each direction. The standing car's load closes it [m]."""
-    bump_stop_m: float = 0.035
-    """Compression of the damper to its bump stop."""
+    bump_stop_m: float = 0.035  # compression of the damper to its bump stop
     rebound_stop_m: float = 0.065
+    # a, b, c of the force a x + b x2 + c x3 [N/m, N/m2, N/m3]
     stop_stiffness: tuple[float, ...] = (40000.0, 2.4e6, 9e7)
-    """a, b, c of the force a x + b x2 + c x3 [N/m, N/m2, N/m3]."""
-    friction_N: float = 0.0
-    """Dry friction of the damper."""
+    friction_N: float = 0.0  # dry friction of the damper
     damper_velocity_mps: tuple[float, ...] = (-1.0, 0.0, 1.0)
     damper_force_N: tuple[float, ...] = (-1900.0, 0.0, 1900.0)
-    curves: AxleCurves | None = None
-    """Curves of a guided axle that give the measured curves on the rig, under load."""
+    curves: AxleCurves | None = None  # curves of a guided axle that give the measured curves on the rig, under load
 
 
 @dataclass
@@ -69,15 +63,12 @@ class Trimmed:
 
     front: TrimmedAxle = field(default_factory=TrimmedAxle)
     rear: TrimmedAxle = field(default_factory=TrimmedAxle)
-    pinion_radius_m: float = 0.0075
-    """Rack travel per angle of the steering wheel [m/rad]."""
-    ratio: float = 16.0
-    """Steering wheel angle over mean steer angle."""
+    pinion_radius_m: float = 0.0075  # rack travel per angle of the steering wheel [m/rad]
+    ratio: float = 16.0  # steering wheel angle over mean steer angle
     chassis: Solid = field(
         default_factory=lambda: Solid(1200.0, np.array([-1.1, 0.0, 0.55]), np.array([450.0, 1800.0, 1850.0]))
     )
-    cg_m: tuple[float, float] = (-1.2, 0.55)
-    """x and height of the whole car's centre of gravity."""
+    cg_m: tuple[float, float] = (-1.2, 0.55)  # x and height of the whole car's centre of gravity
 
     def axle(self, name: str) -> TrimmedAxle:
         """Return the axle `front` or `rear`."""
@@ -342,11 +333,9 @@ def _first_guess(
     if axle.kind.strut and axle.table.anti_roll_bar_Nmprad is not None:
         # The bar acts along the strut, whose travel is smaller than the wheel travel.
         axle.anti_roll_bar_Npm /= damper**2
-    bump, rebound = axle.table.bump_stop_m, axle.table.rebound_stop_m
-    axle_trim.bump_stop_m = log.take(f"{axle.name}.bump_stop_m", bump, _STOPS_M[0] * damper, "35 mm at the wheel", "m")
-    axle_trim.rebound_stop_m = log.take(
-        f"{axle.name}.rebound_stop_m", rebound, _STOPS_M[1] * damper, "65 mm at the wheel", "m"
-    )
+    name, table = axle.name, axle.table
+    axle_trim.bump_stop_m = log.take(name, table, "bump_stop_m", _STOPS_M[0] * damper, "35 mm at the wheel")
+    axle_trim.rebound_stop_m = log.take(name, table, "rebound_stop_m", _STOPS_M[1] * damper, "65 mm at the wheel")
     if measured is not None and axle.table.stop_stiffness is None:
         # The measured wheel load includes them.
         axle_trim.stop_stiffness = (0.0, 0.0, 0.0)
@@ -359,31 +348,20 @@ def _first_guess(
         log.note(f"{axle.name}.stop_stiffness", words, "cellular rubber, at the wheel as the compact's")
     else:
         axle_trim.stop_stiffness = axle.table.stop_stiffness
-    friction = axle.table.damper_friction_N
-    axle_trim.friction_N = log.take(
-        f"{axle.name}.damper_friction_N", friction, round(30.0 / damper), "30 N at the wheel", "N"
-    )
+    axle_trim.friction_N = log.take(name, table, "damper_friction_N", round(30.0 / damper), "30 N at the wheel")
 
 
 def _stand(vehicle_file: Path) -> _Stand:
     car = load_car(vehicle_file)
     vehicle = dataclasses.replace(car, config=dataclasses.replace(car.config, friction=Friction())).on()
-    design = mujoco.MjData(vehicle.model)
-    mujoco.mj_kinematics(vehicle.model, design)
-    chassis = vehicle.model.body("chassis").id
-    turn = vehicle.data.xmat[chassis].reshape(3, 3).T
     held = HeldCar(vehicle)
-    travel, toe, camber = [], [], []
-    for index, corner in enumerate(CORNERS):
-        wheel = vehicle.model.body(f"{corner}_wheel").id
-        now = turn @ (vehicle.data.xpos[wheel] - vehicle.data.xpos[chassis])
-        travel.append(now[2] - design.xpos[wheel, 2])
+    toe, camber = [], []
+    for corner, inwards in enumerate(INWARDS):
         # On the rig, without the moments of asymmetric tyres: static toe and camber are those that `kc` measures.
-        x, y, z = held.wheel(index).rotation[:, 1]
-        inwards = -1.0 if corner.endswith("l") else 1.0
+        x, y, z = held.wheel(corner).rotation[:, 1]
         toe.append(math.atan2(-x, y) * inwards)
         camber.append(math.asin(z) * inwards)
-    return _Stand(vehicle, held, np.array(travel), np.array(toe), np.array(camber))
+    return _Stand(vehicle, held, wheel_travel_m(vehicle), np.array(toe), np.array(camber))
 
 
 def wheel_rates_Npm(held: HeldCar) -> dict[str, float]:

@@ -17,7 +17,6 @@ PUBLIC = (
     "activesteer.maneuver.base.Maneuver",
     "activesteer.recording.recording.Recording",
     "activesteer.rigs.kc.result.kinematics_compliance",
-    "activesteer.rigs.tyre_rig.TyreRig",
     "activesteer.scenario.car.load_car",
     "activesteer.scenario.scenario.resolve",
     "activesteer.simulation.runner.simulate",

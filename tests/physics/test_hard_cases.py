@@ -103,3 +103,44 @@ def test_rate_of_a_screw_is_what_it_does_on_a_large_demand():
     first, last = (int(np.argmax(angle > math.radians(limit))) for limit in (0.5, 2.0))
     measured = (angle[last] - angle[first]) / (run.time_s[last] - run.time_s[first])
     assert measured == pytest.approx(known, rel=0.05)
+
+
+def test_brakes_hold_a_car_that_leaves_snow_while_the_estimator_does_not_explain_it():
+    """The authority over the driver falls with the innovations. With it, the brakes rested and this car spun."""
+    pytest.importorskip("daqp")
+    changes = {
+        "load.payload_kg": 62.7, "load.payload_forward_change_m": 0.361, "factors.front_cornering_stiffness": 0.90,
+        "factors.rear_cornering_stiffness": 0.70, "factors.front_tyre_friction": 1.06,
+        "factors.rear_tyre_friction": 0.86, "rear_actuator.preset": "screw_3deg", "road.mu": 0.602,
+        "road.patches.0.mu": 0.205, "speed_kmh": 62.5, "duration_s": 12.2,
+    }  # fmt: skip
+    for seed in (15, 1):
+        run = simulate("mu_jump", "integrated", "compact_electric", SENSORS | changes | {"sensors.seed": seed})
+        # `esc` keeps 7 to 8 deg, and the car without control spins.
+        assert run.metrics["sideslip_peak_abs_rad"] < math.radians(15.0)
+
+
+def test_brakes_do_not_follow_a_yaw_rate_sensor_that_is_frozen():
+    pytest.importorskip("daqp")
+    for start_s in (2.8, 3.2):
+        fault = {"part": "yaw_rate_sensor", "kind": "stuck", "start_s": start_s}
+        run = simulate("slalom", "integrated", overrides=SENSORS | {"fault": [fault]})
+        # Without control 2.5 deg; with the brakes of a frozen sensor 39 and 75 deg.
+        assert run.metrics["sideslip_peak_abs_rad"] < math.radians(6.0)
+
+
+def test_slow_sound_actuators_are_not_taken_for_failed_in_a_lane_change():
+    """Both were, at 4.9 s: their angles stayed at 3.0 and 1.9 deg, and the sedan hit 13 cones."""
+    pytest.importorskip("daqp")
+    changes = {
+        "load.payload_kg": 105.9, "load.payload_forward_change_m": -0.282, "load.roof_kg": 65.3,
+        "factors.front_cornering_stiffness": 1.05, "factors.rear_cornering_stiffness": 0.714,
+        "factors.front_tyre_friction": 0.863, "factors.rear_tyre_friction": 0.732,
+        "rear_actuator.preset": "screw_3deg", "rear_actuator.supply_voltage_V": 11.55, "road.mu": 0.515,
+        "speed_kmh": 70.44, "duration_s": 18.2,
+    }  # fmt: skip
+    for seed in (10, 20):
+        overrides = SENSORS | changes | {"sensors.seed": seed}
+        run = simulate("double_lane_change", "integrated", "sedan", overrides, driver="expert")
+        assert run.metrics["lane_overstep_m"] < 0.0
+        assert abs(run["superposition_rad"][-1]) < math.radians(0.5)

@@ -22,7 +22,6 @@ from activesteer.studies.linear.linearisation import (
     LinearCar,
     eigenvalue_table,
     linear_car,
-    linear_cars,
     linear_response,
 )
 from tests.physics.runs import assert_has_key_metrics, go_on, last, run
@@ -145,7 +144,7 @@ def test_state_space_has_names_and_no_heave():
 
 def test_yaw_gain_is_largest_at_the_characteristic_speed():
     speeds = np.arange(60.0, 116.0, 5.0) / 3.6
-    gains = [np.asarray(one.state_space().dcgain())[0, 0] for one in linear_cars("compact", list(speeds))]
+    gains = [np.asarray(linear_car("compact", speed).state_space().dcgain())[0, 0] for speed in speeds]
     a, b, _ = np.polyfit(speeds, gains, 2)
     stored = load_car().config.single_track.characteristic_speed_mps
     assert -b / (2 * a) == pytest.approx(stored, rel=0.05)

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from activesteer.rigs.tyre_rig import RigForces, TyreRig
-from activesteer.rigs.wheel_motion import turned as to_heading
 from activesteer.tyre import TyreForces, TyreParameters, load_tir
 from tests.reference.tyre_tables import read_coefficients
+from tests.tyre_rig import RigForces, TyreRig
+from tests.tyre_rig import turned as to_heading
 
 TYRES = Path(__file__).parents[2] / "models" / "tyres"
 POINTS = 120

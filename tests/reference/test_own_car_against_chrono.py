@@ -3,7 +3,7 @@
 Facts of the Sedan of chrono_models (commit 7689fbc, BSD-3-Clause); all of its joints are rigid, so its links are made
 rigid here. `models/reference/sedan/travel_sweep.csv` was measured by running that code. Tolerances: angles 0.01 deg of
 4.2 and 3.5 deg of range; dampers 1 % of their range, because what a damper's foot lies beside its arm's plane (25 mm in
-front) or its link's line (80 mm behind) does not turn with it here (`vehicle_builder.levers`).
+front) or its link's line (80 mm behind) does not turn with it here (`vehicle_builder.axle_kinds`).
 """
 
 from __future__ import annotations

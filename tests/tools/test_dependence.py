@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tools.proportions import strongest
+from tools.dependence import strongest
 
 Factors = dict[str, NDArray[np.float64]]
 

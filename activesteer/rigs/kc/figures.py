@@ -32,23 +32,15 @@ _FURTHEST: Final = 0.6
 """How far beyond its band a metric is drawn, in widths of the band."""
 
 
-class Row(NamedTuple):
-    """A row of panels.
+Row = tuple[str, Callable[[Sweep], Array]]
+"""Name and unit of the ordinate, and the function from a sweep to the values of each wheel, shape (n, 4)."""
 
-    Attributes:
-        label: Name and unit of its ordinate.
-        values: Function from a sweep to the values of each wheel, shape (n, 4).
-    """
-
-    label: str
-    values: Callable[[Sweep], Array]
-
-
-_TOE: Final = Row("toe [deg]\n(+ toe-in)", lambda sweep: _DEG * sweep.toe_rad)
-_CAMBER: Final = Row("camber [deg]\n(- top in)", lambda sweep: _DEG * sweep.camber_rad)
-_LOAD: Final = Row("vertical force\n[kN]", lambda sweep: 1e-3 * sweep.load_N)
-_WIND_UP: Final = Row(
-    "wind-up of the\nknuckle [deg]", lambda sweep: _DEG * (sweep.wind_up_rad - sweep.wind_up_rad[sweep.zero])
+_TOE: Final[Row] = ("toe [deg]\n(+ toe-in)", lambda sweep: _DEG * sweep.toe_rad)
+_CAMBER: Final[Row] = ("camber [deg]\n(- top in)", lambda sweep: _DEG * sweep.camber_rad)
+_LOAD: Final[Row] = ("vertical force\n[kN]", lambda sweep: 1e-3 * sweep.load_N)
+_WIND_UP: Final[Row] = (
+    "wind-up of the\nknuckle [deg]",
+    lambda sweep: _DEG * (sweep.wind_up_rad - sweep.wind_up_rad[sweep.zero]),
 )
 
 
@@ -136,31 +128,22 @@ def _wheels(x: Array, values: Array, label: str = "", *, both: bool = True) -> l
 
 
 class Grid(NamedTuple):
-    """A picture with one row per quantity and one column per axle.
-
-    Attributes:
-        title: Title of the picture.
-        rows: The rows.
-        both: Name and word for the legend of the sweep that is drawn of both wheels.
-        left: The same of a sweep that is drawn of the left wheel.
-        x_label: Label of the abscissa.
-        factor: From the sweep's SI unit to the label's unit.
-    """
+    """A picture with one row per quantity and one column per axle."""
 
     title: str
     rows: Sequence[Row]
-    both: tuple[str, str]
-    left: tuple[str, str] | None
+    both: tuple[str, str]  # name and word for the legend of the sweep that is drawn of both wheels
+    left: tuple[str, str] | None  # the same of a sweep that is drawn of the left wheel
     x_label: str
-    factor: float
+    factor: float  # from the sweep's SI unit to the label's unit
 
 
 _GRIDS: Final = {
     "parallel_travel": Grid(
         "parallel wheel travel",
         (
-            _TOE, _CAMBER, _LOAD, Row("contact point\noutwards [mm]", _moved("contact_m", 1, outwards=True)),
-            Row("wheel centre\nforwards [mm]", _moved("centre_m", 0)),
+            _TOE, _CAMBER, _LOAD, ("contact point\noutwards [mm]", _moved("contact_m", 1, outwards=True)),
+            ("wheel centre\nforwards [mm]", _moved("centre_m", 0)),
         ),
         ("parallel_travel", ""), ("parallel_kinematic", "without springs, links unloaded"),
         "wheel travel [mm] (+ bump)", 1e3,
@@ -172,20 +155,20 @@ _GRIDS: Final = {
     "side_force": Grid(
         "side force at the contact points",
         (
-            _TOE, _CAMBER, Row("contact point\nto the left [mm]", _moved("contact_m", 1)),
-            Row("wheel centre\nto the left [mm]", _moved("centre_m", 1)),
+            _TOE, _CAMBER, ("contact point\nto the left [mm]", _moved("contact_m", 1)),
+            ("wheel centre\nto the left [mm]", _moved("centre_m", 1)),
         ),
         ("lateral_in_phase", "in phase (+ to the left)"), ("lateral_opposed", "left, opposed (+ inwards)"),
         "side force at each wheel [kN]", 1e-3,
     ),
     "longitudinal_force": Grid(
         "longitudinal force",
-        (_TOE, _CAMBER, Row("wheel centre\nforwards [mm]", _moved("centre_m", 0)), _WIND_UP),
+        (_TOE, _CAMBER, ("wheel centre\nforwards [mm]", _moved("centre_m", 0)), _WIND_UP),
         ("longitudinal_patch", "at the contact point, locked"), ("longitudinal_centre", "left, at the wheel centre"),
         "force at each wheel [kN] (+ forwards)", 1e-3,
     ),
     "aligning_moment": Grid(
-        "aligning moment", (Row("steer angle [deg]\n(+ left)", lambda sweep: _DEG * sweep.steer_rad), _CAMBER),
+        "aligning moment", (("steer angle [deg]\n(+ left)", lambda sweep: _DEG * sweep.steer_rad), _CAMBER),
         ("aligning_in_phase", "in phase (+ to the left)"), ("aligning_opposed", "left, opposed (+ toe-in)"),
         "moment on each wheel [Nm]", 1.0,
     ),
@@ -195,15 +178,15 @@ _GRIDS: Final = {
 
 def _drawn_grid(result: KcResult, grid: Grid) -> Picture:
     panels = []
-    for row in grid.rows:
-        above, below = row is grid.rows[0], row is grid.rows[-1]
+    for place, (row_label, of_wheels) in enumerate(grid.rows):
+        above, below = place == 0, place == len(grid.rows) - 1
         for axle, first in _AXLES:
             curves = []
             for name, label in filter(None, (grid.both, grid.left)):
                 sweep = result.curves[name]
-                values = row.values(sweep)[:, first : first + 2]
+                values = of_wheels(sweep)[:, first : first + 2]
                 curves += _wheels(grid.factor * sweep.x, values, label, both=name == grid.both[0])
-            labels = grid.x_label if below else "", row.label if not first else ""
+            labels = grid.x_label if below else "", row_label if not first else ""
             panels.append(Panel(*labels, curves, axle if above else "", zero=True))
     height_in = 1.0 + 1.75 * len(grid.rows)
     return Picture(grid.title, panels, columns=2, width_in=8.5, height_in=height_in, shared_legend=True)

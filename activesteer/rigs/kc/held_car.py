@@ -63,16 +63,13 @@ class WheelPose(NamedTuple):
 class Case:
     """Loads and positions that the rig imposes at one point of a sweep; arrays by corner."""
 
-    hold: Hold = "centre"
-    """What the pads hold: heights of the wheel centres, heights of the contact points, or nothing."""
+    hold: Hold = "centre"  # what the pads hold: heights of the wheel centres, heights of the contact points, or nothing
+    # Height above the height in the standing car [m], shape (4,)
     height_m: Array = field(default_factory=lambda: np.zeros(4))
-    """Height above the height in the standing car [m], shape (4,)."""
+    # Force at the contact points in addition to the vertical force of the pads [N], shape (4, 3)
     patch_N: Array = field(default_factory=lambda: np.zeros((4, 3)))
-    """Force at the contact points in addition to the vertical force of the pads [N], shape (4, 3)."""
-    centre_N: Array = field(default_factory=lambda: np.zeros((4, 3)))
-    """Force at the wheel centres [N], shape (4, 3)."""
-    moment_Nm: Array = field(default_factory=lambda: np.zeros((4, 3)))
-    """Moment on the wheels [N m], shape (4, 3)."""
+    centre_N: Array = field(default_factory=lambda: np.zeros((4, 3)))  # force at the wheel centres [N], shape (4, 3)
+    moment_Nm: Array = field(default_factory=lambda: np.zeros((4, 3)))  # moment on the wheels [N m], shape (4, 3)
     steering_wheel_rad: float = 0.0
     rear_steer_rad: float = 0.0
 

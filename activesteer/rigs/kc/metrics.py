@@ -1,13 +1,13 @@
-"""Metrics of the rig: static ride, wheel travel and roll, steering and compliance, and the standing car."""
+"""Metrics of the rig: the formulas of metrics.toml, and target bands."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -17,11 +17,9 @@ from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.errors import nearest_names
 from activesteer.resources import models_dir
 from activesteer.rigs.kc.held_car import MOUNT_ENDINGS
-from activesteer.rigs.kc.modes import NAMES, TyreStiffness
+from activesteer.rigs.kc.modes import TyreStiffness
 from activesteer.rigs.kc.programme import INWARDS, Measured, SteeringAxis, Sweep
 from activesteer.vehicle.curve_axles import HOLDING_TENDON
-
-AxleName = Literal["front", "rear", "car"]
 
 DEG: Final = math.degrees(1.0)
 SMALL_TRAVEL_M: Final = 0.015
@@ -36,7 +34,7 @@ _SMALL: Final = {
 class Axle(NamedTuple):
     """One axle of the measured car. Arrays of its wheels are in the order left, right."""
 
-    name: AxleName
+    name: str
     measured: Measured
 
     @property
@@ -64,7 +62,7 @@ class Axle(NamedTuple):
         """Names of the knuckles' bodies."""
         return (f"{self.name[0]}l_knuckle", f"{self.name[0]}r_knuckle")
 
-    def beside(self, name: AxleName) -> Axle:
+    def beside(self, name: str) -> Axle:
         """Return another axle of the same car."""
         return Axle(name, self.measured)
 
@@ -87,32 +85,6 @@ class Axle(NamedTuple):
         return float(self.slope(sweep, values if axis is None else values[..., axis]).mean())
 
 
-Evaluate = Callable[[Axle], float]
-
-
-def slope(sweep: str, quantity: str, factor: float = 1.0, axis: int | None = None) -> Evaluate:
-    """Return the evaluation of `Axle.mean_slope`, times a factor."""
-    return lambda axle: factor * axle.mean_slope(sweep, quantity, axis)
-
-
-class Definition(NamedTuple):
-    """A metric's definition.
-
-    Attributes:
-        name: Name.
-        unit: Unit.
-        evaluate: Function from an axle to its value.
-        text: Definition, sign, source.
-        axles: Axles that have the metric.
-    """
-
-    name: str
-    unit: str
-    evaluate: Evaluate
-    text: str
-    axles: tuple[AxleName, ...] = ("front", "rear")
-
-
 def _standing(axle: Axle, angle: str) -> float:
     sweep = axle.sweep("parallel_travel")
     return math.degrees(getattr(sweep, angle)[sweep.zero, axle.wheels].mean())
@@ -124,11 +96,8 @@ def _track(axle: Axle) -> float:
     return 1e3 * float(left - right)
 
 
-_wheel_rate: Final = slope("parallel_travel", "load_N", 1e-3)
-
-
 def _ride_rate(axle: Axle) -> float:
-    wheel, tyre = _wheel_rate(axle), 1e-3 * axle.tyre.vertical_Npm
+    wheel, tyre = 1e-3 * axle.mean_slope("parallel_travel", "load_N"), 1e-3 * axle.tyre.vertical_Npm
     return wheel * tyre / (wheel + tyre)
 
 
@@ -241,101 +210,9 @@ def _cg_height(axle: Axle) -> float:
     return 1e3 * float(axle.measured.vehicle.data.subtree_com[0, 2])
 
 
-TRAVEL_METRICS: Final = (
-    Definition("wheel_load", "N", lambda axle: float(axle.load_N.mean()),
-        "Vertical force of one tyre of the standing car, driver included."),
-    Definition("track", "mm", _track,
-        "Distance between the contact points of the standing car (ISO 8855)."),
-    Definition("static_toe", "deg", lambda axle: _standing(axle, "toe_rad"),
-        "Toe angle of one wheel of the standing car, positive toe-in (ISO 8855: mean of both wheels)."),
-    Definition("static_camber", "deg", lambda axle: _standing(axle, "camber_rad"),
-        "Camber angle of the standing car, negative with the top of the wheel towards the middle (ISO 8855)."),
-    Definition("wheel_rate", "N/mm", _wheel_rate,
-        "Change of wheel load per travel of the wheel centre, both wheels together, within 15 mm (ISO 8855)."),
-    Definition("ride_rate", "N/mm", _ride_rate,
-        "Wheel rate in series with the vertical stiffness of the tyre under its static load (Milliken 1995, ch. 16)."),
-    Definition("ride_frequency", "Hz", _ride_frequency,
-        "Undamped natural frequency of the sprung mass of one axle on the ride rate. The sprung mass is the static load"
-        " less the unsprung mass: the knuckle and all parts on it (Milliken 1995, ch. 16)."),
-    Definition("bump_steer", "deg/m", slope("parallel_travel", "toe_rad", DEG),
-        "Change of toe angle per travel, both wheels together, within 15 mm; positive goes to toe-in in bump."),
-    Definition("bump_camber", "deg/m", slope("parallel_travel", "camber_rad", DEG),
-        "Change of camber angle per travel, both wheels together, within 15 mm; negative leans the top in in bump."),
-    Definition("track_change", "mm/m", _track_change,
-        "Change of track (both wheels) per travel, both wheels together, within 15 mm; positive widens in bump."),
-    Definition("wheel_recession", "mm/m", slope("parallel_travel", "centre_m", -1e3, 0),
-        "Rearward motion of the wheel centre per travel, within 15 mm; positive gives way to an obstacle."),
-    Definition("damper_ratio", "mm/mm", _damper_ratio,
-        "Shortening of the damper per travel, both wheels together, within 15 mm."),
-    Definition("bump_stop_contact", "mm", lambda axle: _contact(axle, 0),
-        "Bump travel at which the bump stop takes up its first load, both wheels together; nan beyond 80 mm."),
-    Definition("rebound_stop_contact", "mm", lambda axle: _contact(axle, 1),
-        "Rebound travel at which the rebound stop takes up its first load, both wheels together; nan beyond 80 mm."),
-    Definition("roll_centre_height", "mm", _roll_centre_height,
-        "Height over the road at which the normal to the contact point's path meets the middle of the car. The path "
-        "belongs to parallel travel within 15 mm, with loaded links and springs (ISO 8855: kinematic roll centre)."),
-    Definition("roll_centre_height_by_force", "mm", _roll_centre_height_by_force,
-        "Height over the road at which a side force does not change the vertical forces of the pads. Half the track "
-        "times the change of vertical force per side force in phase, at fixed wheel heights, within 1 kN: the part of a"
-        " side force that the links carry directly (force-based roll centre: Milliken 1995, ch. 17)."),
-    Definition("roll_stiffness", "kNm/rad", _roll_stiffness,
-        "Moment of the pads about the x axis per roll angle of the body, tyres rigid, within 15 mm of opposite "
-        "travel."),
-    Definition("front_roll_stiffness_fraction", "%", _front_roll_stiffness_fraction,
-        "Roll stiffness of the front axle over the roll stiffness of both axles, tyres rigid.", ("car",)),
-    Definition("roll_steer_outer", "deg/deg", lambda axle: _outer_per_roll(axle, "toe_rad"),
-        "Change of toe angle of the wheel in bump per roll angle, opposite travel; positive goes to toe-in."),
-    Definition("roll_understeer", "deg/deg", _roll_understeer,
-        "Change of the mean steer angle per roll angle, positive for understeer. In a left turn the body rolls to the "
-        "right: positive if the front wheels then steer to the right, or the rear wheels to the left (Gillespie 1992, "
-        "ch. 7)."),
-    Definition("roll_camber", "deg/deg", lambda axle: _outer_per_roll(axle, "camber_rad"),
-        "Change of the outer wheel's camber to the body per roll angle; negative leans it into the turn. With -1 the "
-        "wheel stays upright on the road."),
-    Definition("left_right_difference", "deg", _left_right_difference,
-        "Largest difference between left and right toe or camber angle in parallel travel over +-80 mm.", ("car",)),
-    Definition("anti_dive", "%", lambda axle: _brake_fraction(axle) * _support(axle, "patch_m"),
-        "Fraction of the dive that the front links prevent: brake fraction x l/h x slope of the locked wheel's patch. "
-        "Positive if the contact point of the wheel, locked to its knuckle, moves forwards in bump. Links unloaded, "
-        "brake distribution at full pedal (Gillespie 1992, ch. 7; Milliken 1995, ch. 17).", ("front",)),
-    Definition("anti_lift", "%", lambda axle: -_brake_fraction(axle) * _support(axle, "patch_m"),
-        "Fraction of the rear lift in braking that the rear links prevent: anti-dive with the sign of a rear axle. "
-        "Positive if the contact point of the wheel, locked to its knuckle, moves rearwards in bump.", ("rear",)),
-    Definition("anti_lift_drive", "%", lambda axle: _support(axle, "centre_m"),
-        "Fraction of the front lift in acceleration that the front links prevent, if only half-shafts drive this axle. "
-        "l/h x slope of the wheel centre's path, positive if the wheel centre moves forwards in bump.", ("front",)),
-    Definition("anti_squat", "%", lambda axle: -_support(axle, "centre_m"),
-        "Fraction of the squat in acceleration that the rear links prevent, if only half-shafts drive this axle. l/h x "
-        "slope of the wheel centre's path, positive if it moves rearwards in bump (Gillespie 1992, ch. 7).", ("rear",)),
-    Definition("wheelbase", "mm", wheelbase_mm,
-        "Distance of the contact points of front and rear axle along the standing car (ISO 8855).", ("car",)),
-    Definition("cg_height", "mm", _cg_height,
-        "Height of the whole car's centre of gravity over the road, driver included.", ("car",)),
-    Definition("mass", "kg", lambda axle: float(axle.measured.vehicle.model.body_subtreemass[0]),
-        "Mass of the whole car, driver included.", ("car",)),
-    Definition("front_load_fraction", "%", lambda axle: 100.0 * float(axle.load_N[:2].sum() / axle.load_N.sum()),
-        "Fraction of the weight on the front axle of the standing car.", ("car",)),
-)  # fmt: skip
-"""Metrics in the order of the table."""
-
-
 _ON_CENTRE_RAD: Final = math.radians(20.0)
 _TRAIL_M: Final = 0.03
 _NOT_LINKS: Final = ("_spring", "_damper", HOLDING_TENDON, *MOUNT_ENDINGS)
-_MODE_WORDS: Final = {
-    "body_bounce": "the body going up and down",
-    "body_pitch": "the body pitching",
-    "body_roll": "the body rolling, tyres holding the road sideways",
-    "wheel_hop_front": "both front wheels going up and down together",
-    "wheel_hop_rear": "both rear wheels going up and down together",
-    "tramp_front": "the front wheels going up and down against each other",
-    "tramp_rear": "the rear wheels going up and down against each other",
-}
-
-
-def _axis(quantity: str, factor: float) -> Evaluate:
-    """Return the mean of a quantity of the steering axes of both wheels, times a factor."""
-    return lambda axle: factor * float(np.mean([getattr(axis, quantity) for axis in axle.axes]))
 
 
 def mean_steer_rad(axle: Axle, sweep: str = "steering_rolling") -> Array:
@@ -460,141 +337,106 @@ def _per_g(gradient_radps2pm: float) -> float:
     return math.degrees(gradient_radps2pm) * GRAVITY_MPS2
 
 
-def _modes() -> Iterator[Definition]:
-    """Yield frequency and damping of each mode."""
-    for name in NAMES:
-        axle: AxleName = "front" if name.endswith("_front") else "rear" if name.endswith("_rear") else "car"
-        short = name.removesuffix("_front").removesuffix("_rear")
-        text = f"Eigenvalue of the linearised standing car on its tyres: {_MODE_WORDS[name]}."
-        for what, unit, quantity, words in (
-            ("frequency", "Hz", "frequency_Hz", "Magnitude over 2 pi."),
-            ("damping", "-", "damping_ratio", "Damping ratio."),
-        ):  # fmt: skip
-            yield Definition(f"{short}_{what}", unit, _of_mode(name, quantity), f"{words} {text}", (axle,))
+FORMULAS: Final[dict[str, Callable[[Axle], float]]] = {
+    "wheel_load": lambda axle: float(axle.load_N.mean()),
+    "track": _track,
+    "static_toe": lambda axle: _standing(axle, "toe_rad"),
+    "static_camber": lambda axle: _standing(axle, "camber_rad"),
+    "ride_rate": _ride_rate,
+    "ride_frequency": _ride_frequency,
+    "track_change": _track_change,
+    "damper_ratio": _damper_ratio,
+    "bump_stop_contact": lambda axle: _contact(axle, 0),
+    "rebound_stop_contact": lambda axle: _contact(axle, 1),
+    "roll_centre_height": _roll_centre_height,
+    "roll_centre_height_by_force": _roll_centre_height_by_force,
+    "roll_stiffness": _roll_stiffness,
+    "front_roll_stiffness_fraction": _front_roll_stiffness_fraction,
+    "roll_steer_outer": lambda axle: _outer_per_roll(axle, "toe_rad"),
+    "roll_understeer": _roll_understeer,
+    "roll_camber": lambda axle: _outer_per_roll(axle, "camber_rad"),
+    "left_right_difference": _left_right_difference,
+    "anti_dive": lambda axle: _brake_fraction(axle) * _support(axle, "patch_m"),
+    "anti_lift": lambda axle: -_brake_fraction(axle) * _support(axle, "patch_m"),
+    "anti_lift_drive": lambda axle: _support(axle, "centre_m"),
+    "anti_squat": lambda axle: -_support(axle, "centre_m"),
+    "wheelbase": wheelbase_mm,
+    "cg_height": _cg_height,
+    "mass": lambda axle: float(axle.measured.vehicle.model.body_subtreemass[0]),
+    "front_load_fraction": lambda axle: 100.0 * float(axle.load_N[:2].sum() / axle.load_N.sum()),
+    "steering_ratio": _steering_ratio,
+    "steering_ratio_10deg": lambda axle: _ratio_at(axle, 10.0),
+    "steering_ratio_25deg": lambda axle: _ratio_at(axle, 25.0),
+    "rack_travel": _rack_travel,
+    "greatest_inner_angle": lambda axle: _at_lock(axle)[0],
+    "greatest_outer_angle": lambda axle: _at_lock(axle)[1],
+    "ackermann": _ackermann,
+    "turning_circle": _turning_circle,
+    "parking_lost_angle": _parking_lost_angle,
+    "rear_steer_range": _rear_steer_range,
+    "side_force_toe": lambda axle: _per_side_force(axle, "toe_rad"),
+    "side_force_toe_with_trail": _side_force_toe_with_trail,
+    "side_force_camber": lambda axle: _per_side_force(axle, "camber_rad"),
+    "braking_recession": _braking_recession,
+    "softest_bush": lambda axle: 1e-3 * float(_bushes_Npmm(axle).min()),
+    "stiffest_bush": lambda axle: 1e-3 * float(_bushes_Npmm(axle).max()),
+    "top_mount_radial_stiffness": lambda axle: _top_mount_Npmm(axle, "y"),
+    "top_mount_axial_stiffness": lambda axle: _top_mount_Npmm(axle, "z"),
+    "body_roll_frequency_sliding": lambda axle: axle.measured.modes.body_roll_sliding.frequency_Hz,
+    "roll_gradient": lambda axle: _per_g(axle.measured.modes.roll_gradient_radps2pm),
+    "braking_pitch_gradient": lambda axle: _per_g(axle.measured.modes.pitch_gradient_radps2pm),
+    "damper_asymmetry": _damper_asymmetry,
+}
+"""Characteristic of metrics.toml -> function from an axle to its value. Others are slopes, axes or modes."""
 
 
-def _of_mode(name: str, quantity: str) -> Evaluate:
-    return lambda axle: getattr(axle.measured.modes.by_name[name], quantity)
+@dataclass(frozen=True)
+class Definition:
+    """A characteristic: a table of metrics.toml, which explains the fields."""
+
+    name: str
+    unit: str
+    text: str
+    axles: Sequence[str] = ("front", "rear")
+    slope: Sequence[str] = ()
+    steering_axis: str = ""
+    mode: Sequence[str] = ()
+    factor: float = 1.0
+
+    def evaluate(self, axle: Axle) -> float:
+        """Return the value of an axle, in the unit."""
+        if self.mode:
+            name = self.mode[0] if axle.name == "car" else f"{self.mode[0]}_{axle.name}"
+            return getattr(axle.measured.modes.by_name[name], self.mode[1])
+        if self.steering_axis:
+            mean = float(np.mean([getattr(axis, self.steering_axis) for axis in axle.axes]))
+            return self._factor(self.steering_axis) * mean
+        if self.slope:
+            sweep, (quantity, _, along) = self.slope[0], self.slope[1].partition(".")
+            return self._factor(quantity) * axle.mean_slope(sweep, quantity, "xyz".index(along) if along else None)
+        return FORMULAS[self.name](axle)
+
+    def _factor(self, quantity: str) -> float:
+        return self.factor * (DEG if quantity.endswith("_rad") else 1.0)
 
 
-DEFINITIONS: Final = (
-    *TRAVEL_METRICS,
-    Definition("caster", "deg", _axis("caster_rad", DEG),
-        "Angle of the steering axis to the vertical in side view, positive with the top to the rear (ISO 8855). Front "
-        "axle: the axis about which the wheel turns at a fixed damper length. Rear axle: the axis of the steering "
-        "hinge."),
-    Definition("kingpin_inclination", "deg", _axis("inclination_rad", DEG),
-        "Angle of the steering axis to the vertical in front view, positive with the top inwards (ISO 8855)."),
-    Definition("scrub_radius", "mm", _axis("scrub_radius_m", 1e3),
-        "Steering-axis offset at the ground: positive where the axis meets the road inside the contact (ISO 8855)."),
-    Definition("caster_trail", "mm", _axis("trail_m", 1e3),
-        "Castor offset at the ground: positive where the axis meets the road ahead of the contact point (ISO 8855)."),
-    Definition("spindle_offset", "mm", _axis("centre_offset_m", 1e3),
-        "Steering-axis offset at the wheel centre, positive where the axis passes inside (ISO 8855)."),
-    Definition("centre_trail", "mm", _axis("centre_trail_m", 1e3),
-        "Castor offset at the wheel centre, positive where the axis passes ahead of it (ISO 8855)."),
-    Definition("steering_ratio", "-", _steering_ratio,
-        "Steering wheel angle over mean steer angle of the front wheels, slope within 20 deg, without load (ISO 8855).",
-        ("front",)),
-    Definition("steering_ratio_10deg", "-", lambda axle: _ratio_at(axle, 10.0),
-        "Steering wheel angle over mean steer angle, at a mean steer angle of 10 deg.", ("front",)),
-    Definition("steering_ratio_25deg", "-", lambda axle: _ratio_at(axle, 25.0),
-        "Steering wheel angle over mean steer angle, at a mean steer angle of 25 deg.", ("front",)),
-    Definition("rack_travel", "mm/rev", _rack_travel,
-        "Travel of the rack per turn of the steering wheel, within 20 deg.", ("front",)),
-    Definition("greatest_inner_angle", "deg", lambda axle: _at_lock(axle)[0],
-        "Steer angle of the inner wheel at full lock, from straight ahead, without load.", ("front",)),
-    Definition("greatest_outer_angle", "deg", lambda axle: _at_lock(axle)[1],
-        "Steer angle of the outer wheel at full lock, from straight ahead, without load.", ("front",)),
-    Definition("ackermann", "%", _ackermann,
-        "Difference of inner and outer steer angle over the ideal difference, at 20 deg of the inner wheel. Ideal "
-        "difference: cot(outer) - cot(inner) = distance of the steering axes on the ground / wheelbase. Angles from "
-        "straight ahead; 0 is parallel steering, 100 pure rolling at walking pace (Milliken 1995, ch. 19).",
-        ("front",)),
-    Definition("turning_circle", "m", _turning_circle,
-        "Diameter of the kerb circle at full lock and walking pace: path of the outer front tyre's outer edge. The car "
-        "turns about the point beside its rear axle at which the normals of both front wheels meet on average (mean "
-        "cotangent).", ("front",)),
-    Definition("parking_lost_angle", "deg", _parking_lost_angle,
-        "Steering wheel angle lost in the compliance when the standing car is steered on a dry road. Half the width of "
-        "the loop at straight ahead, 0.9 of friction (moment of each tyre: Gough 1956).", ("front",)),
-    Definition("rear_steer_range", "deg", _rear_steer_range,
-        "Greatest steer angle of a rear wheel by the rear steering actuators, from straight ahead.", ("rear",)),
-    Definition("lateral_compliance_centre", "mm/kN", slope("lateral_in_phase", "centre_m", 1e6, 1),
-        "Motion of the wheel centre with a side force at the contact points, in phase, within 1 kN."),
-    Definition("lateral_compliance_patch", "mm/kN", slope("lateral_in_phase", "contact_m", 1e6, 1),
-        "Motion of the contact point with a side force at the contact points, in phase, within 1 kN."),
-    Definition("side_force_toe", "deg/kN", lambda axle: _per_side_force(axle, "toe_rad"),
-        "Change of the outer wheel's toe angle per side force, in phase, within 1 kN; positive goes to toe-in. The "
-        "force acts at the contact points, on both wheels in the same direction, at the outer wheel towards the middle "
-        "of the car."),
-    Definition("side_force_toe_with_trail", "deg/kN", _side_force_toe_with_trail,
-        "`side_force_toe` with the force 30 mm behind the contact point, about the pneumatic trail of a tyre."),
-    Definition("side_force_toe_opposed", "deg/kN", slope("lateral_opposed", "toe_rad", 1e3 * DEG),
-        "Change of toe angle per side force towards the middle of the car on both wheels, within 1 kN."),
-    Definition("side_force_camber", "deg/kN", lambda axle: _per_side_force(axle, "camber_rad"),
-        "Change of the outer wheel's camber angle per side force, in phase, within 1 kN; positive leans its top out."),
-    Definition("longitudinal_compliance_centre", "mm/kN", slope("longitudinal_centre", "centre_m", 1e6, 0),
-        "Motion of the wheel centre with a longitudinal force at the wheel centres, within 1 kN."),
-    Definition("longitudinal_compliance_braking", "mm/kN", slope("longitudinal_patch", "centre_m", 1e6, 0),
-        "Motion of the wheel centre with a longitudinal force at the contact points, wheels locked, within 1 kN."),
-    Definition("braking_recession", "mm", _braking_recession,
-        "Rearward motion of the wheel centre under 5 kN of braking at each contact point."),
-    Definition("braking_toe", "deg/kN", slope("longitudinal_patch", "toe_rad", -1e3 * DEG),
-        "Change of toe angle per braking force at the contact points, wheels locked, within 1 kN; positive is toe-in."),
-    Definition("braking_wind_up", "deg/kN", slope("longitudinal_patch", "wind_up_rad", -1e3 * DEG),
-        "Rotation of the knuckle per braking force at the contact points, within 1 kN, positive as the wheels roll."),
-    Definition("driving_toe", "deg/kN", slope("longitudinal_centre", "toe_rad", 1e3 * DEG),
-        "Change of toe angle per driving force at the wheel centres, within 1 kN; positive is toe-in."),
-    Definition("aligning_steer", "deg/100Nm", slope("aligning_in_phase", "steer_rad", 100.0 * DEG),
-        "Change of steer angle per aligning moment in phase, within 100 N m, positive with the moment."),
-    Definition("aligning_toe_opposed", "deg/100Nm", slope("aligning_opposed", "toe_rad", 100.0 * DEG),
-        "Change of toe angle per moment towards toe-in on both wheels, within 100 N m."),
-    Definition("aligning_camber", "deg/100Nm", slope("aligning_opposed", "camber_rad", 100.0 * DEG),
-        "Change of camber angle per moment towards toe-in on both wheels, within 100 N m."),
-    Definition("softest_bush", "kN/mm", lambda axle: 1e-3 * float(_bushes_Npmm(axle).min()),
-        "Twice the axial stiffness of the softest link, unloaded: one of its two bushes, if both were alike."),
-    Definition("stiffest_bush", "kN/mm", lambda axle: 1e-3 * float(_bushes_Npmm(axle).max()),
-        "Twice the axial stiffness of the stiffest link, unloaded: one of its two bushes, if both were alike."),
-    Definition("top_mount_radial_stiffness", "N/mm", lambda axle: _top_mount_Npmm(axle, "y"),
-        "Stiffness of a strut's top mount across its axis: bushing, bent rod and strut tower; none if rigid.",
-        ("front",)),
-    Definition("top_mount_axial_stiffness", "N/mm", lambda axle: _top_mount_Npmm(axle, "z"),
-        "Stiffness of the top mount along the strut or damper; none if rigid."),
-    *_modes(),
-    Definition("body_roll_frequency_sliding", "Hz", lambda axle: axle.measured.modes.body_roll_sliding.frequency_Hz,
-        "Natural frequency of body roll with tyres that slide sideways without resistance, as on air bearings.",
-        ("car",)),
-    Definition("roll_gradient", "deg/g", lambda axle: _per_g(axle.measured.modes.roll_gradient_radps2pm),
-        "Roll angle per lateral acceleration of the standing car on its tyres, linearised (ISO 4138 drives).",
-        ("car",)),
-    Definition("braking_pitch_gradient", "deg/g", lambda axle: _per_g(axle.measured.modes.pitch_gradient_radps2pm),
-        "Pitch angle per deceleration, positive nose down, linearised, with the brake distribution at full pedal.",
-        ("car",)),
-    Definition("damper_asymmetry", "-", _damper_asymmetry,
-        "Force of the damper in rebound over the force in bump, at 0.3 m/s."),
-)  # fmt: skip
-"""All metrics, in the order of the table."""
+DEFINITIONS: Final = tuple(
+    Definition(name, **table) for name, table in read_toml(Path(__file__).with_name("metrics.toml"))[0].items()
+)
+"""All characteristics, in the order of the table."""
 
 
 @dataclass(frozen=True)
 class Target:
     """Target band of a metric."""
 
-    band: tuple[float, ...]
-    """Lowest and highest value, in the metric's unit."""
-    source: str
-    """Source of the band."""
-    remark: str = ""
-    """Remark about a value outside the band."""
+    band: tuple[float, ...]  # lowest and highest value, in the metric's unit
+    source: str  # source of the band
+    remark: str = ""  # remark about a value outside the band
 
 
-Targets = dict[tuple[str, str], Target]
-"""Targets by axle and metric."""
-
-
-def load_targets(vehicle: str, path: str | os.PathLike[str] | None = None) -> Targets:
-    """Read the target bands of a vehicle."""
+def load_targets(vehicle: str, path: str | os.PathLike[str] | None = None) -> dict[tuple[str, str], Target]:
+    """Read the target bands of a vehicle, by axle and metric."""
     file = Path(path) if path is not None else models_dir() / "targets" / f"{vehicle}_kc.toml"
     if path is None and not file.is_file():
         return {}

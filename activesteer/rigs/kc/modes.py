@@ -75,8 +75,7 @@ NAMES: Final = (
 class Mode:
     """One mode of the car."""
 
-    frequency_Hz: float
-    """Frequency of the undamped oscillation: magnitude of the eigenvalue [Hz]."""
+    frequency_Hz: float  # frequency of the undamped oscillation: magnitude of the eigenvalue [Hz]
     damping_ratio: float
 
 
@@ -84,14 +83,11 @@ class Mode:
 class Modes:
     """The modes of body and wheels, and the lean of the car."""
 
-    by_name: dict[str, Mode]
-    """The modes of `NAMES`."""
-    body_roll_sliding: Mode
-    """Body roll with tyres that slide sideways without resistance, as on air bearings."""
-    roll_gradient_radps2pm: float
-    """Roll angle per lateral acceleration [rad s2/m], positive to the outside of the turn."""
+    by_name: dict[str, Mode]  # the modes of `NAMES`
+    body_roll_sliding: Mode  # body roll with tyres that slide sideways without resistance, as on air bearings
+    roll_gradient_radps2pm: float  # roll angle per lateral acceleration [rad s2/m], positive to the outside of the turn
+    # Pitch angle per deceleration with the brake distribution at full pedal [rad s2/m], positive nose down
     pitch_gradient_radps2pm: float
-    """Pitch angle per deceleration with the brake distribution at full pedal [rad s2/m], positive nose down."""
 
 
 class _Linear:

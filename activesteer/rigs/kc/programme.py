@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from activesteer.config import read_toml
 from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
@@ -29,34 +31,20 @@ class Sweep:
     Arrays have the shape (n, 4) or (n, 4, 3), by corner.
     """
 
-    title: str
-    """Title of the sweep."""
-    variable: str
-    """Variable of the sweep, with its sign."""
-    unit: str
-    """SI unit of the variable."""
-    x: Array
-    """Values of the variable, shape (n,)."""
-    centre_m: Array
-    """Wheel centres."""
-    axle: Array
-    """Unit vectors along the wheels' axles, to the left."""
-    contact_m: Array
-    """Contact points: the lowest points of the wheels."""
-    patch_m: Array
-    """Points of the wheels, locked to their knuckles, that are the contact points at x = 0."""
-    load_N: Array
-    """Vertical forces of the pads."""
-    wind_up_rad: Array
-    """Rotation of the knuckles about y, positive in the sense of forward rolling."""
-    damper_m: Array
-    """Lengths of the dampers; for a strut its extension from the design position."""
-    rack_m: Array
-    """Travel of the rack, positive steers left, shape (n,)."""
-    steering_wheel_rad: Array
-    """Steering wheel angle, shape (n,)."""
-    steering_wheel_torque_Nm: Array
-    """Torque that holds the steering wheel, positive to the left, shape (n,)."""
+    title: str  # title of the sweep
+    variable: str  # variable of the sweep, with its sign
+    unit: str  # SI unit of the variable
+    x: Array  # values of the variable, shape (n,)
+    centre_m: Array  # wheel centres
+    axle: Array  # unit vectors along the wheels' axles, to the left
+    contact_m: Array  # contact points: the lowest points of the wheels
+    patch_m: Array  # points of the wheels, locked to their knuckles, that are the contact points at x = 0
+    load_N: Array  # vertical forces of the pads
+    wind_up_rad: Array  # rotation of the knuckles about y, positive in the sense of forward rolling
+    damper_m: Array  # lengths of the dampers; for a strut its extension from the design position
+    rack_m: Array  # travel of the rack, positive steers left, shape (n,)
+    steering_wheel_rad: Array  # steering wheel angle, shape (n,)
+    steering_wheel_torque_Nm: Array  # torque that holds the steering wheel, positive to the left, shape (n,)
 
     @property
     def steer_rad(self) -> Array:
@@ -82,13 +70,6 @@ class Sweep:
     def zero(self) -> int:
         """Index of the point of the standing car, x = 0."""
         return int(np.abs(self.x).argmin())
-
-    def as_table(self) -> dict[str, object]:
-        """Return all arrays as lists for JSON, with the angles of the wheels."""
-        table: dict[str, object] = {"title": self.title, "variable": self.variable, "unit": self.unit}
-        arrays = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in table}
-        arrays |= {"toe_rad": self.toe_rad, "camber_rad": self.camber_rad, "steer_rad": self.steer_rad}
-        return table | {name: value.tolist() for name, value in arrays.items()}
 
 
 def _read(car: HeldCar) -> dict[str, Array]:
@@ -136,23 +117,17 @@ def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float
 class SteeringAxis:
     """A steering axis, and its distances from the wheel of the standing car."""
 
-    point_m: Array
-    """Point of the axis at the height of the contact point, vehicle axes, shape (3,)."""
-    direction: Array
-    """Unit vector along it, upwards, shape (3,)."""
-    caster_rad: float
-    """Angle to the vertical in side view, positive with the top to the rear (ISO 8855)."""
+    point_m: Array  # point of the axis at the height of the contact point, vehicle axes, shape (3,)
+    direction: Array  # unit vector along it, upwards, shape (3,)
+    caster_rad: float  # angle to the vertical in side view, positive with the top to the rear (ISO 8855)
+    # Angle to the vertical in front view, positive with the top towards the middle of the car (ISO 8855)
     inclination_rad: float
-    """Angle to the vertical in front view, positive with the top towards the middle of the car (ISO 8855)."""
-    trail_m: float
-    """Distance from the contact point forwards to the axis on the ground: positive if the axis is ahead."""
+    trail_m: float  # distance from the contact point forwards to the axis on the ground: positive if the axis is ahead
+    # Distance from the axis on the ground outwards to the contact point: positive if the axis is inside
     scrub_radius_m: float
-    """Distance from the axis on the ground outwards to the contact point: positive if the axis is inside."""
-    centre_trail_m: float
-    """Distance from the wheel centre forwards to the axis, at the height of the wheel centre."""
+    centre_trail_m: float  # distance from the wheel centre forwards to the axis, at the height of the wheel centre
+    # Distance from the axis outwards to the wheel centre, at the height of the wheel centre (disturbing force lever)
     centre_offset_m: float
-    """Distance from the axis outwards to the wheel centre, at the height of the wheel centre (disturbing force
-    lever)."""
 
 
 def steering_axis(right: WheelPose, left: WheelPose, standing: WheelPose, inwards: float) -> SteeringAxis:
@@ -189,11 +164,6 @@ def steering_axis(right: WheelPose, left: WheelPose, standing: WheelPose, inward
     )
 
 
-_TRAVEL_M: Final = np.linspace(-0.08, 0.08, 33)
-_SIDE_FORCE_N: Final = np.linspace(-4000.0, 4000.0, 17)
-_PATCH_FORCE_N: Final = np.linspace(-5000.0, 3000.0, 17)
-_CENTRE_FORCE_N: Final = np.linspace(-3000.0, 5000.0, 17)
-_MOMENT_NM: Final = np.linspace(-150.0, 150.0, 13)
 _STEERING_POINTS: Final = 24
 """Points of the steering sweep to either side."""
 _AXIS_STEER_RAD: Final = math.radians(5.0)
@@ -209,12 +179,9 @@ class Measured:
 
     vehicle: Vehicle
     sweeps: dict[str, Sweep]
-    axes: tuple[SteeringAxis, ...]
-    """Steering axes by corner; at the rear the axes of the steering hinges."""
-    tyres: tuple[TyreStiffness, TyreStiffness]
-    """Front and rear tyres."""
-    static_load_N: Array
-    """Wheel loads of the standing car, shape (4,)."""
+    axes: tuple[SteeringAxis, ...]  # steering axes by corner; at the rear the axes of the steering hinges
+    tyres: tuple[TyreStiffness, TyreStiffness]  # front and rear tyres
+    static_load_N: Array  # wheel loads of the standing car, shape (4,)
     modes: Modes
 
     @property
@@ -244,86 +211,42 @@ def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> M
 def _sweeps(
     vehicle: Vehicle, car: HeldCar, load_N: Array, tyres: tuple[TyreStiffness, TyreStiffness]
 ) -> dict[str, Sweep]:
+    table, _ = read_toml(Path(__file__).with_name("sweeps.toml"))
     free = HeldCar(vehicle, springs="out")
-    both, opposed = np.ones(4), INWARDS
-    travel = "wheel travel, positive in bump"
-    steering = "steering wheel angle, positive to the left"
+    sweeps = {}
+    for name, row in table.items():
+        signs = INWARDS if row.get("opposed") else np.ones(4)
+        unit = np.outer(signs, row["direction"]) if "direction" in row else signs
+        first, last, count = row["points"]
+        cases = {x: Case(**{row["load"]: x * unit}) for x in np.linspace(first, last, count).tolist()}
+        sweeps[name] = run(car if row.get("springs", True) else free, row["title"], row["variable"], row["unit"], cases)
     scrub = np.repeat(
         [parking_moment_Nm(load_N[:2].mean(), tyres[0]), parking_moment_Nm(load_N[2:].mean(), tyres[1])], 2
     )
     scrub *= [1.0, 1.0, 0.0, 0.0]
-    angles = _steering_angles(vehicle)
-    rear = np.linspace(-1.0, 1.0, 13) * _rear_range(vehicle)
-
-    def sweep(
-        title: str, variable: str, unit: str, points: Array, case: Callable[[float], Case], on: HeldCar = car
-    ) -> Sweep:
-        return run(on, title, variable, unit, {float(x): case(float(x)) for x in points})
-
-    def push(x: float, y: float) -> Callable[[float], Array]:
-        return lambda force: np.outer(both, [x * force, y * force, 0.0])
-
-    along, across = push(1.0, 0.0), push(0.0, 1.0)
-    inwards = [np.outer(opposed, axis) for axis in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0])]
-    return {
-        "parallel_travel": sweep("parallel wheel travel", travel, "m", _TRAVEL_M, lambda z: Case(height_m=z * both)),
-        "opposite_travel": sweep(
-            "opposite wheel travel", "travel of the right wheels, positive in bump; the left wheels move the other way",
-            "m", _TRAVEL_M, lambda z: Case(height_m=z * opposed),
-        ),
-        "parallel_kinematic": sweep(
-            "parallel wheel travel, without springs", travel, "m", _TRAVEL_M, lambda z: Case(height_m=z * both), free
-        ),
-        "lateral_in_phase": sweep(
-            "side force in phase", "side force at each contact point, positive to the left", "N", _SIDE_FORCE_N,
-            lambda force: Case(patch_N=across(force)),
-        ),
-        "lateral_opposed": sweep(
-            "side force out of phase", "side force at each contact point, positive towards the middle of the car", "N",
-            _SIDE_FORCE_N, lambda force: Case(patch_N=force * inwards[0]),
-        ),
-        "longitudinal_patch": sweep(
-            "longitudinal force at the contact points, wheels locked to their knuckles",
-            "force at each wheel, positive forwards: brakes are negative", "N", _PATCH_FORCE_N,
-            lambda force: Case(patch_N=along(force)),
-        ),
-        "longitudinal_centre": sweep(
-            "longitudinal force at the wheel centres", "force at each wheel, positive forwards: drive is positive", "N",
-            _CENTRE_FORCE_N, lambda force: Case(centre_N=along(force)),
-        ),
-        "aligning_in_phase": sweep(
-            "aligning moment in phase", "moment about the vertical on each wheel, positive to the left", "Nm",
-            _MOMENT_NM,
-            lambda moment: Case(moment_Nm=np.outer(both, [0.0, 0.0, moment])),
-        ),
-        "aligning_opposed": sweep(
-            "aligning moment out of phase", "moment about the vertical on each wheel, positive towards toe-in", "Nm",
-            _MOMENT_NM, lambda moment: Case(moment_Nm=moment * inwards[1]),
-        ),
-        "steering_rolling": sweep(
-            "steering wheel sweep, pads without friction", steering, "rad", angles,
-            lambda angle: Case("contact", steering_wheel_rad=angle),
-        ),
-        "steering_at_rest_left": sweep(
-            "steering wheel turned to the left on a dry road, at rest", steering, "rad", angles,
-            lambda angle: Case("contact", steering_wheel_rad=angle, moment_Nm=np.outer(-scrub, [0.0, 0.0, 1.0])),
-        ),
-        "steering_at_rest_right": sweep(
-            "steering wheel turned to the right on a dry road, at rest", steering, "rad", angles,
-            lambda angle: Case("contact", steering_wheel_rad=angle, moment_Nm=np.outer(scrub, [0.0, 0.0, 1.0])),
-        ),
-        "rear_steering": sweep(
-            "rear steering", "angle of the rear steering actuators, positive to the left", "rad", rear,
-            lambda angle: Case("contact", rear_steer_rad=angle),
-        ),
-        **({
-            f"rear_steering_{name}": sweep(
-                f"rear steering with {name} of {1e3 * abs(height):.0f} mm",
-                "angle of the rear steering actuators, positive to the left", "rad", rear,
-                lambda angle, height=height: Case("contact", height * both, rear_steer_rad=angle),
-            ) for name, height in (("bump", _STEERED_BUMP_M), ("rebound", -_STEERED_BUMP_M))
-        } if vehicle.parameters.rear_actuator.is_screw else {}),
-    }  # fmt: skip
+    for ending, title, moment in (
+        ("rolling", "steering wheel sweep, pads without friction", 0.0 * scrub),
+        ("at_rest_left", "steering wheel turned to the left on a dry road, at rest", -scrub),
+        ("at_rest_right", "steering wheel turned to the right on a dry road, at rest", scrub),
+    ):
+        moment_Nm = np.outer(moment, [0.0, 0.0, 1.0])
+        cases = {
+            angle: Case("contact", steering_wheel_rad=angle, moment_Nm=moment_Nm)
+            for angle in _steering_angles(vehicle).tolist()
+        }
+        sweeps[f"steering_{ending}"] = run(car, title, "steering wheel angle, positive to the left", "rad", cases)
+    heights = {"": 0.0}
+    if vehicle.parameters.rear_actuator.is_screw:
+        heights |= {"_bump": _STEERED_BUMP_M, "_rebound": -_STEERED_BUMP_M}
+    for ending, height_m in heights.items():
+        title = "rear steering" + (f" with {ending[1:]} of {1e3 * abs(height_m):.0f} mm" if ending else "")
+        cases = {
+            angle: Case("contact", height_m * np.ones(4), rear_steer_rad=angle)
+            for angle in (np.linspace(-1.0, 1.0, 13) * _rear_range(vehicle)).tolist()
+        }
+        variable = "angle of the rear steering actuators, positive to the left"
+        sweeps[f"rear_steering{ending}"] = run(car, title, variable, "rad", cases)
+    return sweeps
 
 
 def rear_screw_travel_m(vehicle: Vehicle, angles_rad: Array) -> Array:

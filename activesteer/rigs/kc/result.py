@@ -14,7 +14,7 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from activesteer.core.conventions import Array
 from activesteer.core.files import make_folder, write_text
 from activesteer.core.units import known_unit
 from activesteer.errors import ModelError, ParameterError, nearest_names
-from activesteer.rigs.kc.metrics import DEFINITIONS, Axle, Target, Targets, load_targets
+from activesteer.rigs.kc.metrics import DEFINITIONS, Axle, load_targets
 from activesteer.rigs.kc.programme import INWARDS, Measured, Sweep, measure
 from activesteer.scenario import FileOrTable, check_gains, load_car
 from activesteer.vehicle.parameters import Friction
@@ -30,29 +30,17 @@ from activesteer.vehicle.parameters import Friction
 
 @dataclass(frozen=True)
 class KcMetric:
-    """One metric of the car.
-
-    Attributes:
-        name: Name.
-        axle: `front`, `rear` or `car`.
-        value: Value; nan if the car has none.
-        unit: Unit.
-        band: Target band; None without a target.
-        inside: Whether the value is inside the band; None without a target.
-        source: Source of the band; empty without a target.
-        definition: Definition, sign, source.
-        remark: Remark of the target file about a value outside the band.
-    """
+    """One metric of the car."""
 
     name: str
-    axle: str
-    value: float
+    axle: str  # `front`, `rear` or `car`
+    value: float  # value; nan if the car has none
     unit: str
-    band: tuple[float, float] | None
-    inside: bool | None
-    source: str
-    definition: str
-    remark: str = ""
+    band: tuple[float, float] | None  # target band; None without a target
+    inside: bool | None  # whether the value is inside the band; None without a target
+    source: str  # source of the band; empty without a target
+    definition: str  # definition, sign, source
+    remark: str = ""  # remark of the target file about a value outside the band
 
 
 @dataclass(frozen=True)
@@ -125,76 +113,30 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.4g}" if abs(value) >= 1.0 else f"{value:.3f}"
 
 
-_NO_TARGET: Final = Target((), "")
-
-
-def evaluated(vehicle: str, measured: Measured, targets: Targets) -> KcResult:
-    """Compute all metrics and compare them with their bands."""
-    metrics = []
-    for definition in DEFINITIONS:
-        for name in definition.axles:
-            value = definition.evaluate(Axle(name, measured))
-            band, inside, target = None, None, targets.get((name, definition.name), _NO_TARGET)
-            if target is not _NO_TARGET:
-                band = target.band[0], target.band[1]
-                inside = bool(band[0] <= value <= band[1])
-            metrics.append(
-                KcMetric(
-                    definition.name, name, value, definition.unit, band, inside, target.source, definition.text,
-                    target.remark,
-                )
-            )  # fmt: skip
-    return KcResult(vehicle, tuple(metrics), measured.sweeps, measured)
-
-
-Mirror = Literal["alike", "opposed"]
-
-
 @dataclass(frozen=True)
 class Test:
-    """One test of an axle.
+    """One test of an axle."""
 
-    Attributes:
-        sweep: Name of our own sweep.
-        variable: Channel of the variable.
-        meaning: Meaning of the variable, with its sign.
-        sign: Sign from the variable to the load of the left wheel: its travel; forwards, to the left; a turn to the
-            left.
-        mirror: Whether the load of the right wheel is the mirror image of the left wheel's load, or its opposite.
-        front_only: Whether only the front axle has the test.
-    """
-
-    sweep: str
-    variable: str
-    meaning: str
+    sweep: str  # name of our own sweep
+    variable: str  # channel of the variable
+    # Sign from the variable to the load of the left wheel: its travel; forwards, to the left; a turn to the left
     sign: float = 1.0
-    mirror: Mirror = "alike"
-    front_only: bool = False
+    # Whether the load of the right wheel is the mirror image of the left wheel's load, or its opposite
+    mirrored: bool = True
+    front_only: bool = False  # whether only the front axle has the test
 
 
 TESTS: Final = {
-    "parallel_travel": Test("parallel_travel", "travel", "wheel travel, both wheels, positive in bump"),
-    "opposite_travel": Test("opposite_travel", "travel", "wheel travel, positive in bump, one wheel up, one down"),
-    "steering": Test(
-        "steering_rolling", "rack", "travel of the rack, positive steers left", 1.0, "opposed", front_only=True
-    ),
-    "side_force": Test(
-        "lateral_in_phase", "force", "side force at each contact point, positive to the left", 1.0, "opposed"
-    ),
-    "side_force_opposed": Test(
-        "lateral_opposed", "force", "side force at each contact point, positive towards the middle of the car", -1.0
-    ),
-    "braking_force": Test(
-        "longitudinal_patch", "force", "force at each contact point, wheels locked, positive forwards"
-    ),
-    "drive_force": Test("longitudinal_centre", "force", "force at each wheel centre, positive forwards"),
-    "aligning_moment": Test(
-        "aligning_in_phase", "moment", "moment about the vertical on each wheel, positive to the left", 1.0, "opposed"
-    ),
-    "aligning_moment_opposed": Test(
-        "aligning_opposed", "moment", "moment about the vertical on each wheel, positive towards toe-in", -1.0
-    ),
-}  # fmt: skip
+    "parallel_travel": Test("parallel_travel", "travel"),
+    "opposite_travel": Test("opposite_travel", "travel"),
+    "steering": Test("steering_rolling", "rack", mirrored=False, front_only=True),
+    "side_force": Test("lateral_in_phase", "force", mirrored=False),
+    "side_force_opposed": Test("lateral_opposed", "force", -1.0),
+    "braking_force": Test("longitudinal_patch", "force"),
+    "drive_force": Test("longitudinal_centre", "force"),
+    "aligning_moment": Test("aligning_in_phase", "moment", mirrored=False),
+    "aligning_moment_opposed": Test("aligning_opposed", "moment", -1.0),
+}
 """Tests by name. AXLE_NAME.csv is the file of a test."""
 
 CHANNELS: Final = {
@@ -216,8 +158,10 @@ def write_tables(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]
         for name, test in TESTS.items():
             if test.front_only and axle == "rear":
                 continue
-            columns = _columns(result.curves[test.sweep], test, first)
-            text = _csv(f"{axle} axle of {result.vehicle}; {test.variable}: {test.meaning}", columns)
+            sweep = result.curves[test.sweep]
+            text = _csv(
+                f"{axle} axle of {result.vehicle}: {sweep.title}; {sweep.variable}", _columns(sweep, test, first)
+            )
             written.append(write_text(target / f"{axle}_{name}.csv", text, ParameterError))
     return written
 
@@ -297,4 +241,14 @@ def kinematics_compliance(
         raise ModelError(
             f"{car.mjcf}: the kinematics and compliance rig needs a part that the model lacks: {reason}"
         ) from reason
-    return evaluated(car.name, measured, bands)
+    metrics = []
+    for definition in DEFINITIONS:
+        for name in definition.axles:
+            value, target = definition.evaluate(Axle(name, measured)), bands.get((name, definition.name))
+            band = None if target is None else (target.band[0], target.band[1])
+            inside = None if band is None else bool(band[0] <= value <= band[1])
+            source, remark = ("", "") if target is None else (target.source, target.remark)
+            metrics.append(
+                KcMetric(definition.name, name, value, definition.unit, band, inside, source, definition.text, remark)
+            )
+    return KcResult(car.name, tuple(metrics), measured.sweeps, measured)

@@ -31,21 +31,13 @@ confidence interval draws, so a half needs more than 20."""
 
 
 class Index(NamedTuple):
-    """An index of one factor.
-
-    Attributes:
-        factor: Its key.
-        name: `S1`, `ST`, or `mu*`.
-        value: The index; `mu*` is in the unit of the metric.
-        confidence: Half width of its 95 % confidence interval.
-        spread: Standard deviation of the elementary effects (Morris); nan for others.
-    """
+    """An index of one factor."""
 
     factor: str
-    name: str
-    value: float
-    confidence: float
-    spread: float = np.nan
+    name: str  # `S1`, `ST`, or `mu*`
+    value: float  # the index; `mu*` is in the unit of the metric
+    confidence: float  # half width of its 95 % confidence interval
+    spread: float = np.nan  # standard deviation of the elementary effects (Morris); nan for others
 
 
 def indices(

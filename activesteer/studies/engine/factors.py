@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from activesteer.config import Source
+from activesteer.config import Source, build
 from activesteer.core.limits import MAX_NUMBER
-from activesteer.errors import nearest_names, shown
+from activesteer.errors import shown
 
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """Kinds of factors. A factor's table has exactly one of these keys."""
-_OPTIONS: Final = {"choice": ("weights",), "normal": ("truncate",)}
+_OPTIONS: Final = {"weights": "choice", "truncate": "normal"}
+"""Option -> the kind that it belongs to."""
 _ANYWHERE: Final = ("nominal", "of", "grows_with", "maneuvers", "when")
 """Keys that every kind allows."""
-NOMINAL: Final = ("times", "plus")
-"""Ways in which a factor may be relative to the value of the files."""
 _DEFAULT_TRUNCATION: Final = 3.0
 """Default truncation of a normal distribution, in standard deviations."""
 
@@ -30,37 +29,24 @@ Value = Any
 
 @dataclass(frozen=True)
 class Factor:
-    """A factor: a key and its values.
+    """A factor: a key and its values."""
 
-    Attributes:
-        key: Dotted key, as for `--set`.
-        kind: One of `KINDS`.
-        values: Values of a grid or a choice.
-        weights: Probability of each value of a choice.
-        low: Lower end of a range.
-        high: Upper end of a range.
-        mean: Mean of a normal distribution before truncation.
-        deviation: Standard deviation of a normal distribution before truncation.
-        nominal: One of `NOMINAL` if the values multiply the value of the files or are added to it; else empty.
-        of: Earlier factor to whose value the values are relative, in place of the value of the files; empty for none.
-        grows_with: Other factor -> exponent. The value is also multiplied by that factor, over its value in the
-            files, to the power of the exponent.
-        maneuvers: Names of the manoeuvres in which the factor varies; empty for all.
-        when: Other factor -> its values with which the factor varies; empty for all.
-    """
-
-    key: str
-    kind: str
-    values: tuple[Value, ...] = ()
-    weights: tuple[float, ...] = ()
-    low: float = 0.0
-    high: float = 0.0
-    mean: float = 0.0
-    deviation: float = 0.0
-    nominal: str = ""
+    key: str  # dotted key, as for `--set`
+    kind: str  # one of `KINDS`
+    values: tuple[Value, ...] = ()  # values of a grid or a choice
+    weights: tuple[float, ...] = ()  # probability of each value of a choice
+    low: float = 0.0  # lower end of a range
+    high: float = 0.0  # upper end of a range
+    mean: float = 0.0  # mean of a normal distribution before truncation
+    deviation: float = 0.0  # standard deviation of a normal distribution before truncation
+    nominal: str = ""  # `times` or `plus` if the values multiply the value of the files or are added to it; else empty
+    # Earlier factor to whose value the values are relative, in place of the value of the files; empty for none
     of: str = ""
+    # Other factor -> exponent. The value is also multiplied by that factor, over its value in the files, to the power
+    # of the exponent.
     grows_with: Mapping[str, float] = field(default_factory=dict)
-    maneuvers: tuple[str, ...] = ()
+    maneuvers: tuple[str, ...] = ()  # names of the manoeuvres in which the factor varies; empty for all
+    # Other factor -> its values with which the factor varies; empty for all
     when: Mapping[str, Value] = field(default_factory=dict)
 
     def acts(self, values: Mapping[str, Value]) -> bool:
@@ -104,96 +90,92 @@ class Factor:
         return table
 
 
+@dataclass(frozen=True)
+class FactorTable:
+    """Keys of a factor in a study file (see `Factor`)."""
+
+    grid: tuple[Any, ...] = ()
+    choice: tuple[Any, ...] = ()
+    uniform: tuple[float, ...] = ()
+    log_uniform: tuple[float, ...] = ()
+    normal: tuple[float, ...] = ()
+    weights: tuple[float, ...] = ()
+    truncate: tuple[float, ...] = ()
+    nominal: Literal["times", "plus"] | None = None
+    of: str = ""
+    grows_with: dict[str, float] = field(default_factory=dict)
+    maneuvers: tuple[str, ...] = ()
+    when: dict[str, Any] = field(default_factory=dict)
+
+
 def read_factor(key: str, table: object, source: Source) -> Factor:
     """Read a factor from its table in a study file."""
-    where = ("factors", key)
+    where, kinds = ("factors", key), ", ".join(KINDS)
     if not isinstance(table, Mapping):
-        raise source.fail(
-            where, f"{shown(table)} is no table; {{ uniform = [low, high] }} or another of {_listed()} is needed"
-        )
-    kinds = [name for name in table if name in KINDS]
-    if len(kinds) != 1:
-        wrong = next((name for name in table if name not in KINDS), "")
-        hint = f"; {nearest_names(wrong, KINDS)}" if wrong and not kinds else ""
-        raise source.fail(where, f"exactly one of {_listed()} is needed{hint}")
-    kind = kinds[0]
-    for name in table:
-        allowed = (*_OPTIONS.get(kind, ()), *_ANYWHERE)
-        if name != kind and name not in allowed:
-            raise source.fail((*where, name), f"does not belong to {kind}; beside it may stand: {', '.join(allowed)}")
-    nominal = table.get("nominal", "")
-    if "nominal" in table and nominal not in NOMINAL:
-        raise source.fail((*where, "nominal"), f"{shown(nominal)} is none of {', '.join(NOMINAL)}", nominal, NOMINAL)
-    of = table.get("of", "")
-    if not isinstance(of, str) or ("of" in table and not nominal):
-        raise source.fail((*where, "of"), "names an earlier factor, and stands beside nominal", of)
-    maneuvers = table.get("maneuvers", [])
-    if not isinstance(maneuvers, Sequence) or isinstance(maneuvers, str) or ("maneuvers" in table and not maneuvers):
-        raise source.fail((*where, "maneuvers"), f"{shown(maneuvers)} is no list of names", maneuvers)
-    when = table.get("when", {})
-    if not isinstance(when, Mapping) or ("when" in table and not when):
-        raise source.fail((*where, "when"), f"{shown(when)} is no table of other factors and their values", when)
-    grows_with = table.get("grows_with", {})
-    if not isinstance(grows_with, Mapping) or not all(map(_is_number, grows_with.values())):
-        problem = f"{shown(grows_with)} is no table of other factors and their exponents"
-        raise source.fail((*where, "grows_with"), problem, grows_with)
-    if grows_with and nominal != "times":
-        raise source.fail((*where, "grows_with"), 'belongs to nominal = "times"', grows_with)
-    other = {"of": of, "grows_with": dict(grows_with), "maneuvers": tuple(map(str, maneuvers)), "when": dict(when)}
-    return replace(_read(key, kind, table, source), nominal=nominal, **other)
+        problem = f"{shown(table)} is no table; {{ uniform = [low, high] }} or another of {kinds} is needed"
+        raise source.fail(where, problem)
+    given = build(FactorTable, table, source, where)
+    found = [kind for kind in KINDS if kind in table]
+    if len(found) != 1:
+        raise source.fail(where, f"exactly one of {kinds} is needed")
+    for name, value in table.items():
+        if _OPTIONS.get(name, found[0]) != found[0]:
+            raise source.fail((*where, name), f"belongs to {_OPTIONS[name]}, not to {found[0]}")
+        if value in ([], {}, ""):
+            raise source.fail((*where, name), "is empty", value)
+    if given.of and given.nominal is None:
+        raise source.fail((*where, "of"), "names an earlier factor, and stands beside nominal", given.of)
+    if given.grows_with and given.nominal != "times":
+        raise source.fail((*where, "grows_with"), 'belongs to nominal = "times"', given.grows_with)
+    return replace(
+        _read(key, found[0], given, source),
+        **{name: getattr(given, name) for name in ("of", "grows_with", "maneuvers", "when")},
+        nominal=given.nominal or "",
+    )
 
 
-def _read(key: str, kind: str, table: Mapping[str, Any], source: Source) -> Factor:
+def _read(key: str, kind: str, table: FactorTable, source: Source) -> Factor:
     """Return the factor of a table whose keys are consistent, after checking its values."""
-    where = ("factors", key)
-    given = table[kind]
+    where = ("factors", key, kind)
+    given = getattr(table, kind)
     if kind in ("grid", "choice"):
-        return _listed_values(key, kind, given, table.get("weights"), source)
-    first, second = _pair(given, source, (*where, kind))
+        return _listed_values(key, kind, given, table.weights, source)
+    first, second = _pair(given, source, where)
     if kind == "normal":
         if second <= 0.0:
-            raise source.fail((*where, kind), f"the standard deviation is {second:g}; it must be above 0")
+            raise source.fail(where, f"the standard deviation is {second:g}; it must be above 0")
         around = (first - _DEFAULT_TRUNCATION * second, first + _DEFAULT_TRUNCATION * second)
-        low, high = _pair(table["truncate"], source, (*where, "truncate")) if "truncate" in table else around
+        place = ("factors", key, "truncate")
+        low, high = _pair(table.truncate, source, place) if table.truncate else around
         if low >= high or ndtr((low - first) / second) == ndtr((high - first) / second):
-            raise source.fail(
-                (*where, "truncate"), f"between {low:g} and {high:g} there is nothing of the distribution"
-            )
+            raise source.fail(place, f"between {low:g} and {high:g} there is nothing of the distribution")
         return Factor(key, kind, low=low, high=high, mean=first, deviation=second)
     if first >= second:
-        raise source.fail((*where, kind), f"the lower end {first:g} is not below the upper end {second:g}")
+        raise source.fail(where, f"the lower end {first:g} is not below the upper end {second:g}")
     if kind == "log_uniform" and first <= 0.0:
-        raise source.fail((*where, kind), f"the lower end is {first:g}; it must be above 0")
+        raise source.fail(where, f"the lower end is {first:g}; it must be above 0")
     return Factor(key, kind, low=first, high=second)
 
 
-def _listed() -> str:
-    return ", ".join(KINDS)
-
-
-def _listed_values(key: str, kind: str, given: object, weights: object, source: Source) -> Factor:
+def _listed_values(key: str, kind: str, given: tuple[Value, ...], weights: tuple[float, ...], source: Source) -> Factor:
     where = ("factors", key, kind)
-    if not isinstance(given, Sequence) or isinstance(given, str) or not given:
-        raise source.fail(where, f"{shown(given)} is no list of values")
     for value in given:
         if not is_plain(value):
             raise source.fail(where, f"{shown(value)} is no number, text, true or false", value)
     if any(given.count(value) > 1 for value in given):
         raise source.fail(where, "a value stands in it twice")
-    if weights is None:
-        return Factor(key, kind, tuple(given))
     place = ("factors", key, "weights")
-    if not isinstance(weights, Sequence) or len(weights) != len(given):
+    if weights and len(weights) != len(given):
         raise source.fail(place, f"as many weights as values are needed: {len(given)}")
-    if not all(_is_number(weight) and weight >= 0.0 for weight in weights) or sum(weights) <= 0.0:
+    if weights and not (min(weights) >= 0.0 and sum(weights) > 0.0):
         raise source.fail(place, f"{shown(list(weights))} are no weights: at least 0, not all of them 0")
-    return Factor(key, kind, tuple(given), tuple(float(weight) for weight in weights))
+    return Factor(key, kind, given, weights)
 
 
-def _pair(given: object, source: Source, where: Sequence[str]) -> tuple[float, float]:
-    if not isinstance(given, Sequence) or len(given) != 2 or not all(map(_is_number, given)):
-        raise source.fail(where, f"{shown(given)} is not two finite numbers up to {MAX_NUMBER:g}")
-    return float(given[0]), float(given[1])
+def _pair(given: Sequence[float], source: Source, where: Sequence[str]) -> tuple[float, float]:
+    if len(given) != 2:
+        raise source.fail(where, f"{shown(list(given))} is not two numbers")
+    return given[0], given[1]
 
 
 def _is_number(value: object) -> bool:

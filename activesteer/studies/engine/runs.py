@@ -89,11 +89,6 @@ def deciding_versions() -> dict[str, str]:
     return {key: versions()[key] for key in ("activesteer", "source", "mujoco")}
 
 
-def files_digest(scenario: Scenario) -> str:
-    """Return the hash of the content of all files of a scenario."""
-    return digest(scenario.files)
-
-
 def controller_digest(controller: str) -> str:
     """Return the hash of a controller: its name, its parameters, and the source of a user's own controller."""
     path, _, name = controller.partition(":")
@@ -122,26 +117,18 @@ _VERSION: Final = "version of "
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that all runs of a study share; small, because every task carries them.
+    """Settings that all runs of a study share; small, because every task carries them."""
 
-    Attributes:
-        study: The study without its cases and searches.
-        maneuvers: Label and name, path or table of each manoeuvre.
-        vehicles: Label and name, path or table of each vehicle.
-        controllers: Label and name or file of each controller.
-        folder: Folder of the recordings.
-        named: Indices of manoeuvre and vehicle with overrides, one for each combination of text factors, which may name
-            other files.
-        expected: Hashes at the start of the study: of the files of each pair of manoeuvre and vehicle with each
-            combination of texts, of each controller, and of the versions.
-    """
-
-    study: StudyFile
-    maneuvers: tuple[tuple[str, FileOrTable], ...]
-    vehicles: tuple[tuple[str, FileOrTable], ...]
-    controllers: tuple[tuple[str, str], ...]
+    study: StudyFile  # the study without its cases and searches
+    maneuvers: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each manoeuvre
+    vehicles: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each vehicle
+    controllers: tuple[tuple[str, str], ...]  # label and name or file of each controller
     folder: Path | None
+    # Indices of manoeuvre and vehicle with overrides, one for each combination of text factors, which may name other
+    # files.
     named: tuple[tuple[int, int, dict[str, Any]], ...]
+    # Hashes at the start of the study: of the files of each pair of manoeuvre and vehicle with each combination of
+    # texts, of each controller, and of the versions.
     expected: dict[str, str]
 
 
@@ -163,7 +150,7 @@ def present_inputs(settings: Settings) -> dict[str, str]:
     places = itertools.product(range(len(settings.maneuvers)), range(len(settings.vehicles)))
     for maneuver, vehicle, overrides in (*((*place, settings.study.overrides) for place in places), *settings.named):
         scenario = scenario_of(settings, maneuver, vehicle, overrides)
-        found[files_key(settings, maneuver, vehicle, overrides)] = files_digest(scenario)
+        found[files_key(settings, maneuver, vehicle, overrides)] = digest(scenario.files)
     for label, controller in settings.controllers:
         found[f"controller {label}"] = controller_digest(controller)
     return found
@@ -316,7 +303,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     place = first.maneuver, first.vehicle, first.overrides
     try:
         scenario, key = scenario_of(settings, *place), files_key(settings, *place)
-        if files_digest(scenario) != settings.expected[key]:
+        if digest(scenario.files) != settings.expected[key]:
             raise StudyError(f"{key}: changed while the study ran")
         with preparation.not_on_disk():
             ready = with_amplitude_found(scenario, settings.study.timestep_s)

@@ -12,6 +12,7 @@ Files are written under another name and renamed, so that they appear completely
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import platform
 import shutil
@@ -54,16 +55,6 @@ def table_of(rows: Sequence[Row], factors: Sequence[str]) -> pa.Table:
     return pa.Table.from_arrays(list(columns.values()), schema=pa.schema(fields))
 
 
-def joined_schema(schemas: Iterable[pa.Schema]) -> pa.Schema:
-    """Return the columns of all parts. A factor with whole numbers in some parts only becomes a float."""
-    fields: dict[str, pa.Field] = {}
-    for schema in schemas:
-        for field in schema:
-            known = fields.get(field.name)
-            fields[field.name] = field if known is None else known.with_type(_common(known.type, field.type))
-    return pa.schema(list(fields.values()))
-
-
 def _factor_column(values: Sequence[Any]) -> pa.Array:
     """Return a column of numbers, texts or truth values. Anything else is written as JSON."""
     try:
@@ -76,44 +67,18 @@ def _factor_column(values: Sequence[Any]) -> pa.Array:
     return pa.array([None if value is None else json.dumps(value) for value in values], pa.string())
 
 
-def _common(a: pa.DataType, b: pa.DataType) -> pa.DataType:
-    if a == b or pa.types.is_null(b):
-        return a
-    if pa.types.is_null(a):
-        return b
-    both_numbers = all(pa.types.is_integer(kind) or pa.types.is_floating(kind) for kind in (a, b))
-    return pa.float64() if both_numbers else pa.string()
-
-
-def fitted(table: pa.Table, schema: pa.Schema) -> pa.Table:
-    """Return the table with the columns of the schema. Missing columns are empty."""
-    present = set(table.column_names)
-    columns = [
-        table[field.name].cast(field.type) if field.name in present else pa.nulls(len(table), field.type)
-        for field in schema
-    ]
-    return pa.Table.from_arrays(columns, schema=schema)
-
-
-def batched(tables: Iterable[pa.Table], rows: int) -> Iterator[pa.Table]:
-    """Return the rows in tables of equal length, so that the file does not depend on the division of the work."""
-    waiting: list[pa.Table] = []
-    count = 0
+def joined(tables: Sequence[pa.Table]) -> pa.Table:
+    """Return the rows of all parts. A factor with texts in some parts and numbers in others becomes a text."""
+    kinds: dict[str, set[pa.DataType]] = {}
+    for field in (field for table in tables for field in table.schema if not pa.types.is_null(field.type)):
+        kinds.setdefault(field.name, set()).add(field.type)
+    mixed = [name for name, found in kinds.items() if len(found) > 1 and found != {pa.int64(), pa.float64()}]
+    fitted = []
     for table in tables:
-        waiting.append(table)
-        count += len(table)
-        while count >= rows:
-            joined = pa.concat_tables(waiting).combine_chunks()
-            yield joined.slice(0, rows)
-            waiting, count = [joined.slice(rows)], count - rows
-    if count:
-        yield pa.concat_tables(waiting).combine_chunks()
+        fields = [field.with_type(pa.string()) if field.name in mixed else field for field in table.schema]
+        fitted.append(table.cast(pa.schema(fields)))
+    return pa.concat_tables(fitted, promote_options="permissive")
 
-
-try:
-    import fcntl
-except ImportError:  # not available on Windows
-    fcntl = None
 
 RESULTS: Final = "results.parquet"
 LOCK: Final = ".lock"
@@ -124,23 +89,14 @@ _KEY_CHARACTERS: Final = 200
 
 
 class Progress(NamedTuple):
-    """Progress of a study.
+    """Progress of a study."""
 
-    Attributes:
-        total: Runs of the study.
-        done: Runs that have a row.
-        by_status: Status -> number of runs.
-        errors: The most frequent errors, with their numbers.
-        running: Whether a process works on the study.
-        without_effect: Factors that change no metric of any run, once the study is complete.
-    """
-
-    total: int
-    done: int
-    by_status: dict[str, int]
-    errors: dict[str, int]
-    running: bool
-    without_effect: list[str]
+    total: int  # runs of the study
+    done: int  # runs that have a row
+    by_status: dict[str, int]  # status -> number of runs
+    errors: dict[str, int]  # the most frequent errors, with their numbers
+    running: bool  # whether a process works on the study
+    without_effect: list[str]  # factors that change no metric of any run, once the study is complete
 
     def to_json(self) -> dict[str, Any]:
         """Return the progress as JSON values."""
@@ -195,11 +151,10 @@ class Store:
         """Join all parts to one file in the order of the runs, and delete the parts."""
         target = self.folder / RESULTS
         if not target.exists():
-            paths = self._paths()
-            schema = self._joined_schema(paths)
-            with atomic_write(target, StudyError) as path, pq.ParquetWriter(path, schema) as writer:
-                for batch in batched((fitted(table, schema) for table in _tables(paths)), _ROW_GROUP):
-                    writer.write_table(batch, row_group_size=_ROW_GROUP)
+            # In one piece, so that the file does not depend on the division of the work.
+            table = self.read().combine_chunks()
+            with atomic_write(target, StudyError) as path:
+                pq.write_table(table, path, row_group_size=_ROW_GROUP)
         shutil.rmtree(self._parts, ignore_errors=True)
         return target
 
@@ -207,9 +162,7 @@ class Store:
         """Return all rows so far, in the order of the runs."""
         if (self.folder / RESULTS).exists():
             return next(_tables([self.folder / RESULTS]))
-        paths = self._paths()
-        schema = self._joined_schema(paths)
-        return pa.concat_tables([schema.empty_table(), *(fitted(table, schema) for table in _tables(paths))])
+        return joined(list(_tables(self._paths())) or [table_of([], self._factors)])
 
     def progress(self) -> Progress:
         """Return the progress of the study."""
@@ -246,9 +199,6 @@ class Store:
     def _paths(self) -> list[Path]:
         return sorted(self._parts.glob("[0-9]*.parquet"))
 
-    def _joined_schema(self, paths: Iterable[Path]) -> pa.Schema:
-        return joined_schema(list(_schemas(paths)) or [table_of([], self._factors).schema])
-
 
 def read_environment(folder: Path) -> dict[str, Any]:
     """Return the description in a study's folder."""
@@ -278,27 +228,14 @@ def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) ->
     raise StudyError(f"{folder} holds another study{why}; use a new folder, or delete this one", value=folder)
 
 
-def _schemas(paths: Iterable[Path]) -> Iterator[pa.Schema]:
-    for path in paths:
-        with _refusing(path):
-            schema = pq.read_schema(path)
-        yield schema
-
-
 def _tables(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator[pa.Table]:
     for path in paths:
-        with _refusing(path):
-            table = pq.read_table(path, columns=columns)
+        try:
+            with reading(path, StudyError):
+                table = pq.read_table(path, columns=columns)
+        except pa.ArrowException as reason:
+            raise StudyError(f"cannot read {path}: {reason}", value=path) from reason
         yield table
-
-
-@contextlib.contextmanager
-def _refusing(path: Path) -> Iterator[None]:
-    try:
-        with reading(path, StudyError):
-            yield
-    except pa.ArrowException as reason:
-        raise StudyError(f"cannot read {path}: {reason}", value=path) from reason
 
 
 @contextlib.contextmanager
@@ -307,18 +244,17 @@ def locked(path: Path) -> Iterator[None]:
     with writing(path, StudyError):
         file = path.open("w")
     with file:
-        if fcntl is not None:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as reason:
-                raise StudyError(f"{path.parent}: another process works on this study", value=path.parent) from reason
-            except OSError:
-                pass
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as reason:
+            raise StudyError(f"{path.parent}: another process works on this study", value=path.parent) from reason
+        except OSError:
+            pass
         yield
 
 
 def _is_locked(path: Path) -> bool:
-    if fcntl is None or not path.exists():
+    if not path.exists():
         return False
     with contextlib.suppress(OSError), path.open("r+") as file:
         try:

@@ -3,38 +3,29 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
-from activesteer.config import Source, build, read_toml, toml_value
+from activesteer.config import Range, Source, build, read_toml, toml_value
 from activesteer.core.conventions import DEFAULT_TIMESTEP_S
 from activesteer.core.files import user_path
-from activesteer.errors import StudyError, nearest_names, shown
+from activesteer.errors import StudyError, shown
 from activesteer.resources import DEFAULT_DRIVER, find_study
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.design import DesignTable, Samples, cases, choose_design, draw, read_cases
 from activesteer.studies.engine.factors import Factor, is_plain, read_factor
 
-_KEYS: Final = (
-    "title", "maneuvers", "controllers", "vehicles", "driver", "overrides", "factors", "design", "seed", "metrics",
-    "recordings", "curves", "claims", "timestep_s", "tune", "fit",
-)  # fmt: skip
 SEARCHES: Final = {
     "tune": "it says what is to be minimised, satisfied or violated",
     "fit": "it says which channels are compared, and how noisy they are",
 }
 """Tables of searches, which choose the factor values themselves; each with a hint for a missing table."""
-_SUCCESSORS: Final = {
-    "falsify": '[tune] with violate = "harm(controller) <= 1" and trials, the number of sets of each search',
-    "match": '[tune.satisfy] with lines such as prompt = "yaw_rate_response_time_s(ars) <= 0.1" or S1 = "claim(S1)", '
-    "and trials and seeds in [tune]",
-}
-"""Former key -> what does its work now."""
 _KEPT: Final = ("none", "failed", "all")
+_LISTS: Final = ("maneuvers", "controllers", "vehicles", "metrics", "curves")
+"""Keys with a list, or with its only name."""
 
 
 def label_of(item: FileOrTable) -> str:
@@ -51,46 +42,25 @@ def label_of(item: FileOrTable) -> str:
 
 @dataclass(frozen=True)
 class StudyFile:
-    """A study as in its file, with absolute paths.
+    """A study as in its file, with absolute paths."""
 
-    Attributes:
-        maneuvers: Names, paths or tables of manoeuvres.
-        controllers: Names or files of controllers.
-        vehicles: Names, paths or tables of vehicles.
-        driver: Name, path or table of the driver, or a driver class.
-        overrides: Overrides of all runs: dotted key -> value.
-        factors: Varied keys.
-        design: Design of the combinations.
-        case_list: Cases of a list design; None for other designs.
-        seed: Seed of the samples.
-        metrics: Patterns of the metrics to keep, such as `yaw_rate_*`; empty for all.
-        recordings: `none`, `failed`, `all`, or a number n for every n-th sample.
-        curves: Channels to keep of every run, every `conventions.CURVE_STEP_S`.
-        claims: Whether to check the paper's claims for every sample; this needs its three systems.
-        timestep_s: Step of engine, driver and controller [s].
-        tune: The table [tune], unparsed; see `tuning`.
-        fit: The table [fit], unparsed; see `measured.fit_file`.
-        title: One line for the report.
-        source: For error messages.
-    """
-
-    maneuvers: tuple[FileOrTable, ...]
-    controllers: tuple[str, ...] = ("none",)
-    vehicles: tuple[FileOrTable, ...] = ("compact",)
-    driver: FileOrTable = DEFAULT_DRIVER
-    overrides: dict[str, Any] = field(default_factory=dict)
+    maneuvers: tuple[FileOrTable, ...]  # names, paths or tables of manoeuvres
+    controllers: tuple[str, ...] = ("none",)  # names or files of controllers
+    vehicles: tuple[FileOrTable, ...] = ("compact",)  # names, paths or tables of vehicles
+    driver: FileOrTable = DEFAULT_DRIVER  # name, path or table of the driver, or a driver class
+    overrides: dict[str, Any] = field(default_factory=dict)  # overrides of all runs: dotted key -> value
     factors: tuple[Factor, ...] = ()
     design: DesignTable = DesignTable()
-    case_list: Samples | None = None
+    case_list: Samples | None = None  # cases of a list design; None for other designs
     seed: int = 0
-    metrics: tuple[str, ...] = ()
-    recordings: str | int = "none"
-    curves: tuple[str, ...] = ()
-    claims: bool = False
-    timestep_s: float = DEFAULT_TIMESTEP_S
-    tune: dict[str, Any] | None = None
-    fit: dict[str, Any] | None = None
-    title: str = ""
+    metrics: tuple[str, ...] = ()  # patterns of the metrics to keep, such as `yaw_rate_*`; empty for all
+    recordings: str | int = "none"  # `none`, `failed`, `all`, or a number n for every n-th sample
+    curves: tuple[str, ...] = ()  # channels to keep of every run, every `conventions.CURVE_STEP_S`
+    claims: bool = False  # whether to check the paper's claims for every sample; this needs its three systems
+    timestep_s: float = DEFAULT_TIMESTEP_S  # step of engine, driver and controller [s]
+    tune: dict[str, Any] | None = None  # the table [tune], unparsed; see `tuning`
+    fit: dict[str, Any] | None = None  # the table [fit], unparsed; see `measured.fit_file`
+    title: str = ""  # one line for the report
     source: Source = Source("study")
 
     def samples(self) -> tuple[Samples, ...]:
@@ -145,6 +115,34 @@ class StudyFile:
         return "\n".join(lines) + "\n"
 
 
+@dataclass(frozen=True)
+class StudyTable:
+    """Keys of a study file (see `StudyFile`)."""
+
+    KEY_HINTS: ClassVar = {
+        "falsify": 'write [tune] with violate = "harm(controller) <= 1" and trials, the number of sets of each search',
+        "match": 'write [tune.satisfy] with lines such as prompt = "yaw_rate_response_time_s(ars) <= 0.1" or '
+        'S1 = "claim(S1)", and trials and seeds in [tune]',
+    }
+
+    maneuvers: tuple[Any, ...]
+    controllers: tuple[str, ...] = StudyFile.controllers
+    vehicles: tuple[Any, ...] = StudyFile.vehicles
+    driver: Any = StudyFile.driver
+    overrides: dict[str, Any] = field(default_factory=dict)
+    factors: dict[str, Any] = field(default_factory=dict)
+    design: dict[str, Any] = field(default_factory=dict)
+    seed: Annotated[int, Range(0)] = StudyFile.seed
+    metrics: tuple[str, ...] = ()
+    recordings: Any = StudyFile.recordings
+    curves: tuple[str, ...] = ()
+    claims: bool = StudyFile.claims
+    timestep_s: Annotated[float, Range(1e-9)] = StudyFile.timestep_s
+    tune: dict[str, Any] | None = None
+    fit: dict[str, Any] | None = None
+    title: str = ""
+
+
 def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
     """Read a study file and check everything that needs neither manoeuvres nor vehicles."""
     if isinstance(given, StudyFile):
@@ -155,38 +153,25 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
         path = find_study(given)
         table, source = read_toml(path, StudyError)
         folder = path.resolve().parent
-    for key in table:
-        if key in _SUCCESSORS:
-            raise source.fail((key,), f"is no table any more; write {_SUCCESSORS[key]}")
-        if key not in _KEYS:
-            raise source.fail((key,), f"there is no such key; {nearest_names(key, _KEYS)}")
+    table |= {key: [value] for key in _LISTS if isinstance(value := table.get(key), str)}
+    read = build(StudyTable, table, source)
+    for key in (*_LISTS, "driver"):
+        items = [read.driver] if key == "driver" else getattr(read, key)
+        if key in table and not (items and all(isinstance(item, (str, Mapping)) for item in items)):
+            raise source.fail((key,), f"{shown(table[key])} is no name, file or table, nor a list of them", table[key])
     if search and search not in table:
         raise source.fail((search,), f"the table is missing: {SEARCHES[search]}")
-    if "maneuvers" not in table:
-        raise source.fail((), "the key maneuvers is missing: a list of names or files")
-    read = {
-        "maneuvers": lambda value: tuple(_located(item, folder) for item in _items(value, (str, Mapping))),
-        "vehicles": lambda value: tuple(_located(item, folder) for item in _items(value, (str, Mapping))),
-        "driver": lambda value: _located_code(_typed(value, (str, Mapping), "a name, a file or a table"), folder),
-        "controllers": lambda value: tuple(_located_code(item, folder) for item in _items(value, (str,))),
-        "metrics": lambda value: tuple(_items(value, (str,))),
-        "curves": lambda value: tuple(_items(value, (str,))),
-        "overrides": lambda value: dict(_typed(value, Mapping, "a table")),
-        **dict.fromkeys(SEARCHES, lambda value: dict(_typed(value, Mapping, "a table"))),
-        "claims": lambda value: _typed(value, bool, "true or false"),
-        "title": lambda value: _typed(value, str, "a text"),
-        "seed": _seed,
-        "timestep_s": _timestep,
-        "recordings": _recordings,
-    }
-    found: dict[str, Any] = {}
-    for key, value in table.items():
-        if key in read:
-            try:
-                found[key] = read[key](value)
-            except _WrongValueError as wrong:
-                raise source.fail((key,), f"{shown(value)} is not {wrong}", value) from None
-    study = StudyFile(**found, source=source, **_varied(table, folder, source))
+    study = StudyFile(
+        **{name: getattr(read, name) for name in ("overrides", "seed", "metrics", "curves", "claims", "timestep_s")},
+        **{name: getattr(read, name) for name in (*SEARCHES, "title")},
+        maneuvers=tuple(_located(item, folder) for item in read.maneuvers),
+        vehicles=tuple(_located(item, folder) for item in read.vehicles),
+        driver=_located_code(read.driver, folder),
+        controllers=tuple(_located_code(item, folder) for item in read.controllers),
+        recordings=_recordings(read.recordings, source),
+        source=source,
+        **_varied(read, folder, source),
+    )
     both = [key for key in study.keys if key in study.overrides]
     if both:
         raise source.fail(("overrides", both[0]), "is varied by the study too; give it in one place")
@@ -203,27 +188,15 @@ def changed_study(given: FileOrTable, changes: dict[str, Any]) -> StudyFile:
     return read_study(table) if changes else study
 
 
-class _WrongValueError(Exception):
-    """Return the expected form of a value, in words."""
-
-
-def _varied(table: Mapping[str, Any], folder: Path, source: Source) -> dict[str, Any]:
+def _varied(table: StudyTable, folder: Path, source: Source) -> dict[str, Any]:
     """Return factors, design and cases, checked for consistency."""
-    parts = []
-    for key in ("factors", "design"):
-        if not isinstance(part := table.get(key, {}), Mapping):
-            raise source.fail((key,), f"{shown(part)} is not a table")
-        parts.append(dict(part))
-    factors = tuple(read_factor(key, value, source) for key, value in parts[0].items())
-    case_list = _cases(parts[1].pop("cases", None), folder, source)
-    if any(key in table for key in SEARCHES) and any(factor.kind != "grid" for factor in factors):
-        parts[1].setdefault("samples", 1)
-    design = build(DesignTable, parts[1], source, ("design",))
-    return {
-        "factors": factors,
-        "design": choose_design(design, factors, case_list is not None, source),
-        "case_list": case_list,
-    }
+    factors = tuple(read_factor(key, value, source) for key, value in table.factors.items())
+    given = dict(table.design)
+    case_list = _cases(given.pop("cases", None), folder, source)
+    if any(getattr(table, key) is not None for key in SEARCHES) and any(factor.kind != "grid" for factor in factors):
+        given.setdefault("samples", 1)
+    design = choose_design(build(DesignTable, given, source, ("design",)), factors, case_list is not None, source)
+    return {"factors": factors, "design": design, "case_list": case_list}
 
 
 def _cases(given: object, folder: Path, source: Source) -> Samples | None:
@@ -244,39 +217,15 @@ def _cases(given: object, folder: Path, source: Source) -> Samples | None:
     return cases(given)
 
 
-def _recordings(value: object) -> str | int:
-    if isinstance(value, str) and value in _KEPT:
+def _recordings(value: Any, source: Source) -> str | int:
+    if value in _KEPT:
         return value
     if isinstance(value, Mapping) and set(value) == {"every"}:
         every = value["every"]
         if isinstance(every, int) and not isinstance(every, bool) and every > 0:
             return every
-    raise _WrongValueError(f"one of {', '.join(_KEPT)} or {{ every = 50 }}")
-
-
-def _seed(value: object) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise _WrongValueError("a whole number of at least 0")
-    return value
-
-
-def _timestep(value: object) -> float:
-    if not isinstance(value, float) or not (math.isfinite(value) and value > 0.0):
-        raise _WrongValueError("a time above 0 s")
-    return value
-
-
-def _typed(value: Any, kind: Any, wanted: str) -> Any:
-    if not isinstance(value, kind):
-        raise _WrongValueError(wanted)
-    return value
-
-
-def _items(value: object, kinds: tuple[type, ...]) -> list[Any]:
-    items = [value] if isinstance(value, str) else value
-    if not isinstance(items, Sequence) or not items or not all(isinstance(item, kinds) for item in items):
-        raise _WrongValueError("a list with at least one name")
-    return list(items)
+    problem = f"{shown(value)} is not one of {', '.join(_KEPT)} or {{ every = 50 }}"
+    raise source.fail(("recordings",), problem, value)
 
 
 def _located(item: FileOrTable, folder: Path) -> FileOrTable:

@@ -41,22 +41,15 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Trial:
-    """A set of values that was tried.
-
-    Attributes:
-        number: Its number.
-        values: Factor -> value.
-        objectives: Name of an objective -> its value.
-        margins: Name of a statement -> its margin, negative if it is violated; at most 1e6 in magnitude.
-        constraints: Name of a constraint -> its margin.
-        implausibility: Distance from the nominal values, see `factor_values`; nan if statements are not the goal.
-    """
+    """A set of values that was tried."""
 
     number: int
-    values: dict[str, Any]
-    objectives: dict[str, float]
+    values: dict[str, Any]  # factor -> value
+    objectives: dict[str, float]  # name of an objective -> its value
+    # Name of a statement -> its margin, negative if it is violated; at most 1e6 in magnitude
     margins: dict[str, float] = field(default_factory=dict)
-    constraints: dict[str, float] = field(default_factory=dict)
+    constraints: dict[str, float] = field(default_factory=dict)  # name of a constraint -> its margin
+    # Distance from the nominal values, see `factor_values`; nan if statements are not the goal
     implausibility: float = math.nan
 
     @property
@@ -72,34 +65,23 @@ class Trial:
 
 @dataclass(frozen=True)
 class Tuning:
-    """Result of a search.
-
-    Attributes:
-        goal: Its goal.
-        done: Number of all sets that were tried.
-        runs: Number of their runs.
-        trials: All sets that could be judged.
-        front: The best set. For several objectives, all sets that no other set beats. For statements, the most
-            plausible set for each number of them, from the most down. For a violation, the set with the least margin.
-        without_effect: Factors that change no metric of any run, if objectives are the goal and sets were tried now.
-        requirement: The requirement to violate.
-        controller: The examined controller of a violation.
-        maneuver: The manoeuvre of a violation.
-        commands: Controller -> command line that repeats its run of the worst set.
-        plausibility: Plausibility of the best set, if statements are the goal.
-    """
+    """Result of a search."""
 
     goal: Goal
-    done: int
-    runs: int
-    trials: list[Trial]
+    done: int  # number of all sets that were tried
+    runs: int  # number of their runs
+    trials: list[Trial]  # all sets that could be judged
+    # The best set. For several objectives, all sets that no other set beats. For statements, the most plausible set for
+    # each number of them, from the most down. For a violation, the set with the least margin.
     front: list[Trial]
+    # Factors that change no metric of any run, if objectives are the goal and sets were tried now
     without_effect: list[str] = field(default_factory=list)
-    requirement: str = ""
-    controller: str = ""
-    maneuver: str = ""
+    requirement: str = ""  # the requirement to violate
+    controller: str = ""  # the examined controller of a violation
+    maneuver: str = ""  # the manoeuvre of a violation
+    # Controller -> command line that repeats its run of the worst set
     commands: dict[str, str] = field(default_factory=dict)
-    plausibility: Plausibility | None = None
+    plausibility: Plausibility | None = None  # plausibility of the best set, if statements are the goal
 
     @property
     def failed(self) -> int:

@@ -1,4 +1,4 @@
-"""Workers behind one interface: this process, or processes of this machine; and their tasks.
+"""Workers behind one interface: this process, processes of this machine, or a Dask cluster; and their tasks.
 
 `TaskQueue` distributes tasks and returns their results as they arrive. If a worker dies, only its own tasks are lost
 and repeated. A task that kills its worker every time is given up.
@@ -15,11 +15,11 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, ProcessPoolExecutor, wait
 from multiprocessing import connection
-from typing import Any, Final, NamedTuple, Protocol
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 from activesteer.config import Range
-from activesteer.errors import ParameterError, StudyError
-from activesteer.studies.engine import dask_cluster
+from activesteer.errors import ParameterError, StudyError, not_installed
 
 _BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Environment variables from which the BLAS of numpy and scipy take their number of threads when loaded."""
@@ -27,43 +27,17 @@ _MOST_JOBS: Final = 16
 """Number of processes that is allowed on a machine with few processors; four times the processors on a larger one."""
 
 
-class Workers(Protocol):
-    """Workers that do tasks.
+class Workers:
+    """This process, which does every task immediately. Others override its methods.
 
     Attributes:
         in_flight: Number of tasks to submit at a time, so that no worker waits.
     """
 
-    in_flight: int
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Start a task. The function and its arguments must be picklable."""
-        ...
-
-    def died(self, error: BaseException) -> bool:
-        """Return True if an error means that a worker died, not that the task failed."""
-        ...
-
-    def replace(self) -> None:
-        """Replace dead workers."""
-        ...
-
-    def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """Call a function once on every machine before its workers start. Return the first objection."""
-        ...
-
-    def close(self, *, abandon: bool) -> None:
-        """End the workers; if abandoned, without waiting for their tasks."""
-        ...
-
-
-class ThisProcess:
-    """This process, which does every task immediately."""
-
     in_flight = 1
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Do the task and return a finished future."""
+        """Start a task. The function and its arguments must be picklable."""
         future: Future[Any] = Future()
         try:
             future.set_result(function(*arguments))
@@ -72,21 +46,21 @@ class ThisProcess:
         return future
 
     def died(self, error: BaseException) -> bool:
-        """Return False: the worker is this process."""
+        """Return True if an error means that a worker died, not that the task failed."""
         return False
 
     def replace(self) -> None:
-        """Do nothing."""
+        """Replace dead workers."""
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """See `Workers`."""
+        """Call a function once on every machine before its workers start. Return the first objection."""
         return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:
-        """Do nothing."""
+        """End the workers; if abandoned, without waiting for their tasks."""
 
 
-class LocalProcesses:
+class LocalProcesses(Workers):
     """Newly started processes that share nothing with this one, because MuJoCo's callbacks belong to a process."""
 
     def __init__(self, count: int) -> None:
@@ -121,10 +95,6 @@ class LocalProcesses:
         """Replace the pool, which ends with the first of its processes that dies."""
         self._pool.shutdown(wait=False, cancel_futures=True)
         self._pool = self._new_pool()
-
-    def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """See `Workers`. The function is called here, on this machine."""
-        return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:
         """See `Workers`."""
@@ -162,6 +132,119 @@ def _end_with(sentinel: int) -> None:
     os._exit(1)
 
 
+_CONNECT_S: Final = 10
+_WORKERS_S: Final = 30
+"""Time to wait for the first worker of a cluster [s]."""
+_TASKS_A_WORKER: Final = 4
+_SAME: Final = ("distributed", "dask", "cloudpickle", "msgpack")
+"""Packages whose versions must agree between client, scheduler and workers."""
+
+
+class DaskCluster(Workers):
+    """A Dask cluster, accessed through its client.
+
+    Its workers may join and leave. One thread of a worker does one task at a time, so start a worker with one thread.
+    """
+
+    def __init__(self, client: Any) -> None:
+        """Check the cluster. The client still belongs to the caller."""
+        self._client = client
+        self._executor = client.get_executor(pure=False)
+        try:
+            client.wait_for_workers(1, timeout=_WORKERS_S)
+            found = client.get_versions()
+        except Exception as reason:
+            raise StudyError(f"the cluster at {client.scheduler.address} has no worker: {_line(reason)}") from reason
+        _compare_versions(found)
+        self.in_flight = 0
+        self._count()
+
+    def _count(self) -> None:
+        self.in_flight = max(32, _TASKS_A_WORKER * len(self._client.nthreads()))
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """See `Workers`."""
+        return self._executor.submit(function, *arguments)
+
+    def died(self, error: BaseException) -> bool:
+        """Return True for the error of a task that killed several workers or that the scheduler lost."""
+        return type(error).__name__ == "KilledWorker" or isinstance(error, CancelledError)
+
+    def replace(self) -> None:
+        """Check that the scheduler still exists. The cluster replaces its workers itself."""
+        try:
+            self._client.wait_for_workers(1, timeout=_WORKERS_S)
+        except Exception as reason:
+            raise StudyError(
+                "the scheduler or its workers are gone; what is finished is kept, start the study again to go on"
+            ) from reason
+        self._count()
+
+    def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
+        """See `Workers`. One worker of each machine goes first, so that kernels are compiled once."""
+        hosts: dict[str, list[str]] = {}
+        for address in self._client.nthreads():
+            hosts.setdefault(address.rpartition(":")[0], []).append(address)
+        for addresses in ([each[0] for each in hosts.values()], [one for each in hosts.values() for one in each[1:]]):
+            if not addresses:
+                continue
+            answers = self._client.run(check, *arguments, workers=addresses, on_error="return")
+            for address, answer in answers.items():
+                problem = answer if isinstance(answer, str) else f"{type(answer).__name__}: {_line(answer)}"
+                if problem:
+                    return f"worker {address}: {problem}"
+        return ""
+
+    def close(self, *, abandon: bool) -> None:
+        """Cancel the tasks that have not begun."""
+        with contextlib.suppress(Exception):  # without a cluster there is nothing to cancel
+            self._executor.shutdown(wait=not abandon, cancel_futures=True)
+
+
+@contextlib.contextmanager
+def connected(scheduler: str) -> Iterator[Any]:
+    """Yield a client of the scheduler at an address, such as tcp://host:8786, or of the file that it wrote."""
+    try:
+        from distributed import Client  # noqa: PLC0415 - an extra
+    except ImportError as reason:
+        raise not_installed(StudyError, "--scheduler", "distributed", "cluster") from reason
+    if "://" in scheduler:
+        where: dict[str, Any] = {"address": scheduler}
+    elif Path(scheduler).is_file():
+        where = {"scheduler_file": scheduler}
+    else:
+        raise StudyError(
+            "is no address, as tcp://host:8786, and no scheduler file", key=f"--scheduler {scheduler}", value=scheduler
+        )
+    try:
+        client = Client(**where, timeout=_CONNECT_S)
+    except Exception as reason:  # any error of the network, the address or the file
+        raise StudyError(
+            f"cannot be reached: {_line(reason)}", key=f"--scheduler {scheduler}", value=scheduler
+        ) from reason
+    with client:
+        yield client
+
+
+def _compare_versions(found: dict[str, Any]) -> None:
+    """Check that client, scheduler and workers have the same versions. Ask the workers for that of activesteer."""
+    here = found["client"]
+    others = {"the scheduler": found["scheduler"]} | {f"worker {key}": value for key, value in found["workers"].items()}
+    for who, theirs in others.items():
+        ours, other = here["packages"], (theirs or {}).get("packages", {})
+        wrong = {name: other.get(name) for name in _SAME if other.get(name) != ours.get(name)}
+        python = [str(packages.get("python", "")).split(".")[:2] for packages in (ours, other)]
+        if python[0] != python[1]:
+            wrong["python"] = other.get("python")
+        if wrong:
+            words = "; ".join(f"{name} {version}, here {ours.get(name)}" for name, version in wrong.items())
+            raise StudyError(f"{who} has other versions: {words}", value=wrong)
+
+
+def _line(reason: BaseException) -> str:
+    return (str(reason).splitlines() or [type(reason).__name__])[0][:200]
+
+
 @contextlib.contextmanager
 def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str | None = None) -> Iterator[Workers]:
     """Yield this machine's processes, by default one per processor, or a Dask cluster. Abandon tasks if the body fails.
@@ -177,12 +260,12 @@ def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str |
         )
     with contextlib.ExitStack() as stack:
         if client is None and scheduler is not None:
-            client = stack.enter_context(dask_cluster.connected(scheduler))
+            client = stack.enter_context(connected(scheduler))
         if client is not None:
-            workers: Workers = dask_cluster.DaskCluster(client)
+            workers: Workers = DaskCluster(client)
         else:
             count = jobs or _processors()
-            workers = LocalProcesses(count) if count > 1 else ThisProcess()
+            workers = LocalProcesses(count) if count > 1 else Workers()
         early = True
         try:
             yield workers

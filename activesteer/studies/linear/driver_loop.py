@@ -32,7 +32,7 @@ from activesteer.plotting import Curve, Panel, Picture, draw
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, check_gains, resolve
 from activesteer.simulation.runner import simulate
-from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_cars
+from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_car
 from activesteer.theory.single_track import SingleTrack
 
 if TYPE_CHECKING:
@@ -116,22 +116,14 @@ class DriverLoop:
 
     Opened at the steering wheel: x[k+1] = A x[k] + B w, where w are the car's steering wheel angles in the steps of the
     period; the angles from the driver are C x[k]. His knowledge of his own decisions stays in A.
-
-    Attributes:
-        a: System matrix of the open loop, shape (n, n).
-        b: Input matrix of the angle in each step, shape (n, m) with m steps in a period.
-        c: Output matrix of the angle in each step, shape (m, n).
-        closed: System matrix of the closed loop, shape (n, n).
-        offset: Index of the lateral offset from the path in the state.
-        timestep_s: Time between two steps [s].
     """
 
-    a: Array
-    b: Array
-    c: Array
-    closed: Array
-    offset: int
-    timestep_s: float
+    a: Array  # system matrix of the open loop, shape (n, n)
+    b: Array  # input matrix of the angle in each step, shape (n, m) with m steps in a period
+    c: Array  # output matrix of the angle in each step, shape (m, n)
+    closed: Array  # system matrix of the closed loop, shape (n, n)
+    offset: int  # index of the lateral offset from the path in the state
+    timestep_s: float  # time between two steps [s]
 
     @cached_property
     def response(self) -> NDArray[np.complexfloating]:
@@ -251,19 +243,12 @@ def driver_loop(
 
 @dataclass(frozen=True)
 class LoopAtSpeed:
-    """A loop at one speed with one controller, and the same in a run of the full car.
-
-    Attributes:
-        speed_kmh: Speed [km/h].
-        controller: The controller.
-        loop: The linear loop.
-        run: A run with a small step of the path, including the friction of the rack and the tolerance band.
-    """
+    """A loop at one speed with one controller, and the same in a run of the full car."""
 
     speed_kmh: float
     controller: str
     loop: DriverLoop
-    run: RecordingLike
+    run: RecordingLike  # a run with a small step of the path, including the friction of the rack and the tolerance band
 
     @property
     def damping_in_run(self) -> float:
@@ -309,7 +294,8 @@ def driver_loops(
     known = SingleTrack(setup.single_track)
     found = []
     of_car = {key: value for key, value in (overrides or {}).items() if not key.startswith("driver.")}
-    for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], of_car):
+    for speed_kmh in speeds_kmh:
+        car = linear_car(vehicle, speed_kmh / 3.6, of_car)
         gains = steering_gains(car.speed_mps, known.matrices, who, setup.steering_ratio)
         for name in controllers:
             linear = linear_controller(name, setup, car.speed_mps)

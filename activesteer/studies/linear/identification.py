@@ -37,13 +37,6 @@ from activesteer.theory.single_track import SingleTrack, TwoTrackParameters
 RADIUS_TEST: Final = "100 m"
 """The test on a circle."""
 
-CLASS_BANDS: Final = {
-    "understeer_gradient_radpmps2": (2.2, 3.2, "computed for axle stiffnesses of 80-110 and 120-155 kN/rad"),
-    "characteristic_speed_mps": (77.0, 93.0, "computed for axle stiffnesses of 80-110 and 120-155 kN/rad"),
-    "roll_gradient_radpmps2": (3.9, 6.4, "computed for a roll stiffness of 95 to 60 kNm/rad"),
-}
-"""Usual values of the compact class: metric -> low, high (in display units), source."""
-
 
 @dataclass(frozen=True)
 class Identification:
@@ -73,23 +66,14 @@ class Identification:
         return {"single_track": single_track_lines(self.single_track), "two_track": two_track_lines(self.two_track)}
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values: `metrics` with name, test, value, unit, band, inside, source; both models in SI."""
-        metrics = []
-        for test, handling in self.tests.items():
-            for name, value in handling.items():
-                if math.isnan(value):
-                    continue
-                unit = metric(name).unit
-                shown = value * unit.factor
-                low, high, source = CLASS_BANDS.get(name, (None, None, None))
-                inside = None if low is None or high is None else low <= shown <= high
-                band = None if low is None else [low, high]
-                metrics.append(
-                    {
-                        "name": name.rpartition("_")[0], "test": test, "value": shown, "unit": unit.name, "band": band,
-                        "inside": inside, "source": source,
-                    }
-                )  # fmt: skip
+        """Return JSON values: `metrics` with name, test, value, unit; both models in SI."""
+        metrics = [
+            {"name": name.rpartition("_")[0], "test": test, "value": value * unit.factor, "unit": unit.name}
+            for test, handling in self.tests.items()
+            for name, value in handling.items()
+            if not math.isnan(value)
+            for unit in (metric(name).unit,)
+        ]
         known = {key: value for key, value in vars(self.single_track).items() if value is not None}
         return {"vehicle": self.vehicle, "metrics": metrics, "single_track": known, "two_track": vars(self.two_track)}
 

@@ -283,25 +283,13 @@ def linearise(
 
 
 def linear_car(
-    vehicle: FileOrTable = "compact", speed_mps: float = 80.0 / 3.6, overrides: Mapping[str, Any] | None = None
-) -> LinearCar:
-    """Return the car before reduction, with all modes (see `linearise`)."""
-    return linear_cars(vehicle, [speed_mps], overrides)[0]
-
-
-def linear_cars(
-    vehicle: FileOrTable,
-    speeds_mps: Sequence[float],
+    vehicle: FileOrTable = "compact",
+    speed_mps: float = 80.0 / 3.6,
     overrides: Mapping[str, Any] | None = None,
     controllers: Sequence[Any] = (),
-) -> list[LinearCar]:
-    """Return the car linearised at several speeds. See `linearise`. Overrides may set parameters of controllers."""
-    return [_linearised(vehicle, float(speed), overrides, controllers) for speed in speeds_mps]
-
-
-def _linearised(
-    vehicle: FileOrTable, speed_mps: float, overrides: Mapping[str, Any] | None, controllers: Sequence[Any]
 ) -> LinearCar:
+    """Return the car before reduction, with all modes. Overrides may set parameters of controllers."""
+    speed_mps = float(speed_mps)
     if not MIN_SPEED_MPS <= speed_mps < math.inf:
         raise ParameterError(
             f"is {speed_mps:g} m/s; needed are {MIN_SPEED_MPS:g} m/s ({3.6 * MIN_SPEED_MPS:g} km/h) at least",

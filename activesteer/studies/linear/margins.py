@@ -29,7 +29,7 @@ import functools
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
@@ -58,7 +58,7 @@ from activesteer.studies.engine.plan import Plan, task_size
 from activesteer.studies.engine.study import StudyProgress
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import in_parallel, workers_for
-from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_cars
+from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_car
 
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 """Default speeds [km/h]."""
@@ -77,19 +77,12 @@ Response = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop, or nan if a margin does not exist, such as the gain margin of a loop above -180 deg.
+    """Margins of one loop, or nan if a margin does not exist, such as the gain margin of a loop above -180 deg."""
 
-    Attributes:
-        gain_dB: Smallest factor on the gain, up or down, that makes the loop marginal [dB].
-        phase_rad: Smallest phase that makes it marginal [rad].
-        delay_s: Smallest delay that makes it marginal [s].
-        disk: alpha of the balanced disk [-]; 0 if the closed loop is unstable.
-    """
-
-    gain_dB: float
-    phase_rad: float
-    delay_s: float
-    disk: float
+    gain_dB: float  # smallest factor on the gain, up or down, that makes the loop marginal [dB]
+    phase_rad: float  # smallest phase that makes it marginal [rad]
+    delay_s: float  # smallest delay that makes it marginal [s]
+    disk: float  # alpha of the balanced disk [-]; 0 if the closed loop is unstable
 
 
 def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) -> Margins:
@@ -189,22 +182,15 @@ def is_stable(returned: Response) -> bool:
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Margins of one loop of a controller at a speed.
-
-    Attributes:
-        controller: The controller.
-        loop: Point at which the loop is opened: one of `LOOPS`, or `BOTH`.
-        speed_kmh: Speed [km/h].
-        margins: The margins.
-        factors: Factors of the car with the smallest disk margin, if there are many cars: key -> value.
-        curves: Loop gains at `FREQUENCIES_RADPS`; empty for many cars.
-    """
+    """Margins of one loop of a controller at a speed."""
 
     controller: str
-    loop: str
+    loop: str  # point at which the loop is opened: one of `LOOPS`, or `BOTH`
     speed_kmh: float
     margins: Margins
+    # Factors of the car with the smallest disk margin, if there are many cars: key -> value
     factors: Mapping[str, Any] = field(default_factory=dict)
+    # Loop gains at `FREQUENCIES_RADPS`; empty for many cars
     curves: tuple[Response, ...] = field(default=(), compare=False, repr=False)
 
     def to_json(self) -> dict[str, Any]:
@@ -232,7 +218,7 @@ def loop_margins(
     If a controller uses both actuators, the margins of both together come last.
     """
     check_gains(overrides or {}, controllers)
-    return next(margins_of_cars(controllers, vehicle, speeds_kmh, [overrides or {}], keep_curves=True))
+    return _margins(controllers, vehicle, speeds_kmh, [overrides or {}], keep_curves=True)[0]
 
 
 def straight_on(speed_mps: float) -> dict[str, Any]:
@@ -240,23 +226,25 @@ def straight_on(speed_mps: float) -> dict[str, Any]:
     return {"kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0}
 
 
-def margins_of_cars(
+def _margins(
     controllers: Sequence[Any],
     vehicle: FileOrTable,
     speeds_kmh: Sequence[float],
     cars: Iterable[Mapping[str, Any]],
     *,
     keep_curves: bool = False,
-) -> Iterator[list[LoopMargins]]:
-    """Yield the margins of several cars, given by their overrides.
+) -> list[list[LoopMargins]]:
+    """Return the margins of several cars, given by their overrides.
 
     A controller that knows the same about two cars is evaluated once. With `keep_curves` the loop gains are kept too.
     """
     plugins = [controller_spec(given) for given in controllers]
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
+    every: list[list[LoopMargins]] = []
     for overrides in cars:
         found: list[LoopMargins] = []
-        for car in linear_cars(vehicle, [speed / 3.6 for speed in speeds_kmh], overrides, controllers):
+        for speed_kmh in speeds_kmh:
+            car = linear_car(vehicle, speed_kmh / 3.6, overrides, controllers)
             scenario = resolve(straight_on(car.speed_mps), vehicle, overrides, controllers=controllers)
             for number, plugin in enumerate(plugins):
                 unit_s = interval_s(plugin, scenario.car.config.controllers, car.timestep_s)
@@ -267,7 +255,8 @@ def margins_of_cars(
                 returned = round_trip(car, answers[key], scenario, unit_s, FREQUENCIES_RADPS)
                 loops = _of_loops(plugin.label, 3.6 * car.speed_mps, returned)
                 found += loops if keep_curves else [replace(loop, curves=()) for loop in loops]
-        yield found
+        every.append(found)
+    return every
 
 
 def _of_loops(controller: str, speed_kmh: float, returned: Response) -> list[LoopMargins]:
@@ -479,12 +468,3 @@ def worst_margins(
             replace(row[least], margins=weakest([each.margins for each in row]), factors=requests[least].factors)
         )
     return worst
-
-
-def _margins(
-    controllers: Sequence[Any],
-    vehicle: FileOrTable,
-    speeds_kmh: Sequence[float],
-    cars: Sequence[Mapping[str, Any]],
-) -> list[list[LoopMargins]]:
-    return list(margins_of_cars(controllers, vehicle, speeds_kmh, cars))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from activesteer.analysis.harm import (
+    actuators_at_limit,
     changes,
     harms,
     has_spun,
@@ -18,6 +20,8 @@ from activesteer.analysis.harm import (
     shown,
 )
 from activesteer.core.metric_table import CONES_MISSED, STAYS_IN_LANES
+from activesteer.core.signals import Channel
+from activesteer.recording import Recording
 
 LANE = {
     "lane_overstep_m": 0.12, "cones_hit": 2.0, "sideslip_peak_abs_rad": 0.05, "heading_end_rad": 0.01,
@@ -173,3 +177,24 @@ def test_a_longer_stop_is_harm_and_no_stop_is_a_lost_car():
     assert harms(changes(stop, stop | {"stopping_distance_m": 40.4})) == []
     assert harms(changes(stop, stop | {"stopping_distance_m": 40.6})) == ["stopping"]
     assert harms(changes(stop, stop | {"stopping_distance_m": math.nan})) == ["stopping", "lost"]
+
+
+@pytest.mark.parametrize(
+    ("sideslip_deg", "demand_rad", "said"),
+    [
+        (30.0, 0.05, ["before at a limit of angle, rate or torque: rear steering for 0.4 s"]),
+        (15.0, 0.05, []),  # under control
+        (30.0, 0.0, []),  # not steered by the controller
+    ],
+)
+def test_a_car_that_spins_says_for_how_long_its_actuators_were_at_their_limits(sideslip_deg, demand_rad, said):
+    time_s = np.arange(0.0, 2.0, 0.01)
+    channels = {
+        "sideslip_rad": np.radians(sideslip_deg) * (time_s > 1.0),
+        "rear_steer_demand_rad": np.full_like(time_s, demand_rad),
+        "rl_steer_saturated": 1.0 * ((time_s > 0.395) & (time_s < 0.695)),
+        "rr_steer_saturated": 1.0 * ((time_s > 0.495) & (time_s < 0.795) | (time_s > 1.2)),  # after the loss: no matter
+    }
+    made = [Channel(name, "", "", "vehicle", single=False) for name in channels]
+    run = Recording(made, time_s, np.column_stack(list(channels.values())))
+    assert list(actuators_at_limit(run)) == said

@@ -130,6 +130,16 @@ def test_actuator_that_lags_is_sound_and_one_that_stays_has_failed():
     assert stuck.failed
 
 
+def test_actuator_that_follows_a_demand_which_turns_back_is_sound():
+    """A screw of 12 deg/s behind a demand of 2 Hz is late, and moves away from what was demanded a window before."""
+    actuator, position = SupervisedActuator(math.radians(0.3), 0.06, INTERVAL_S), 0.0
+    for k in range(400):
+        demand = math.radians(2.0) * math.sin(2.0 * math.pi * 2.0 * k * INTERVAL_S)
+        step = math.radians(12.0) * INTERVAL_S
+        assert not actuator.step(demand, position)
+        position += min(max(demand - position, -step), step)
+
+
 def test_failed_actuator_stays_so():
     actuator = SupervisedActuator(0.005, 0.06, INTERVAL_S)
     for _ in range(30):

@@ -133,7 +133,8 @@ def test_friction_that_does_not_show_is_not_learned(make):
 
 def test_friction_that_shows_is(slalom):
     run = slalom.recording
-    assert run["estimated_friction_std"].min() < 0.05
+    # 0.03 by the forces, and 0.05 of the friction for camber and turn slip, which the model does not know.
+    assert run["estimated_friction_std"].min() < 0.06
     shows = run["estimated_friction_std"] < 0.08
     assert np.abs(run["estimated_friction"][shows] - 0.9).max() < 0.25
 
@@ -183,6 +184,16 @@ def test_the_superelevation_of_a_curve_is_not_taken_for_a_slippery_road(vehicle,
     ).recording
     assert np.abs(run["estimated_sideslip_rad"] - run["sideslip_rad"]).max() < np.radians(0.6)
     assert (np.abs(run["estimated_friction"] - 0.9) < 2.0 * run["estimated_friction_std"]).mean() > 0.9
+
+
+@pytest.mark.parametrize("vehicle", ["compact", "sedan", "tesla_model_s"])
+def test_the_toe_of_dived_wheels_on_split_friction_is_not_taken_for_an_offset_of_the_sensors(vehicle):
+    """Dive turns the wheels by up to 1.5 deg per g, and only those on the better side count."""
+    run = drive("split_mu_braking", vehicle).recording
+    counts = (run["vx_mps"] > 5.0) & (run.time_s > 1.0)
+    error = (run["estimated_sideslip_rad"] - run["sideslip_rad"])[counts]
+    assert rms(error) < math.radians(0.4)
+    assert rms(error / run["estimated_sideslip_std_rad"][counts]) < 2.0
 
 
 def test_roll_steer_is_not_taken_for_stiff_tyres():

@@ -187,7 +187,8 @@ def test_wheels_carry_the_car_and_shift_load_to_the_front_in_braking_and_out_of_
     memory["last_spin_radps"] = said[SAID.index("fl_spin_radps") :][:4]
     pressure_Pa = 20e5
     said[SAID.index("fl_pressure_Pa") :][:4] = pressure_Pa
-    read_wheels(known, memory, said, 0.01)
+    tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
+    read_wheels(known, tyres, memory, said, 0.01)
     car, more = setup.single_track, setup.estimation.two_track
     fl_N, fr_N, rl_N, rr_N = memory.load_N
     assert memory.load_N.sum() == pytest.approx(car.mass_kg * GRAVITY_MPS2)
@@ -201,6 +202,22 @@ def test_wheels_carry_the_car_and_shift_load_to_the_front_in_braking_and_out_of_
     assert memory.front_along_N == pytest.approx(-brakes_N[:2].sum())
     assert memory.moment_Nm == pytest.approx(0.0, abs=1e-9)
     assert memory.by_wheel_mps == pytest.approx([20.0] * 4)
+
+
+def test_driven_wheels_also_carry_the_drag_of_the_steered_wheels(setup, known, memory):
+    """In a steady turn the lateral force of the front wheels points backwards by the sine of their angle."""
+    memory["speed_mps"], memory["front_angle_rad"] = 20.0, 0.15
+    memory.state[FRONT_SLIP], memory.state[FRICTION] = 0.1, 0.9
+    memory.state[FRONT_STIFFNESS] = memory.state[REAR_STIFFNESS] = 1.0
+    tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
+    said = np.zeros(len(SAID))
+    said[SAID.index("fl_spin_radps") :][:4] = memory["last_spin_radps"] = 20.0 / known.rolling_radius_m
+    read_wheels(known, tyres, memory, said, 0.01)
+    front_N, rear_N = forces_of(known, tyres, memory, memory.state)
+    assert front_N > 5000.0
+    assert rear_N == 0.0
+    # The front wheels drive, and their forces lower the friction that is left a little.
+    assert memory.along_N.sum() == pytest.approx(front_N * math.sin(0.15) + known.drag_kgpm * 400.0, rel=0.02)
 
 
 def test_brush_model_gives_slip_and_slope_that_belong_together():
@@ -245,7 +262,8 @@ def test_said_errors_are_those_of_the_filters_and_of_the_way_to_the_present(know
     turned = half_wheelbase_m * wrong_N / known.yaw_inertia_kgm2 * ahead_s
     assert memory.estimate == pytest.approx([
         speed_mps, 0.6, math.atan2(0.6, speed_mps), 0.25, 0.8, math.hypot(0.2, known.radius_std * speed_mps),
-        lateral_std, math.atan2(lateral_std, speed_mps), math.hypot(math.sqrt(rate), turned), math.sqrt(friction),
+        lateral_std, math.atan2(lateral_std, speed_mps), math.hypot(math.sqrt(rate), turned),
+        math.hypot(math.sqrt(friction), known.friction_fraction * 0.8),
         1.1, 0.7, math.sqrt(front), math.sqrt(rear),
     ])  # fmt: skip
 

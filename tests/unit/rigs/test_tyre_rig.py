@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ModelError, ParameterError
-from activesteer.rigs.tyre_rig import Motion, TyreRig
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 from tests.raising import raises
+from tests.tyre_rig import Motion, TyreRig
 from tests.unit.tyre.tyres import tyre
 
 AT = {"slip_angle_rad": 0.05, "slip_ratio": 0.02, "inclination_rad": 0.03, "load_N": 4000.0, "speed_mps": 20.0}

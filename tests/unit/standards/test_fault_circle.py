@@ -10,7 +10,8 @@ import pytest
 
 import activesteer
 from activesteer.scenario import resolve
-from activesteer.standards.fault_circle import AY_MPS2, CIRCLES, YAW_RATE_RADPS, circle, fault_circle
+from activesteer.standards.r79_circle import AY_MPS2, YAW_RATE_RADPS, circle, fault_circle
+from activesteer.standards.standard import SIDES
 
 FAULTS = ("rear:runaway=left", "rear:runaway=right", "rear:stuck")
 BEGIN_S = 4.5
@@ -18,7 +19,7 @@ BEGIN_S = 4.5
 
 @pytest.fixture(scope="module")
 def made() -> dict[tuple[str, str], dict[str, Any]]:
-    rows = [row for direction in CIRCLES for row in fault_circle("ars", "typical", "compact", {}, FAULTS, direction)]
+    rows = [row for direction in SIDES for row in fault_circle("ars", "typical", "compact", {}, FAULTS, direction)]
     return {(row["fault"], row["direction"]): row for row in rows}
 
 
@@ -57,10 +58,10 @@ def test_the_tolerated_time_keeps_the_limits_and_a_little_more_breaks_them(made)
     assert used(tolerant_s) <= 1.0 < used(tolerant_s + 0.006)
 
 
-@pytest.mark.parametrize("direction", CIRCLES)
+@pytest.mark.parametrize("direction", SIDES)
 def test_the_path_is_a_circle_of_100_m_when_the_fault_begins(direction: str) -> None:
     maneuver: Any = resolve(circle(direction)).maneuver
     x, y = np.array(maneuver.path.x_m), np.array(maneuver.path.y_m)
-    curvature = CIRCLES[direction] * np.diff(np.unwrap(np.arctan2(np.diff(y), np.diff(x))))
+    curvature = SIDES[direction] * np.diff(np.unwrap(np.arctan2(np.diff(y), np.diff(x))))
     assert curvature.max() == pytest.approx(0.01, rel=0.01)
     assert curvature[round(BEGIN_S * 80.0 / 3.6) - 1] == pytest.approx(0.01, rel=0.02)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections.abc import Mapping
@@ -15,10 +14,9 @@ from activesteer.core.files import json_text
 from activesteer.errors import ManeuverError
 from activesteer.pages import render_page
 from activesteer.standards import fmvss126
-from activesteer.standards.examination import examination_page, examine
-from activesteer.standards.fmvss126 import STANDARD, amplitudes, verdict
-from activesteer.standards.standard import Findings
-from activesteer.standards.study_test_runner import StudyTestRunner
+from activesteer.standards.examination import EXAMINED_BY, examination_page, examine
+from activesteer.standards.fmvss126 import amplitudes, verdict
+from activesteer.standards.standard import Findings, StandardRunner
 from tests.raising import raises
 from tests.unit.standards.runners import PrescribedRunner
 
@@ -82,7 +80,7 @@ def test_displacement_counts_from_5_a_on():
 
 def test_a_car_that_keeps_the_limits_passes():
     runner = PrescribedRunner(driven)
-    found = STANDARD.examine(runner)
+    found = fmvss126.examine(runner)
     assert found.passed is True
     assert found.values["A_deg"] == 30.0
     assert len(found.values["series"]) == 32
@@ -93,7 +91,7 @@ def test_a_car_that_keeps_the_limits_passes():
 
 
 def test_a_car_that_spins_to_one_side_fails_and_the_first_amplitude_is_named():
-    found = STANDARD.examine(PrescribedRunner(lambda series, case: driven(series, case, spins_from_deg=164.0)))
+    found = fmvss126.examine(PrescribedRunner(lambda series, case: driven(series, case, spins_from_deg=164.0)))
     assert found.passed is False
     assert "first at 5.5 A (165 deg), right first: yaw rate 80 %" in found.summary
     assert [row["pass"] for row in found.values["series"]].count(False) == 8
@@ -104,7 +102,7 @@ def test_a_run_in_which_the_car_tips_over_is_a_row_that_fails():
         over = case.get("steer.steering_wheel_deg", 0.0) > 260.0
         return "the car tips over" if over else driven(series, case)
 
-    found = STANDARD.examine(PrescribedRunner(tips))
+    found = fmvss126.examine(PrescribedRunner(tips))
     assert found.passed is False
     assert [row["amplitude_deg"] for row in found.values["series"] if not row["pass"]] == [270.0, 270.0]
     assert "no result: the car tips over" in found.summary
@@ -113,12 +111,11 @@ def test_a_run_in_which_the_car_tips_over_is_a_row_that_fails():
 
 
 def test_a_controller_with_which_the_car_cannot_be_tested_does_not_stop_the_others(monkeypatch):
-    def examined(runner: object) -> Findings:
-        good = isinstance(runner, StudyTestRunner) and runner.controller == "afs"
-        return STANDARD.examine(PrescribedRunner(driven if good else lambda *_: "it spins"))
+    def examined(runner: StandardRunner) -> Findings:
+        good = runner.controller == "afs"
+        return fmvss126.examine(PrescribedRunner(driven if good else lambda *_: "it spins"))
 
-    standard = dataclasses.replace(STANDARD, examine=examined)
-    monkeypatch.setattr("activesteer.standards.examination.standard_of", lambda _: standard)
+    monkeypatch.setitem(EXAMINED_BY, "fmvss126", examined)
     result = examine("fmvss126", ["ars", "afs"], jobs=1)
     assert result.failed == ["ars"]
     assert "A: " in result.findings["ars"].values["error"]
@@ -129,13 +126,13 @@ def test_a_controller_with_which_the_car_cannot_be_tested_does_not_stop_the_othe
 
 def test_noisy_sensors_are_drawn_anew_for_each_repetition():
     runner = PrescribedRunner(driven, changed={"sensors.preset": "production"})
-    STANDARD.examine(runner)
+    fmvss126.examine(runner)
     assert [case["sensors.seed"] for case in runner.asked["slowly_increasing_steer"]] == [0, 1, 2, 0, 1, 2]
 
 
 def test_a_car_that_does_not_get_to_0_375_g_has_no_a():
     with raises(ManeuverError, key="A"):
-        STANDARD.examine(PrescribedRunner(lambda *_: {"steering_wheel_at_0_3g_rad": math.nan}))
+        fmvss126.examine(PrescribedRunner(lambda *_: {"steering_wheel_at_0_3g_rad": math.nan}))
 
 
 def test_the_compact_keeps_the_limits_at_3_a_and_not_without_control_at_6_5_a(monkeypatch, tmp_path):

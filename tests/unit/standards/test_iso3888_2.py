@@ -44,7 +44,7 @@ def test_one_clean_line_is_enough_and_a_car_that_tips_over_is_a_row():
     # Without channels there is nothing to draw.
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(iso3888_2, "_pictures", lambda *_: [])
-        found = iso3888_2.STANDARD.examine(runner)
+        found = iso3888_2.examine(runner)
     assert found.values["entry_speed_kmh"] == {"left": 52.0, "right": 52.0}
     assert [case["speed_kmh"] for case in runner.asked["left_fine"][::3]] == [51.0, 52.0, 53.0, 54.0]
     tipped = [row for row in found.values["runs"] if row["speed_kmh"] == 80.0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,13 +13,11 @@ from activesteer.analysis.handling import CarGeometry, evaluate
 from activesteer.config import Range
 from activesteer.core.files import json_text
 from activesteer.errors import ManeuverError, ParameterError, RecordingError
-from activesteer.standards import examination, iso7401, iso7975, iso13674
+from activesteer.standards import braking, examination, iso7401, iso13674
+from activesteer.standards.braking import after_one_second, corrected_distance
 from activesteer.standards.catalogue import STANDARDS, standard_of
 from activesteer.standards.examination import Examination, examine
-from activesteer.standards.iso14512 import after_one_second
-from activesteer.standards.iso21994 import corrected_distance
-from activesteer.standards.standard import Findings, StandardRun, metrics_table, steering_wheel_at
-from activesteer.standards.study_test_runner import StudyTestRunner
+from activesteer.standards.standard import Findings, StandardRun, StandardRunner, metrics_table, steering_wheel_at
 from tests.raising import raises
 from tests.unit.standards.signals import run_of, times
 
@@ -46,13 +43,12 @@ def test_settings_of_a_controller_are_for_the_controllers_that_read_them(monkeyp
     changes = {"controllers.ars.limit_deg": 2.0, "factors.mass": 1.1}
     given = {}
 
-    def look(runner: StudyTestRunner) -> Findings:
+    def look(runner: StandardRunner) -> Findings:
         given[runner.controller] = dict(runner.overrides)
         [run] = runner.drive("short", "straight_line", [{"speed_kmh": 50.0}], {"duration_s": 0.2})
         return Findings({}, run.error)
 
-    quick = replace(standard_of("iso4138"), examine=look)
-    monkeypatch.setattr(examination, "standard_of", lambda _: quick)
+    monkeypatch.setitem(examination.EXAMINED_BY, "iso4138", look)
     result = examine("iso4138", ["none", "ars"], overrides=changes, jobs=1)
     assert given == {"none": {"factors.mass": 1.1}, "ars": changes}
     assert [found.summary for found in result.findings.values()] == ["", ""]
@@ -61,6 +57,7 @@ def test_settings_of_a_controller_are_for_the_controllers_that_read_them(monkeyp
 
 
 def test_every_standard_says_what_it_is():
+    assert set(STANDARDS) == set(examination.EXAMINED_BY)
     for name, standard in STANDARDS.items():
         assert standard_of(name) is standard
         for text in (standard.title, standard.edition, *standard.implemented, *standard.left_out):
@@ -188,7 +185,7 @@ def test_split_friction_turns_the_car_to_the_side_that_holds():
 
 @pytest.mark.slow
 def test_braking_in_a_turn_begins_on_the_circle(monkeypatch):
-    monkeypatch.setattr(iso7975, "PEDALS", (0.2, 0.4))
+    monkeypatch.setattr(braking, "PEDALS", (0.2, 0.4))
     found = no_verdict(examine("iso7975", jobs=1))
     for run in found.values["runs"]:
         assert abs(run["ay_begin_mps2"]) == pytest.approx(5.0, rel=0.03)

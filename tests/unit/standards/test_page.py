@@ -7,8 +7,9 @@ import re
 
 from activesteer.pages import Table, render_page
 from activesteer.plotting import Curve, Panel, Picture
+from activesteer.standards.catalogue import Standard
 from activesteer.standards.examination import Examination, _together, examination_page
-from activesteer.standards.standard import Findings, Standard
+from activesteer.standards.standard import Findings
 
 EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'
 
@@ -17,7 +18,7 @@ def examination(word: str, **values: bool) -> Examination:
     picture = Picture(word, [Panel(word, word, [Curve([1.0, 2.0], [1.0, 2.0], word)], word, limits=[(1.5, word)])])
     shaded = Picture(word, [Panel("x", "y", [Curve([1.0, 2.0], [1.0, 2.0], shade=0.5)], log="x")], (word, 0.0, 1.0))
     found = Findings(dict(values), word, [Table(word, [word], [[word]], frozenset([0]))], [picture, shaded])
-    standard = Standard("one", word, word, [word], [word], lambda _: found)
+    standard = Standard(word, word, (word,), (word,), name="one")
     return Examination(standard, word, word, {"road.mu": word}, {word: found}, {"activesteer": word}, datetime.date.min)
 
 

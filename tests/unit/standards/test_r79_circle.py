@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from activesteer.core.files import json_text
+from activesteer.standards import r79_circle
 from activesteer.standards.examination import examine
-from activesteer.standards.fault_circle import CIRCLES
-from activesteer.standards.r79_circle import EFFORTS, FIGURES, RIM_RADIUS_M, STANDARD, reached
-from activesteer.standards.standard import StandardRun
+from activesteer.standards.r79_circle import EFFORTS, FIGURES, RIM_RADIUS_M
+from activesteer.standards.standard import SIDES, StandardRun
 from tests.unit.standards.runners import PrescribedRunner
 from tests.unit.standards.signals import run_of, times
 
@@ -35,23 +35,31 @@ class SpiralRunner(PrescribedRunner):
     def __init__(self, tightest_m: float = 9.0, force_N: float = 100.0) -> None:
         super().__init__(lambda _, case: spiral(tightest_m, force_N, math.copysign(1.0, case["steer.rate_degps"])))
 
-    def fault_circles(self) -> list[dict[str, Any]]:
+
+@pytest.fixture
+def two_faults(monkeypatch) -> None:
+    """Prescribe the circles with faults."""
+
+    def fault_circles(_: object) -> list[dict[str, Any]]:
         one = dict.fromkeys(FIGURES, 0.1) | {"fault": "rear:stuck", "fault_tolerant_time_s": None}
         lost = dict.fromkeys(FIGURES, math.nan) | {"fault": "rear:float", "error": "the car tips over"}
-        return [row | {"direction": direction} for row in (one, lost) for direction in CIRCLES]
+        return [row | {"direction": direction} for row in (one, lost) for direction in SIDES]
+
+    monkeypatch.setattr(r79_circle, "fault_circles", fault_circles)
 
 
 def test_force_until_the_radius_of_a_known_spiral():
     """1/12 m of 1/9 m is reached after 3 of 4 s, with 75 of 100 N."""
-    found = reached(spiral(9.0, 100.0, -1.0), 12.0)
+    found = r79_circle.reached(spiral(9.0, 100.0, -1.0), 12.0)
     assert found.time_s == pytest.approx(3.0, abs=0.02)
     assert found.effort_N == pytest.approx(75.0, abs=0.5)
-    assert math.isnan(reached(spiral(13.0, 100.0), 12.0).effort_N)
+    assert math.isnan(r79_circle.reached(spiral(13.0, 100.0), 12.0).effort_N)
 
 
+@pytest.mark.usefixtures("two_faults")
 def test_intact_and_without_power_assist_to_both_sides():
     runner = SpiralRunner()
-    found = STANDARD.examine(runner)
+    found = r79_circle.examine(runner)
     assert found.passed is True
     assert [row["direction"] for row in found.values["efforts"]] == ["left", "right"] * 2
     intact, failed = runner.asked.values()
@@ -60,25 +68,28 @@ def test_intact_and_without_power_assist_to_both_sides():
     assert intact[0]["steer.rate_degps"] == pytest.approx(20.0 / 12.0 * failed[0]["steer.rate_degps"])
 
 
+@pytest.mark.usefixtures("two_faults")
 @pytest.mark.parametrize(
     ("force_N", "steering"), [(200.1, ["intact"] * 2), (700.0, ["intact"] * 2 + ["power_assist_failed"] * 2)]
 )
 def test_more_than_the_effort_that_is_allowed_fails(force_N, steering):
     """A radius of 12 m needs three quarters of the force at 9 m, 20 m needs 9 / 20 of it."""
-    found = STANDARD.examine(SpiralRunner(force_N=force_N))
+    found = r79_circle.examine(SpiralRunner(force_N=force_N))
     assert found.passed is False
     assert [row["steering"] for row in found.values["efforts"] if not row["pass"]] == steering
-    assert STANDARD.examine(SpiralRunner(force_N=195.0)).passed is True
+    assert r79_circle.examine(SpiralRunner(force_N=195.0)).passed is True
 
 
+@pytest.mark.usefixtures("two_faults")
 def test_a_radius_that_is_not_reached_fails():
-    found = STANDARD.examine(SpiralRunner(tightest_m=15.0))
+    found = r79_circle.examine(SpiralRunner(tightest_m=15.0))
     assert found.passed is False
     assert "a radius of 12 m is not reached within 4 s" in found.summary
 
 
+@pytest.mark.usefixtures("two_faults")
 def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
-    found = STANDARD.examine(SpiralRunner())
+    found = r79_circle.examine(SpiralRunner())
     rows = {(row["fault"], row["direction"]): row for row in found.values["faults"]}
     assert rows["rear:float", "right"]["error"] == "the car tips over"
     assert "2 of 4 faults did not finish" in found.summary
@@ -87,7 +98,7 @@ def test_a_fault_that_ends_the_run_is_a_row_and_no_verdict():
 
 
 def test_the_compact_is_steered_alike_to_both_sides_and_corrected_in_both_circles(monkeypatch):
-    monkeypatch.setattr("activesteer.standards.fault_circle.usual_faults", lambda _: ["rear:offset=1deg"])
+    monkeypatch.setattr("activesteer.standards.r79_circle.usual_faults", lambda _: ["rear:offset=1deg"])
     found = examine("r79-circle", ["ars"], jobs=1).findings["ars"]
     efforts = {(row["steering"], row["direction"]): row["effort_N"] for row in found.values["efforts"]}
     for name in EFFORTS:

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.scenario import resolve
 from activesteer.studies.engine.runs import run_id
-from activesteer.studies.engine.store import joined_schema, table_of
+from activesteer.studies.engine.store import joined, table_of
 
 
 def column(*values):
@@ -35,13 +35,13 @@ def test_a_factor_of_lists_or_tables_is_written_as_json():
     [
         (pa.int64(), pa.int64(), pa.int64()), (pa.int64(), pa.float64(), pa.float64()),
         (pa.int64(), pa.null(), pa.int64()), (pa.null(), pa.string(), pa.string()),
-        (pa.int64(), pa.string(), pa.string()),
+        (pa.int64(), pa.string(), pa.string()), (pa.bool_(), pa.float64(), pa.string()),
     ],
 )  # fmt: skip
 def test_parts_of_different_types_are_joined(one, other, both):
-    schemas = [pa.schema([("load", kind)]) for kind in (one, other)]
-    assert joined_schema(schemas).field("load").type == both
-    assert joined_schema(reversed(schemas)).field("load").type == both
+    parts = [pa.schema([("load", kind)]).empty_table() for kind in (one, other)]
+    assert joined(parts).schema.field("load").type == both
+    assert joined(parts[::-1]).schema.field("load").type == both
 
 
 def test_a_run_id_has_16_digits_and_differs_with_whatever_decides_the_run():

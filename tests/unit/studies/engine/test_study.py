@@ -228,11 +228,11 @@ def test_a_full_disk_ends_the_study_and_keeps_what_is_finished(tmp_path, monkeyp
     written = pq.write_table
     calls = []
 
-    def full(table, path):
+    def full(table, path, **options):
         calls.append(path)
         if len(calls) == 2:
             raise OSError(errno.ENOSPC, "No space left on device")
-        written(table, path)
+        written(table, path, **options)
 
     monkeypatch.setattr("activesteer.studies.engine.store.pq.write_table", full)
     with raises(StudyError, cause=OSError):

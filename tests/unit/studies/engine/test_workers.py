@@ -8,7 +8,7 @@ import pytest
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
-from activesteer.studies.engine.workers import LocalProcesses, ThisProcess, workers_for
+from activesteer.studies.engine.workers import LocalProcesses, workers_for
 from tests.raising import raises
 
 
@@ -33,7 +33,8 @@ def test_without_a_number_there_is_a_process_for_each_processor(monkeypatch) -> 
         assert workers.in_flight == 4  # one task waits
     monkeypatch.setattr("os.sched_getaffinity", lambda _pid: {5}, raising=False)
     with workers_for() as workers:
-        assert isinstance(workers, ThisProcess)
+        assert not isinstance(workers, LocalProcesses)
+        assert workers.in_flight == 1
 
 
 @pytest.mark.parametrize("jobs", [0, 65, 99_999_999])

@@ -38,14 +38,12 @@ TWO_TRACK = TwoTrackParameters(0.6, 1.51, 1.52, 0.55, 0.009, 2.0, 0.3, 0.4, 0.00
 RESULT = Identification("made up", {"100 m": HANDLING}, PARAMETERS, TWO_TRACK)
 
 
-def test_json_says_what_is_inside_its_band_and_leaves_out_what_is_not_defined():
+def test_json_is_in_display_units_and_leaves_out_what_is_not_defined():
     document = json.loads(json_text(RESULT.to_json()))
     metrics = {metric["name"]: metric for metric in document["metrics"]}
     assert metrics["understeer_gradient"]["value"] == pytest.approx(2.5)
-    assert (metrics["understeer_gradient"]["unit"], metrics["understeer_gradient"]["inside"]) == ("deg/g", True)
+    assert metrics["understeer_gradient"]["unit"] == "deg/g"
     assert metrics["characteristic_speed"]["value"] == pytest.approx(108.0)
-    assert metrics["characteristic_speed"]["inside"] is False
-    assert metrics["limit_acceleration"]["band"] is None
     assert "yaw_rate_gain" not in metrics
     assert document["single_track"]["mass_kg"] == 1400.0
 

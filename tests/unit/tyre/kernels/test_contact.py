@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.rigs.tyre_rig import Motion, RigForces, TyreRig
 from activesteer.tyre.kernels.contact import WheelForces, tyre_on_road
 from activesteer.tyre.kernels.slip import carcass_stiffnesses
 from activesteer.tyre.kernels.vertical import free_radius
+from tests.tyre_rig import Motion, RigForces, TyreRig
 from tests.unit.tyre.tyres import tyre
 
 STEP_S = 0.001

@@ -1,16 +1,24 @@
-"""The whole check, in the order of its stages. A stage that fails gives its reason."""
+"""Check of a car before it is driven, in stages: a stage that fails gives its reason.
+
+A finding is one line of the report, with the value, the usual range from usual.toml, and advice.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
 import os
+import textwrap
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple
 
 import mujoco
 import numpy as np
+from scipy.optimize import lsq_linear
 
+from activesteer.config import build, read_toml
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.errors import ActiveSteerError, ModelError, SimulationDiverged, nearest_names
@@ -20,8 +28,127 @@ from activesteer.scenario import CarSpec, load_car
 from activesteer.vehicle import Vehicle, engine_warnings_held
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.statics import mass_properties
-from activesteer.vehicle_builder.check.findings import CheckReport, Finding, Level, checked, judged, usual_values
-from activesteer.vehicle_builder.corner_motion import corner_motion
+from activesteer.vehicle_builder.corner_motion import corner_motion, wheel_travel_m
+
+Level = Literal["ok", "warning", "error"]
+_ROUNDING: Final = 1e-7
+"""Smallest value that is not printed as 0."""
+_WRAPPED: Final = textwrap.TextWrapper(80, subsequent_indent=11 * " ", break_long_words=False)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report.
+
+    Attributes:
+        topic: parts, geometry, standing, riding, kinematics, steering, tyres.
+        what: Subject of the finding.
+        level: Level: ok, warning or error.
+        value: Value with unit, or words.
+        usual: Usual range; may be empty.
+        advice: Advice; empty without a problem.
+    """
+
+    topic: str
+    what: str
+    level: Level
+    value: str
+    usual: str = ""
+    advice: str = ""
+
+
+def checked(topic: str, what: str, good: bool, value: str, advice: str) -> Finding:
+    """Return the finding about a property that a car must have, with the advice if it has not."""
+    return Finding(topic, what, "ok" if good else "error", value, "", "" if good else advice)
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """All findings of a car.
+
+    Attributes:
+        vehicle: Name of the car.
+        findings: The lines.
+    """
+
+    vehicle: str
+    findings: tuple[Finding, ...]
+
+    def count(self, level: Level) -> int:
+        """Return the number of findings of a level."""
+        return sum(finding.level == level for finding in self.findings)
+
+    def __getitem__(self, what: str) -> Finding:
+        """Return the finding about a subject."""
+        return next(finding for finding in self.findings if finding.what == what)
+
+    def as_table(self) -> dict[str, Any]:
+        """Return the report as JSON values."""
+        return {
+            "vehicle": self.vehicle,
+            "errors": self.count("error"),
+            "warnings": self.count("warning"),
+            "findings": [asdict(finding) for finding in self.findings],
+        }
+
+    def table(self) -> str:
+        """Return the report as text, with advice below warnings and errors."""
+        lines, topic = [], ""
+        for finding in self.findings:
+            if finding.topic != topic:
+                topic = finding.topic
+                lines += ["", topic] if lines else [topic]
+            usual = f" (usual: {finding.usual})" if finding.usual else ""
+            lines += _WRAPPED.wrap(f"  {finding.level:7}  {finding.what}: {finding.value}{usual}")
+            if finding.advice:
+                lines += _WRAPPED.wrap(f"           -> {finding.advice}")
+        errors, warnings = self.count("error"), self.count("warning")
+        return "\n".join([*lines, "", f"{self.vehicle}: {errors} errors, {warnings} warnings, {self.count('ok')} ok"])
+
+
+@dataclass(frozen=True)
+class Usual:
+    """Usual and possible range of a value. Keys of a table in usual.toml, which has the sources."""
+
+    topic: str
+    words: str  # name in the report
+    usual: tuple[float, ...]  # lowest and highest usual value. A value outside is a warning
+    advice: str  # advice for a value outside
+    unit: str = ""  # unit, or empty for a pure number or a metric of the rig, which has its own
+    # Lowest and highest possible value. A value outside is an error
+    possible: tuple[float, ...] = (-math.inf, math.inf)
+    axle: str = ""
+    name: str = ""  # axle and name of a metric of the rig
+
+    def judged(self, value: float, unit: str = "", **words: str) -> Finding:
+        """Return the finding about a value. Nan counts as a warning."""
+        unit = (self.unit or unit).removesuffix("-")
+        level: Level = "warning"
+        if not math.isnan(value):
+            level = "ok" if self.usual[0] <= value <= self.usual[1] else "warning"
+            level = level if self.possible[0] <= value <= self.possible[1] else "error"
+        shown = 0.0 if abs(value) < _ROUNDING else value
+        said = "none" if math.isnan(value) else f"{shown:.4g} {unit}".strip()
+        usual = f"{self.usual[0]:g} to {self.usual[1]:g} {unit}".strip()
+        advice = "" if level == "ok" else self.advice
+        return Finding(self.topic, self.words.format(**words), level, said, usual, advice)
+
+
+@dataclass(frozen=True)
+class _File:
+    metric: tuple[Usual, ...]
+    quantity: dict[str, Usual]
+
+
+@functools.cache
+def usual_values() -> _File:
+    """Return the usual values of metrics and quantities."""
+    return build(_File, *read_toml(Path(__file__).with_name("usual.toml")))
+
+
+def judged(quantity: str, value: float, **words: str) -> Finding:
+    """Return the finding about a quantity of usual.toml (see `Usual.judged`)."""
+    return usual_values().quantity[quantity].judged(value, **words)
 
 
 def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
@@ -91,15 +218,11 @@ _OPPOSITE: Final = {"fl": "fr", "rl": "rr"}
 _MIRRORED: Final = np.array([1.0, -1.0, 1.0])
 
 
-@dataclass(frozen=True)
-class _Rod:
+class _Rod(NamedTuple):
     name: str
     start_m: Array
     end_m: Array
-
-    @property
-    def length_m(self) -> float:
-        return float(np.linalg.norm(self.end_m - self.start_m))
+    length_m: float
 
 
 def geometry(model: mujoco.MjModel) -> Iterator[Finding]:
@@ -166,7 +289,7 @@ def _rods(model: mujoco.MjModel, data: mujoco.MjData) -> list[_Rod]:
         straight = count == 2 and (model.wrap_type[first : first + 2] == int(mujoco.mjtWrap.mjWRAP_SITE)).all()
         if name[:3] in ("fl_", "rl_") and straight and not name.endswith(("_spring", "_damper", "_guide")):
             start, end = (data.site_xpos[int(site)].copy() for site in model.wrap_objid[first : first + 2])
-            rods.append(_Rod(name, start, end))
+            rods.append(_Rod(name, start, end, float(np.linalg.norm(end - start))))
     return rods
 
 
@@ -180,15 +303,13 @@ def _order(rods: list[_Rod], points: dict[str, Array]) -> Iterator[Finding]:
     yield _any("inner ends further in than outer ends", crossed, "its inner and outer point seem to be exchanged")
     upside = []
     for corner in ("fl", "rl"):
-        for upper, lower in (("uca", "lca"), ("trailing_upper", "trailing_lower"), ("camber_link", "spring_link")):
-            above = [
-                point[2] for name, point in points.items() if name.startswith(f"{corner}_{upper}") and "outer" in name
-            ]
-            below = [
-                point[2] for name, point in points.items() if name.startswith(f"{corner}_{lower}") and "outer" in name
-            ]
+        for pair in (("uca", "lca"), ("trailing_upper", "trailing_lower"), ("camber_link", "spring_link")):
+            above, below = (
+                [at[2] for name, at in points.items() if name.startswith(f"{corner}_{link}") and "outer" in name]
+                for link in pair
+            )
             if above and below and max(above) <= min(below):
-                upside.append(f"{corner}_{upper} below {corner}_{lower}")
+                upside.append(f"{corner}_{pair[0]} below {corner}_{pair[1]}")
     yield _any("upper links above lower links", upside, "exchange them, or check z of their outer points")
 
 
@@ -209,13 +330,9 @@ def _crossings(rods: list[_Rod]) -> Iterator[Finding]:
 
 
 def _distance(one: _Rod, two: _Rod) -> float:
-    """Return the smallest distance of two segments by alternating projection, exact for convex segments [m]."""
-    s, t = 0.5, 0.5
-    u, v = one.end_m - one.start_m, two.end_m - two.start_m
-    for _ in range(200):
-        s = float(np.clip((two.start_m + t * v - one.start_m) @ u / max(u @ u, 1e-12), 0.0, 1.0))
-        t = float(np.clip((one.start_m + s * u - two.start_m) @ v / max(v @ v, 1e-12), 0.0, 1.0))
-    return float(np.linalg.norm(one.start_m + s * u - two.start_m - t * v))
+    """Return the smallest distance of two segments [m]."""
+    along = np.stack([one.end_m - one.start_m, two.start_m - two.end_m], axis=1)
+    return float(np.linalg.norm(lsq_linear(along, two.start_m - one.start_m, (0.0, 1.0), method="bvls").fun))
 
 
 def _reach(points: dict[str, Array]) -> Iterator[Finding]:
@@ -235,14 +352,10 @@ def _reach(points: dict[str, Array]) -> Iterator[Finding]:
     yield _any("points not outside the middle of the wheel", outside, advice)
 
 
-_KINDS: Final = {
-    "body": (mujoco.mjtObj.mjOBJ_BODY, "nbody"),
-    "joint": (mujoco.mjtObj.mjOBJ_JOINT, "njnt"),
-    "site": (mujoco.mjtObj.mjOBJ_SITE, "nsite"),
-    "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
-    "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nu"),
-    "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, "nsensor"),
-}
+_COUNTS: Final = {
+    "body": "nbody", "joint": "njnt", "site": "nsite", "tendon": "ntendon", "actuator": "nu", "sensor": "nsensor",
+}  # fmt: skip
+"""Kind of a part -> the model's number of them."""
 
 
 def _each(*parts: str) -> tuple[str, ...]:
@@ -270,8 +383,8 @@ _NEEDED: Final = {
 def missing_parts(model: mujoco.MjModel) -> Iterator[Finding]:
     """Return one error for each missing part, or one line if none is missing."""
     complete = True
-    for word, (kind, count) in _KINDS.items():
-        there = [mujoco.mj_id2name(model, kind, index) or "" for index in range(getattr(model, count))]
+    for word, count in _COUNTS.items():
+        there = [getattr(model, word)(index).name for index in range(getattr(model, count))]
         for name in _NEEDED[word]:
             if name not in there:
                 complete = False
@@ -298,7 +411,7 @@ def _standing(vehicle: Vehicle, car: CarSpec) -> Iterator[Finding]:
     for axle, left, right in (("front", 0, 1), ("rear", 2, 3)):
         difference = 100.0 * abs(load_N[left] - load_N[right]) / load_N[left : right + 1].mean()
         yield judged("wheel_load_difference", difference, axle=axle)
-    yield from _height(vehicle, design)
+    yield from _height(vehicle)
     wheels = [model.body(f"{corner}_wheel").id for corner in CORNERS]
     y_m, height_m = data.xpos[wheels, 1], float(data.subtree_com[0, 2])
     track = 0.5 * (y_m[0] - y_m[1] + y_m[2] - y_m[3])
@@ -329,23 +442,14 @@ def _standing(vehicle: Vehicle, car: CarSpec) -> Iterator[Finding]:
         yield judged("tyre_reserve", float(tyre["FZMAX"]) / float(load), axle=axle)
 
 
-def _height(vehicle: Vehicle, design: mujoco.MjData) -> Iterator[Finding]:
-    """Check the distance of the wheels from their design position."""
-    model, data = vehicle.model, vehicle.data
-    chassis = model.body("chassis").id
-    turn = data.xmat[chassis].reshape(3, 3).T
-    for axle, corners in (("front", CORNERS[:2]), ("rear", CORNERS[2:])):
-        travel = 0.0
-        for corner in corners:
-            wheel = model.body(f"{corner}_wheel").id
-            now = (turn @ (data.xpos[wheel] - data.xpos[chassis]))[2]
-            travel += 500.0 * float(now - (design.xpos[wheel, 2] - design.xpos[chassis, 2]))
-        yield judged("wheel_travel", travel, axle=axle)
-    w, x, y, z = data.qpos[3:7]
-    pitch = math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))))
-    roll = math.degrees(2.0 * math.atan2(x, w))
-    yield judged("pitch", pitch)
-    yield judged("roll", roll)
+def _height(vehicle: Vehicle) -> Iterator[Finding]:
+    """Check the distance of the wheels from their design position, and the attitude of the chassis."""
+    travel_mm = 1e3 * wheel_travel_m(vehicle)
+    yield judged("wheel_travel", float(travel_mm[:2].mean()), axle="front")
+    yield judged("wheel_travel", float(travel_mm[2:].mean()), axle="rear")
+    w, x, y, z = vehicle.data.qpos[3:7]
+    yield judged("pitch", math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))))
+    yield judged("roll", math.degrees(2.0 * math.atan2(x, w)))
 
 
 def _stays(vehicle: Vehicle) -> Finding:

@@ -1,0 +1,118 @@
+"""Time of each block of the loop on its own, called from Python, and of sensors, brakes and anti-lock system together.
+
+    python tools/bench_blocks.py
+
+The times are those of docs/performance.md; `activesteer bench` measures whole runs.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Final
+
+import numpy as np
+
+from activesteer.core.conventions import CORNERS
+from activesteer.native.compilation import compiled
+from activesteer.scenario import Scenario, resolve
+from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
+from activesteer.simulation.closed_loop import ClosedLoop
+from activesteer.simulation.preparation import with_amplitude_found
+from activesteer.simulation.recorder import Recorder
+from activesteer.simulation.runner import run_scenario
+from activesteer.studies.benchmark import per_call_us
+from activesteer.vehicle.brakes.brake_control_unit import step_brakes
+
+_CALLS: Final = 5000
+_ROUNDS: Final = 5
+"""Rounds. The best one counts, because a disturbance only makes a machine slower."""
+
+
+def blocks(scenario: Scenario) -> dict[str, float]:
+    """Measure each block of the loop on its own, in the order of the data. The vehicle writes the rows."""
+    loop = ClosedLoop(scenario, "ars")
+    vehicle = loop.vehicle
+    measurement, motion, setpoint = vehicle.measure(), vehicle.motion(), loop.maneuver.setpoint(0.6)
+    command = loop.driver.step(setpoint, measurement, motion)
+    steer = loop.controller.step(command, measurement)
+    found = {
+        "maneuver_us": per_call_us(loop.maneuver.setpoint, _CALLS, 0.6),
+        "driver_us": per_call_us(loop.driver.step, _CALLS, setpoint, measurement, motion),
+        "controller_us": per_call_us(loop.controller.step, _CALLS, command, measurement),
+        "vehicle_us": 0.0,
+        "recorder_us": 0.0,
+    }
+    recorder = Recorder(vehicle, _CALLS)
+    vehicle.record_on(recorder.tape)
+    while recorder.rows < _CALLS:
+        start = time.perf_counter()
+        recorder.make_room()
+        found["recorder_us"] += (time.perf_counter() - start) / _CALLS * 1e6
+        steps = min(recorder.room, _CALLS - recorder.rows)
+        found["vehicle_us"] += per_call_us(vehicle.step, steps, command, steer) * steps / _CALLS
+    found["recorder_us"] += per_call_us(recorder.flush, 1) / _CALLS
+    return found
+
+
+_SCALARS: Final = (
+    "speed_mps", "yaw_rate_radps", "ay_mps2", "ax_mps2", "steering_wheel_rad", "rear_steer_rad", "superposition_rad",
+)  # fmt: skip
+_WHEELS: Final = 1 + len(_SCALARS)
+_PEDAL: Final = _WHEELS + len(CORNERS)
+
+
+class DrivenStop:
+    """A stop from 100 km/h with a working anti-lock system and the sensors of production cars.
+
+    Sensors, brakes and anti-lock system alone repeat it in native code.
+    """
+
+    def __init__(self) -> None:
+        scenario = resolve("straight_braking", overrides={"sensors.preset": "production"})
+        recording = run_scenario(scenario)
+        speeds = [recording[f"{corner}_wheel_speed_radps"] for corner in CORNERS]
+        scalars = [recording[name] for name in _SCALARS]
+        self._rows = np.column_stack([recording.time_s, *scalars, *speeds, recording["brake_pedal"]])
+        # Use the state at the beginning of the recording, so that the brakes decide as they did.
+        self._vehicle = ClosedLoop(scenario).vehicle
+        self.anti_lock_fraction = self._drive()[1] / len(self._rows)
+
+    def _drive(self) -> tuple[float, int]:
+        """Return the duration of the work [s] and the number of steps with pressure reduced by the anti-lock system."""
+        (setup, state), sensors = self._vehicle.brakes, self._vehicle.sensors
+        assert sensors is not None
+        work = (
+            self._rows, sensors.chains, sensors.memory.copy(), setup["rolling_radius_m"][0] / len(CORNERS),
+            self._vehicle.timestep_s, *(record.copy().view(np.recarray)[0] for record in (setup, state)),
+        )  # fmt: skip
+        start = time.perf_counter()
+        held = _sense_and_brake(*work)
+        return time.perf_counter() - start, held
+
+    def step_us(self) -> float:
+        """Return the time of sensors, brakes and anti-lock system together in a step of the stop [us]."""
+        return 1e6 * self._drive()[0] / len(self._rows)
+
+
+@compiled
+def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
+    """Step sensors and brakes as `native_step.step` does. Return the number of steps with reduced pressure."""
+    asked_Nm, held = np.zeros(4), 0
+    for row in rows:
+        speeds = memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4]
+        step_brakes(setup, state, speeds, memory[AX], row[_PEDAL], 0.0, asked_Nm, 0.0)
+        held += state.allowed_Pa[0] < state.demand_Pa[0]
+        wheels, p = row[_WHEELS:_PEDAL], state.pressure_Pa
+        truth = (
+            row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7],
+            (wheels[0], wheels[1], wheels[2], wheels[3]), (p[0], p[1], p[2], p[3]),
+        )  # fmt: skip
+        measured(chains, memory, radii_m, timestep_s, truth)
+    return held
+
+
+if __name__ == "__main__":
+    scenario, stop = with_amplitude_found(resolve("step_steer")), DrivenStop()
+    rounds = [{**blocks(scenario), "sensors_and_brakes_us": stop.step_us()} for _ in range(_ROUNDS)]
+    for name in rounds[0]:
+        print(f"{name:28} {min(times[name] for times in rounds):8.2f}")
