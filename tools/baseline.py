@@ -20,7 +20,7 @@ import numpy as np
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
-from activesteer.analysis.metrics import evaluation_of
+from activesteer.analysis.metrics import KEY_METRICS, evaluated_kind
 from activesteer.core.files import read_text, write_json
 from activesteer.core.metric_table import recorded_metric
 from activesteer.errors import ActiveSteerError, RecordingError
@@ -33,6 +33,14 @@ DRIVEN: Final = {
     "start_stop": ("none",),
 }
 """Manoeuvre -> controllers that drive it."""
+
+RELATIVE_TOLERANCE: Final = 0.01
+"""Fraction of a value by which it may always differ between two versions of the program."""
+_TOLERANCES: Final = {
+    "radps": 1e-3, "mps2": 0.02, "rad": 2e-4, "s": 0.005, "srad": 2e-5, "m": 0.01, "mps": 0.02, "radpmps2": 1e-5,
+    "1ps": 0.005, "mps2prad": 0.05, "radprad": 0.001, "Hz": 0.02, "Pa": 1e4, "N": 50.0, "J": 100.0, "": 0.01,
+}  # fmt: skip
+"""SI unit of a metric -> smallest difference between two versions of the program that a reader would notice."""
 
 Run = tuple[str, str]
 """Manoeuvre and controller."""
@@ -59,10 +67,18 @@ class Drift(NamedTuple):
 
 def key_metrics(recording: Recording) -> dict[str, float]:
     """Return the key metrics of a run, rounded to six digits."""
-    names = [metric.name for metric in evaluation_of(recording).key_metrics]
+    names = KEY_METRICS[evaluated_kind(recording)]
     if missing := [name for name in names if name not in recording.metrics]:
         raise RecordingError(f"{recording.metadata['maneuver']['name']}: there is no key metric {missing[0]}")
     return {name: float(f"{recording.metrics[name]:.6g}") for name in names}
+
+
+def tolerance_of(name: str, old: float | None) -> float:
+    """Return the difference [SI] from a value that counts as unchanged: 0 for a count."""
+    if recorded_metric(name).whole:
+        return 0.0
+    least = _TOLERANCES.get(name.rpartition("_")[2], _TOLERANCES[""])
+    return max(least, RELATIVE_TOLERANCE * abs(old)) if old is not None and math.isfinite(old) else least
 
 
 def drifts(news: Metrics, olds: Metrics) -> list[Drift]:
@@ -71,8 +87,8 @@ def drifts(news: Metrics, olds: Metrics) -> list[Drift]:
     for run in dict.fromkeys((*olds, *news)):
         old_ones, new_ones = olds.get(run, {}), news.get(run, {})
         for name in dict.fromkeys((*old_ones, *new_ones)):
-            old, new, metric = old_ones.get(name), new_ones.get(name), recorded_metric(name)
-            tolerance = metric.tolerance_of(old) if old is not None and math.isfinite(old) else metric.tolerance
+            old, new = old_ones.get(name), new_ones.get(name)
+            tolerance = tolerance_of(name, old)
             if old is None or new is None or not np.isclose(new, old, rtol=0.0, atol=tolerance, equal_nan=True):
                 found.append(Drift(run, name, old, new, tolerance))
     return found

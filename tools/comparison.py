@@ -20,7 +20,6 @@ import numpy as np
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIOS
-from activesteer.analysis.harm import MEASURES
 from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, Runs
 from activesteer.analysis.tables import Change, significance
 from activesteer.config import Source
@@ -34,7 +33,7 @@ from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.studies.engine.workers import in_parallel
 from activesteer.studies.reproduction import Progress, drive
-from tools.population_results import NONE, STEERING_EFFORT, TOTAL, Population, SystemEffect, asked
+from tools.population_results import NONE, STEERING_EFFORT, TOTAL, UNITS, Population, SystemEffect, asked
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -345,12 +344,12 @@ def comparison_text(found: Population) -> str:
 
 def shown_growth(name: str, growth: float) -> str:
     """Return the growth of a measure in its unit. `lost` where only the car without control gets so far."""
-    measure = MEASURES[name]
-    return f"{growth * measure.unit.factor:+.2f} {measure.unit.name}".rstrip() if math.isfinite(growth) else "undefined"
+    unit = UNITS[name]
+    return f"{growth * unit.factor:+.2f} {unit.name}".rstrip() if math.isfinite(growth) else "undefined"
 
 
 def _growth(change: Any) -> str:
-    unit = MEASURES[change.metric].unit
+    unit = UNITS[change.metric]
     values = (change.low, change.median, change.high, change.largest)
     return _GROWTH.format(
         change.metric, *(f"{unit.factor * value:+.2f}" for value in values), unit.name, change.harmed, change.number

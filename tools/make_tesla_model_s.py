@@ -89,7 +89,7 @@ def tell_controllers(file: Path, name: str, command: str) -> None:
     start = text.index("# Controllers of the compact")
     controllers = re.sub(r"^#.*\n", "", text[start:], flags=re.MULTILINE).replace(
         "max_lateral_acceleration_mps2 = 7.74",
-        f"max_lateral_acceleration_mps2 = {0.9 * found.tests[RADIUS_TEST].limit_acceleration_mps2:.2f}",
+        f"max_lateral_acceleration_mps2 = {0.9 * found.tests[RADIUS_TEST]['limit_acceleration_mps2']:.2f}",
     )
     model = found.single_track
     rear = model.rear_stiffness_Nprad * model.cg_to_rear_m / model.yaw_inertia_kgm2

@@ -22,7 +22,7 @@ import numpy as np
 from PIL import Image
 
 from activesteer import ActuatorCommand, Simulation, study
-from activesteer.analysis.figures import BY_KIND, over_time, style
+from activesteer.analysis.figures import BY_KIND, over_time
 from activesteer.analysis.frequency_response import frequency_response
 from activesteer.core.units import DisplayUnit, quantity_of
 from activesteer.drawing.panels import PANELS, Line, Panel, panel_of
@@ -139,7 +139,7 @@ def _frequency_responses(runs: Mapping[str, Any]) -> Figure:
     figure = new_figure(7.5, 6.0)
     axes = figure.subplots(3, 1, sharex=True)
     frequencies_Hz = np.geomspace(0.2, 4.0, 120)
-    for curve in style.curves(runs):
+    for curve in over_time.drawn_runs(runs):
         yaw, lateral = (
             frequency_response(curve.recording, name, frequencies_Hz) for name in ("yaw_rate_radps", "ay_mps2")
         )
@@ -151,13 +151,13 @@ def _frequency_responses(runs: Mapping[str, Any]) -> Figure:
             )
     titles = ("yaw rate gain\n[1/s]", "yaw rate phase\n[deg]", "lateral acc. gain\n[m/s² per deg]")
     for axis, title in zip(axes, titles, strict=True):
-        style.plain(axis, title)
+        over_time.plain(axis, title)
     ticks = (0.2, 0.5, 1, 2, 4)
     axes[-1].set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes[-1].minorticks_off()
     axes[-1].set_xlabel("frequency [Hz]")
     figure.align_ylabels(list(axes))
-    style.name_curves(figure, axes[0])
+    over_time.name_curves(figure, axes[0])
     return figure
 
 
@@ -189,7 +189,7 @@ def _sensors() -> dict[str, Figure]:
         for name, colour, label in ((channel, "#222222", "true"), (f"measured_{channel}", "#d55e00", "measured")):
             values = run[name][shown] * quantity.factor
             axis.step(run.time_s[shown], values, where="post", color=colour, linewidth=1.2, label=label)
-        style.plain(axis, quantity.axis_title)
+        over_time.plain(axis, quantity.axis_title)
     axes[-1].set_xlabel("time [s]")
     axes[0].legend(frameon=False)
     figure.align_ylabels(list(axes))
@@ -210,7 +210,7 @@ def _stepping() -> dict[str, Figure]:
         axis.plot(run.time_s, np.degrees(run["sideslip_rad"]), color=colour, label=f"rear angle {rear_deg:+.0f} deg")
     axis.axvline(0.7, color="#888888", linewidth=0.8, linestyle=":")
     axis.set_xlabel("time [s]")
-    style.plain(axis, "sideslip angle [deg]")
+    over_time.plain(axis, "sideslip angle [deg]")
     axis.legend(frameon=False)
     return {"stepping": figure}
 
@@ -245,8 +245,8 @@ def _rear_steer_gains() -> dict[str, Figure]:
                 [row[prediction] for row in own], [math.degrees(row[name]) for row in own],
                 "o-", ms=3.0, color=colour, linewidth=1.2, label=label,
             )  # fmt: skip
-    style.plain(axes[0], "settled rear angle\n[deg]")
-    style.plain(axes[1], "settled sideslip [deg]")
+    over_time.plain(axes[0], "settled rear angle\n[deg]")
+    over_time.plain(axes[1], "settled sideslip [deg]")
     axes[1].set_xlabel("prediction gain [-]")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
     return {"rear_steer_gains": figure}
@@ -288,7 +288,7 @@ def _tyres() -> dict[str, Figure]:
             label = file if load_N == 4000.0 else "_hidden"
             axis.plot(alpha_deg, forces.fy_N / 1000.0, color=colour, label=label)
     axis.set(xlabel="slip angle [deg]", xlim=(0.0, 15.0))
-    style.plain(axis, "side force [kN]")
+    over_time.plain(axis, "side force [kN]")
     axis.legend(frameon=False)
     return {"tyres_side_force": figure}
 
@@ -310,7 +310,7 @@ def _brakes() -> dict[str, Figure]:
         axes[1].plot(time_s[moving], slip, color=colour, linewidth=1.0)
         axes[2].plot(time_s, 1e-5 * recording[f"{corner}_brake_pressure_Pa"], color=colour, linewidth=1.0)
     for axis, title in zip(axes, ("speed\n[km/h]", "slip above 7 km/h\n[%]", "brake pressure\n[bar]"), strict=True):
-        style.plain(axis, title)
+        over_time.plain(axis, title)
     axes[0].legend(frameon=False)
     axes[-1].set(xlabel="time [s]", xlim=(0.4, 4.2))
     figure.align_ylabels(list(axes))
@@ -352,7 +352,7 @@ def _draw(kind: str, runs: Mapping[str, Any]) -> Figure:
 
 def _save(figure: Figure, path: Path) -> None:
     with io.BytesIO() as stream:
-        narrow = figure.get_figwidth() <= style.COLUMN_IN
+        narrow = figure.get_figwidth() <= over_time.COLUMN_IN
         figure.savefig(stream, dpi=COLUMN_DOTS_PER_INCH if narrow else DOTS_PER_INCH, format="png")
         picture = Image.open(stream).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
     picture.save(path, optimize=True)

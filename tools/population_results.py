@@ -6,35 +6,40 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
 
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS, Claim
-from activesteer.analysis.claims.scorecard import NO_FACTOR, ClaimProportion, read_claims, stored_table
-from activesteer.analysis.harm import MEASURES, harms, has_spun, is_lost, severity
+from activesteer.analysis.harm import SIZES, harms, has_spun, is_lost, severity
 from activesteer.analysis.harm import changes as growth_of
 from activesteer.core.conventions import Array
-from activesteer.core.files import finite
+from activesteer.core.files import finite, reading
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
+from activesteer.core.units import DisplayUnit, display_unit
 from activesteer.errors import ManeuverError, ModelError, ParameterError, StudyError
+from activesteer.resources import studies_dir
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.runs import CLAIM, CURVE, Row, run_command, versions
+from activesteer.studies.engine.runs import CLAIM, Row, run_command, versions
 from activesteer.studies.engine.study import StudyProgress, study
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import in_parallel
-from activesteer.theory.proportions import Proportion, percent
 from tools.dependence import strongest
+from tools.proportions import Proportion, ProportionVerdict, percent, proportion_verdict
 
+SUMMARY: Final = "summary.json"
+NO_FACTOR: Final = "none"
+"""Name in place of a factor if no factor is significant."""
 NONE: Final = "none"
 REFERENCES: Final = ("ars", "afs", "esc")
 """Reference controllers: the paper's two systems, and the system that the law requires."""
@@ -53,6 +58,13 @@ CHANGES: Final = (
     STEERING_EFFORT,
 )
 """Metrics whose change by a system is reported: peak sideslip angle, remaining oscillation, steering effort."""
+UNITS: Final = {
+    **dict.fromkeys(("lane", "path", "stopping", "stopping_elsewhere", "displacement"), display_unit("path_m")),
+    **dict.fromkeys(("heading", "heading_open_loop", "steering"), display_unit("heading_rad")),
+    **dict.fromkeys(("cones", "lost"), DisplayUnit("", 1.0)),
+    "yaw_rate": display_unit("yaw_rate_radps"),
+}
+"""Measure of harm -> its unit for display."""
 _RANGE: Final = (0.05, 0.5, 0.95)
 _WORST: Final = 10
 """Number of the worst runs of a controller."""
@@ -68,7 +80,7 @@ class Change:
     """Change of the magnitude of a metric or a measure by a system, relative to the same sample without control.
 
     Attributes:
-        metric: The metric, or the name of one of `harm.MEASURES`.
+        metric: The metric, or the name of one of `harm.SIZES`.
         number: Number of samples in which both runs have the metric.
         low: 5 % quantile of the changes.
         median: Median of the changes.
@@ -187,6 +199,53 @@ _PROPORTIONS: Final = ("saved", "spoiled", "lower", "harmed", "harmed_anywhere")
 
 
 @dataclass(frozen=True)
+class ClaimProportion:
+    """Proportion of a population in which a claim holds."""
+
+    id: str  # number of the claim
+    passed: bool  # whether the claim holds with the nominal car, road and driver
+    number: int  # number of samples in which the claim could be judged
+    share: float  # proportion of these samples in which it holds; nan for no samples
+    low: float  # lower end of the 95 % interval
+    high: float  # upper end
+    depends_on: str = NO_FACTOR  # key of the factor with the largest influence; `none` if no factor is significant
+    explained: float = 0.0  # proportion of the variance that this factor explains
+    # 1 if the claim holds more often with more of the factor, -1 with less, 0 in the middle or at the ends
+    direction: int = 0
+    # value of a choice, such as `sensors.preset = ideal` -> proportion of the samples with this value
+    at: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> ProportionVerdict:
+        """Verdict of the interval."""
+        return proportion_verdict(self.low, self.high)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values."""
+        return {**asdict(self), "verdict": self.verdict.value}
+
+    @property
+    def words(self) -> str:
+        """The factor in words, or empty without a factor."""
+        if self.depends_on == NO_FACTOR:
+            return ""
+        choices = {name: value for name, value in self.at.items() if name.startswith(f"{self.depends_on} = ")}
+        if choices:
+            return f"with {max(choices, key=lambda name: choices[name])}"
+        return f"{('in the middle or at the ends of', 'with more', 'with less')[self.direction]} {self.depends_on}"
+
+
+def read_claims(table: Mapping[str, Any]) -> tuple[ClaimProportion, ...]:
+    """Return the proportions of a stored population. A damaged table raises `StudyError`."""
+    try:
+        return tuple(
+            ClaimProportion(**{key: claim[key] for key in claim if key != "verdict"}) for claim in table["claims"]
+        )
+    except (KeyError, TypeError) as reason:
+        raise StudyError(f"the stored population is damaged: {reason}") from reason
+
+
+@dataclass(frozen=True)
 class Population:
     """Result of a population.
 
@@ -295,8 +354,11 @@ _EFFECTS: Final = ("systems", "cars", "against_required")
 
 def read_population(name: str) -> Population | None:
     """Return the stored results of a study, `population` or `comparison`, or None if there are none."""
-    table = stored_table(name)
-    return None if table is None else Population.from_json(table)
+    path = studies_dir() / name / SUMMARY
+    if not path.is_file():
+        return None
+    with reading(path, StudyError):
+        return Population.from_json(json.loads(path.read_text(encoding="utf-8")))
 
 
 def population_study(
@@ -369,7 +431,7 @@ def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
 
 def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()) -> Population:
     """Count the results of a population's runs as far as it is. A comparison has no nominal claims."""
-    rows = table.select([name for name in table.column_names if not name.startswith(CURVE)]).to_pylist()
+    rows = table.to_pylist()
     names = [label_of(controller) for controller in planned.controllers]
     failed = sum(row["status"] != "ok" for row in rows)
     samples = len({row["sample"] for row in rows})
@@ -526,7 +588,7 @@ def _distribution(name: str, values: Sequence[float] | Array) -> Change:
         median,
         high,
         largest,
-        sum(bool(harms({name: one})) for one in values) if name in MEASURES else 0,
+        sum(bool(harms({name: one})) for one in values) if name in SIZES else 0,
     )
 
 

@@ -8,37 +8,35 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, SYSTEMS, Claim, Kind
-from activesteer.analysis.claims.scorecard import BANDS, PAPER, SUMMARY, TRACK, Band, read_setting
-from activesteer.analysis.harm import MEASURES
+from activesteer.analysis.claims.scorecard import PAPER, read_setting
 from activesteer.commands.terminal import Progress
-from activesteer.core.conventions import CURVE_STEP_S, Array
 from activesteer.core.files import atomic_write, make_folder, write_text
 from activesteer.core.metric_table import metric
 from activesteer.errors import StudyError
 from activesteer.resources import find_study, studies_dir
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.runs import CLAIM, CURVE, DISTANCE, drive
+from activesteer.studies.engine.runs import CLAIM, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.engine.workers import in_parallel
-from activesteer.theory.proportions import percent
 from tools.make_setting import AROUND
 from tools.population_results import (
     NONE,
     REQUIRED,
     STUDY,
+    SUMMARY,
+    UNITS,
     Change,
     Population,
     SystemEffect,
@@ -47,6 +45,7 @@ from tools.population_results import (
     read_population,
     summarise,
 )
+from tools.proportions import percent
 from tools.tables import NOT_REPRODUCED, REPRODUCED
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
@@ -57,14 +56,6 @@ END: Final = "<!-- end of the table -->\n"
 COMPARED: Final = ("none", "esc", "lqr", "integrated")
 """Controllers of the comparison, unless others are given."""
 RUNS: Final = "runs.parquet"
-_EVERY: Final = 2
-"""Interval of the stored values of a band, which is smoother than the curves."""
-QUANTILES: Final = (0.1, 0.9)
-"""Fractions of the runs below the lower and below the upper edge of a band."""
-TRACK_STEP_M: Final = 0.5
-_KEY: Final = ("maneuver", "controller", "channel")
-_MANTISSA_BITS: Final = 11
-"""Bits that are kept of an edge: an error of 0.02 %, less than the width of a line."""
 _KEPT: Final = ("sample", "maneuver", "controller", "status")
 PRODUCTION: Final = "sensors.preset = production"
 """Key of the samples with the sensors of production cars."""
@@ -74,9 +65,8 @@ This page shows how often each claim holds if car, road, driver, line, gains and
 
 `activesteer study population` drives {samples} variations of the {vehicle}, its road, its
 driver, his line and the gains through the paper's five scenarios with all three systems: {runs} runs. The package
-stores the results (`studies/population/`). `activesteer reproduce` prints the proportions beside every nominal verdict,
-and the figures show 10 to 90 % of the runs behind the curves. `tools/renew.py population` renews the results and this
-page. They were driven with {versions}.
+stores the results (`studies/population/`). `tools/renew.py population` renews the results and this page. They were
+driven with {versions}.
 
 ## Varied quantities
 
@@ -196,7 +186,7 @@ def _worst(effect: SystemEffect, measures: Sequence[str]) -> str:
     values = [value for value in map(effect.worst, measures) if not math.isnan(value)]
     if not values:
         return "-"
-    worst = max(values) * MEASURES[measures[0]].unit.factor
+    worst = max(values) * UNITS[measures[0]].factor
     return f"{worst:.2f}" if math.isfinite(worst) else "lost"
 
 
@@ -278,11 +268,9 @@ def store_population(found: Population, study_folder: Path) -> list[Path]:
     about = {b"vehicle": found.vehicle.encode()}
     paths = [store_summary(found, STUDY)]
     folder = paths[0].parent
-    for name, kept in ((RUNS, _in_short(table)), (BANDS, table_of(_bands(table)))):
-        with atomic_write(folder / name, StudyError) as path:
-            pq.write_table(kept.replace_schema_metadata(about), path, compression="zstd", compression_level=19)
-        paths.append(folder / name)
-    return paths
+    with atomic_write(folder / RUNS, StudyError) as path:
+        pq.write_table(_in_short(table).replace_schema_metadata(about), path, compression="zstd", compression_level=19)
+    return [*paths, folder / RUNS]
 
 
 def stored_runs() -> pa.Table:
@@ -333,81 +321,11 @@ def _in_short(table: pa.Table) -> pa.Table:
             columns[name] = table[name].cast(pa.int16()) if name == "sample" else table[name].dictionary_encode()
         elif (
             name not in factors
-            and not name.startswith((CURVE, DISTANCE))
+            and not name.startswith(DISTANCE)
             and pa.types.is_floating(table.schema.field(name).type)
         ):
             columns[name] = table[name].cast(pa.float32())
     return pa.table(columns)
-
-
-def _bands(table: pa.Table) -> dict[tuple[str, str, str], Band]:
-    found = {}
-    channels = [name.removeprefix(CURVE) for name in table.column_names if name.startswith(CURVE)]
-    for maneuver in table["maneuver"].unique().to_pylist():
-        for controller in table["controller"].unique().to_pylist():
-            chosen = (pc.field("maneuver") == maneuver) & (pc.field("controller") == controller)
-            rows = table.filter(chosen & (pc.field("status") == "ok"))
-            curves = {name: _curves(rows, name) for name in channels}
-            if not rows.num_rows:
-                continue
-            for name in channels:
-                if name not in TRACK:
-                    found[maneuver, controller, name] = band_over_time(
-                        [curve[::_EVERY] for curve in curves[name]], _EVERY * CURVE_STEP_S
-                    )
-            tracks = list(zip(*(curves[name] for name in TRACK), strict=True))
-            found[maneuver, controller, TRACK[1]] = band_of_tracks(tracks)
-    return found
-
-
-def band_over_time(curves: Sequence[Array], step_s: float) -> Band:
-    """Return the band of a channel over time.
-
-    Args:
-        curves: The channel in every run, every `step_s`; the shortest run ends the band.
-        step_s: Time between two values [s].
-    """
-    length = min(map(len, curves))
-    low, high = np.quantile(np.stack([curve[:length] for curve in curves]), QUANTILES, axis=0)
-    return Band(step_s * np.arange(length, dtype=np.float64), low, high)
-
-
-def band_of_tracks(tracks: Sequence[tuple[Array, Array]]) -> Band:
-    """Return the band of tracks across the course, to the place that half of the runs reach.
-
-    Args:
-        tracks: x and y of the front axle centre in every run [m].
-    """
-    furthest = [np.maximum.accumulate(x) for x, _ in tracks]
-    begin, end = max(float(x[0]) for x in furthest), float(np.median([x[-1] for x in furthest]))
-    at = np.arange(begin, end, TRACK_STEP_M)
-    # A car that turns round counts until it does so.
-    across = [np.interp(at, x, y, right=np.nan) for x, (_, y) in zip(furthest, tracks, strict=True)]
-    low, high = np.nanquantile(np.stack(across), QUANTILES, axis=0)
-    return Band(at, low, high)
-
-
-def table_of(bands: Mapping[tuple[str, str, str], Band]) -> pa.Table:
-    """Return bands as a table, with the precision of a picture.
-
-    Args:
-        bands: (manoeuvre, controller, channel) -> band.
-    """
-    keys = list(bands)
-    edges = pa.list_(pa.float32())
-    columns = {name: pa.array([key[place] for key in keys]) for place, name in enumerate(_KEY)}
-    columns |= {
-        "start": pa.array([float(band.at[0]) for band in bands.values()]),
-        "step": pa.array([float(band.at[1] - band.at[0]) for band in bands.values()]),
-        "low": pa.array([_rounded(band.low) for band in bands.values()], edges),
-        "high": pa.array([_rounded(band.high) for band in bands.values()], edges),
-    }
-    return pa.table(columns)
-
-
-def _rounded(values: Array) -> np.ndarray:
-    mantissa, exponent = np.frexp(values)
-    return np.ldexp(np.round(mantissa * 2.0**_MANTISSA_BITS) / 2.0**_MANTISSA_BITS, exponent).astype(np.float32)
 
 
 def judge_again(changed: dict[str, str], jobs: int | None) -> Population:
@@ -458,7 +376,3 @@ def judge_again(changed: dict[str, str], jobs: int | None) -> Population:
     again = replace(stored, claims=kept)
     print(f"{len(wanted)} samples driven again: {store_summary(again, STUDY)}")
     return again
-
-
-def _curves(rows: pa.Table, channel: str) -> list[np.ndarray]:
-    return [np.asarray(curve.values, dtype=np.float64) for curve in rows[f"{CURVE}{channel}"]]

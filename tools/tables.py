@@ -19,15 +19,14 @@ import numpy as np
 
 from activesteer import simulate
 from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, Kind
-from activesteer.analysis.claims.scorecard import PAPER, not_reproduced, read_setting, stored_population
-from activesteer.analysis.claims.scorecard import Population as StoredPopulation
+from activesteer.analysis.claims.scorecard import PAPER, not_reproduced, read_setting
 from activesteer.config import Range, dataclass_in, element_of, spellings
 from activesteer.controllers import load_controller
 from activesteer.maneuver.base import Maneuver
 from activesteer.maneuver.kinds import KINDS
-from activesteer.theory.proportions import percent
 from tools.make_setting import AROUND
 from tools.population_results import Population, read_population
+from tools.proportions import percent
 
 CLAIMS_PAGE: Final = Path(__file__).parents[1] / "docs" / "claims.md"
 CLAIMS_BEGIN: Final = "<!-- the table is written by tools/renew.py claims -->\n"
@@ -43,7 +42,7 @@ NOT_REPRODUCED: Final = "\N{NOT EQUAL TO} not reproduced"
 
 def claims_table() -> str:
     """Return the claims_table in Markdown: statements about the systems alone, then statements with a driver."""
-    known, population = not_reproduced(VEHICLE), stored_population(VEHICLE)
+    known, population = not_reproduced(VEHICLE), read_population("population")
     fails = read_setting(PAPER).fails
     lines = [*summary(), ""]
     for kind in Kind:
@@ -89,7 +88,7 @@ def around_setting() -> list[str]:
 
 def summary() -> list[str]:
     """Return the statements that hold, by scenario, as lines of Markdown."""
-    known, population, fails = not_reproduced(VEHICLE), stored_population(VEHICLE), read_setting(PAPER).fails
+    known, population, fails = not_reproduced(VEHICLE), read_population("population"), read_setting(PAPER).fails
     lines = [
         "| scenario | the paper's statements | paper's setting | driver from literature | population, ideal sensors | "
         "population, production sensors |",
@@ -104,13 +103,13 @@ def summary() -> list[str]:
     return lines
 
 
-def _mean(population: Population | StoredPopulation | None, claims: Sequence[str], at: str) -> str:
+def _mean(population: Population | None, claims: Sequence[str], at: str) -> str:
     """Return the mean share of claims at a value of a choice, in words."""
     found = [claim.at[at] for claim in population.claims if claim.id in claims] if population else []
     return f"{percent(sum(found) / len(found))} %" if found else ""
 
 
-def _proportion(population: Population | StoredPopulation | None, number: str) -> tuple[str, str, str]:
+def _proportion(population: Population | None, number: str) -> tuple[str, str, str]:
     claims = () if population is None else population.claims
     found = next((claim for claim in claims if claim.id == number), None)
     if found is None:

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.analysis.series import counted_sideslip
+from activesteer.analysis.series import peak
 from activesteer.analysis.source import RecordingLike
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import RecordingError
@@ -72,10 +72,10 @@ def straight_braking_metrics(recording: RecordingLike) -> dict[str, float]:
         "braking_efficiency": efficiency,
         "wheel_slip_max": _largest_slip(recording, speed, braked),
         "brake_pressure_peak_Pa": max(float(recording[f"{corner}_brake_pressure_Pa"].max()) for corner in CORNERS),
-        "yaw_rate_peak_abs_radps": float(np.abs(recording["yaw_rate_radps"][braked]).max()),
+        **peak(recording, "yaw_rate_radps", braked),
         "lateral_deviation_max_m": float(np.abs(aside).max()),
         "heading_end_rad": math.remainder(float(recording["yaw_rad"][end - 1]) - heading, 2.0 * math.pi),
-        "steering_wheel_peak_abs_rad": float(np.abs(recording["steering_wheel_rad"][braked]).max()),
+        **peak(recording, "steering_wheel_rad", braked),
     }
 
 
@@ -182,8 +182,8 @@ def brake_in_turn_metrics(recording: RecordingLike) -> dict[str, float]:
         "yaw_rate_after_1000ms_radps": yaw_rate_then,
         "yaw_rate_deviation_after_1000ms_radps": side * yaw_rate_then - speed_then / radius_m,
         "path_deviation_after_1000ms_m": math.hypot(x_then - middle_x, y_then - middle_y) - radius_m,
-        "yaw_rate_peak_abs_radps": float(np.abs(recording["yaw_rate_radps"][begin:]).max()),
-        "sideslip_peak_abs_rad": float(np.abs(counted_sideslip(recording, slice(begin, None))).max()),
+        **peak(recording, "yaw_rate_radps", slice(begin, None)),
+        **peak(recording, "sideslip_rad", slice(begin, None)),
         "speed_end_mps": float(recording["speed_mps"][-1]),
     }
 

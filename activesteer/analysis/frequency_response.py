@@ -37,37 +37,19 @@ HIGHEST_Hz: Final = 4.0
 
 
 class FrequencyResponse(NamedTuple):
-    """Response of one output to the input.
+    """Response of one output to the input."""
 
-    Attributes:
-        frequency_Hz: Frequencies [Hz], shape (n,).
-        response: Output over input, complex, shape (n,).
-        coherence: Coherence, 0 to 1, shape (n,).
-    """
-
-    frequency_Hz: Array
-    response: NDArray[np.complex128]
-    coherence: Array
+    frequency_Hz: Array  # frequencies [Hz], shape (n,)
+    response: NDArray[np.complex128]  # output over input, complex, shape (n,)
+    coherence: Array  # coherence, 0 to 1, shape (n,)
+    # relative standard error of the gain by coherence and number of averages, shape (n,), or empty for one run; it is
+    # also the standard error of the phase [rad]
+    gain_error: Array = np.zeros(0)
+    averages: float = 1.0  # number of independent segments
 
 
-def frequency_response(
-    recording: RecordingLike,
-    output: str,
-    frequency_Hz: Array,
-) -> FrequencyResponse:
-    """Return the response of a channel to the steering.
-
-    Args:
-        recording: A run that begins and ends straight, with all frequencies in its steering.
-        output: Channel.
-        frequency_Hz: Frequencies [Hz]; the nearest lines of the spectrum are returned.
-
-    Returns:
-        Response and coherence at these lines.
-
-    Raises:
-        RecordingError: a channel is missing, or the steering does not contain a frequency.
-    """
+def frequency_response(recording: RecordingLike, output: str, frequency_Hz: Array) -> FrequencyResponse:
+    """Return the response of a channel to the steering, at the lines of the spectrum nearest to frequencies [Hz]."""
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     step_s = timestep(time_s)
     u = np.fft.rfft(np.asarray(recording[INPUT], dtype=np.float64))
@@ -155,35 +137,12 @@ _HANN_OVERLAP: Final = 1.0 + 2.0 / 36.0
 """Segments with Hann windows that overlap by half, for each independent segment (Welch, 1967)."""
 
 
-class RandomResponse(NamedTuple):
-    """An averaged frequency response.
-
-    Attributes:
-        response: The response, and its coherence.
-        gain_error: Relative standard error of the gain by coherence and number of averages, shape (n,); it is also the
-            standard error of the phase [rad].
-        averages: Number of independent segments.
-    """
-
-    response: FrequencyResponse
-    gain_error: Array
-    averages: float
-
-
 def random_response(
     recordings: Sequence[RecordingLike], output: str, lowest_Hz: float, highest_Hz: float
-) -> RandomResponse:
-    """Return the response of a channel to random steering, at all lines of a range.
-
-    The segments are finite, and the response to the end of a segment is lost. The gain is therefore low by some per
-    mille if the response dies away within a second. The error holds for small deviations: coherence above some 0.3.
-
-    Args:
-        recordings: Runs with different random steering, of at least `SEGMENT_S` each, all with one time step.
-        output: Channel.
-        lowest_Hz: Least frequency [Hz].
-        highest_Hz: Greatest frequency [Hz].
-    """
+) -> FrequencyResponse:
+    """Return the response of a channel to random steering, at all lines of a range, from runs with one time step."""
+    # The segments are finite, and the response to the end of a segment is lost. The gain is therefore low by some per
+    # mille if the response dies away within a second. The error holds for small deviations: coherence above some 0.3.
     if not recordings:
         raise RecordingError("there is no run with random steering")
     from scipy import signal  # noqa: PLC0415 - slow to import, and lists of standards do not need it
@@ -209,4 +168,4 @@ def random_response(
     found = _response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], largest)
     with np.errstate(divide="ignore"):
         error = np.sqrt(0.5 * np.maximum(1.0 / found.coherence - 1.0, 0.0) / averages)
-    return RandomResponse(found, error, averages)
+    return found._replace(gain_error=error, averages=averages)

@@ -38,17 +38,11 @@ MIN_SPEED_MPS: Final = 1.0
 
 
 class CarGeometry(NamedTuple):
-    """Geometry of the car that the evaluation needs.
+    """Geometry of the car that the evaluation needs."""
 
-    Attributes:
-        cg_to_front_m: Distance of the centre of gravity to the front axle, l_V [m].
-        cg_to_rear_m: Distance of the centre of gravity to the rear axle, l_H [m].
-        steering_ratio: Steering wheel angle over road-wheel angle [-].
-    """
-
-    cg_to_front_m: float
-    cg_to_rear_m: float
-    steering_ratio: float
+    cg_to_front_m: float  # distance of the centre of gravity to the front axle, l_V [m]
+    cg_to_rear_m: float  # distance of the centre of gravity to the rear axle, l_H [m]
+    steering_ratio: float  # steering wheel angle over road-wheel angle [-]
 
     @property
     def wheelbase_m(self) -> float:
@@ -56,44 +50,8 @@ class CarGeometry(NamedTuple):
         return self.cg_to_front_m + self.cg_to_rear_m
 
 
-class Handling(NamedTuple):
-    """Steady-state handling in one test. Gradients are over lateral acceleration, or nan if not defined.
-
-    Attributes:
-        understeer_gradient_radpmps2: EG, at the road wheel [rad/(m/s2)].
-        steer_gradient_radpmps2: Gradient of steering wheel over ratio [rad/(m/s2)].
-        ackermann_gradient_radpmps2: Gradient of l/R [rad/(m/s2)].
-        linear_range_mps2: Lateral acceleration at which the steer angle is 5 % off the line [m/s2].
-        characteristic_speed_mps: sqrt(l/EG); nan for a car that does not understeer [m/s].
-        roll_gradient_radpmps2: Roll angle, outwards positive [rad/(m/s2)].
-        sideslip_gradient_radpmps2: Sideslip angle at the centre of gravity, in a left turn [rad/(m/s2)].
-        front_slip_gradient_radpmps2: Effective slip angle of the front axle, steering and roll steer included.
-        rear_slip_gradient_radpmps2: Effective slip angle of the rear axle.
-        yaw_rate_gain_1ps: Yaw rate per steering wheel angle [1/s]; at constant speed.
-        steering_wheel_gain_mps2prad: Lateral acceleration per steering wheel angle [(m/s2)/rad]; at constant speed.
-        limit_acceleration_mps2: Largest lateral acceleration [m/s2].
-    """
-
-    understeer_gradient_radpmps2: float
-    steer_gradient_radpmps2: float
-    ackermann_gradient_radpmps2: float
-    linear_range_mps2: float
-    characteristic_speed_mps: float
-    roll_gradient_radpmps2: float
-    sideslip_gradient_radpmps2: float
-    front_slip_gradient_radpmps2: float
-    rear_slip_gradient_radpmps2: float
-    yaw_rate_gain_1ps: float
-    steering_wheel_gain_mps2prad: float
-    limit_acceleration_mps2: float
-
-
 def car_of(recording: RecordingLike) -> CarGeometry:
-    """Read the geometry of the car from the metadata of a recording.
-
-    Raises:
-        RecordingError: the metadata do not hold it.
-    """
+    """Read the geometry of the car from the metadata of a recording."""
     vehicle: Any = recording.metadata.get("vehicle")
     try:
         single_track, steering = vehicle["single_track"], vehicle["steering"]
@@ -108,20 +66,8 @@ def car_of(recording: RecordingLike) -> CarGeometry:
         ) from error
 
 
-def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> Handling:
-    """Return the steady-state handling from a test.
-
-    Args:
-        recording: A slow ramp to either side, from straight ahead: of the steering wheel at constant speed, or of the
-            speed on a circle.
-        car: Geometry of the car; by default from the recording's metadata.
-
-    Returns:
-        Gradients and limits.
-
-    Raises:
-        RecordingError: a channel is missing, or the run does not cover the range of the fit.
-    """
+def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[str, float]:
+    """Return the steady-state handling from a slow ramp; by default with the car in the recording's metadata."""
     car = car or car_of(recording)
 
     def channel(name: str) -> Array:
@@ -160,25 +106,48 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> Handli
     expected = car.wheelbase_m * curvature + understeer * ay + offset
     departed = rising & (np.abs(_moving_average(steer - expected, step_s)) > DEPARTURE * np.abs(expected))
     departed &= smoothed > FIT_MPS2[1]
-    return Handling(
-        understeer_gradient_radpmps2=understeer,
-        steer_gradient_radpmps2=gradient(steer),
-        ackermann_gradient_radpmps2=gradient(car.wheelbase_m * curvature),
-        linear_range_mps2=float(smoothed[int(departed.argmax())]) if departed.any() else math.nan,
-        characteristic_speed_mps=characteristic_speed(car.wheelbase_m, understeer),
-        roll_gradient_radpmps2=gradient(side * channel("roll_rad")),
-        sideslip_gradient_radpmps2=gradient(sideslip),
-        front_slip_gradient_radpmps2=gradient(steer - sideslip - car.cg_to_front_m * curvature),
-        rear_slip_gradient_radpmps2=gradient(car.cg_to_rear_m * curvature - sideslip),
-        yaw_rate_gain_1ps=_line(wheel[fit], yaw_rate[fit])[0] if constant_speed else math.nan,
-        steering_wheel_gain_mps2prad=_line(wheel[fit], ay[fit])[0] if constant_speed else math.nan,
-        limit_acceleration_mps2=float(smoothed[top]),
-    )
+    return {
+        "understeer_gradient_radpmps2": understeer,
+        "steer_gradient_radpmps2": gradient(steer),
+        "ackermann_gradient_radpmps2": gradient(car.wheelbase_m * curvature),
+        "linear_range_mps2": float(smoothed[int(departed.argmax())]) if departed.any() else math.nan,
+        "characteristic_speed_mps": characteristic_speed(car.wheelbase_m, understeer),
+        "roll_gradient_radpmps2": gradient(side * channel("roll_rad")),
+        "sideslip_gradient_radpmps2": gradient(sideslip),
+        "front_slip_gradient_radpmps2": gradient(steer - sideslip - car.cg_to_front_m * curvature),
+        "rear_slip_gradient_radpmps2": gradient(car.cg_to_rear_m * curvature - sideslip),
+        "yaw_rate_gain_1ps": _line(wheel[fit], yaw_rate[fit])[0] if constant_speed else math.nan,
+        "steering_wheel_gain_mps2prad": _line(wheel[fit], ay[fit])[0] if constant_speed else math.nan,
+        "limit_acceleration_mps2": float(smoothed[top]),
+    }
 
 
 def handling_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the values of `evaluate`, and the speed at the end."""
-    return {**evaluate(recording)._asdict(), "speed_end_mps": float(recording["speed_mps"][-1])}
+    """Return the steady-state handling from a test.
+
+    Args:
+        recording: A slow ramp to either side, from straight ahead: of the steering wheel at constant speed, or of the
+            speed on a circle. Its metadata describe the car.
+
+    Returns:
+        Gradients are over lateral acceleration, in rad/(m/s2), or nan if not defined.
+
+        - `understeer_gradient_radpmps2`: EG, at the road wheel; `steer_gradient_...` of steering wheel over ratio,
+          `ackermann_gradient_...` of l/R.
+        - `linear_range_mps2`: lateral acceleration at which the steer angle is 5 % off the line.
+        - `characteristic_speed_mps`: sqrt(l/EG); nan for a car that does not understeer.
+        - `roll_gradient_...`: roll angle, outwards positive. `sideslip_gradient_...`: sideslip angle at the centre of
+          gravity, in a left turn.
+        - `front_slip_gradient_...`, `rear_slip_gradient_...`: effective slip angles of the axles, that of the front one
+          with steering and roll steer.
+        - At constant speed `yaw_rate_gain_1ps` and `steering_wheel_gain_mps2prad`: yaw rate and lateral acceleration
+          per steering wheel angle.
+        - `limit_acceleration_mps2`: largest lateral acceleration; `speed_end_mps`.
+
+    Raises:
+        RecordingError: a channel is missing, or the run does not cover the range of the fit.
+    """
+    return {**evaluate(recording), "speed_end_mps": float(recording["speed_mps"][-1])}
 
 
 def _line(x: Array, y: Array) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Harm that a controller does, and loss of control.
 
-A controller *harms* a run if one of `MEASURES` grows by more than its size. The sizes were written down before the
+A controller *harms* a run if one of `SIZES` grows by more than its size. The sizes were written down before the
 first run of a comparison. A measure without a size is reported and not counted. A measure of 0 is as good as can be:
 moving within the lane is no harm, and an error within `FREE_SIDE_M` of a path is none either.
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from activesteer.core.metric_table import (
     STAYS_IN_LANES,
     recorded_metric,
 )
-from activesteer.core.units import DisplayUnit, display_unit
 
 if TYPE_CHECKING:
     from activesteer.recording import Recording
@@ -130,33 +129,20 @@ _DEGREE: Final = math.pi / 180.0
 _DWELL: Final = "yaw_rate_after_1750ms_share"
 
 
-class Measure(NamedTuple):
-    """A measure of a run that shall not grow."""
-
-    words: str  # meaning
-    unit: DisplayUnit  # unit for display
-    size: float | None  # growth above which it is harm [SI]; None if it is not counted
-
-
-_M, _DEG, _DEGPS = display_unit("path_m"), display_unit("heading_rad"), display_unit("yaw_rate_radps")
-_COUNT: Final = DisplayUnit("", 1.0)
-MEASURES: Final = {
-    "lane": Measure("largest distance of the body beyond its lane", _M, 0.05),
-    "path": Measure("largest path error beyond the free side of a lane", _M, 0.05),
-    "cones": Measure("cones hit or missed", _COUNT, 1.0),
-    "stopping": Measure("stopping distance", _M, 0.5),
-    "stopping_elsewhere": Measure(
-        "stopping distance, where the car without control leaves the free side of its lane", _M, None
-    ),
-    "heading": Measure("heading at the end against path or straight line", _DEG, 2.0 * _DEGREE),
-    "yaw_rate": Measure("yaw rate left at the end", _DEGPS, 1.0 * _DEGREE),
-    "displacement": Measure("lateral displacement that FMVSS 126 misses", _M, 0.10),
-    "lost": Measure("car lost", _COUNT, 0.5),
-    "heading_open_loop": Measure("heading at the end of a sine with dwell", _DEG, None),
-    "steering": Measure("steering wheel, root mean square", _DEG, None),
+SIZES: Final[dict[str, float | None]] = {
+    "lane": 0.05,  # largest distance of the body beyond its lane
+    "path": 0.05,  # largest path error beyond the free side of a lane
+    "cones": 1.0,  # cones hit or missed
+    "stopping": 0.5,  # stopping distance
+    "stopping_elsewhere": None,  # the same, where the car without control leaves the free side of its lane
+    "heading": 2.0 * _DEGREE,  # heading at the end against path or straight line: 0.8 m/s of drift at 80 km/h
+    "yaw_rate": 1.0 * _DEGREE,  # yaw rate left at the end
+    "displacement": 0.10,  # lateral displacement that FMVSS 126 misses: 5 % of the displacement that it asks for
+    "lost": 0.5,  # car lost
+    "heading_open_loop": None,  # heading at the end of a sine with dwell
+    "steering": None,  # steering wheel, root mean square
 }
-"""Name -> measure. Sizes of heading and displacement: 2 deg are 0.8 m/s of drift at 80 km/h; 0.10 m is 5 % of the
-displacement that the law asks for."""
+"""Measure of a run that shall not grow -> growth above which it is harm [SI]; None if it is not counted."""
 
 
 def measured(metrics: Metrics) -> dict[str, float]:
@@ -193,7 +179,7 @@ def measured(metrics: Metrics) -> dict[str, float]:
 def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
     """Return the growth of each measure by a controller [SI], for the measures that the manoeuvre has."""
     found, all_before, all_after = {}, measured(without), measured(controlled)
-    for name in MEASURES:
+    for name in SIZES:
         if name not in all_before and name not in all_after:
             continue
         before, after = (values.get(name, math.inf) for values in (all_before, all_after))
@@ -205,10 +191,10 @@ def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
 
 def harms(change: Mapping[str, float]) -> list[str]:
     """Return the measures that grew by more than their size."""
-    return [name for name, growth in change.items() if (size := MEASURES[name].size) is not None and growth > size]
+    return [name for name, growth in change.items() if (size := SIZES[name]) is not None and growth > size]
 
 
 def severity(change: Mapping[str, float]) -> float:
     """Return the largest growth of a counted measure, in multiples of its size."""
-    sizes = ((growth, MEASURES[name].size) for name, growth in change.items())
+    sizes = ((growth, SIZES[name]) for name, growth in change.items())
     return max((growth / size for growth, size in sizes if size), default=0.0)

@@ -1,39 +1,195 @@
-"""The metrics that belong to a recording, chosen by the kind of its manoeuvre."""
+"""The metrics that belong to a recording, chosen by the kind of its manoeuvre, and those of all runs.
+
+The latter are sizes, energy, ride and rollover.
+
+The seat point lies in the middle of the wheelbase, `SEAT_ASIDE_M` beside the middle of the car, on both sides in turn;
+the worse side counts. Its vertical acceleration is that of the centre of gravity plus that of pitch and roll.
+
+Source: ISO 2631-1:1997, annex A (frequency weighting W_k: band limits 0.4 and 100 Hz, transition 12.5 Hz, step 2.37 to
+3.35 Hz).
+
+NHTSA's rollover test counts a run in which both inner wheels leave the ground by two inches at the same time. Here the
+wheels count as lifted while the road does not carry them.
+
+Source: 68 FR 59250 (2003), Consumer Information; New Car Assessment Program; Rollover Resistance.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final
 
-from activesteer.analysis import (
-    braking,
-    frequency_response,
-    general,
-    handling,
-    path_following,
-    sine_with_dwell,
-    step_response,
-)
+import numpy as np
+from numpy.typing import NDArray
+
+from activesteer.analysis import braking, frequency_response, handling, path_following, sine_with_dwell, step_response
+from activesteer.analysis.series import peak, sizes
 from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
 from activesteer.config import read_toml
-from activesteer.core.metric_table import Metric, metric
+from activesteer.core.conventions import CORNERS, Array
+from activesteer.core.metric_table import metric
 from activesteer.errors import RecordingError, nearest_names
+from activesteer.road.road import road_of
+
+_MEASURABLE: Final[tuple[Callable[[RecordingLike], dict[str, float]], ...]] = (
+    *(partial(sizes, channel=channel) for channel in ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad")),
+    partial(peak, channel="steering_wheel_rad"),
+    lambda recording: {"speed_end_mps": float(recording["speed_mps"][-1])},
+)
+"""Functions that evaluate what a test car can measure."""
 
 
-class Evaluation(NamedTuple):
-    """Evaluation of the runs of one kind of manoeuvre."""
+def general_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Return peaks and root mean squares of a run.
 
-    metrics: Callable[[RecordingLike], dict[str, float]]  # function from a run to its metrics
-    # the metrics that are printed first and held against the baseline, the most telling first
-    key_metrics: tuple[Metric, ...]
+    Returns:
+        `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip (above 10 km/h)
+        and roll; the largest steering wheel angle; `friction_utilisation_max`, the largest fraction of its available
+        friction that any tyre uses; and `speed_end_mps`.
+
+    Raises:
+        RecordingError: a channel is missing.
+    """
+    use = max(float(recording[f"{corner}_friction_utilisation"].max()) for corner in CORNERS)
+    *values, end = (part(recording) for part in _MEASURABLE)
+    return {name: value for part in (*values, {"friction_utilisation_max": use}, end) for name, value in part.items()}
+
+
+def measured_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Return the metrics whose channels were measured. A car on a proving ground has no sensors of tyre forces."""
+    values: dict[str, float] = {}
+    for part in _MEASURABLE:
+        with suppress(RecordingError):
+            values |= part(recording)
+    return values
+
+
+def energy_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Return the energies of a run, or nothing for a car without motors."""
+    vehicle = recording.metadata.get("vehicle")
+    if not isinstance(vehicle, Mapping) or not vehicle.get("motors"):
+        return {}
+    time_s = recording.time_s
+    battery_J = recording["battery_energy_J"]
+    brakes_W = sum(-recording[f"{c}_brake_torque_Nm"] * recording[f"{c}_wheel_speed_radps"] for c in CORNERS)
+    steering_J = sum(np.trapezoid(np.maximum(power_W, 0.0), time_s) for power_W in _steering(recording, vehicle))
+    return {
+        "battery_energy_J": float(battery_J[-1] - battery_J[0]),
+        "steering_energy_J": float(steering_J),
+        "brake_energy_J": float(np.trapezoid(brakes_W, time_s)),
+    }
+
+
+def _steering(recording: RecordingLike, vehicle: Mapping[str, Any]) -> Iterator[NDArray[np.float64]]:
+    """Yield the mechanical powers of the steering actuators."""
+    rear = np.gradient(recording["rear_steer_rad"], recording.time_s)
+    added = vehicle["steering"]["ratio"] * np.gradient(recording["superposition_rad"], recording.time_s)
+    presets = vehicle["rear_actuator"], vehicle["superposition_actuator"]
+    motors: list[str] = []
+    if (preset := presets[0]["preset"]) == "hinge":
+        yield from (recording[f"{name}_steer_torque_Nm"] * rear for name in ("rl", "rr"))
+    else:
+        central = presets[0].get("arrangement", "central" if preset == "screw_10deg" else "") == "central"
+        motors += ["rear"] if central else ["rl", "rr"]
+    if presets[1]["preset"] == "servo":
+        yield recording["superposition_torque_Nm"] * added
+    else:
+        motors.append("superposition")
+    yield from (recording[f"{name}_motor_torque_Nm"] * recording[f"{name}_motor_speed_radps"] for name in motors)
+
+
+SEAT_ASIDE_M: Final = 0.35
+_BUTTERWORTH: Final = math.sqrt(0.5)
+_EVERY: Final = 10
+"""Rows from one look at the place of a wheel to the next: 0.2 m at 20 m/s."""
+_MARKER: Final = "fl_road_z_m"
+"""A channel of uneven roads only."""
+
+
+def is_uneven(recording: RecordingLike) -> bool:
+    """Return whether a run was driven on an uneven road."""
+    return any(getattr(channel, "name", channel) == _MARKER for channel in getattr(recording, "channels", ()))
+
+
+def ride_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Return the metrics of the ride."""
+    road = road_of(recording.metadata)
+    extended = [
+        road.extended_share(*(np.asarray(recording[f"{corner}_contact_{axis}_m"])[::_EVERY] for axis in "xy"))
+        for corner in CORNERS
+    ]
+    loads = np.stack([np.asarray(recording[f"{corner}_tyre_fz_N"], np.float64) for corner in CORNERS])
+    travels = np.stack([np.asarray(recording[f"{corner}_travel_m"], np.float64) for corner in CORNERS])
+    return {
+        "seat_acceleration_rms_mps2": seat_acceleration_mps2(recording),
+        "wheel_load_coefficient_max": float((loads.std(axis=1) / loads.mean(axis=1)).max()),
+        "suspension_travel_max_m": float(np.ptp(travels, axis=1).max()),
+        "wheel_lift_share": float((loads <= 0.0).mean(axis=1).max()),
+        "extended_road_share": max(extended),
+    }
+
+
+def seat_acceleration_mps2(recording: RecordingLike) -> float:
+    """Return the weighted RMS of the vertical acceleration at the worse seat point [m/s2]."""
+    time_s = np.asarray(recording.time_s, np.float64)
+    step_s = float(time_s[1] - time_s[0])
+    up, pitch, roll = (
+        np.asarray(recording[name], np.float64) for name in ("az_mps2", "pitch_rate_radps", "roll_rate_radps")
+    )
+    axle_m = math.hypot(
+        recording["front_axle_x_m"][0] - recording["x_m"][0], recording["front_axle_y_m"][0] - recording["y_m"][0]
+    )
+    wheelbase_m = float(recording.metadata.get("car", {}).get("wheelbase_m", 2.0 * axle_m))
+    ahead_m = axle_m - 0.5 * wheelbase_m
+    base = up - ahead_m * np.gradient(pitch, step_s)
+    aside = SEAT_ASIDE_M * np.gradient(roll, step_s)
+    return max(float(np.sqrt(np.mean(weighted(base + sign * aside, step_s) ** 2))) for sign in (1.0, -1.0))
+
+
+def weighted(acceleration_mps2: Array, step_s: float) -> Array:
+    """Return a vertical acceleration filtered by W_k. Its mean is removed first."""
+    spectrum = np.fft.rfft(acceleration_mps2 - np.mean(acceleration_mps2))
+    gain = weighting(np.asarray(np.fft.rfftfreq(len(acceleration_mps2), step_s), np.float64))
+    return np.fft.irfft(spectrum * gain, len(acceleration_mps2))
+
+
+def weighting(frequency_Hz: Array) -> NDArray[np.complex128]:
+    """Return the complex gain of the weighting W_k."""
+    s = 2j * math.pi * np.asarray(frequency_Hz, np.float64)
+
+    def quadratic(at_Hz: float, quality: float) -> NDArray[np.complex128]:
+        part = s / (2.0 * math.pi * at_Hz)
+        return 1.0 + part / quality + part * part
+
+    high = (s / (2.0 * math.pi * 0.4)) ** 2 / quadratic(0.4, _BUTTERWORTH)
+    transition = (1.0 + s / (2.0 * math.pi * 12.5)) / quadratic(12.5, 0.63)
+    step = quadratic(2.37, 0.91) / quadratic(3.35, 0.91) * (2.37 / 3.35) ** 2
+    return high / quadratic(100.0, _BUTTERWORTH) * transition * step
+
+
+LIFTED_N: Final = 1.0
+"""Vertical load below which a wheel is lifted [N]."""
+
+
+def rollover_metrics(recording: RecordingLike) -> dict[str, float]:
+    """Return the general metrics, and those of the wheel loads."""
+    loads_N = np.array([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS], dtype=np.float64)
+    lifted = loads_N < LIFTED_N
+    both = (lifted[0] & lifted[2]) | (lifted[1] & lifted[3])
+    step_s = float(recording.time_s[1] - recording.time_s[0])
+    values = {"two_wheel_lift_time_s": float(both.sum()) * step_s, "wheel_load_min_N": float(loads_N.min())}
+    return values | general_metrics(recording)
 
 
 _TABLE: Final = read_toml(Path(__file__).with_name("key_metrics.toml"), RecordingError)[0]
-_METRICS: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
+EVALUATIONS: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "step_steer": step_response.step_response_metrics,
-    "open_loop": general.general_metrics,
-    "random_steer": general.general_metrics,
+    "open_loop": general_metrics,
+    "random_steer": general_metrics,
     "slowly_increasing_steer": step_response.slow_ramp_metrics,
     "constant_radius": handling.handling_metrics,
     "sine_sweep": frequency_response.frequency_response_metrics,
@@ -42,21 +198,21 @@ _METRICS: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "slalom": path_following.path_following_metrics,
     "follow_path": path_following.path_following_metrics,
     "brake_in_turn": braking.brake_in_turn_metrics,
-    "phases": general.rollover_metrics,
+    "phases": rollover_metrics,
     "straight_braking": braking.straight_braking_metrics,
-    "measured": general.measured_metrics,
+    "measured": measured_metrics,
 }
-EVALUATIONS: Final = {
-    kind: Evaluation(metrics, tuple(map(metric, _TABLE["key_metrics"].get(kind, _TABLE["key_metrics"]["open_loop"]))))
-    for kind, metrics in _METRICS.items()
+"""Kind of manoeuvre -> function from a run to its metrics."""
+KEY_METRICS: Final[dict[str, tuple[str, ...]]] = {
+    kind: tuple(_TABLE["key_metrics"].get(kind, _TABLE["key_metrics"]["open_loop"])) for kind in EVALUATIONS
 }
-"""Kind of manoeuvre -> its evaluation."""
+"""Kind of manoeuvre -> metrics that are printed first and held against the baseline, the most telling first."""
 KEY_FIGURES: Final = {title: tuple(metrics) for title, metrics in _TABLE["key_figures"].items()}
 """Title of a key figure -> names of metrics, of which the first one that a run has is shown."""
 
 
-def evaluation_of(recording: RecordingLike) -> Evaluation:
-    """Return the evaluation of a run's kind of manoeuvre."""
+def evaluated_kind(recording: RecordingLike) -> str:
+    """Return the kind of a run's manoeuvre, which must have an evaluation."""
     kind = maneuver_kind(recording)
     if kind not in EVALUATIONS:
         raise RecordingError(
@@ -65,7 +221,7 @@ def evaluation_of(recording: RecordingLike) -> Evaluation:
             key="maneuver.kind",
             value=kind,
         )
-    return EVALUATIONS[kind]
+    return kind
 
 
 def metrics(recording: RecordingLike) -> dict[str, float]:
@@ -82,9 +238,9 @@ def metrics(recording: RecordingLike) -> dict[str, float]:
             than two rows, or the run is not what its kind promises.
         ParameterError: the evaluation returns a metric that `metric_table` does not declare.
     """
-    values = evaluation_of(recording).metrics(Evaluable(recording)) | general.energy_metrics(recording)
-    if general.is_uneven(recording):
-        values |= general.ride_metrics(Evaluable(recording))
+    values = EVALUATIONS[evaluated_kind(recording)](Evaluable(recording)) | energy_metrics(recording)
+    if is_uneven(recording):
+        values |= ride_metrics(Evaluable(recording))
     for name in values:
         metric(name)
     return values

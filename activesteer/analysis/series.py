@@ -49,10 +49,16 @@ def counted(recording: RecordingLike, channel: str, part: slice = _ALL) -> Array
     return counted_sideslip(recording, part) if channel == "sideslip_rad" else recording[channel][part]
 
 
+def peak(recording: RecordingLike, channel: str, part: slice = _ALL) -> dict[str, float]:
+    """Return the metric of the peak of a channel in a part of a run."""
+    name, _, unit = channel.rpartition("_")
+    return {f"{name}_peak_abs_{unit}": float(np.abs(counted(recording, channel, part)).max())}
+
+
 def sizes(recording: RecordingLike, channel: str) -> dict[str, float]:
     """Return the metrics of the peak and the root mean square of a channel."""
-    values, (name, _, unit) = counted(recording, channel), channel.rpartition("_")
-    return {f"{name}_peak_abs_{unit}": float(np.abs(values).max()), f"{name}_rms_{unit}": rms(values)}
+    name, _, unit = channel.rpartition("_")
+    return {**peak(recording, channel), f"{name}_rms_{unit}": rms(counted(recording, channel))}
 
 
 def smooth(values: Array, timestep_s: float) -> Array:

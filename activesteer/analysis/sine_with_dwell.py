@@ -16,23 +16,17 @@ Source: 49 CFR 571.126 (FMVSS 126), S5.2 and S7.11; UN Regulation 140.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.series import (
-    THRESHOLD_RAD,
-    counted,
-    crossing_time,
-    low_pass,
-    offset,
-    timestep,
-    zeroing_range,
-)
+from activesteer.analysis.series import THRESHOLD_RAD, crossing_time, low_pass, offset, peak, timestep, zeroing_range
 from activesteer.analysis.source import RecordingLike
 from activesteer.core.conventions import Array
 from activesteer.errors import RecordingError
+from activesteer.recording.contents import events_of
 
 STEERING_CUT_OFF_Hz: Final = 10.0
 """Cut-off frequency for the steering wheel angle [Hz]."""
@@ -44,6 +38,7 @@ PEAK_PROMINENCE: Final = 0.02
 """Least prominence of a peak of the yaw rate, as a fraction of the largest one."""
 INSTANTS_S: Final = (1.0, 1.75)
 """Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
+END_OF_STEER: Final = "end of steer"
 DISPLACEMENT_TIME_S: Final = 1.07
 """Time after the beginning of steer at which the lateral displacement is taken [s]. FMVSS 126 requires 1.83 m from a
 car up to 3500 kg, from 5 A on."""
@@ -55,29 +50,17 @@ PEAKS: Final = ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad", "steeri
 
 
 class Steering(NamedTuple):
-    """Times and side of a sine with dwell.
+    """Times and side of a sine with dwell."""
 
-    Attributes:
-        side: 1 for a sine that begins to the left, -1 to the right.
-        begin_s: Time at which the wheel first passes 5 deg [s].
-        reversal_s: Time at which it passes the centre between the two halves [s].
-        completion_s: Time at which it is back at the centre after the second half [s].
-        straight: Samples before the sine in which every signal shall be zero.
-    """
-
-    side: float
-    begin_s: float
-    reversal_s: float
-    completion_s: float
-    straight: slice
+    side: float  # 1 for a sine that begins to the left, -1 to the right
+    begin_s: float  # time at which the wheel first passes 5 deg [s]
+    reversal_s: float  # time at which it passes the centre between the two halves [s]
+    completion_s: float  # time at which it is back at the centre after the second half [s]
+    straight: slice  # samples before the sine in which every signal shall be zero
 
 
 def steering(recording: RecordingLike) -> Steering:
-    """Return beginning, reversal and completion of a sine with dwell, interpolated between samples.
-
-    Raises:
-        RecordingError: the run holds no sine with dwell: the wheel does not turn to both sides and come back.
-    """
+    """Return beginning, reversal and completion of a sine with dwell, interpolated between samples."""
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     angle = low_pass(np.asarray(recording["steering_wheel_rad"]), timestep(time_s), STEERING_CUT_OFF_Hz)
     if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
@@ -106,6 +89,19 @@ def steering(recording: RecordingLike) -> Steering:
     return Steering(side, begin_s, reversal_s, completion_s, straight)
 
 
+def marks(recording: RecordingLike) -> list[tuple[float, str]]:
+    """Return the times that plots over time mark, with their words: instants of the criterion, or phases that begin."""
+    maneuver = recording.metadata.get("maneuver")
+    if not isinstance(maneuver, Mapping) or maneuver.get("kind") != "sine_with_dwell":
+        return [(event.time_s, event.what) for event in events_of(recording.metadata) if event.kind == "phase"]
+    try:
+        completion_s = steering(recording).completion_s
+    except RecordingError:
+        # An incomplete run has no such instants, but it can be shown.
+        return []
+    return [(completion_s, END_OF_STEER), *((completion_s + s, f"+{s:.2f} s") for s in INSTANTS_S)]
+
+
 def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of a sine with dwell.
 
@@ -132,21 +128,21 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
         - offset(recording[name], times.straight)
         for name in ("yaw_rate_radps", "ay_mps2")
     )
-    peak_s, peak = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
+    top_s, top = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
     values = {
         "steer_begin_time_s": times.begin_s,
         "steer_reversal_time_s": times.reversal_s,
         "steer_completion_time_s": times.completion_s,
-        "yaw_rate_reversal_peak_radps": -times.side * peak,
-        "yaw_rate_reversal_peak_time_s": peak_s,
+        "yaw_rate_reversal_peak_radps": -times.side * top,
+        "yaw_rate_reversal_peak_time_s": top_s,
     }
     for instant_s in INSTANTS_S:
         later = -times.side * _at(time_s, yaw_rate, times.completion_s + instant_s)
-        values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / peak
+        values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / top
     values["lateral_displacement_m"] = _displacement(recording, times)
     values["lateral_displacement_by_ay_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
-    for name, _, unit in (channel.rpartition("_") for channel in PEAKS):
-        values[f"{name}_peak_abs_{unit}"] = float(np.abs(counted(recording, f"{name}_{unit}")).max())
+    for channel in PEAKS:
+        values |= peak(recording, channel)
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     values["heading_end_rad"] = float(recording["yaw_rad"][-1] - recording["yaw_rad"][0])
     return values

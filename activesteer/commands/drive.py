@@ -206,11 +206,11 @@ def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Nam
 
 def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
     """Print the key metrics of all runs beside each other, or every metric."""
-    from activesteer.analysis.metrics import evaluation_of
+    from activesteer.analysis.metrics import KEY_METRICS, evaluated_kind
     from activesteer.analysis.tables import comparison
 
     metrics = {label: recording.metrics for label, recording in recordings.items()}
-    names = [metric.name for metric in evaluation_of(next(iter(recordings.values()))).key_metrics]
+    names = KEY_METRICS[evaluated_kind(next(iter(recordings.values())))]
     chosen = {run: {name: found[name] for name in names if name in found} for run, found in metrics.items()}
     print(comparison(metrics if every else chosen, partial(_paint, metrics)))
     _print_outcomes(recordings)

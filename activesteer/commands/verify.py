@@ -42,7 +42,6 @@ def _setting(name: str) -> str:
 def _reproduce(options: argparse.Namespace) -> int:
     """Drive the 15 runs in every setting asked for, and tell the verdicts."""
     from activesteer.studies.reproduction import draw_figures, write_page
-    from activesteer.theory.proportions import percent
 
     settings = list(dict.fromkeys(options.settings or ["literature"]))
     folders = {name: options.output / name if len(settings) > 1 else options.output for name in settings}
@@ -71,9 +70,6 @@ def _reproduce(options: argparse.Namespace) -> int:
         lines.append(
             "The paper's setting was selected by the verdicts: the claims can hold together. It is no evidence."
         )
-    shares = [item.proportion.share for item in results[settings[-1]].scorecard.judged if item.proportion is not None]
-    if shares:
-        lines.append(f"In the stored population {percent(sum(shares) / len(shares))} % of the claims hold on average.")
     if not options.all:
         lines.append("--all prints every claim with its numbers")
     if "paper" not in settings and options.vehicle == "compact":

@@ -32,14 +32,6 @@ TRACK_M: Final = 0.05
 STEERING_WHEEL_RAD: Final = math.radians(5.0)
 """Difference of two steering wheel angles [rad]: about what a driver can tell apart while he turns the wheel."""
 
-RELATIVE_TOLERANCE: Final = 0.01
-"""Fraction of a value by which it may always differ between two versions of the program."""
-_TOLERANCES: Final = {
-    "radps": 1e-3, "mps2": 0.02, "rad": 2e-4, "s": 0.005, "srad": 2e-5, "m": 0.01, "mps": 0.02, "radpmps2": 1e-5,
-    "1ps": 0.005, "mps2prad": 0.05, "radprad": 0.001, "Hz": 0.02, "Pa": 1e4, "N": 50.0, "J": 100.0, "": 0.01,
-}  # fmt: skip
-"""Declared unit of a metric -> smallest difference between two versions of the program that a reader would notice."""
-
 FRICTION_UTILISATION: Final = ("friction_utilisation_max", "friction_utilisation_mean")
 RENAMED: Final = {f"tyre_use_{end}": f"friction_utilisation_{end}" for end in ("max", "mean")}
 """Former name of a metric -> its name."""
@@ -78,8 +70,6 @@ class Metric(NamedTuple):
         significance: Smallest difference that a driver or a sensor in a test car could tell [SI]; 0 if unknown.
         better: Its preferred direction; None where neither more nor less is better.
         form: How its value is written.
-        tolerance: Smallest difference between two versions of the program that a reader would notice [SI]; 0 for a
-            count.
     """
 
     name: str
@@ -88,11 +78,6 @@ class Metric(NamedTuple):
     significance: float = 0.0
     better: Better | None = None
     form: Form = Form.NUMBER
-    tolerance: float = 0.0
-
-    def tolerance_of(self, value: float) -> float:
-        """Return the difference from a value that counts as unchanged: `tolerance`, or 1 % of the value if larger."""
-        return max(self.tolerance, RELATIVE_TOLERANCE * abs(value)) if self.tolerance else 0.0
 
     @property
     def unit_name(self) -> str:
@@ -144,8 +129,7 @@ def _declare(
         head, _, tail = stem.partition("_")
         label = " ".join(part for part in (_WORDS.get(head, head), tail.replace("_", " ")) if part)
         name = f"{stem}_{si}" if si else stem
-        tolerance = _TOLERANCES[si] if form is Form.NUMBER else 0.0
-        found.append(Metric(name, label, unit or display_unit(f"_{si}"), significance, better, form, tolerance))
+        found.append(Metric(name, label, unit or display_unit(f"_{si}"), significance, better, form))
     return found
 
 

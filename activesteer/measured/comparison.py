@@ -107,28 +107,18 @@ class Filter(NamedTuple):
     """A low-pass filter without phase."""
 
     poles: int  # poles of both passes together
-    cut_off_Hz: tuple[float, float]  # cut-off frequency of the steering wheel angle, and of all other channels [Hz]
+    steering_cut_off_Hz: float  # cut-off frequency of the steering wheel angle [Hz]
+    cut_off_Hz: float  # cut-off frequency of all other channels [Hz]
     source: str  # standard
 
     def of(self, channel: str) -> float:
         """Return the cut-off frequency of a channel [Hz]."""
-        return self.cut_off_Hz[0 if channel == "steering_wheel_rad" else 1]
-
-    def words(self) -> str:
-        """Describe the filter."""
-        wheel, others = self.cut_off_Hz
-        cut = f"{others:g} Hz" if wheel == others else f"{others:g} Hz, steering wheel {wheel:g} Hz"
-        return f"Butterworth, {self.poles} poles, zero phase, {cut} ({self.source})"
-
-    def to_json(self) -> dict[str, Any]:
-        """Return JSON values."""
-        wheel, others = self.cut_off_Hz
-        return {"poles": self.poles, "steering_cut_off_Hz": wheel, "cut_off_Hz": others, "source": self.source}
+        return self.steering_cut_off_Hz if channel == "steering_wheel_rad" else self.cut_off_Hz
 
 
 FILTERS: Final[dict[str, Filter | None]] = {
-    "iso15037": Filter(8, (10.1, 10.1), "ISO 15037-1, as ISO 7401 requires"),
-    "fmvss126": Filter(12, (10.0, 6.0), "FMVSS 126, UN R140: 12 poles"),
+    "iso15037": Filter(8, 10.1, 10.1, "ISO 15037-1, as ISO 7401 requires"),
+    "fmvss126": Filter(12, 10.0, 6.0, "FMVSS 126, UN R140: 12 poles"),
     "none": None,
 }
 """Name -> filter. ISO 15037-1 requires a filter of fourth order or higher with -3 dB at 9 Hz or above, and at most
@@ -260,7 +250,7 @@ class Comparison(NamedTuple):
             "standard": self.standard,
             "time_shift_s": float(np.mean(self.shifts_s)),
             "time_shifts_s": list(self.shifts_s),
-            "filter": {"name": self.filtered} | (chosen.to_json() if (chosen := FILTERS[self.filtered]) else {}),
+            "filter": {"name": self.filtered} | (chosen._asdict() if (chosen := FILTERS[self.filtered]) else {}),
             "unfiltered": list(self.unfiltered),
             "quantities": [quantity.to_json() for quantity in self.quantities],
             "inside": self.inside,
@@ -317,8 +307,11 @@ def compare(
     found = []
     for name in names:
         if standard == "iso19365":
+            tolerance, (mean, confidence) = tolerances[name], mean_of(name)
             values = np.interp(time_s, simulated.time_s, simulated_of[name])
-            found.append(_timed(name, tolerances[name], time_s, *mean_of(name), values, allowed[name]))
+            low, high = corridor(time_s, values, tolerance.width(values) + allowed[name])
+            sides = mean, confidence, values, low, high, (mean >= low) & (mean <= high)
+            found.append(Compared(name, tolerance, time_s, *sides, allowed[name]))
         elif name not in (_ACROSS, "speed_mps"):
             width = tolerances[_ACROSS].width(simulated_of[_ACROSS]) + allowed[_ACROSS]
             curve = simulated_of[_ACROSS], width, simulated_of[name]
@@ -334,14 +327,6 @@ def _confidence(values: Array) -> Array:
     if count < 2:
         return np.zeros(values.shape[1])
     return t.ppf(0.975, count - 1) * values.std(axis=0, ddof=1) / math.sqrt(count)
-
-
-def _timed(
-    name: str, tolerance: Tolerance, time_s: Array, measured: Array, confidence: Array, simulated: Array, noise: float
-) -> Compared:
-    low, high = corridor(time_s, simulated, tolerance.width(simulated) + noise)
-    within = (measured >= low) & (measured <= high)
-    return Compared(name, tolerance, time_s, measured, confidence, simulated, low, high, within, noise)
 
 
 def _crossed(
@@ -384,7 +369,11 @@ def assumptions(found: Comparison) -> list[str]:
     if assumed:
         lines.append(f"Tolerances of {', '.join(assumed)} are assumptions.")
     if (chosen := FILTERS[found.filtered]) is not None:
-        lines.append(f"Both sides are filtered alike: {chosen.words()}.")
+        wheel = f", steering wheel {chosen.steering_cut_off_Hz:g} Hz"
+        cut = f"{chosen.cut_off_Hz:g} Hz" + wheel * (chosen.steering_cut_off_Hz != chosen.cut_off_Hz)
+        lines.append(
+            f"Both sides are filtered alike: Butterworth, {chosen.poles} poles, zero phase, {cut} ({chosen.source})."
+        )
     lines += [f"Not filtered: {problem}." for problem in found.unfiltered]
     if any(each.noise for each in found.quantities):
         lines.append(

@@ -27,13 +27,7 @@ _TOO_LITTLE: Final = 0.5
 standard deviation would be twice the range."""
 
 
-class Intervals(NamedTuple):
-    """Uncertainty of the parameters, relative to their ranges."""
-
-    half_widths: Array  # half of each interval, shape (p,); nan for a parameter at an end of its range
-    correlations: Array  # correlations of the errors, shape (p, p); nan likewise
-    independent: tuple[float, ...]  # number of independent samples of each series
-    freedom: float  # degrees of freedom of the t distribution; infinite for stated noise
+Intervals = tuple[Array, Array, tuple[float, ...], float]
 
 
 def autocorrelation_time(values: Array) -> float:
@@ -56,7 +50,12 @@ def autocorrelation_time(values: Array) -> float:
 
 
 def intervals(series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool) -> Intervals:
-    """Return intervals of the parameters, in the linear neighbourhood of the solution."""
+    """Return the uncertainty of the parameters, relative to their ranges, in the linear neighbourhood of the solution.
+
+    That is half of each interval, shape (p,), and correlations of the errors, shape (p, p), both nan for a parameter at
+    an end of its range; the number of independent samples of each series; and the degrees of freedom of the t
+    distribution, infinite for stated noise.
+    """
     # Least squares weights each series by its stated noise. If this noise is not trusted, each series gets the variance
     # of its residual, and its n samples count as n/tau, with tau its autocorrelation time. The result is exact if the
     # derivatives change slowly compared with the noise, and too wide if they change as fast.
@@ -82,7 +81,7 @@ def intervals(series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np
     half_widths, correlations = np.full(len(free), np.nan), np.full((len(free), len(free)), np.nan)
     half_widths[free] = t.ppf(0.5 + 0.5 * LEVEL, freedom) * deviations
     correlations[np.ix_(free, free)] = covariance / np.outer(deviations, deviations)
-    return Intervals(half_widths, correlations, independent, freedom)
+    return half_widths, correlations, independent, freedom
 
 
 def without_effect(slopes: Sequence[Array]) -> list[int]:

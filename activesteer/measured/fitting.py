@@ -19,7 +19,7 @@ from activesteer.core.conventions import Array
 from activesteer.driver import is_driver_file
 from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
 from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, notes_of, told_apart, without_effect
-from activesteer.measured.signals import at_sensor
+from activesteer.measured.signals import at_sensor, by_channel
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
 from activesteer.scenario.scenario import is_recording, led, open_loop_of
@@ -91,21 +91,6 @@ class Measured(NamedTuple):
     begin_s: float  # time of the recording at which the manoeuvre starts [s]
     time_s: Array  # times at which channels are compared [s], shape (n,)
     channels: dict[str, Array]  # measured values there, SI; not finite where missing
-
-
-def noise_of(study: StudyFile, table: FitTable, known: Collection[str]) -> dict[str, float]:
-    """Return the standard deviation of the noise of each channel of the table [fit], SI."""
-    found: dict[str, float] = {}
-    for key, value in table.noise.items():
-        name, factor = field_in_unit(key, known)
-        if name is None:
-            raise study.source.fail(
-                ("fit", "noise", key), f"there is no such channel; {nearest_names(key, known)}", key
-            )
-        if name in found:
-            raise study.source.fail(("fit", "noise", key), "is given twice, in two units", key)
-        found[name] = value * factor
-    return found
 
 
 def measured_of(
@@ -262,7 +247,9 @@ class _Problem:
         inputs = open_loop_of(recordings[0], names[0])
         first = resolve(inputs, study.vehicles[0], known, study.driver, study.controllers)
         car = first.car.on(first.maneuver.ground, study.timestep_s)
-        self._noise = noise_of(study, table, [channel.name for channel in car.channels.channels])
+        channels = [channel.name for channel in car.channels.channels]
+        noise = by_channel(table.noise, channels, study.source, ("fit", "noise"))
+        self._noise = {name: factor * size for name, (_, factor, size) in noise.items()}
         self._measured = [
             measured_of(recording, name, study, table, self._noise)
             for recording, name in zip(recordings, names, strict=True)
@@ -346,17 +333,18 @@ class _Problem:
         """Return the result of the search."""
         free: NDArray[np.bool_] = (found.place > AT_END) & (found.place < 1.0 - AT_END)
         self.check(found.slopes)
-        known = intervals(found.after, found.slopes, free, stated=self._table.intervals == "noise")
+        half_widths, correlations, samples, freedom = intervals(
+            found.after, found.slopes, free, stated=self._table.intervals == "noise"
+        )
         values, start = self._factor_values(found.place), self._factor_values(self.start)
-        half_widths = (self._high - self._low) * known.half_widths
         parameters = tuple(
             Parameter(factor.key, values[factor.key], float(half), start[factor.key], factor.low, factor.high)
-            for factor, half in zip(self._factors, half_widths, strict=True)
+            for factor, half in zip(self._factors, (self._high - self._low) * half_widths, strict=True)
         )
         places = [(measured, name) for measured in self._measured for name in self._noise]
         compared = []
         for (measured, name), before, after, independent in zip(
-            places, found.before, found.after, known.independent, strict=True
+            places, found.before, found.after, samples, strict=True
         ):
             kept = np.isfinite(measured.channels[name])
             compared.append(
@@ -368,7 +356,7 @@ class _Problem:
         everywhere = {factor.key for factor in self._factors if not factor.maneuvers}
         overrides = [self._values.overrides(number, 0, values) for number in range(len(self._measured))]
         made = Fit(
-            parameters, known.correlations, tuple(compared), self._table.intervals, known.freedom, _misfit(found.after),
+            parameters, correlations, tuple(compared), self._table.intervals, freedom, _misfit(found.after),
             found.rounds, self.runs, found.settled,
             {key: value for key, value in overrides[0].items() if key in everywhere},
             {measured.name: own for measured, each in zip(self._measured, overrides, strict=True)

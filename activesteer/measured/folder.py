@@ -40,10 +40,20 @@ class Part(NamedTuple):
     part: str  # one of `PARTS`
     stage: str  # `predicted` or `fitted`
     compared: Compared  # the comparison
+    # lower and upper edge of the band around a prediction, without the tolerance, shape (n,) each; None without a band
+    band: tuple[Array, Array] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values, SI."""
         return {"run": self.run, "part": self.part, "stage": self.stage, **self.compared.to_json()}
+
+    def box(self) -> dict[str, Any]:
+        """Return mean width of the band, SI, and proportion of the measured samples in it, widened by the noise."""
+        assert self.band is not None
+        one, (low, high) = self.compared, self.band
+        inside = (one.measured >= low - one.noise) & (one.measured <= high + one.noise)
+        width = float(np.mean(high - low))
+        return {"run": self.run, "channel": one.channel, "width": width, "share_inside": float(np.mean(inside))}
 
 
 class End(NamedTuple):
@@ -56,30 +66,6 @@ class End(NamedTuple):
     effect: dict[str, float]  # channel -> rms of its change in the check windows at the end that changes it more, SI
 
 
-class Band(NamedTuple):
-    """Band around the prediction in a check window."""
-
-    part: Part  # the prediction
-    low: Array  # lower edge, without the tolerance, shape (n,)
-    high: Array  # upper edge
-
-    @property
-    def share_inside(self) -> float:
-        """Proportion of the measured samples in the band, widened by the noise."""
-        one = self.part.compared
-        return float(np.mean((one.measured >= self.low - one.noise) & (one.measured <= self.high + one.noise)))
-
-    @property
-    def width(self) -> float:
-        """Mean width, SI."""
-        return float(np.mean(self.high - self.low))
-
-    def to_json(self) -> dict[str, Any]:
-        """Return JSON values, SI."""
-        channel = self.part.compared.channel
-        return {"run": self.part.run, "channel": channel, "width": self.width, "share_inside": self.share_inside}
-
-
 @dataclass(frozen=True)
 class MeasuredValidation:
     """Result of a validation against measured runs."""
@@ -87,8 +73,7 @@ class MeasuredValidation:
     file: MeasuredFile  # the checked file
     predicted: Fit | None  # fit of the free factors of the prediction; None if nothing is free
     fitted: Fit | None  # fit of all factors; None without further factors
-    parts: tuple[Part, ...]  # the comparisons
-    bands: tuple[Band, ...]  # bands around the prediction; empty without intervals
+    parts: tuple[Part, ...]  # the comparisons; with intervals, predictions in check windows have a band
     ends: tuple[End, ...]  # effect of each interval
     notes: tuple[str, ...]  # what the import noted, by run
     assumptions: tuple[str, ...]  # what was assumed, by the file and by the method
@@ -111,7 +96,7 @@ class MeasuredValidation:
             "predicted": None if self.predicted is None else self.predicted.to_json(),
             "fitted": None if self.fitted is None else self.fitted.to_json(),
             "quantities": [one.to_json() for one in self.parts],
-            "box": [band.to_json() for band in self.bands],
+            "box": [one.box() for one in self.parts if one.band],
             "intervals": [end._asdict() for end in self.ends],
             "notes": list(self.notes), "assumptions": list(self.assumptions),
         }  # fmt: skip
@@ -146,13 +131,12 @@ def validate_measured(
         beside = in_parallel(
             _at_end, calls, jobs, lambda _, done: progress(0.5 + 0.5 * done / len(calls), "band"), scheduler=scheduler
         )
-    checked = [one for one in parts if one.part == "check" and one.stage == "predicted"]
-    bands, ends = _bands(file, checked, beside)
+    parts, ends = _with_bands(file, parts, beside)
     method = [*case.assumptions, "The measured steering and speed are driven again; their errors are in the residuals."]
     if ends:
         method.append("Effects of several intervals add up in the band; each is taken at its two ends only.")
     return MeasuredValidation(
-        file, predicted, found, tuple(parts), bands, ends, case.notes, (*file.table.assumptions, *method)
+        file, predicted, found, tuple(parts), ends, case.notes, (*file.table.assumptions, *method)
     )
 
 
@@ -271,23 +255,22 @@ def _at_end(
     return values, [one.compared.simulated for one in parts if one.part == "check"]
 
 
-def _bands(
-    file: MeasuredFile, checked: list[Part], beside: list[tuple[dict[str, float], list[Array]]]
-) -> tuple[tuple[Band, ...], tuple[End, ...]]:
-    """Return the bands, and the effect of each interval."""
-    if not beside:
-        return (), ()
-    ends = []
-    for (key, interval), low, high in zip(file.table.intervals.items(), beside[::2], beside[1::2], strict=True):
-        effect: dict[str, float] = {}
-        for place, one in enumerate(checked):
-            change = max(rms(side[1][place] - one.compared.simulated) for side in (low, high))
-            effect[one.compared.channel] = max(effect.get(one.compared.channel, 0.0), change)
-        ends.append(End(key, interval.source, interval.ends, (low[0], high[0]), effect))
-    bands = []
-    for place, one in enumerate(checked):
-        changes = np.stack([side[1][place] - one.compared.simulated for side in beside])
-        pairs = changes.reshape(len(ends), 2, -1)
+def _with_bands(
+    file: MeasuredFile, parts: list[Part], beside: list[tuple[dict[str, float], list[Array]]]
+) -> tuple[list[Part], tuple[End, ...]]:
+    """Return the parts, with bands if there are intervals, and the effect of each interval."""
+    checked = [place for place, one in enumerate(parts) if one.part == "check" and one.stage == "predicted"]
+    ends, effects = [], [dict[str, float]() for _ in file.table.intervals]
+    for number, place in enumerate(checked if beside else ()):
+        one = parts[place].compared
+        pairs = np.stack([side[1][number] - one.simulated for side in beside]).reshape(len(effects), 2, -1)
+        for effect, pair in zip(effects, pairs, strict=True):
+            effect[one.channel] = max(effect.get(one.channel, 0.0), *map(rms, pair))
         low, high = np.minimum(pairs.min(axis=1), 0.0).sum(axis=0), np.maximum(pairs.max(axis=1), 0.0).sum(axis=0)
-        bands.append(Band(one, one.compared.simulated + low, one.compared.simulated + high))
-    return tuple(bands), tuple(ends)
+        parts[place] = parts[place]._replace(band=(one.simulated + low, one.simulated + high))
+    found = [values for values, _ in beside]
+    for (key, each), effect, both in zip(
+        file.table.intervals.items(), effects, zip(found[::2], found[1::2], strict=True), strict=True
+    ):
+        ends.append(End(key, each.source, each.ends, both, effect))
+    return parts, tuple(ends)

@@ -5,29 +5,27 @@ The file stands in the folder of the measured files. Windows are times of these 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-import numpy as np
-
-from activesteer.config import Range, Source, build, field_in_unit, read_toml
+from activesteer.config import Range, Source, build, read_toml
 from activesteer.core.conventions import Array
 from activesteer.core.files import is_file, is_folder, make_folder, shown_path, user_path, write_text
-from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
-from activesteer.measured.circle_changes import Case, ChangeTable
+from activesteer.errors import ActiveSteerError, ParameterError, nearest_names
 from activesteer.measured.comparison import TOLERANCES, Tolerance
-from activesteer.resources import find_vehicle, models_dir
+from activesteer.measured.signals import by_channel
+from activesteer.resources import models_dir
 from activesteer.scenario import load_car, resolve, value_of
-from activesteer.simulation.runner import simulate
 from activesteer.studies.engine.factors import Factor, read_factor
 
 NAME: Final = "validation.toml"
 STEERING: Final = "steering_wheel_rad"
 _OF_RUNS: Final = ("runs", "predict", "factors", "filter", "noise_allowance")
-_OF_CIRCLE: Final = ("effects", "steps", "decisions")
-"""Keys that only measured runs, or only a measured circle, can have."""
+"""Keys that only measured runs can have."""
+CIRCLE_KEYS: Final = ("radius_m", "ay_mps2", "zero_deg", "body_roll", "stiff_column")
+"""Keys of a measured circle that an interval may have, next to those of the car."""
 Window = tuple[float, ...]
 """Start and end in the time of the file [s]."""
 
@@ -80,10 +78,10 @@ class IntervalTable:
     """Where its ends come from."""
     ends: tuple[float, ...] = ()
     """Its ends, of a key."""
-    low: tuple[ChangeTable, ...] = ()
-    """Changes to one end, of any name; only with a circle."""
-    high: tuple[ChangeTable, ...] = ()
-    """Changes to the other end."""
+    low: dict[str, Any] = field(default_factory=dict)
+    """Overrides of one end, of an interval of any name; only with a circle."""
+    high: dict[str, Any] = field(default_factory=dict)
+    """Overrides of the other end."""
 
 
 @dataclass(frozen=True)
@@ -98,18 +96,14 @@ class CircleTable:
     """Size of the measured steering wheel angle, one value for each lap."""
     spread: dict[str, Annotated[float, Range(1e-12)]]
     """`radius_m`, `ay_mps2` or a key of the car -> standard deviation from lap to lap."""
-
-
-@dataclass(frozen=True)
-class StepTable:
-    """A step from the car without effects to the car of the file."""
-
-    name: str
-    """Its name."""
-    origin: Literal["geometry", "measured", "assumed"]
-    """Where its effects come from. The main prediction ends before the last assumed steps."""
-    adds: tuple[str, ...] = ()
-    """Effects that it adds."""
+    zero_deg: float = 0.0
+    """Steering wheel angle that the sensor shows straight ahead."""
+    body_roll: float = 0.0
+    """Part of the body's roll angle by which the accelerometer tilts: 0 levelled, 1 on the body."""
+    stiff_column: bool = False
+    """Whether the steering column does not twist."""
+    prediction: dict[str, Any] = field(default_factory=dict)
+    """Overrides of the prediction that is judged. The intervals start from the car without them."""
 
 
 @dataclass(frozen=True)
@@ -138,12 +132,6 @@ class MeasuredTable:
     """Factors of the fit, with ranges as in a study."""
     intervals: dict[str, IntervalTable] = field(default_factory=dict)
     """Key -> ends of its unknown value, for the band around the prediction."""
-    effects: dict[str, tuple[ChangeTable, ...]] = field(default_factory=dict)
-    """With a circle: effect -> changes that remove it."""
-    steps: tuple[StepTable, ...] = ()
-    """With a circle: steps from the car without effects to the car of the file."""
-    decisions: dict[str, tuple[ChangeTable, ...]] = field(default_factory=dict)
-    """With a circle: open decision -> changes that reverse it."""
     assumptions: tuple[str, ...] = ()
     """What was assumed, one sentence each."""
 
@@ -160,55 +148,40 @@ class MeasuredFile:
     noise: dict[str, float]  # channel -> standard deviation, SI
     predict_channels: tuple[str, ...]  # channels that determine the free factors of the prediction
     source: Source  # for error messages
-    # axle -> its curves in the vehicle file; empty if its axles have links
-    curves: dict[str, Any] = field(default_factory=dict)
-    # key of the car that varies from lap to lap -> its value in the file
+    # key of the circle, or of the car if it varies from lap to lap -> its value in the files
     nominal: dict[str, float] = field(default_factory=dict)
 
     @property
-    def case(self) -> Case:
-        """The car of the file on the measured circle."""
-        circle = self.table.circle
-        assert circle is not None
-        values = {"radius_m": circle.radius_m, "ay_mps2": circle.ay_mps2, "zero_deg": 0.0, "body_roll": 0.0}
-        return Case(self.vehicle, values, self.table.overrides)
+    def on_circle(self) -> dict[str, Any]:
+        """The car of the file on the measured circle: values of `CIRCLE_KEYS`, and overrides."""
+        return {key: getattr(self.table.circle, key) for key in CIRCLE_KEYS} | self.table.overrides
 
-    def changed(self, case: Case, changes: Sequence[ChangeTable]) -> Case:
-        """Return a case with changes."""
+    def changed(self, case: dict[str, Any], *changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a case with overrides. A number that varies is changed by its difference from the files."""
         for change in changes:
-            case = self.without(case, change.without).changed_by(change, self.curves)
+            numbers = {key: self.nominal[key] for key in change if key in self.nominal}
+            added = {key: case.get(key, own) + (change[key] - own) for key, own in numbers.items()}
+            case = {**case, **change, **added}
         return case
 
-    def without(self, case: Case, effects: Sequence[str]) -> Case:
-        """Return a case without effects."""
-        for name in effects:
-            if name not in self.table.effects:
-                raise ParameterError(
-                    f"there is no effect {shown(name)}; {nearest_names(name, self.table.effects)}", value=name
-                )
-            case = self.changed(case, self.table.effects[name])
-        return case
-
-    def drawn(self, case: Case, draw: Array) -> Case:
+    def drawn(self, case: dict[str, Any], draw: Array) -> dict[str, Any]:
         """Return a case of another lap from standard normal numbers, one for each key of `circle.spread`."""
         circle = self.table.circle
         assert circle is not None
-        for (key, spread), number in zip(circle.spread.items(), draw.tolist(), strict=True):
-            if key in case.circle:
-                case = case._replace(circle=case.circle | {key: case.circle[key] + spread * number})
-            else:
-                nominal = case.overrides.get(key, self.nominal[key])
-                case = case._replace(overrides=case.overrides | {key: nominal + spread * number})
-        return case
+        spreads = zip(circle.spread.items(), draw.tolist(), strict=True)
+        return case | {key: case.get(key, self.nominal[key]) + spread * number for (key, spread), number in spreads}
 
 
 def read_measured(folder: Path) -> MeasuredFile:
     """Read and check the file of a folder."""
     given, source = read_toml(folder / NAME)
+    for key in ("effects", "steps", "decisions"):
+        if key in given:
+            raise source.fail((key,), "is gone; give values of the car in [circle.prediction] and [intervals]")
     table = build(MeasuredTable, given, source)
-    foreign, home = (_OF_CIRCLE, "[circle]") if table.circle is None else (_OF_RUNS, "[[runs]]")
-    if wrong := [key for key in foreign if key in given]:
-        raise source.fail((wrong[0],), f"belongs to {home}, and not here")
+    for key in _OF_RUNS if table.circle is not None else ():
+        if key in given:
+            raise source.fail((key,), "belongs to [[runs]], and not here")
     own = folder / table.vehicle
     vehicle = str(own) if table.vehicle.endswith(".toml") or "/" in table.vehicle else table.vehicle
     try:
@@ -216,7 +189,7 @@ def read_measured(folder: Path) -> MeasuredFile:
     except ActiveSteerError as reason:
         raise source.fail(("vehicle",), reason.problem, table.vehicle, reason.allowed) from reason
     for key, value in table.overrides.items():
-        _check_key(vehicle, key, value, source, ("overrides", key))
+        _value(vehicle, key, source, ("overrides", key), {key: value})
     file = MeasuredFile(table, folder, vehicle, (), *_quantities(table, source, names), (), source)
     return _with_runs(file) if table.circle is None else _with_circle(file, table.circle)
 
@@ -230,18 +203,18 @@ def _with_runs(file: MeasuredFile) -> MeasuredFile:
         _check_run(run, file.folder, source, ("runs", str(number)), [other.name for other in table.runs[:number]])
     if not any(run.check_s for run in table.runs):
         raise source.fail(("runs",), "a verdict needs a run with check_s = [start, end]")
-    channels = tuple(_channel(key, file.noise, source, ("predict", "channels")) for key in table.predict.channels)
+    channels = tuple(by_channel(dict.fromkeys(table.predict.channels), file.noise, source, ("predict", "channels")))
     factors = _factors(table, file.vehicle, source)
     if factors and not file.noise:
         raise source.fail(("quantities",), "a fit needs a channel with noise = its standard deviation")
     for key, interval in table.intervals.items():
         _check_ends(interval, source, key)
-        _check_key(file.vehicle, key, interval.ends[0], source, ("intervals", key))
+        _value(file.vehicle, key, source, ("intervals", key), {key: interval.ends[0]})
     return replace(file, factors=factors, predict_channels=channels or tuple(file.noise))
 
 
 def _with_circle(file: MeasuredFile, circle: CircleTable) -> MeasuredFile:
-    """Check circle, effects, steps, decisions and intervals. An interval of a key becomes changes."""
+    """Check circle and intervals. The ends of a key become overrides."""
     table, source = file.table, file.source
     if set(file.tolerances) != {STEERING}:
         raise source.fail(("quantities",), "a circle compares steering_wheel_deg alone", list(table.quantities))
@@ -249,41 +222,23 @@ def _with_circle(file: MeasuredFile, circle: CircleTable) -> MeasuredFile:
         raise source.fail(
             ("circle",), "two different angles, and a spread of at least one value, are needed for distributions"
         )
-    curves = read_toml(find_vehicle(file.vehicle))[0].get("curves", {})
-    file = replace(file, curves=curves)
-    nominal = {}
-    for key in set(circle.spread) - set(file.case.circle):
-        nominal[key] = value = _value(file.vehicle, key, source, ("circle", "spread", key))
+    nominal = {key: value for key, value in file.on_circle.items() if key in CIRCLE_KEYS and key != "stiff_column"}
+    for key in set(circle.spread) - set(nominal):
+        nominal[key] = value = _value(file.vehicle, key, source, ("circle", "spread", key), table.overrides)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise source.fail(("circle", "spread", key), "is no number that could vary", key)
-    intervals = {}
+    intervals = dict(table.intervals)
+    changes = {("circle", "prediction"): circle.prediction}
     for key, interval in table.intervals.items():
-        if interval.low or interval.high:
-            intervals[key] = interval
-            continue
-        _check_ends(interval, source, key)
-        own = file.case.circle.get(key)
-        low, high = (
-            (ChangeTable(set={key: end}),) if own is None else (ChangeTable(add={key: end - own}),)
-            for end in interval.ends
-        )
-        intervals[key] = replace(interval, low=low, high=high)
-    file = replace(file, nominal=nominal, table=replace(table, intervals=intervals))
-    lists = {("effects", name): changes for name, changes in table.effects.items()}
-    lists |= {("decisions", name): changes for name, changes in table.decisions.items()}
-    lists |= {("intervals", name): (*each.low, *each.high) for name, each in intervals.items()}
-    lists |= {("steps", str(number)): (ChangeTable(without=each.adds),) for number, each in enumerate(table.steps)}
-    for where, changes in lists.items():
-        try:
-            file.changed(file.case, changes)
-        except ActiveSteerError as reason:
-            raise source.fail(where, reason.problem, reason.value, reason.allowed) from reason
-        except RecursionError:
-            raise source.fail(where, "contains itself") from None
-        for change in changes:
-            for key, value in change.set.items():
-                _check_key(file.vehicle, key, value, source, where)
-    return file
+        if not interval.low and not interval.high:
+            _check_ends(interval, source, key)
+            intervals[key] = replace(interval, low={key: interval.ends[0]}, high={key: interval.ends[1]})
+        changes |= {("intervals", key, end): getattr(intervals[key], end) for end in ("low", "high")}
+    for where, change in changes.items():
+        own = {key: value for key, value in change.items() if key in CIRCLE_KEYS}
+        build(CircleTable, asdict(circle) | own, source, where)
+        _value(file.vehicle, "", source, where, {key: value for key, value in change.items() if key not in own})
+    return replace(file, nominal=nominal, table=replace(table, intervals=intervals))
 
 
 def _check_ends(interval: IntervalTable, source: Source, key: str) -> None:
@@ -297,7 +252,7 @@ def _factors(table: MeasuredTable, vehicle: str, source: Source) -> tuple[Factor
         where = ("factors", factor.key)
         if factor.kind != "uniform":
             raise source.fail(where, "a fit needs a range: uniform = [low, high]")
-        _check_key(vehicle, factor.key, factor.low, source, where, relative=bool(factor.nominal))
+        _value(vehicle, factor.key, source, where, {} if factor.nominal else {factor.key: factor.low})
     keys = [factor.key for factor in factors]
     for key in table.predict.factors:
         if key not in keys:
@@ -323,13 +278,6 @@ def _check_run(run: RunTable, folder: Path, source: Source, where: tuple[str, ..
         raise source.fail((*where, "check_s"), "the run is used for nothing; give fit_s, check_s or both")
 
 
-def _channel(key: str, known: Iterable[str], source: Source, where: tuple[str, ...]) -> str:
-    name, _ = field_in_unit(key, known := list(known))
-    if name is None:
-        raise source.fail(where, f"there is no such channel; {nearest_names(key, known)}", key, known)
-    return name
-
-
 def _quantities(
     table: MeasuredTable, source: Source, names: list[str]
 ) -> tuple[dict[str, Tolerance], dict[str, float]]:
@@ -339,15 +287,12 @@ def _quantities(
     quantities = table.quantities or ({} if table.circle is None else {STEERING: QuantityTable()})
     if not quantities:
         raise source.fail(("quantities",), "at least one channel is needed")
-    for key, given in quantities.items():
-        where = ("quantities", key)
-        name = _channel(key, names, source, where)
-        factor = field_in_unit(key, names)[1]
-        if name in tolerances:
-            raise source.fail(where, "is given twice, in two units", key)
+    for name, (key, factor, given) in by_channel(quantities, names, source, ("quantities",)).items():
         usual = TOLERANCES.get(name)
         if usual is None and (given.offset is None or given.gain is None):
-            raise source.fail(where, "has no usual tolerance; give offset, gain and source", key, list(TOLERANCES))
+            raise source.fail(
+                ("quantities", key), "has no usual tolerance; give offset, gain and source", key, list(TOLERANCES)
+            )
         if given.offset is not None or given.gain is not None:
             usual = usual or Tolerance(0.0, 0.0, "")
             offset = usual.offset if given.offset is None else given.offset * factor
@@ -359,24 +304,15 @@ def _quantities(
     return tolerances, noise
 
 
-def _check_key(
-    vehicle: str, key: str, value: Any, source: Source, where: tuple[str, ...], *, relative: bool = False
-) -> None:
-    """Refuse a key that neither the car nor a repeated measurement has."""
-    _value(vehicle, key, source, where, {} if relative else {key: value}, value)
-
-
-def _value(
-    vehicle: str, key: str, source: Source, where: tuple[str, ...], overrides: Mapping[str, Any] | None = None,
-    given: Any = None,
-) -> Any:  # fmt: skip
-    """Return the value of a key of the car or of a repeated measurement."""
+def _value(vehicle: str, key: str, source: Source, where: tuple[str, ...], overrides: Mapping[str, Any]) -> Any:
+    """Return the value of a key of the car or of a repeated measurement. Without a key, check the overrides only."""
     steering = {"time_s": [0.0, 1.0], "steering_wheel_rad": [0.0, 0.1]}
     inputs = {"kind": "open_loop", "name": "inputs", "duration_s": 1.0, "speed_mps": 20.0, "steering": steering}
     try:
-        return value_of(resolve(inputs, vehicle, overrides or {}), key)
+        scenario = resolve(inputs, vehicle, overrides)
+        return value_of(scenario, key) if key else None
     except ActiveSteerError as reason:
-        raise source.fail(where, reason.problem, given, reason.allowed) from reason
+        raise source.fail(where, reason.problem, overrides.get(key), reason.allowed) from reason
 
 
 def measured_folder(name: str) -> Path:
@@ -407,36 +343,10 @@ def is_measured(name: str) -> bool:
     )
 
 
-_EXAMPLE: Final = Path(__file__).with_name("example")
-_STEERING: Final = {
-    "time_s": [0.5, 0.8, 1.3, 1.8, 2.2, 3.5, 3.8, 4.3, 4.8, 5.2],
-    "steering_wheel_deg": [0, 40, 40, -40, 0, 0, -50, 0, 50, 0],
-}
-_CAR: Final = {"factors.front_cornering_stiffness": 0.9}
-_SCALE: Final = 0.8
-"""Scale of the steering signal."""
-_COLUMNS: Final = {
-    "Steering [deg]": ("steering_wheel_rad", _SCALE * np.degrees(1.0), 0.02),
-    "v [km/h]": ("speed_mps", 3.6, 0.05),
-    "Yaw rate [deg/s]": ("yaw_rate_radps", np.degrees(1.0), 0.2),
-    "a_y [m/s2]": ("ay_mps2", 1.0, 0.1),
-}
-"""Column -> channel, factor to its unit, and standard deviation of its noise."""
-
-
 def write_template(folder: Path) -> list[Path]:
     """Write a folder that `activesteer compare` and `fit` can run, and return its files."""
     make_folder(folder, ParameterError)
     if any(folder.iterdir()):
         raise ParameterError(f"{shown_path(folder)} is not empty; give a new folder", value=str(folder))
-    table = {"kind": "open_loop", "speed_kmh": 80.0, "duration_s": 6.5, "hold_last": True, "steering": _STEERING}
-    run = simulate(table, overrides=_CAR)
-    rng = np.random.default_rng(1)
-    columns = {"Time [s]": run.time_s[::10]}
-    for name, (channel, factor, noise) in _COLUMNS.items():
-        values = factor * run[channel][::10]
-        columns[name] = values + noise * rng.standard_normal(len(values))
-    rows = "\n".join(",".join(f"{value:.6g}" for value in row) for row in np.column_stack(list(columns.values())))
-    texts = {"run.csv": f"{','.join(columns)}\n{rows}\n"}
-    texts |= {name: (_EXAMPLE / name).read_text(encoding="utf-8") for name in ("map.toml", NAME)}
-    return [write_text(folder / name, text, ParameterError) for name, text in texts.items()]
+    files = sorted(Path(__file__).with_name("example").iterdir())
+    return [write_text(folder / file.name, file.read_text(encoding="utf-8"), ParameterError) for file in files]

@@ -88,9 +88,10 @@ class _Source(NamedTuple):
     """Source of a channel."""
 
     column: Column
-    known: signals.Known
-    given: ChannelMap | None
+    unit: str  # unit of the column
+    factor: float  # factor to the signs and the scale of the channel
     file: Path
+    given: ChannelMap | None = None  # entry of the map
 
 
 _Files = Mapping[Path, list[Column]]
@@ -126,8 +127,8 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
     values = {}
     for name, signal in sampled.items():
         # A slow signal has long steps between its samples.
-        longest_s = max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal.time_s))))
-        before_s, after_s = signal.time_s[:-1], signal.time_s[1:]
+        longest_s = max(chosen.max_gap_s, 1.5 * float(np.median(np.diff(signal[0]))))
+        before_s, after_s = signal[0][:-1], signal[0][1:]
         wide = np.flatnonzero((after_s - before_s > longest_s) & (after_s > grid_s[0]) & (before_s < grid_s[-1]))
         if wide.size:
             begin, end = float(before_s[wide[0]]), float(after_s[wide[0]])
@@ -141,7 +142,7 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
             values[name] = -values[name]
     taken = {}
     for name, source in sources.items():  # many names contain the unit
-        column, unit = source.column.name, source.known.unit or "-"
+        column, unit = source.column.name, source.unit or "-"
         taken[name] = column if signals.split_unit(column)[1] == unit else f"{column} [{unit}]"
     notes += signals.suspicions(values, step_s)
     time_s: Array = np.arange(len(grid_s), dtype=np.float64) * step_s
@@ -187,8 +188,8 @@ def _mapped(chosen: MeasurementMap, files: _Files, table: Collection[str]) -> di
             problem = f"is a channel in another unit; name it {channel} and give `unit`"
             raise RecordingError(problem, key=f"channels.{name}")
         column, file = _found(given.column, files)
-        known = signals.Known(name, given.unit or column.unit or unit_of(name), given.sign * given.factor)
-        sources[name] = _Source(column, known, given, file)
+        unit = given.unit or column.unit or unit_of(name)
+        sources[name] = _Source(column, unit, given.sign * given.factor, file, given)
     return sources
 
 
@@ -206,13 +207,14 @@ def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[st
                 known_units = ", ".join(UNIT_NAMES)
                 notes.append(f"{shown(column.name)} is left out: its unit is unknown; known are {known_units}")
             continue
-        if known.channel in sources:
-            both = f"{shown(sources[known.channel].column.name)} and {shown(column.name)}"
-            raise RecordingError(f"{both} are both {known.channel}; choose one in a map", file=path.name)
-        unit = column.unit or known.unit or unit_of(known.channel)
-        if unit and not known.sure and not (column.unit or known.unit):
+        channel, stated, sign, sure = known
+        if channel in sources:
+            both = f"{shown(sources[channel].column.name)} and {shown(column.name)}"
+            raise RecordingError(f"{both} are both {channel}; choose one in a map", file=path.name)
+        unit = column.unit or stated or unit_of(channel)
+        if unit and not sure and not (column.unit or stated):
             notes.append(f"{column.name} has no unit; {unit} is assumed (a map can set another)")
-        sources[known.channel] = _Source(column, known._replace(unit=unit), None, path)
+        sources[channel] = _Source(column, unit, sign, path)
     if not sources:
         some = ", ".join(shown(name) for name in sorted(names)[:8])
         problem = f"no column has a known name and unit (there are {some})"
@@ -260,25 +262,25 @@ def known_time_unit(name: str) -> str:
 
 def _signal(name: str, source: _Source, shared: Array | None, chosen: MeasurementMap) -> signals.Samples:
     """Return the samples of a channel, in SI units and with the signs of ISO 8855."""
-    column, known, given, path = source
-    found, wanted = signals.written_unit(known.unit), unit_of(name)
+    column, unit, factor, path, given = source
+    found, wanted = signals.written_unit(unit), unit_of(name)
     if found is None or not alike(found, find_unit(wanted)):
         raise RecordingError(
-            f"{name} is in {wanted or 'pure numbers'}, and {shown(column.name)} in {shown(known.unit)}; "
+            f"{name} is in {wanted or 'pure numbers'}, and {shown(column.name)} in {shown(unit)}; "
             f"known units are {', '.join(UNIT_NAMES)}",
-            file=path.name, value=known.unit, allowed=UNIT_NAMES,
+            file=path.name, value=unit, allowed=UNIT_NAMES,
         )  # fmt: skip
     values, own = column.read()
     time_s = own if own is not None else shared
     assert time_s is not None
     shift_s = chosen.shift_s.get(path.name, 0.0)
-    signal = signals.samples(column.name, np.asarray(time_s, np.float64) + shift_s, values, path.name)
+    time_s, values = signals.samples(column.name, np.asarray(time_s, np.float64) + shift_s, values, path.name)
     start_s = -math.inf if chosen.start_s is None else chosen.start_s
     end_s = math.inf if chosen.end_s is None else chosen.end_s
-    inside = (signal.time_s >= start_s) & (signal.time_s <= end_s)
+    inside = (time_s >= start_s) & (time_s <= end_s)
     if np.count_nonzero(inside) < 2:
         raise RecordingError(f"{column.name} has no samples between start_s and end_s", file=path.name)
-    time_s, values = signal.time_s[inside], signal.values[inside]
+    time_s, values = time_s[inside], values[inside]
     if given is not None:
         values = values + given.offset
         if given.zero_until_s is not None:
@@ -288,7 +290,7 @@ def _signal(name: str, source: _Source, shared: Array | None, chosen: Measuremen
                     f"{column.name} starts at {time_s[0]:g} s, after zero_until_s", key=f"channels.{name}.zero_until_s"
                 )
             values = values - values[early].mean()
-    return signals.Samples(time_s, _plausible(values * (known.sign * found.factor), column.name, path))
+    return time_s, _plausible(values * (factor * found.factor), column.name, path)
 
 
 def _plausible(values: Array, column: str, path: Path) -> Array:
@@ -299,9 +301,9 @@ def _plausible(values: Array, column: str, path: Path) -> Array:
 
 def _grid(sampled: Mapping[str, signals.Samples], chosen: MeasurementMap, path: Path) -> tuple[Array, float]:
     """Return times of the file at which all signals exist, and their step: that of the fastest signal."""
-    start = max(float(signal.time_s[0]) for signal in sampled.values())
-    end = min(float(signal.time_s[-1]) for signal in sampled.values())
-    step = chosen.step_s or min(float(np.median(np.diff(signal.time_s))) for signal in sampled.values())
+    times = [time_s for time_s, _ in sampled.values()]
+    start, end = max(float(time_s[0]) for time_s in times), min(float(time_s[-1]) for time_s in times)
+    step = chosen.step_s or min(float(np.median(np.diff(time_s))) for time_s in times)
     # A calendar time of 1.7e9 s resolves 0.2 us; the step is rounded to what the clock resolves.
     step = round(step, min(9, math.floor(-math.log10(8.0 * np.spacing(max(abs(start), abs(end), 1e-9))))))
     if step <= 0.0 or end - start < step:

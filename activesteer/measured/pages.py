@@ -18,7 +18,7 @@ from activesteer.core.files import json_text, make_folder, write_text
 from activesteer.core.units import parameter_title, quantity_of, typeset
 from activesteer.errors import StudyError
 from activesteer.measured.circle import CircleValidation
-from activesteer.measured.comparison import STANDARDS, Compared, Comparison, assumptions, words
+from activesteer.measured.comparison import STANDARDS, Compared, Comparison, Tolerance, assumptions, words
 from activesteer.measured.fit_result import Compared as FitCompared
 from activesteer.measured.fit_result import Fit, rests_on
 from activesteer.measured.folder import MeasuredValidation, Part
@@ -27,6 +27,7 @@ from activesteer.pages import Page, Section, Table, Text, failed, passed, render
 from activesteer.plotting import Area, Curve, Panel, Picture
 
 _EDGE: Final = "#9bbbd4"
+_START: Final = "#888888"
 
 
 def comparison_page(found: Comparison, measured: list[str], simulated: str) -> Page:
@@ -51,67 +52,55 @@ def _shift(shift_s: float) -> str:
     return f"{1e3 * abs(shift_s):.1f} ms {'earlier' if shift_s < 0.0 else 'later'}"
 
 
-def picture(found: Compared, standard: str, runs: int, more: Sequence[Area] = ()) -> Picture:
-    """Return the overlay with its corridor and more areas, and the residual in the same corridor."""
+def picture(
+    found: Compared, standard: str = "iso19365", runs: int = 1, areas: Sequence[Area] = (), start: Array | None = None
+) -> Picture:
+    """Return the overlay with its corridor and more areas, and the residual in the same corridor.
+
+    `start` has the simulated values at the start of a fit.
+    """
     across = standard == "iso19364"
     x_label = "lateral acceleration [m/s²]" if across else "time of the simulation [s]"
     shown = quantity_of(found.channel)
-    overlay, residual = (_across if across else _over_time)(
-        found, shown.factor, "measured" if runs == 1 else f"measured, mean of {runs}"
-    )
-    panels = overlay._replace(areas=[*more, *overlay.areas]), residual
-    titles = (shown.title, f"Measured less simulated [{shown.unit.name}]")
-    return Picture(
-        "", [panel._replace(x_label=x_label, title=title) for panel, title in zip(panels, titles, strict=True)],
-        columns=2, height_in=2.6,
-    )  # fmt: skip
 
+    def line(values: Array, label: str = "", colour: str = RUN_COLOURS[0], dashes: str = "-") -> Curve:
+        curve = Curve(found.x, shown.factor * values, label, colour, dashes)
+        # The points of a cross plot are in no order.
+        return curve._replace(dashes="", marker=".", size=2.0) if across else curve
 
-def _over_time(found: Compared, factor: float, measured: str) -> tuple[Panel, Panel]:
-    areas = [Area(found.x, factor * found.low, factor * found.high, "corridor")]
-    if found.confidence.any():
-        low, high = found.measured - found.confidence, found.measured + found.confidence
-        areas.append(Area(found.x, factor * low, factor * high, "its 95 % interval", RUN_COLOURS[1], 0.3))
-    curves = [
-        Curve(found.x, factor * found.simulated, "simulated", RUN_COLOURS[2]),
-        Curve(found.x, factor * found.measured, measured, RUN_COLOURS[1], "--"),
-    ]
-    around = Area(found.x, factor * (found.low - found.simulated), factor * (found.high - found.simulated))
-    residual = Curve(found.x, factor * found.residual, colour=RUN_COLOURS[0])
-    return Panel("", "", curves, areas=areas), Panel("", "", [residual, *_outside(found, factor)], areas=[around])
-
-
-def _across(found: Compared, factor: float, measured: str) -> tuple[Panel, Panel]:
-    def dots(values: Array, label: str = "", colour: str = _EDGE, size: float = 1.5) -> Curve:
-        return Curve(found.x, factor * values, label, colour, "", marker=".", size=size)
+    def panel(title: str, middle: Array | float, curves: list[Curve], more: Sequence[Area], label: str = "") -> Panel:
+        low, high = found.low - middle, found.high - middle
+        if across:
+            curves = [line(low, label, _EDGE), line(high, "", _EDGE), *curves]
+        else:
+            more = [*more, Area(found.x, shown.factor * low, shown.factor * high, label)]
+        return Panel(x_label, "", curves, title, more)
 
     overlay = [
-        dots(found.low, "corridor of the simulation"),
-        dots(found.high),
-        dots(found.simulated, "simulated, nearest point", RUN_COLOURS[2], 2.0),
-        dots(found.measured, measured, RUN_COLOURS[1], 2.0),
+        line(found.simulated, "simulated, nearest point" if across else "simulated", RUN_COLOURS[2]),
+        line(found.measured, "measured" if runs == 1 else f"measured, mean of {runs}", RUN_COLOURS[1], "--"),
     ]
-    residual = [
-        dots(found.low - found.simulated),
-        dots(found.high - found.simulated),
-        dots(found.residual, colour=RUN_COLOURS[0], size=2.0),
-        *_outside(found, factor),
+    residual = [line(found.residual)]
+    if start is not None:
+        overlay.append(line(start, "at the start", _START, ":"))
+        residual.append(line(found.measured - start, "", _START, ":"))
+    if (outside := ~found.within).any():
+        points = shown.factor * found.residual[outside]
+        residual.append(Curve(found.x[outside], points, "outside", "#b3261e", "", marker="."))
+    if found.confidence.any() and not across:
+        low, high = found.measured - found.confidence, found.measured + found.confidence
+        interval = Area(found.x, shown.factor * low, shown.factor * high, "its 95 % interval", RUN_COLOURS[1], 0.3)
+        areas = [*areas, interval]
+    corridor = "corridor of the simulation" if across else "corridor"
+    panels = [
+        panel(shown.title, 0.0, overlay, areas, corridor),
+        panel(f"Measured less simulated [{shown.unit.name}]", found.simulated, residual, ()),
     ]
-    return Panel("", "", overlay), Panel("", "", residual)
-
-
-def _outside(found: Compared, factor: float) -> list[Curve]:
-    outside = ~found.within
-    if not outside.any():
-        return []
-    residual = factor * found.residual[outside]
-    return [Curve(found.x[outside], residual, "outside", "#b3261e", "", marker=".")]
+    return Picture("", panels, columns=2, height_in=2.6)
 
 
 _HEAD: Final = ["run", "window", "quantity", "rms of the residual", "tolerance", "share inside", ""]
 _BAND_COLOUR: Final = "#b3a369"
-_ORIGINS: Final = {"geometry": "#8a9097", "measured": RUN_COLOURS[2], "assumed": RUN_COLOURS[1]}
-"""Origin of a step -> colour."""
 
 
 def measured_page(result: MeasuredValidation | CircleValidation) -> Page:
@@ -140,23 +129,23 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
             tables.append(_parameter_table(found))
             if len(found.parameters) > 1:
                 tables.append(_correlation_table(found))
-        pictures = [_picture(result, one) for one in shown if one.part == "check"]
+        pictures = [_picture(one) for one in shown if one.part == "check"]
         lines, points = ["no value comes from the data"], []
         if found is not None:
             free = f"free in the fit windows: {', '.join(one.key for one in found.parameters)}"
             lines, points = [free, *(f"! {note}" for note in found.notes)], rests_on(found)
         sections.append(Section(name.capitalize(), lines, pictures, tables, points))
-    if result.bands:
+    if result.ends:
         text = (
             "The band contains the prediction with each value at either end of its interval. Before that, the free "
             "factors of the prediction are found again. Effects of several intervals add up."
         )
         widths, ends = [], []
-        for band in result.bands:
-            shown = quantity_of(band.part.compared.channel)
-            width = f"{shown.factor * band.width:.3g} {shown.unit.name} wide"
-            inside = f"{100.0 * band.share_inside:.1f} % of the measured samples inside"
-            widths.append((band.part.run, shown.label, width, inside))
+        for box in (one.box() for one in result.parts if one.band):
+            shown = quantity_of(box["channel"])
+            width = f"{shown.factor * box['width']:.3g} {shown.unit.name} wide"
+            inside = f"{100.0 * box['share_inside']:.1f} % of the measured samples inside"
+            widths.append((box["run"], shown.label, width, inside))
         for end in result.ends:
             quantities = [(quantity_of(channel), value) for channel, value in end.effect.items()]
             effects = [f"{one.label} {one.factor * value:.2g} {one.unit.name}" for one, value in quantities]
@@ -171,57 +160,47 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
     return lead, sections
 
 
-def _picture(result: MeasuredValidation, one: Part) -> Picture:
-    band = next((band for band in result.bands if band.part is one), None)
-    if band is None:
-        return picture(one.compared, "iso19365", 1)
-    factor = quantity_of(one.compared.channel).factor
-    area = Area(one.compared.x, factor * band.low, factor * band.high, "band of the intervals", _BAND_COLOUR, 0.25)
-    return picture(one.compared, "iso19365", 1, [area])
+def _picture(one: Part) -> Picture:
+    areas = []
+    if one.band is not None:
+        low, high = (quantity_of(one.compared.channel).factor * edge for edge in one.band)
+        areas = [Area(one.compared.x, low, high, "band of the intervals", _BAND_COLOUR, 0.25)]
+    return picture(one.compared, areas=areas)
 
 
 def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
-    ours, measured = result.samples_deg, result.measured_deg
+    found, ours, measured = result.numbers, result.numbers["ours_deg"], result.numbers["measured_deg"]
     lead: list[Text] = [
         Markup("The mean difference of <b>{} deg</b> is {} the tolerance of {} deg ({}).").format(
-            typeset(f"{result.difference_deg:+.1f}"), passed("inside") if result.inside else failed("outside"),
-            f"{result.tolerance_deg:.1f}", result.file.tolerances[STEERING].source,
+            typeset(f"{found['difference_deg']:+.1f}"), passed("inside") if result.inside else failed("outside"),
+            f"{found['tolerance_deg']:.1f}", result.file.tolerances[STEERING].source,
         ),
-        f"Area metric {result.area_metric_deg:.1f} deg, overlap of the distributions {100.0 * result.overlap:.0f} %.",
+        f"Area metric {found['area_metric_deg']:.1f} deg, overlap of the distributions {100 * found['overlap']:.0f} %.",
     ]  # fmt: skip
     rows = [
-        ("measured", f"{measured.mean():.1f} +- {measured.std(ddof=1):.1f}", f"{len(measured)} values"),
-        ("predicted", f"{ours.mean():.1f} +- {ours.std(ddof=1):.1f}", f"{len(ours)} samples, nominal "
-         f"{result.nominal_deg:.1f}"),
-        ("predicted, with assumed effects", f"{result.assumed_deg:.1f}", "nominal"),
-    ]  # fmt: skip
-    sections = [Section("", (), [_distributions(result)], [_table(["steering wheel", "deg", ""], rows)])]
-    if result.ends:
-        text = (
-            f"From {result.low_deg:.1f} to {result.high_deg:.1f} deg, {result.high_deg - result.low_deg:.1f} deg wide: "
-            f"{result.measured_inside} of {len(measured)} measured angles lie inside. Values with one unknown true "
-            "value are intervals; the others vary from lap to lap. The table gives the second prediction with the ends "
-            "of each interval alone."
+        (words, f"{one['mean']:.1f} +- {one['std']:.1f}", more)
+        for words, one, more in (
+            ("measured", measured, f"{measured['n']} values"),
+            ("predicted", ours, f"{ours['n']} samples, nominal {ours['nominal']:.1f}"),
         )
-        ends = [(name, f"{low:.1f}", f"{high:.1f}", source) for name, source, low, high in result.ends]
+    ]
+    if two := found["with_assumptions_deg"] != ours["nominal"]:
+        second = f"{found['with_assumptions_deg']:.1f}"
+        rows.append(("second prediction, without [circle.prediction]", second, "nominal"))
+    sections = [Section("", (), [_distributions(result)], [_table(["steering wheel", "deg", ""], rows)])]
+    if box := found["box"]:
+        text = (
+            f"From {box['low_deg']:.1f} to {box['high_deg']:.1f} deg, {box['width_deg']:.1f} deg wide: "
+            f"{box['measured_inside']} of {measured['n']} measured angles lie inside. Values with one unknown true "
+            "value are intervals; the others vary from lap to lap. The table gives the "
+            f"{'second ' * two}prediction with the ends of each interval alone."
+        )
+        ends = [
+            (each["name"], f"{each['low_deg']:.1f}", f"{each['high_deg']:.1f}", each["source"])
+            for each in box["intervals"]
+        ]
         head = ["interval", "low end, deg", "high end, deg", "source"]
         sections.append(Section("Probability box", [text], tables=[_table(head, ends)]))
-    if result.steps:
-        steps = [(name, origin, f"{angle:.1f}") for name, origin, angle in result.steps]
-        sections.append(
-            Section(
-                "From geometry to the second prediction", (), [_waterfall(result)],
-                [_table(["with", "origin", "deg"], steps)],
-            )
-        )  # fmt: skip
-    for title, head, angles in (
-        ("Decrease of the second prediction without one effect", "effect",
-         {name: f"{result.assumed_deg - angle:+.1f}" for name, angle in result.effects.items()}),
-        ("Second prediction with one open decision reversed", "decision",
-         {name: f"{angle:.1f}" for name, angle in result.decisions.items()}),
-    ):  # fmt: skip
-        if angles:
-            sections.append(Section(title, tables=[_table([head, "deg"], list(angles.items()))]))
     return lead, sections
 
 
@@ -229,31 +208,18 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[Text]]) -> Table:
     return Table("", columns, rows, kind="comparisons")
 
 
-def _waterfall(result: CircleValidation) -> Picture:
-    """Draw the angle of each step as a bar from the angle of the step before."""
-    measured = float(result.measured_deg.mean())
-    areas, before = [], min(measured, result.steps[0][2])
-    labels = {origin: origin for _, origin, _ in result.steps}
-    for place, (_, origin, angle) in enumerate(result.steps):
-        low, high = sorted((before, angle))
-        areas.append(Area([place + 0.1, place + 0.9], low, high, labels.pop(origin, ""), _ORIGINS[origin]))
-        before = angle
-    line = Curve([0.0, float(len(result.steps))], [measured, measured], "measured mean", "#777777")
-    panel = Panel("step of the table", "steering wheel angle [deg]", [line], areas=areas)
-    return Picture("", [panel], width_in=7.0, height_in=3.2)
-
-
 def _distributions(result: CircleValidation) -> Picture:
-    middle = float(result.measured_deg.mean())
-    tolerance = [middle - result.tolerance_deg, middle + result.tolerance_deg]
-    shown = [(result.measured_deg, "measured", "#777777"), (result.samples_deg, "predicted", RUN_COLOURS[2])]
-    if result.ends:
-        shown += [(result.lower_deg, "probability box", RUN_COLOURS[1]), (result.upper_deg, "", RUN_COLOURS[1])]
+    measured, tolerance = (result.numbers[key] for key in ("measured_deg", "tolerance_deg"))
+    around = [measured["mean"] - tolerance, measured["mean"] + tolerance]
+    box = RUN_COLOURS[1]
+    looks = [("measured", "#777777"), ("predicted", RUN_COLOURS[2]), ("probability box", box), ("", box)]
     curves = []
-    for values, label, colour in shown:
+    for values, (label, colour) in zip(result.distributions, looks, strict=True):
+        if not len(values):  # without intervals
+            continue
         fraction = np.repeat(np.arange(len(values) + 1) / len(values), 2)[1:-1]
         curves.append(Curve(np.repeat(np.sort(values), 2), fraction, label, colour))
-    area = Area(tolerance, 0.0, 1.0, "tolerance", "#777777", 0.15)
+    area = Area(around, 0.0, 1.0, "tolerance", "#777777", 0.15)
     panel = Panel("steering wheel angle [deg]", "cumulative fraction", curves, areas=[area])
     return Picture("", [panel], width_in=7.0, height_in=3.2)
 
@@ -302,7 +268,7 @@ def fit_page(found: Fit, name: str) -> Page:
         rows.append((each.recording, shown.label, *numbers, *samples))
     sections.append(Section("Remaining differences", tables=[Table("", columns, rows)]))
     for recording, compared in groupby(found.compared, lambda each: each.recording):
-        sections.append(Section(recording, pictures=[_fit_picture(list(compared))]))
+        sections.append(Section(recording, pictures=[*map(_fit_picture, compared)]))
     sections.append(Section("Assumptions", points=rests_on(found)))
     return Page(f"activesteer fit: {name}", f"Parameters from recordings: {name}", lead, sections)
 
@@ -329,24 +295,11 @@ def _correlation_table(found: Fit) -> Table:
     return Table("", ["", *(str(number) for number in range(1, len(rows) + 1))], rows)
 
 
-def _fit_picture(compared: list[FitCompared]) -> Picture:
-    """Return the channels of one recording: measured and simulated values, and beside them their difference."""
-    panels = []
-    for each in compared:
-        shown = quantity_of(each.channel)
-        noise = shown.factor * each.noise
-        measured = shown.factor * each.measured
-        over = "time of the recording [s]"
-        curves = [
-            Curve(each.time_s, measured, "measured", RUN_COLOURS[1], "", marker=".", size=2.0),
-            Curve(each.time_s, measured + noise * each.before, "at the start", "#888888", "--", 1.0),
-            Curve(each.time_s, measured + noise * each.after, "fitted", RUN_COLOURS[2]),
-        ]
-        rest = [
-            Curve(each.time_s, noise * each.before, "", "#888888", "--", 0.8),
-            Curve(each.time_s, noise * each.after, "", RUN_COLOURS[2], width=0.8),
-        ]
-        band = Area(each.time_s[[0, -1]], -2.0 * noise, 2.0 * noise, "2 standard deviations of the noise")
-        panels.append(Panel(over, "", curves, shown.title))
-        panels.append(Panel(over, "", rest, f"Simulated less measured [{shown.unit.name}]", [band]))
-    return Picture("", panels, columns=2, width_in=11.0, height_in=2.5 * len(compared))
+def _fit_picture(found: FitCompared) -> Picture:
+    """Return the overlay and the difference of a channel of a recording, with twice its noise as the corridor."""
+    start, end = (found.measured + found.noise * each for each in (found.before, found.after))
+    twice = Tolerance(2.0 * found.noise, 0.0, "")
+    low, high = end - twice.offset, end + twice.offset
+    zero, all_of_them = np.zeros(len(end)), np.ones(len(end), np.bool_)
+    compared = Compared(found.channel, twice, found.time_s, found.measured, zero, end, low, high, all_of_them)
+    return picture(compared, start=start)

@@ -7,14 +7,14 @@ import math
 import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, TypeVar
 
 import numpy as np
 
-from activesteer.config import field_in_unit, read_toml
+from activesteer.config import Source, field_in_unit, read_toml
 from activesteer.core.conventions import Array
 from activesteer.core.units import Unit, find_unit, known_unit, unit_of
-from activesteer.errors import RecordingError
+from activesteer.errors import RecordingError, nearest_names
 from activesteer.recording import Poses, Recording
 from activesteer.vehicle import Vehicle
 
@@ -23,13 +23,22 @@ TURNED_IN_SAE: Final = frozenset(_NAMES["turned_in_sae_j670"])
 _BY_WORD: Final = {word: channel for channel, words in _NAMES["words"].items() for word in words.split()}
 
 
-class Known(NamedTuple):
-    """Meaning of a column."""
+Entry = TypeVar("Entry")
 
-    channel: str  # channel that the column fills
-    unit: str = ""  # unit, if the file states none
-    sign: float = 1.0  # -1 if the exporter uses the sign opposite to ISO 8855
-    sure: bool = True  # whether the unit is the exporter's; otherwise SI is assumed
+
+def by_channel(
+    table: Mapping[str, Entry], known: Collection[str], source: Source, where: tuple[str, ...]
+) -> dict[str, tuple[str, float, Entry]]:
+    """Return the entries of a table of a file by channel, each with its key and the factor of the key's unit to SI."""
+    found: dict[str, tuple[str, float, Entry]] = {}
+    for key, entry in table.items():
+        name, factor = field_in_unit(key, known)
+        if name is None:
+            raise source.fail((*where, key), f"there is no such channel; {nearest_names(key, known)}", key, list(known))
+        if name in found:
+            raise source.fail((*where, key), "is given twice, in two units", key)
+        found[name] = key, factor, entry
+    return found
 
 
 def written_unit(unit: str) -> Unit | None:
@@ -54,21 +63,25 @@ def is_time(name: str) -> bool:
     return name == "time_s" or _word(split_unit(name)[0]) in _NAMES["time"].split()
 
 
-def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> Known | None:
-    """Return the meaning of a column by its name, the names of all columns and the channels of a car, or None."""
+def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> tuple[str, str, float, bool] | None:
+    """Return the meaning of a column by its name, the names of all columns and the channels of a car, or None.
+
+    That is the channel that it fills, its unit if the file states none, -1 if the exporter uses the sign opposite to
+    ISO 8855, and whether the unit is the exporter's; otherwise SI is assumed.
+    """
     for mark, names in _NAMES["exporters"].items():
         if mark in columns and name in names:
             key = names[name].lstrip("-")
             channel = field_in_unit(key, channels)[0] or key
-            return Known(channel, unit_of(key), -1.0 if names[name] != key else 1.0)
+            return channel, unit_of(key), -1.0 if names[name] != key else 1.0, True
     if name in channels:
-        return Known(name)
+        return name, "", 1.0, True
     channel, _ = field_in_unit(name, channels)
     if channel is not None:
-        return Known(channel, name.rsplit("_", 1)[1])
+        return channel, name.rsplit("_", 1)[1], 1.0, True
     words, unit = split_unit(name)
     channel = _BY_WORD.get(_word(words))
-    return None if channel is None else Known(channel, unit, sure=bool(unit))
+    return None if channel is None else (channel, unit, 1.0, bool(unit))
 
 
 def _word(name: str) -> str:
@@ -195,11 +208,8 @@ def _alike(one: Array, other: Array) -> float:
     return float(one @ other) / size if size > 0.0 else 0.0
 
 
-class Samples(NamedTuple):
-    """Signal as measured."""
-
-    time_s: Array  # times [s], increasing, shape (n,)
-    values: Array  # values, finite, shape (n,)
+Samples = tuple[Array, Array]
+"""Times [s], increasing, and values, finite, of a signal as measured, shape (n,) each."""
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
@@ -221,22 +231,23 @@ def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
     last = np.append(steps > 0.0, True) if len(time_s) else known[:0]
     if np.count_nonzero(last) < 2:
         raise RecordingError(f"{name} has fewer than two samples that are numbers", file=file)
-    return Samples(time_s[last], values[last])
+    return time_s[last], values[last]
 
 
 def resampled(signal: Samples, grid_s: Array) -> Array:
     """Resample a signal to a uniform grid, with straight lines between samples."""
     # If the samples are closer than the grid, their mean over a grid step is taken, which prevents aliasing.
+    time_s, measured = signal
     step_s = float(grid_s[1] - grid_s[0])
-    if float(np.median(np.diff(signal.time_s))) > 0.75 * step_s:
-        return np.interp(grid_s, signal.time_s, signal.values)
+    if float(np.median(np.diff(time_s))) > 0.75 * step_s:
+        return np.interp(grid_s, time_s, measured)
     from scipy.interpolate import make_interp_spline  # noqa: PLC0415 - slow to import
 
-    integral = make_interp_spline(signal.time_s, signal.values, k=1).antiderivative()
+    integral = make_interp_spline(time_s, measured, k=1).antiderivative()
     # Towards the ends, the window shrinks on both sides, so that its centre does not move.
-    half = np.minimum(0.5 * step_s, np.minimum(grid_s - signal.time_s[0], signal.time_s[-1] - grid_s))
+    half = np.minimum(0.5 * step_s, np.minimum(grid_s - time_s[0], time_s[-1] - grid_s))
     wide = half > 1e-3 * step_s
-    values = np.interp(grid_s, signal.time_s, signal.values)
+    values = np.interp(grid_s, time_s, measured)
     values[wide] = (integral((grid_s + half)[wide]) - integral((grid_s - half)[wide])) / (2.0 * half[wide])
     return values
 

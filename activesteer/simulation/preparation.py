@@ -25,7 +25,7 @@ from typing import Any, Final, NamedTuple
 import mujoco
 import numpy as np
 
-from activesteer.analysis.handling import CarGeometry, Handling, evaluate
+from activesteer.analysis.handling import CarGeometry, evaluate
 from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.step_response import FIT, angle_at
 from activesteer.config import to_table
@@ -295,19 +295,19 @@ def body_of(car: CarSpec) -> Body:
     return Body(body.mass_kg, float(body.inertia_kgm2[2, 2]), float(front - x_m), float(x_m - rear))
 
 
-def handling_in(scenario: Scenario, body: Body, run: Run) -> Handling:
+def handling_in(scenario: Scenario, body: Body, run: Run) -> dict[str, float]:
     """Return the steady-state handling of a car in a test."""
     return evaluate(
         run(scenario), CarGeometry(body.cg_to_front_m, body.cg_to_rear_m, scenario.car.config.steering.ratio)
     )
 
 
-def fitted(body: Body, tests: list[Handling]) -> SingleTrackParameters:
+def fitted(body: Body, tests: list[dict[str, float]]) -> SingleTrackParameters:
     """Return the model with the mean slip angles and understeer of the tests at constant speed."""
     wheelbase = body.cg_to_front_m + body.cg_to_rear_m
 
     def mean(name: str) -> float:
-        return float(np.mean([getattr(test, name) for test in tests]))
+        return float(np.mean([test[name] for test in tests]))
 
     understeer, front, rear = (mean(f"{name}_gradient_radpmps2") for name in ("understeer", "front_slip", "rear_slip"))
     if understeer <= 0.0:

@@ -59,7 +59,7 @@ def examine(runner: StandardRunner) -> Findings:
         values[method] = []
         for side, run in zip(SIDES, runs, strict=True):
             try:
-                metrics = evaluate(run, car)._asdict().items()
+                metrics = evaluate(run, car).items()
                 found[side] = {name: value for name, value in metrics if not math.isnan(value)}
                 values[method].append({"direction": side, **found[side]})
             except RecordingError as error:

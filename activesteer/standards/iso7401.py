@@ -13,7 +13,6 @@ from activesteer.analysis.frequency_response import (
     FrequencyResponse,
     HIGHEST_Hz,
     LOWEST_Hz,
-    RandomResponse,
     frequency_response,
     random_response,
 )
@@ -77,7 +76,7 @@ def examine(runner: StandardRunner) -> Findings:
         (INPUT, *_RESPONSES),
     )
     averaged = _random_responses(random)
-    found = {"sweep": _sweep_responses(sweep), "random": {name: each.response for name, each in averaged.items()}}
+    found = {"sweep": _sweep_responses(sweep), "random": averaged}
     weak = {(kind, name): weak_ranges(each) for kind, responses in found.items() for name, each in responses.items()}
     left = steps["left"]
     bandwidth_Hz = sweep.metric("yaw_rate_bandwidth_Hz")
@@ -130,7 +129,7 @@ def _sweep_responses(sweep: StandardRun) -> Responses:
         return {}
 
 
-def _random_responses(runs: list[StandardRun]) -> dict[str, RandomResponse]:
+def _random_responses(runs: list[StandardRun]) -> Responses:
     """Return the responses from the finished runs with random steering, or empty without one."""
     driven = [run for run in runs if run.channels]
     if not driven:

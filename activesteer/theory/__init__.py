@@ -1,5 +1,5 @@
 """Formulas that need no multibody car, shared by controllers, driver, figures and identification.
 
 In: parameters of simple models.
-Out: steady states, responses and proportions, as formulas.
+Out: steady states and responses, as formulas.
 """

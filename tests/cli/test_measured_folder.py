@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import activesteer
+
+EXAMPLE = Path(activesteer.__file__).parent / "measured" / "example"
 
 
 def test_a_new_folder_is_made_once(call, tmp_path: Path) -> None:
@@ -25,3 +30,25 @@ def test_the_example_is_predicted_and_fitted(call) -> None:
     assert Path("page/page.html").stat().st_size > 10_000
     # The front tyres of the example are 10 % softer than those of the car.
     assert "factors.front_cornering_stiffness" in told.out
+
+
+def test_the_example_is_a_noisy_run_of_a_car_with_softer_front_tyres_and_a_scaled_steering_signal() -> None:
+    """If the car has changed, write the run again with these numbers."""
+    steering = {
+        "time_s": [0.5, 0.8, 1.3, 1.8, 2.2, 3.5, 3.8, 4.3, 4.8, 5.2],
+        "steering_wheel_deg": [0, 40, 40, -40, 0, 0, -50, 0, 50, 0],
+    }
+    table = {"kind": "open_loop", "speed_kmh": 80.0, "duration_s": 6.5, "hold_last": True, "steering": steering}
+    run = activesteer.simulate(table, overrides={"factors.front_cornering_stiffness": 0.9})
+    columns = {  # channel, factor to the unit of the column, and standard deviation of its noise
+        "Steering [deg]": ("steering_wheel_rad", 0.8 * np.degrees(1.0), 0.02),
+        "v [km/h]": ("speed_mps", 3.6, 0.05),
+        "Yaw rate [deg/s]": ("yaw_rate_radps", np.degrees(1.0), 0.2),
+        "a_y [m/s2]": ("ay_mps2", 1.0, 0.1),
+    }
+    noise = np.random.default_rng(1)
+    stored = np.genfromtxt(EXAMPLE / "run.csv", delimiter=",", names=True, deletechars="", replace_space=" ")
+    for name, (channel, factor, size) in columns.items():
+        values = factor * run[channel][::10]
+        values = values + size * noise.standard_normal(len(values))
+        assert stored[name] == pytest.approx(values, rel=1e-4, abs=0.01 * size), name

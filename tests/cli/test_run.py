@@ -14,7 +14,7 @@ import pytest
 
 import activesteer
 from activesteer import Recording
-from activesteer.analysis.metrics import EVALUATIONS
+from activesteer.analysis.metrics import KEY_METRICS
 from activesteer.analysis.tables import comparison
 from activesteer.commands import drive as run_command
 from activesteer.commands.terminal import BAD, coloured, painted
@@ -41,7 +41,7 @@ def test_each_controller_makes_a_file_and_a_column(call, tmp_path):
     for name, value in zip(("none", "ars", "afs"), shown, strict=True):
         metrics = Recording.open(tmp_path / "out" / f"step_steer-{name}.mcap").metrics
         assert value == pytest.approx(math.degrees(metrics["yaw_rate_peak_radps"]), abs=6e-4)
-    names = [metric.name for metric in EVALUATIONS["step_steer"].key_metrics]
+    names = KEY_METRICS["step_steer"]
     assert [" ".join(line.split("  ")[:1]) for line in lines[1:11]] == [recorded_metric(name).label for name in names]
     assert lines[11:] == ["10 of 28 metrics; --all prints all"]
     again = call("run", "step_steer", "-c", "none", *PAPER, "-o", "out", "--all").out.splitlines()

@@ -81,7 +81,7 @@ def test_reference_angle_of_fmvss_126_is_that_of_the_hand_calculation():
 
 @pytest.mark.slow
 def test_constant_speed_and_constant_radius_give_the_same_understeer():
-    gradients = [test.understeer_gradient_radpmps2 for test in full().tests.values()]
+    gradients = [test["understeer_gradient_radpmps2"] for test in full().tests.values()]
     assert list(full().tests) == [*CONSTANT_SPEED_TESTS, RADIUS_TEST]
     assert max(gradients) / min(gradients) < 1.02
 
@@ -96,10 +96,10 @@ def test_short_tests_find_the_same_single_track_model_as_the_full_ones():
 @pytest.mark.slow
 def test_handling_is_that_of_a_car_of_this_class():
     for test in full().tests.values():
-        assert 2.2 < DEGPG * test.understeer_gradient_radpmps2 < 3.2
-        assert 3.9 < DEGPG * test.roll_gradient_radpmps2 < 6.4
-        assert test.linear_range_mps2 > 3.5
-        assert 7.5 < test.limit_acceleration_mps2 < 9.5
+        assert 2.2 < DEGPG * test["understeer_gradient_radpmps2"] < 3.2
+        assert 3.9 < DEGPG * test["roll_gradient_radpmps2"] < 6.4
+        assert test["linear_range_mps2"] > 3.5
+        assert 7.5 < test["limit_acceleration_mps2"] < 9.5
 
 
 @pytest.mark.slow

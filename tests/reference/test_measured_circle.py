@@ -1,4 +1,4 @@
-"""Comparison with a measured circle: its measures by hand, the angle against geometry, effects and open decisions.
+"""Comparison with a measured circle: its measures by hand, the angle against geometry, and the effects of the Tesla.
 
 The design rules of the source's numbers are from C. Angerer et al., NEVVE 2018, and S. Fuchs, TUM 2014, as in
 TUMFTM/TOTEM.
@@ -16,14 +16,24 @@ import pytest
 
 from activesteer.config import read_toml
 from activesteer.errors import ActiveSteerError, ParameterError
-from activesteer.measured.circle import CircleValidation, steering_wheel_deg, validate_circle
-from activesteer.measured.circle_changes import Case
+from activesteer.measured.circle import judged, steering_wheel_deg, validate_circle
 from activesteer.measured.folder_file import MeasuredFile, read_measured
 from activesteer.measured.pages import measured_page
-from activesteer.resources import find_vehicle, models_dir
+from activesteer.resources import find_vehicle
 from tests.raising import raises
+from tools.tesla_circle import (
+    DECISIONS,
+    FOLDER,
+    PREDICTION,
+    QUICK_RATIO,
+    STEPS,
+    VEHICLE,
+    Case,
+    changed,
+    fall,
+    without,
+)
 
-FOLDER = models_dir() / "reference" / "tesla_model_s"
 KC_OFF = [
     f"{effect}, {axle}"
     for effect in ("toe over side force", "roll steer", "static toe", "camber over side force")
@@ -38,28 +48,27 @@ def file() -> MeasuredFile:
     return read_measured(FOLDER)
 
 
-def result(file: MeasuredFile, ours: np.ndarray, measured: np.ndarray) -> CircleValidation:
-    lower, upper = np.linspace(80.0, 90.0, 101), np.linspace(110.0, 120.0, 101)
-    ends = (("ratio", "source", 80.0, 120.0),)
-    return CircleValidation(file, measured, float(ours.mean()), 0.0, {}, {}, (), ends, ours, lower, upper)
+def result(file: MeasuredFile, ours: np.ndarray, measured: np.ndarray) -> dict[str, Any]:
+    box = np.linspace(80.0, 90.0, 101), np.linspace(110.0, 120.0, 101)
+    return judged(file, float(ours.mean()), 0.0, [("ratio", "source", 80.0, 120.0)], [measured, ours, *box]).to_json()
 
 
 def test_the_area_between_shifted_distributions_is_the_shift(file: MeasuredFile, rng: np.random.Generator) -> None:
     values = rng.normal(94.0, 1.3, 200)
-    assert result(file, values + 5.0, values).area_metric_deg == pytest.approx(5.0, abs=1e-9)
-    assert result(file, values, values).area_metric_deg == pytest.approx(0.0, abs=1e-9)
+    assert result(file, values + 5.0, values)["area_metric_deg"] == pytest.approx(5.0, abs=1e-9)
+    assert result(file, values, values)["area_metric_deg"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_distributions_apart_do_not_overlap_and_alike_ones_do(file: MeasuredFile, rng: np.random.Generator) -> None:
     values = rng.normal(94.0, 1.3, 200)
-    assert result(file, values + 30.0, values).overlap < 1e-3
-    assert result(file, values, values).overlap == pytest.approx(1.0, abs=0.01)
+    assert result(file, values + 30.0, values)["overlap"] < 1e-3
+    assert result(file, values, values)["overlap"] == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_tolerance_is_that_of_iso_19364(file: MeasuredFile) -> None:
     measured = np.array([99.0, 101.0])
-    assert result(file, measured + 7.9, measured).inside
-    assert not result(file, measured + 8.1, measured).inside
+    assert result(file, measured + 7.9, measured)["inside"]
+    assert not result(file, measured + 8.1, measured)["inside"]
 
 
 def test_too_few_samples_are_an_error(file: MeasuredFile) -> None:
@@ -77,24 +86,16 @@ def test_too_few_samples_are_an_error(file: MeasuredFile) -> None:
             "circle.steering_wheel_deg",
         ),
         ('spread = { "factors.mass"', 'spread = { "factors.mas"', "circle.spread.factors.mas"),
-        ('axle = "front", hold = "toe_deg"', 'axle = "left", hold = "toe_deg"', "effects.roll steer, front.0.axle"),
-        ('axle = "front", hold = "toe_deg"', 'axle = "front", hold = "toes_deg"', "effects.roll steer, front"),
-        ('axle = "front", hold = "toe_deg"', 'hold = "stiffness"', "effects.roll steer, front"),
-        ('compliance = "no_camber"', 'compliance = "no_cambers"', "effects.camber over side force, front.0.compliance"),
-        ('[{ without = [\n  "roll steer, front"', '[{ without = [\n  "roll steers"', "effects.all six effects on toe"),
-        (
-            '[{ without = [\n  "roll steer, front"',
-            '[{ without = [\n  "all six effects on toe"',
-            "effects.all six effects on toe",
-        ),
-        ('"powertrain.front_fraction"', '"powertrain.front"', "effects.drive on the front wheels (assumed)"),
-        ('adds = ["roll steer, front"', 'adds = ["roll steers"', "steps.3"),
-        ('origin = "geometry"', 'origin = "guess"', "steps.0.origin"),
-        ("{ radius_m = 0.83 }", "{ radius = 0.83 }", "intervals.point that follows 30 m"),
-        ("low = [{ add = { body_roll = 1.0 } }]", "ends = [1.0]", "intervals.tilt of the accelerometer"),
-        ("[decisions]", '[[runs]]\nname = "a"\nfiles = ["a.csv"]\n\n[decisions]', "runs"),
-        ("[decisions]", "[quantities]\nay_mps2 = {}\n\n[decisions]", "quantities"),
-        ('vehicle = "tesla_model_s"', 'vehicle = "compact"', "effects.roll steer, front"),
+        ("stiff_column = true", "stiff_column = 1", "circle.prediction.stiff_column"),
+        ('"curves.front.stiffness" = [\n  4079964.0, ', '"curves.front.stiffness" = [', "circle.prediction"),
+        ('"factors.tyre_friction" = 1.05', '"factors.tyre" = 1.05', "intervals.side force of the tyres.low"),
+        ("{ radius_m = 30.83 }", "{ radius = 30.83 }", "intervals.point that follows 30 m.low"),
+        ("{ radius_m = 30.83 }", '{ radius_m = "a" }', "intervals.point that follows 30 m.low.radius_m"),
+        ("low = { body_roll = 1.0 }", "ends = [1.0]", "intervals.tilt of the accelerometer"),
+        ("[circle]", '[[runs]]\nname = "a"\nfiles = ["a.csv"]\n\n[circle]', "runs"),
+        ("[circle]", "[quantities]\nay_mps2 = {}\n\n[circle]", "quantities"),
+        ("[circle]", "[effects]\n\n[circle]", "effects"),
+        ('vehicle = "tesla_model_s"', 'vehicle = "compact"', "circle.prediction"),
     ],
 )
 def test_a_wrong_key_or_value_is_one_error_with_file_and_key(tmp_path: Path, old: str, new: str, key: str) -> None:
@@ -124,12 +125,14 @@ def test_a_circle_of_any_car_needs_no_effects_and_its_intervals_may_be_keys(tmp_
     (tmp_path / "validation.toml").write_text(text, encoding="utf-8")
     found = validate_circle(read_measured(tmp_path), 10, 1)
     by_hand = 2.57 / 40.0 * 16.0  # wheelbase and ratio of some such car, within a half
-    assert found.nominal_deg == found.assumed_deg == pytest.approx(math.degrees(by_hand), rel=0.5)
+    numbers = found.numbers
+    nominal_deg, box = numbers["ours_deg"]["nominal"], numbers["box"]
+    assert nominal_deg == numbers["with_assumptions_deg"] == pytest.approx(math.degrees(by_hand), rel=0.5)
     # A smaller radius and softer front tyres both need more angle: the lower ends of these keys are the upper angles.
-    for (_, _, low, high), larger in zip(found.ends, ("39.0", "0.9"), strict=True):
-        assert low < found.nominal_deg < high, larger
-    assert found.low_deg < min(end[2] for end in found.ends)
-    assert found.high_deg > max(end[3] for end in found.ends)
+    for end, larger in zip(box["intervals"], ("39.0", "0.9"), strict=True):
+        assert end["low_deg"] < nominal_deg < end["high_deg"], larger
+    assert box["low_deg"] < min(end["low_deg"] for end in box["intervals"])
+    assert box["high_deg"] > max(end["high_deg"] for end in box["intervals"])
     lines = "\n".join(measured_page(found).lines())
     assert "factors.front_cornering_stiffness" in lines
 
@@ -163,49 +166,52 @@ def test_the_wheel_inertia_of_the_source_is_that_of_both_wheels_of_an_axle() -> 
 
 def toe_deg(case: Case, axle: str, side_N: float, aligning_Nm: float) -> float:
     """Return the rotation of the left wheel to the left under forces at the road."""
-    table, _ = read_toml(find_vehicle("tesla_model_s"))
+    table, _ = read_toml(find_vehicle(VEHICLE))
     matrix = np.zeros((5, 5))
-    matrix[np.triu_indices(5)] = case.overrides.get(f"curves.{axle}.stiffness", table["curves"][axle]["stiffness"])
+    matrix[np.triu_indices(5)] = case.get(f"curves.{axle}.stiffness", table["curves"][axle]["stiffness"])
     moved = np.linalg.solve(matrix + np.triu(matrix, 1).T, [0.0, side_N, 0.335 * side_N, 0.0, aligning_Nm])
     return float(np.degrees(moved[4]))
 
 
 def test_switching_an_effect_off_changes_no_other_effect(file: MeasuredFile) -> None:
-    case = file.case
+    case = file.on_circle
     for axle, sign in (("front", 1.0), ("rear", -1.0)):
         side, aligning = toe_deg(case, axle, -1e3, 0.0), toe_deg(case, axle, 0.0, 100.0)
         assert side * sign > 0.03, "towards the middle of the car: front toe-out, rear toe-in"
         assert aligning > 0.4
-        no_side = file.without(case, [f"toe over side force, {axle}"])
+        no_side = without(case, f"toe over side force, {axle}")
         assert toe_deg(no_side, axle, -1e3, 0.0) == pytest.approx(0.0, abs=1e-4)
         assert toe_deg(no_side, axle, 0.0, 100.0) == pytest.approx(aligning, rel=1e-4)
-        no_moment = file.without(case, [f"toe over aligning moment, {axle} (assumed)"])
+        no_moment = without(case, f"toe over aligning moment, {axle} (assumed)")
         assert toe_deg(no_moment, axle, -1e3, 0.0) == pytest.approx(side, rel=1e-3)
         assert toe_deg(no_moment, axle, 0.0, 100.0) < 0.5 * aligning
-        no_camber = file.without(case, [f"camber over side force, {axle}"])
+        no_camber = without(case, f"camber over side force, {axle}")
         assert toe_deg(no_camber, axle, -1e3, 0.0) == pytest.approx(side, rel=1e-2)
-        turned = file.changed(case, file.table.decisions["elkin_y_toe of both axles reversed (used: understeering)"])
+        turned = changed(case, *DECISIONS["elkin_y_toe of both axles reversed (used: understeering)"])
         assert toe_deg(turned, axle, -1e3, 0.0) == pytest.approx(-side, rel=1e-3)
 
 
-def at(case: Case, **circle: float) -> Case:
-    return case._replace(circle=case.circle | circle)
-
-
-def measured_only(file: MeasuredFile) -> Case:
-    return file.without(file.case, [name for step in file.table.steps[:-3:-1] for name in step.adds])
+def test_the_file_has_the_numbers_of_the_effects(file: MeasuredFile) -> None:
+    circle, intervals = file.table.circle, file.table.intervals
+    assert circle is not None
+    assert circle.prediction == changed({}, PREDICTION)
+    assert circle.prediction == intervals["compliance to aligning moment and of the column"].low
+    assert intervals["steering ratio"].low == changed({}, QUICK_RATIO)
+    full = file.on_circle
+    assert file.changed(full, circle.prediction) == fall(full, len(STEPS) - 3), "all but the assumed steps"
+    assert fall(full, len(STEPS) - 1) == full
 
 
 @pytest.mark.slow
 def test_without_changes_of_toe_the_angle_is_that_of_geometry_and_tyres(file: MeasuredFile) -> None:
     """Tyres add some degrees to the Ackermann angle of 87: the front carries more load and more roll moment."""
-    assert 88.0 < steering_wheel_deg(file.without(file.case, ["all six effects on toe"])) < 98.0
+    assert 88.0 < steering_wheel_deg(VEHICLE, without(file.on_circle, "all six effects on toe")) < 98.0
 
 
 @pytest.mark.slow
 def test_without_lateral_acceleration_the_angle_is_that_of_ackermann(file: MeasuredFile) -> None:
     """A line through two low accelerations must reach 5.64 deg at the wheels (30 m) times the ratio of 15.5."""
-    low, high = (steering_wheel_deg(at(file.case, ay_mps2=ay)) for ay in (0.6, 1.2))
+    low, high = (steering_wheel_deg(VEHICLE, file.on_circle | {"ay_mps2": ay}) for ay in (0.6, 1.2))
     assert low < high
     assert 2.0 * low - high == pytest.approx(15.48 * math.degrees(math.atan(2.96 / 30.0)), rel=0.02)
 
@@ -224,34 +230,34 @@ def test_with_the_settings_of_the_source_the_angle_is_that_of_its_own_model(
     the source's driver reaches the circle is not published. The differences of all its sets below 7 m/s2 are -6.8 to
     +5.7 % (docs/validation.md), the worst two among these: 7.5 % notices a changed car, it is no target.
     """
-    case = at(file.without(measured_only(file), KC_OFF), radius_m=100.0, ay_mps2=ay_mps2)
-    case = case._replace(overrides=case.overrides | {"factors.mass": mass_kg / 2374.0})
-    assert steering_wheel_deg(case) == pytest.approx(theirs_deg, rel=0.075)
+    case = without(changed(file.on_circle, PREDICTION), *KC_OFF)
+    case |= {"radius_m": 100.0, "ay_mps2": ay_mps2, "factors.mass": mass_kg / 2374.0}
+    assert steering_wheel_deg(VEHICLE, case) == pytest.approx(theirs_deg, rel=0.075)
 
 
 def test_the_box_lies_between_the_ends_of_the_intervals_and_counts_what_is_inside(file: MeasuredFile) -> None:
-    box = result(file, np.array([94.0, 95.0]), np.array([80.0, 81.0, 100.0, 119.0, 120.0]))
-    assert box.low_deg == pytest.approx(80.25)
-    assert box.high_deg == pytest.approx(119.75)
-    assert box.measured_inside == 3
-    assert box.to_json()["box"]["measured_deg"] == 100.0
+    box = result(file, np.array([94.0, 95.0]), np.array([80.0, 81.0, 100.0, 119.0, 120.0]))["box"]
+    assert (box["low_deg"], box["high_deg"]) == pytest.approx((80.25, 119.75))
+    assert box["measured_inside"] == 3
+    assert box["measured_deg"] == 100.0
 
 
 @pytest.mark.slow
 def test_a_tilted_accelerometer_shows_more_than_the_horizontal_acceleration(file: MeasuredFile) -> None:
     """By hand: a cos(phi) + g sin(phi) = 5.65 with phi = 0.0458 rad * a / 5.65 gives 5.24 m/s2."""
-    (change,) = file.table.intervals["tilt of the accelerometer"].low
-    tilted = steering_wheel_deg(file.changed(file.case, [change]), 0.0458 / 5.65)
-    assert tilted == pytest.approx(steering_wheel_deg(at(file.case, ay_mps2=5.238)), abs=0.01)
+    full = file.on_circle
+    change = file.table.intervals["tilt of the accelerometer"].low
+    tilted = steering_wheel_deg(VEHICLE, file.changed(full, change), 0.0458 / 5.65)
+    assert tilted == pytest.approx(steering_wheel_deg(VEHICLE, full | {"ay_mps2": 5.238}), abs=0.01)
 
 
 @pytest.mark.slow
 def test_without_the_assumed_compliances_the_angle_is_smaller_and_a_quicker_ratio_makes_it_smaller_still(
     file: MeasuredFile,
 ) -> None:
-    main = measured_only(file)
+    main = changed(file.on_circle, PREDICTION)
     quick = file.changed(main, file.table.intervals["steering ratio"].low)
-    angles = [steering_wheel_deg(each) for each in (quick, main, file.case)]
+    angles = [steering_wheel_deg(VEHICLE, each) for each in (quick, main, file.on_circle)]
     assert angles[2] - angles[1] == pytest.approx(8.2, abs=0.3)  # 10.4 - 5.3 + 3.1 deg
     # The wheels need the same angle, so the steering wheel turns less in proportion to the ratio.
     assert angles[0] == pytest.approx(angles[1] * 14.27 / 15.48, rel=0.01)

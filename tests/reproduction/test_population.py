@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from activesteer.analysis.claims.judge import SCENARIOS, STATEMENTS, SYSTEMS
-from activesteer.analysis.claims.scorecard import TRACK, bands_of
 from activesteer.analysis.harm import is_lost
 from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan
@@ -83,25 +81,6 @@ def test_the_page_on_chassis_control_says_what_is_stored():
 def test_nominal_verdicts_are_those_of_the_nominal_runs(runs: dict[str, dict[str, Recording]]):
     found = {claim.id: claim.passed for name, systems in runs.items() for claim in SCENARIOS[name](systems)}
     assert found == {claim.id: claim.passed for claim in stored().claims}
-
-
-def test_every_nominal_run_has_its_bands(runs: dict[str, dict[str, Recording]]):
-    for systems in runs.values():
-        for run in systems.values():
-            bands = bands_of(run)
-            assert {TRACK[1], "yaw_rate_radps", "sideslip_rad", "steering_wheel_rad"} <= set(bands)
-            for band in bands.values():
-                assert (band.low <= band.high).all()
-            # The nominal car is one of the population's middle.
-            assert bands["yaw_rate_radps"].high.max() > 0.5 * run["yaw_rate_radps"].max()
-
-
-@pytest.mark.parametrize(
-    "other", [{"overrides": {"factors.mass": 1.1}}, {"overrides": {"speed_kmh": 90}}, {"driver": {"name": "expert"}}]
-)
-def test_another_car_manoeuvre_or_driver_has_none(runs: dict[str, dict[str, Recording]], other: dict[str, Any]):
-    run: Any = SimpleNamespace(metadata=runs["slalom"]["ars"].metadata | other)
-    assert bands_of(run) == {}
 
 
 def driven_again(pairs: list[tuple[int, str]]) -> list[tuple[list[Row], list[Row]]]:

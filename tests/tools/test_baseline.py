@@ -7,18 +7,18 @@ import math
 
 import pytest
 
-from activesteer.analysis.metrics import EVALUATIONS
+from activesteer.analysis.metrics import KEY_METRICS
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tools import baseline
-from tools.baseline import drifts, read_baseline, write_baseline
+from tools.baseline import drifts, read_baseline, tolerance_of, write_baseline
 
 RUN = "slalom", "ars"
 
 
 def driven(**changed: float) -> dict[tuple[str, str], dict[str, float]]:
     """Return a slalom whose key metrics are all 2, except for the changed ones."""
-    return {RUN: {metric.name: 2.0 for metric in EVALUATIONS["slalom"].key_metrics} | changed}
+    return {RUN: dict.fromkeys(KEY_METRICS["slalom"], 2.0) | changed}
 
 
 def test_unchanged_metrics_do_not_drift():
@@ -28,6 +28,12 @@ def test_unchanged_metrics_do_not_drift():
 @pytest.mark.parametrize(("value", "found"), [(2.019, 0), (2.021, 1), (1.981, 0), (1.979, 1)])
 def test_a_drift_begins_at_one_per_cent(value, found):
     assert len(drifts(driven(track_amplitude_m=value), driven())) == found
+
+
+def test_the_tolerance_of_a_key_metric_grows_with_its_value():
+    assert tolerance_of("ay_peak_abs_mps2", 0.5) == 0.02
+    assert tolerance_of("ay_peak_abs_mps2", -8.0) == pytest.approx(0.08)
+    assert tolerance_of("cones_hit", 300.0) == 0.0
 
 
 def test_a_count_has_no_tolerance():

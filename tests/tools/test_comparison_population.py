@@ -15,13 +15,13 @@ from activesteer.core.metric_table import SIDESLIP_PEAKS
 from activesteer.errors import ParameterError, StudyError
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.plan import Plan
-from activesteer.theory.proportions import Proportion
 from tests.raising import raises
 from tools.comparison import (
     comparison_text,
     population_targets,
 )
 from tools.population_results import STEERING_EFFORT, Population, SystemEffect, comparison_study, summarise
+from tools.proportions import Proportion
 
 SPIN_RAD = 1.0
 

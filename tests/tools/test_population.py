@@ -11,17 +11,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from activesteer.analysis.claims.judge import SYSTEMS, Claim
-from activesteer.analysis.claims.scorecard import NO_FACTOR, ClaimProportion
+from activesteer.analysis.claims.judge import Claim
 from activesteer.core.metric_table import CONES_MISSED
 from activesteer.errors import StudyError
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.study import study
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.theory.proportions import Proportion, ProportionVerdict
 from tests.raising import raises
 from tools import population_store
-from tools.population_results import Population, population_study, summarise
+from tools.population_results import NO_FACTOR, ClaimProportion, Population, population_study, summarise
+from tools.proportions import Proportion, ProportionVerdict
 
 RESULTS = "results.parquet"
 
@@ -152,12 +151,10 @@ def test_what_is_stored_is_what_was_found(serial: Path) -> None:
         Population.from_json({"claims": []})
 
 
-def test_the_package_stores_results_runs_and_bands(
-    serial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_package_stores_results_and_runs(serial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(population_store, "studies_dir", lambda: tmp_path)
     found = summarise(pq.read_table(serial / RESULTS), shortened(2), nominal(S1=True))
-    summary, runs, bands = population_store.store_population(found, serial)
+    summary, runs = population_store.store_population(found, serial)
     assert Population.from_json(json.loads(summary.read_text())) == found
     assert (
         pq.read_table(runs).select(["sample", "maneuver", "controller"]).to_pylist()
@@ -165,7 +162,6 @@ def test_the_package_stores_results_runs_and_bands(
     )
     assert {"claim_S1", "sideslip_peak_rad", "status"} <= set(pq.read_table(runs).column_names)
     assert not set(shortened(2).keys) & set(pq.read_table(runs).column_names)
-    assert set(pq.read_table(bands)["controller"].to_pylist()) == set(SYSTEMS)
     with raises(StudyError):
         population_store.store_population(found, tmp_path)
 

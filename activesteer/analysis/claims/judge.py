@@ -27,18 +27,7 @@ from activesteer.analysis.requirement import EvaluatedRun, Names, Requirement, d
 from activesteer.analysis.series import Array, crossing_time, rms, smooth, timestep
 from activesteer.analysis.source import Evaluable, RecordingLike, read_course
 from activesteer.config import Source, build, read_toml
-from activesteer.core.metric_table import (
-    CONES_HIT,
-    LANE_OVERSTEP,
-    SETTLED_SIDESLIP_RAD,
-    SIDESLIP_RAD,
-    STAYS_IN_LANES,
-    STEER_RAD,
-    STEERING_WHEEL_RAD,
-    TIME_S,
-    TRACK_M,
-    YAW_RATE_RADPS,
-)
+from activesteer.core import metric_table
 from activesteer.errors import ParameterError, RecordingError
 
 SYSTEMS: Final = ("none", "ars", "afs")
@@ -198,12 +187,12 @@ def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> 
     for system in SYSTEMS:
         for name, owner in (("rear_steer", "ars"), ("superposition", "afs")):
             demand = f"{name}_demand_rad"
-            angle = f"{math.degrees(STEER_RAD):.2f} deg of {name.replace('_', ' ')}"
-            if system != owner and float(np.abs(recordings[system][demand]).max()) >= STEER_RAD:
+            angle = f"{math.degrees(metric_table.STEER_RAD):.2f} deg of {name.replace('_', ' ')}"
+            if system != owner and float(np.abs(recordings[system][demand]).max()) >= metric_table.STEER_RAD:
                 found.append((f"the run {system} demands {angle}", 1.0))
-            if system == owner and not (action := largest_action(recordings[system], demand)) >= STEER_RAD:
+            if system == owner and not (action := largest_action(recordings[system], demand)) >= metric_table.STEER_RAD:
                 words = f"the run {system} never demands {angle} more than straight ahead, as a mean over {MEAN_S:g} s"
-                found.append((words, min(1.0, 1.0 - action / STEER_RAD)))
+                found.append((words, min(1.0, 1.0 - action / metric_table.STEER_RAD)))
     return (found[0][0], max(missing for _, missing in found)) if found else ("", 0.0)
 
 
@@ -311,7 +300,7 @@ def _tracks(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool)
 
 def _slippery_metrics(recording: RecordingLike) -> dict[str, float]:
     # A course without lanes has no track to stay on.
-    without = dict.fromkeys((LANE_OVERSTEP, STAYS_IN_LANES, CONES_HIT), math.nan)
+    without = dict.fromkeys((metric_table.LANE_OVERSTEP, metric_table.STAYS_IN_LANES, metric_table.CONES_HIT), math.nan)
     last = recording.time_s >= recording.time_s[-1] - END_S
     end = {
         "yaw_rate_end_rms_radps": rms(recording["yaw_rate_radps"][last]),
@@ -330,12 +319,13 @@ class _Limit(float):
 def _statements() -> dict[str, tuple[Statement, ...]]:
     """Return the rows of `statements.toml`, by manoeuvre, with their limits."""
     table, source = read_toml(Path(__file__).with_name("statements.toml"), ParameterError)
+    least = metric_table
     angles = {
-        "steer_deg": STEER_RAD, "settled_deg": SETTLED_SIDESLIP_RAD, "sideslip_deg": SIDESLIP_RAD,
-        "yaw_rate_degps": YAW_RATE_RADPS, "wheel_deg": STEERING_WHEEL_RAD, "lost_deg": LOST_SIDESLIP_RAD,
+        "steer_deg": least.STEER_RAD, "settled_deg": least.SETTLED_SIDESLIP_RAD, "sideslip_deg": least.SIDESLIP_RAD,
+        "yaw_rate_degps": least.YAW_RATE_RADPS, "wheel_deg": least.STEERING_WHEEL_RAD, "lost_deg": LOST_SIDESLIP_RAD,
     }  # fmt: skip
     numbers = {name: math.degrees(angle) for name, angle in angles.items()} | table.pop("limits")
-    numbers |= {"time_s": TIME_S, "time_ms": 1000.0 * TIME_S, "track_m": TRACK_M}
+    numbers |= {"time_s": least.TIME_S, "time_ms": 1000.0 * least.TIME_S, "track_m": least.TRACK_M}
     limits = {name: _Limit(number) for name, number in numbers.items()}
     words = {name: text.format(**limits) for name, text in table.pop("words").items()}
     found: dict[str, tuple[Statement, ...]] = {}
@@ -366,7 +356,7 @@ SCENARIOS: Final[dict[str, Scenario]] = {
         "double lane change",
         Kind.DRIVER,
         _ROWS["double_lane_change"],
-        lambda run: {CONES_HIT: math.nan} | path_following.path_following_metrics(run),
+        lambda run: {metric_table.CONES_HIT: math.nan} | path_following.path_following_metrics(run),
         _tracks,
     ),
     "slalom": Scenario("slalom", Kind.DRIVER, _ROWS["slalom"], path_following.path_following_metrics),

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from activesteer.analysis.figures import style, tracks
+from activesteer.analysis.figures import over_time, tracks
 from activesteer.analysis.figures.over_time import figure_2, figure_11, time_figure
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Source, build
@@ -39,9 +39,9 @@ Draw = Callable[[Mapping[str, RecordingLike]], "Figure"]
 """Function from recordings by system to a figure."""
 
 
-def _over_time(*panels: str, instants: bool = False) -> Draw:
+def _over_time(*panels: str) -> Draw:
     """Return the function that draws panels over one time axis."""
-    return partial(time_figure, panels=[PANELS[name] for name in panels], instants=instants)
+    return partial(time_figure, panels=[PANELS[name] for name in panels])
 
 
 FORMATS: Final = (".png", ".svg", ".pdf")
@@ -49,8 +49,8 @@ FORMATS: Final = (".png", ".svg", ".pdf")
 BY_SCENARIO: Final[dict[str, dict[str, Draw]]] = {
     "step_steer": {"figure_11_step_steer": figure_11},
     "sine_with_dwell": {
-        "figure_12_sine_with_dwell_input": _over_time("steering_wheel", instants=True),
-        "figure_13_sine_with_dwell": _over_time("yaw_rate", "added", "lateral", "sideslip", instants=True),
+        "figure_12_sine_with_dwell_input": _over_time("steering_wheel"),
+        "figure_13_sine_with_dwell": _over_time("yaw_rate", "added", "lateral", "sideslip"),
     },
     "double_lane_change": {
         "figure_14_double_lane_change_course": tracks.course_figure,
@@ -82,7 +82,7 @@ def figure_7(recording: RecordingLike) -> Figure:
     gain = _number(_parameters(recording, "controllers", "ars"), "prediction_gain", 1.0)
     speed_mps = np.linspace(0.0, TOP_SPEED_MPS, 400)
     ratio, _, _ = single_track.rear_prediction(speed_mps)
-    figure = new_figure(width_in=style.COLUMN_IN, height_in=2.6)
+    figure = new_figure(width_in=over_time.COLUMN_IN, height_in=2.6)
     axis: Axes = figure.subplots()
     axis.axhline(0.0, color="#999999", linewidth=0.8)
     axis.plot(3.6 * speed_mps, ratio, color=RUN_COLOURS[1], linewidth=1.6, label="keeps sideslip at zero (eq. 5)")
@@ -92,20 +92,14 @@ def figure_7(recording: RecordingLike) -> Figure:
     zero = np.flatnonzero((ratio[:-1] < 0.0) & (ratio[1:] >= 0.0))
     if zero.size:
         at = 3.6 * float(np.interp(0.0, ratio[zero[0] : zero[0] + 2], speed_mps[zero[0] : zero[0] + 2]))
-        axis.annotate(
-            f"{at:.0f} km/h", (at, 0.0), (10, -16), textcoords="offset points", color="#555555",
-            fontsize=style.TEXT_PT,
-            arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.8},
-        )  # fmt: skip
+        arrow = {"arrowstyle": "-", "color": "#999999", "linewidth": 0.8}
+        over_time.note(axis, f"{at:.0f} km/h", (at, 0.0), (10, -16), arrowprops=arrow)
     for text, offset in (("in phase", 6), ("opposed", -12)):
-        axis.annotate(
-            text, (0.0, 0.0), (4, offset), textcoords="offset points", ha="left", color="#555555",
-            fontsize=style.TEXT_PT,
-        )  # fmt: skip
-    style.plain(axis, "rear angle over front angle,\nsteady [deg/deg]")
+        over_time.note(axis, text, (0.0, 0.0), (4, offset), ha="left")
+    over_time.plain(axis, "rear angle over front angle,\nsteady [deg/deg]")
     axis.set_xlabel("speed [km/h]")
     axis.set_xlim(0.0, 3.6 * TOP_SPEED_MPS)
-    style.name_curves(figure, axis)
+    over_time.name_curves(figure, axis)
     return figure
 
 
@@ -118,7 +112,7 @@ def figure_9(recording: RecordingLike) -> Figure:
         bands.setdefault(band, []).append(system)
     end = 1.6 * max(full for _, full in bands)
     error_radps = np.linspace(-end, end, 1001)
-    figure = new_figure(width_in=style.COLUMN_IN, height_in=2.6)
+    figure = new_figure(width_in=over_time.COLUMN_IN, height_in=2.6)
     axis: Axes = figure.subplots()
     for (off, full), systems in bands.items():
         colour = RUN_COLOURS[list(SYSTEM_LABELS).index(systems[0])] if len(systems) == 1 else RUN_COLOURS[0]
@@ -127,15 +121,13 @@ def figure_9(recording: RecordingLike) -> Figure:
         axis.plot(np.degrees(error_radps), activity, color=colour, linewidth=1.6, label=label)
         for name, value in (("off", off), ("in", full)):
             axis.axvline(math.degrees(value), color=colour, linewidth=0.8, linestyle=":")
-            axis.annotate(
-                f"$c_{{{name}}}$ = {math.degrees(value):.3g} deg/s", (math.degrees(value), 0.5), (3, 0), rotation=90,
-                textcoords="offset points", va="center", fontsize=style.TEXT_PT, color="#555555",
-            )  # fmt: skip
-    style.plain(axis, "activity of the corrector [-]")
+            text = f"$c_{{{name}}}$ = {math.degrees(value):.3g} deg/s"
+            over_time.note(axis, text, (math.degrees(value), 0.5), (3, 0), rotation=90, va="center")
+    over_time.plain(axis, "activity of the corrector [-]")
     axis.set_xlabel("yaw rate error, desired less actual [deg/s]")
     axis.set_xlim(-math.degrees(end), math.degrees(end))
     axis.set_ylim(-0.05, 1.12)
-    style.name_curves(figure, axis)
+    over_time.name_curves(figure, axis)
     return figure
 
 
@@ -174,7 +166,7 @@ OF_ANY_RUN: Final = {
 
 BY_KIND: Final[dict[str, Draw]] = {
     "step_steer": figure_11,
-    "sine_with_dwell": _over_time("steering_wheel", "yaw_rate", "added", "lateral", "sideslip", instants=True),
+    "sine_with_dwell": _over_time("steering_wheel", "yaw_rate", "added", "lateral", "sideslip"),
     "lane_change": tracks.overview,
     "slalom": tracks.overview,
     "follow_path": tracks.overview,

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis import lanes
-from activesteer.analysis.claims.scorecard import TRACK
-from activesteer.analysis.figures import over_time, style
-from activesteer.analysis.figures.style import DrawnRun
+from activesteer.analysis.figures import over_time
+from activesteer.analysis.figures.over_time import PAGE_IN, TEXT_PT, DrawnRun, drawn_runs
 from activesteer.analysis.lanes import CourseView, view_of
 from activesteer.analysis.source import RecordingLike, read_course, read_footprint
 from activesteer.drawing.panels import PANELS
@@ -29,7 +28,6 @@ PANELS_BELOW_TRACK: Final = ("steering_wheel", "yaw_rate", "added", "lateral", "
 LANE_COLOUR: Final = "#f0e6c8"
 CONE_COLOUR: Final = "#e69f00"
 STRUCK_COLOUR: Final = "#b3261e"
-WIDTH_IN: Final = style.PAGE_IN
 CARS: Final = 12
 """Most outlines of a car along the course."""
 COURSE_ASPECT: Final = 0.2
@@ -39,35 +37,33 @@ TRACK_ASPECT: Final = 0.35
 
 def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Draw the course: path, lanes with their sizes, cones. The axis names the factor that stretches y."""
-    course = read_course(style.curves(recordings)[0].recording)
-    figure = new_figure(width_in=WIDTH_IN, height_in=0.65 + _axis_height_in(course, COURSE_ASPECT))
+    course = read_course(drawn_runs(recordings)[0].recording)
+    figure = new_figure(width_in=PAGE_IN, height_in=0.65 + _axis_height_in(course, COURSE_ASPECT))
     axis: Axes = figure.subplots()
     _draw_course(axis, course, COURSE_ASPECT)
     for lane in course.lanes:
         text = f"{lane.name}\n" if lane.name else ""
-        axis.annotate(
-            f"{text}{lane.end_x_m - lane.start_x_m:.1f} m x {lane.left_y_m - lane.right_y_m:.2f} m",
-            (0.5 * (lane.start_x_m + lane.end_x_m), lane.left_y_m), (0, 5), textcoords="offset points",
-            ha="center", va="bottom", fontsize=style.TEXT_PT, color="#444444",
-        )  # fmt: skip
+        size = f"{lane.end_x_m - lane.start_x_m:.1f} m x {lane.left_y_m - lane.right_y_m:.2f} m"
+        middle = 0.5 * (lane.start_x_m + lane.end_x_m), lane.left_y_m
+        over_time.note(axis, text + size, middle, (0, 5), ha="center", va="bottom", color="#444444")
     return figure
 
 
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Draw tracks of the front axle centre along the course. The axis names the factor that stretches y."""
-    course = read_course(style.curves(recordings)[0].recording)
-    figure = new_figure(width_in=WIDTH_IN, height_in=0.95 + _axis_height_in(course, TRACK_ASPECT))
+    course = read_course(drawn_runs(recordings)[0].recording)
+    figure = new_figure(width_in=PAGE_IN, height_in=0.95 + _axis_height_in(course, TRACK_ASPECT))
     axis: Axes = figure.subplots()
     _draw_tracks(axis, recordings)
-    style.name_curves(figure, axis)
+    over_time.name_curves(figure, axis)
     return figure
 
 
 def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Draw tracks, and below them the actions of driver, car and systems over time."""
-    drawn = style.curves(recordings)
-    panels = style.present([PANELS[name] for name in PANELS_BELOW_TRACK], drawn)
-    figure = new_figure(width_in=WIDTH_IN, height_in=3.2 + 1.15 * len(panels))
+    drawn = drawn_runs(recordings)
+    panels = over_time.present([PANELS[name] for name in PANELS_BELOW_TRACK], drawn)
+    figure = new_figure(width_in=PAGE_IN, height_in=3.2 + 1.15 * len(panels))
     grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[2.6, *(1.0 for _ in panels)])
     above = figure.add_subplot(grid[0])
     _draw_tracks(above, recordings)
@@ -78,18 +74,22 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     figure.align_ylabels(axes)
-    style.name_curves(figure, above)
+    over_time.name_curves(figure, above)
     return figure
 
 
 def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
     """Draw the course, and the track of the front axle centre of every run."""
-    drawn = style.curves(recordings)
+    drawn = drawn_runs(recordings)
     for curve in drawn:
-        style.draw_band(axis, curve, TRACK[1])
-        x, y = (style.thinned(values) for values in lanes.front_axle(curve.recording))
+        x, y = (over_time.thinned(values) for values in lanes.front_axle(curve.recording))
         axis.plot(
-            x, y, color=curve.look.colour, linewidth=style.LINE_PT, linestyle=curve.linestyle, label=curve.look.label
+            x,
+            y,
+            color=curve.look.colour,
+            linewidth=over_time.LINE_PT,
+            linestyle=curve.linestyle,
+            label=curve.look.label,
         )
     course = read_course(drawn[0].recording)
     struck = lanes.struck_cones([curve.recording for curve in drawn], course)
@@ -126,8 +126,8 @@ def _draw_friction(axis: Axes, curve: DrawnRun) -> None:
     for piece in pieces:
         axis.add_patch(
             Polygon(
-                piece.corners_m, closed=True, facecolor=style.PATCH_COLOUR, edgecolor="none", zorder=-1,
-                label=style.friction_label(min(mu[piece.area]), max(mu[piece.area])),
+                piece.corners_m, closed=True, facecolor=over_time.PATCH_COLOUR, edgecolor="none", zorder=-1,
+                label=over_time.friction_label(min(mu[piece.area]), max(mu[piece.area])),
             )
         )  # fmt: skip
 
@@ -162,10 +162,8 @@ def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.b
         )
         shown.append(axis.get_lines()[-1])
         names.append("cone hit")
-    axis.legend(
-        shown, names, loc="upper right", fontsize=style.TEXT_PT, frameon=False, handlelength=1.8, labelspacing=0.25
-    )
-    style.plain(axis)
+    axis.legend(shown, names, loc="upper right", fontsize=TEXT_PT, frameon=False, handlelength=1.8, labelspacing=0.25)
+    over_time.plain(axis)
     axis.set_xlim(view.x_m)
     axis.set_ylim(view.y_m)
     axis.set_xlabel("x [m]")
@@ -183,4 +181,4 @@ def _stretch(view: CourseView, aspect: float) -> int:
 def _axis_height_in(course: Course, aspect: float) -> float:
     view = view_of(course)
     (left, right), (low, high) = view.x_m, view.y_m
-    return (WIDTH_IN - 0.9) * _stretch(view, aspect) * (high - low) / (right - left)
+    return (PAGE_IN - 0.9) * _stretch(view, aspect) * (high - low) / (right - left)

@@ -9,16 +9,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.analysis import sine_with_dwell
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
-from activesteer.analysis.report.groups import Group, ReportedRun, entry
+from activesteer.analysis.report.groups import Group, ReportedRun
+from activesteer.analysis.sine_with_dwell import marks
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.core.conventions import Array
 from activesteer.drawing import wheel_angles
 from activesteer.drawing.panels import PATH_DISTANCE, REPORT, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
-from activesteer.recording.contents import events_of
 from activesteer.road.course import CONE_RADIUS_M, Course
 
 RATE_HZ: Final = 200.0
@@ -64,7 +63,7 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
             for run in group.runs
         ],
         "panels": panels,
-        "marks": _marks(group),
+        "marks": [{"time_s": at_s, "text": text} for at_s, text in marks(group.runs[0].recording)],
         "track": _track(group, grid),
     }
 
@@ -130,21 +129,6 @@ def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
     numbers = np.round(np.where(finite, values, 0.0), decimals) + 0.0  # no -0.0
     listed = [int(number) if number == int(number) else number for number in numbers.tolist()]
     return [number if exists else None for number, exists in zip(listed, finite.tolist(), strict=True)]
-
-
-def _marks(group: Group) -> list[dict[str, Any]]:
-    """Return the instants of a standard's criterion, or those at which phases begin in the first run."""
-    recording = group.runs[0].recording
-    if entry(recording, "maneuver", "kind") != "sine_with_dwell":
-        events = events_of(recording.metadata)
-        return [{"time_s": event.time_s, "text": event.what} for event in events if event.kind == "phase"]
-    try:
-        completion_s = sine_with_dwell.steering(recording).completion_s
-    except RecordingError:
-        # An incomplete run has no such instants, but it can be shown.
-        return []
-    later = [{"time_s": completion_s + s, "text": f"+{s:.2f} s"} for s in sine_with_dwell.INSTANTS_S]
-    return [{"time_s": completion_s, "text": "end of steer"}, *later]
 
 
 def _track(group: Group, grid: Array) -> dict[str, Any] | None:

@@ -23,7 +23,6 @@ from activesteer.errors import ParameterError
 from activesteer.pages import render
 from activesteer.recording import Recording
 from activesteer.recording.contents import events_of
-from activesteer.theory.proportions import percent
 
 TITLE: Final = "activesteer report"
 _VERDICT_LOOK: Final = {
@@ -66,10 +65,7 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
     every = [run.recording for run in runs]
     file_titles, files = file_rows(groups)
     cards = [section["scorecard"] for section in sections]
-    everything = Scorecard(
-        tuple(item for card in cards for item in card.judged),
-        next((card.population for card in cards if card.population is not None), None),
-    )
+    everything = Scorecard(tuple(item for card in cards for item in card.judged))
     return render(
         "report.html",
         title=TITLE if several else f"{TITLE}: {groups[0].title}",
@@ -82,11 +78,8 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
         verdict_class={verdict: look[0] for verdict, look in _VERDICT_LOOK.items()},
         verdict_mark={verdict: look[1] for verdict, look in _VERDICT_LOOK.items()},
         change_mark=_CHANGE_MARK,
-        by_proportion=everything.by_proportion(),
-        population=everything.population,
         number_lines=number_lines,
         typeset=typeset,
-        percent=percent,
         friction_utilisation_notes=lambda runs: notes({run.name: run.recording.metrics for run in runs}),
         names=[f"{group.name} {run.name}" if several else run.name for group in groups for run in group.runs],
         vehicle=rows(every, "vehicle"),

@@ -17,7 +17,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.handling import Handling
 from activesteer.analysis.source import RecordingLike
 from activesteer.analysis.tables import comparison
 from activesteer.controllers import SingleTrackParameters
@@ -51,13 +50,13 @@ class Identification:
     """
 
     vehicle: str
-    tests: dict[str, Handling]
+    tests: dict[str, dict[str, float]]
     single_track: SingleTrackParameters
     two_track: TwoTrackParameters
 
     def table(self) -> str:
         """Return all as text: a column per test, then the keys of [single_track] and [two_track]."""
-        shown = comparison({name: handling._asdict() for name, handling in self.tests.items()})
+        shown = comparison(self.tests)
         for name, lines in self.lines().items():
             shown += "\n".join([f"\n\n[{name}]", *(f"{key} = {value}" for key, value in lines.items())])
         return shown
@@ -71,7 +70,7 @@ class Identification:
         metrics = [
             {"name": name.rpartition("_")[0], "test": test, "value": value * unit.factor, "unit": unit.name}
             for test, handling in self.tests.items()
-            for name, value in handling._asdict().items()
+            for name, value in handling.items()
             if not math.isnan(value)
             for unit in (metric(name).unit,)
         ]

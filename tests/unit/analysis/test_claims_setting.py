@@ -63,12 +63,11 @@ def test_runs_of_the_paper_s_setting_are_judged_and_those_with_other_cones_are_n
     assert claims_for(run_of("slalom", {**overrides, "cones.spacing_m": 30.0})) is None
 
 
-def test_the_paper_s_setting_has_its_own_list_and_no_population():
+def test_the_paper_s_setting_has_its_own_list():
     fails = read_setting(PAPER).fails
     claims = [Claim(statement, number not in fails, {}) for number, statement in STATEMENTS.items()]
     card = scorecard(claims, "compact", setting=PAPER)
     assert card.exit_status == 0
-    assert card.population is None
     assert card.to_json()["setting"] == PAPER
     assert {item.claim.id for item in card.judged if item.verdict is Verdict.NOT_REPRODUCED} == set(fails)
 

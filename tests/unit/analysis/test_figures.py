@@ -16,7 +16,6 @@ from activesteer.analysis.figures import (
     figure_11,
     figure_for,
     over_time,
-    style,
     tracks,
 )
 from activesteer.core.conventions import run_looks
@@ -132,7 +131,7 @@ def test_curves_are_told_apart_in_grey_by_their_dashes(draw):
 def test_every_text_is_of_8_points_in_a_figure_as_wide_as_a_column_or_a_page(draw):
     figure = draw()
     figure.draw_without_rendering()
-    assert figure.get_figwidth() in (style.COLUMN_IN, style.PAGE_IN)
+    assert figure.get_figwidth() in (over_time.COLUMN_IN, over_time.PAGE_IN)
     texts = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
     assert len(texts) > 10
     assert min(text.get_fontsize() for text in texts) >= 8.0

@@ -208,16 +208,6 @@ def test_claims_are_judged_where_the_three_systems_are_there(page):
     assert "The claims of the paper are not judged: no run of ars, afs" in words  # the sine with dwell
 
 
-def test_proportions_of_the_stored_population_stand_beside_the_claims_of_its_car():
-    runs = step_steers()
-    for run in runs.values():
-        run.metadata["vehicle"] = {**run.metadata["vehicle"], "name": "compact"}
-    words = Page(report_page(runs, MADE)).words
-    assert words.count("population: ") == 5
-    assert "population: depends, in 16 % (12 to 21 %), more often with sensors.preset = ideal" in words
-    assert "For 250 other cars, roads and drivers" in words
-
-
 @pytest.mark.parametrize(
     ("change", "reason"),
     [

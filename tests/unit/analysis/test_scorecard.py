@@ -8,9 +8,8 @@ import math
 import pytest
 
 from activesteer.analysis.claims.judge import Claim, Statement
-from activesteer.analysis.claims.scorecard import ClaimProportion, Population, Verdict, not_reproduced, scorecard
+from activesteer.analysis.claims.scorecard import Verdict, not_reproduced, scorecard
 from activesteer.errors import ParameterError
-from activesteer.theory.proportions import percent
 from tests.raising import raises
 
 
@@ -56,7 +55,7 @@ def test_all_passed():
 def test_json_has_the_keys_and_no_nan():
     table = scorecard([claim("L1", False, none_x_m=math.nan, ars_x_m=1.0)], known={}).to_json()
     entry = table["claims"][0]
-    keys = {"id", "text", "passed", "values", "criterion", "verdict", "reason", "kind", "obstacle", "population"}
+    keys = {"id", "text", "passed", "values", "criterion", "verdict", "reason", "kind", "obstacle"}
     assert keys == set(entry)
     assert entry["values"] == {"none_x_m": None, "ars_x_m": 1.0}
     assert table["verdicts"]["failed"] == 1
@@ -99,38 +98,3 @@ def test_a_wrong_list_is_refused(text, key, tmp_path):
     path.write_text(text)
     with raises(ParameterError, file="list.toml", key=key):
         not_reproduced("compact", path)
-
-
-def test_the_share_of_the_population_stands_beside_the_nominal_verdict():
-    proportions = (
-        ClaimProportion("S1", True, 100, 0.99, 0.95, 1.0),
-        ClaimProportion("S2", True, 100, 0.5, 0.4, 0.6, "road.mu", 0.3, 1),
-        ClaimProportion("D1", False, 100, 0.0, 0.0, 0.04),
-    )
-    population = Population(100, 1, "compact", proportions)
-    claims = [claim("S1", True), claim("S2", True), claim("D1", False), claim("D2", True)]
-    card = scorecard(claims, known={"D1": "why"}, population=population)
-    lines = card.to_text().splitlines()
-    assert "S1  passed            99 %  holds          text of S1" in lines
-    assert "D1  not reproduced     0 %  does not hold  text of D1" in lines
-    assert "D2  passed                                 text of D2" in lines
-    assert lines[-3:] == ["  holds          S1", "  depends        S2 (road.mu)", "  does not hold  D1"]
-    first, *_, last = card.to_json()["claims"]
-    assert (first["population"]["verdict"], first["population"]["share"]) == ("holds", 0.99)
-    assert last["population"] is None
-
-
-def test_a_car_without_a_population_has_no_shares():
-    assert "population" not in scorecard([claim("S1", True)], "a car that nobody knows").to_text()
-
-
-def test_a_small_share_is_not_rounded_to_another_one():
-    assert [percent(count / 500) for count in (0, 1, 3, 5, 210, 497, 500)] == [
-        "0",
-        "0.2",
-        "0.6",
-        "1",
-        "42",
-        "99.4",
-        "100",
-    ]

@@ -13,8 +13,7 @@ from scipy.io import savemat
 
 from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
-from activesteer.measured import foreign_files
-from activesteer.measured.columns import csv_columns, find, read_columns
+from activesteer.measured.columns import FOREIGN_READERS, csv_columns, find, read_columns
 from activesteer.measured.importing import import_file
 from activesteer.measured.signals import suspicions
 from activesteer.playback.runs import runs_of
@@ -129,7 +128,7 @@ def written_by(name: str, path: Path) -> Path:
 @pytest.mark.parametrize("name", ["csv", "mat", "parquet", "mf4"])
 def test_too_many_rows_are_refused_before_one_is_read(tmp_path, monkeypatch, name):
     path = written_by(name, tmp_path / f"a.{name}")
-    read = csv_columns if name == "csv" else foreign_files.READERS[f".{name}"]
+    read = csv_columns if name == "csv" else FOREIGN_READERS[f".{name}"]
     assert len(read(path)) in (1, 2)
     monkeypatch.setattr("activesteer.core.limits.MAX_ROWS", len(TIME_S) - 1)
     for reader in ("pyarrow.csv.read_csv", "scipy.io.loadmat", "pyarrow.parquet.ParquetFile.read"):
@@ -145,7 +144,7 @@ def test_a_parquet_column_of_texts_is_not_read(tmp_path, monkeypatch):
     parquet.write_table(table, path)
     monkeypatch.setattr("pyarrow.parquet.ParquetFile.read", lambda *_, **__: pytest.fail("read"))
     with raises(RecordingError) as refused:
-        find(foreign_files.READERS[".parquet"](path), "yaw_rate_radps", path).read()
+        find(FOREIGN_READERS[".parquet"](path), "yaw_rate_radps", path).read()
     assert "its type is string" in str(refused.value)
 
 

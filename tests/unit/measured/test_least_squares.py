@@ -52,8 +52,8 @@ def test_of_100_intervals_95_hold_the_truth(rng, alike, stated):
     held = np.zeros(2)
     for _ in range(100):
         found = found_with([autoregressive(rng, alike) for _ in range(2)])
-        known = intervals(found.after, found.slopes, FREE, stated=stated)
-        held += np.abs(found.place - TRUTH) < known.half_widths
+        half_widths, *_ = intervals(found.after, found.slopes, FREE, stated=stated)
+        held += np.abs(found.place - TRUTH) < half_widths
     # Three standard deviations of a share of 95 % in 100 are 6.5; alike noise is known from few independent samples.
     assert np.all(held >= (88 if alike == 0.0 else 84))
     assert np.all(held <= 100 if alike else held < 100)
@@ -62,8 +62,8 @@ def test_of_100_intervals_95_hold_the_truth(rng, alike, stated):
 def test_noise_that_is_alike_would_otherwise_be_taken_for_more_than_it_is(rng):
     found = found_with([autoregressive(rng, 0.8) for _ in range(2)])
     told, stated = (intervals(found.after, found.slopes, FREE, stated=stated) for stated in (False, True))
-    assert np.all(told.half_widths > 2.0 * stated.half_widths)  # sqrt(9), but for what 400 samples say of it
-    assert sum(told.independent) < 0.25 * sum(stated.independent)
+    assert np.all(told[0] > 2.0 * stated[0])  # sqrt(9), but for what 400 samples say of it
+    assert sum(told[2]) < 0.25 * sum(stated[2])
 
 
 @pytest.mark.parametrize(("alike", "time"), [(0.0, 1.0), (0.5, 3.0), (0.8, 9.0)])
@@ -79,19 +79,19 @@ def test_what_stays_on_one_side_counts_as_little():
 
 def test_a_parameter_at_an_end_of_its_range_has_no_interval_and_the_other_one_keeps_its_own():
     found = found_with([0.1, 0.1])
-    both = intervals(found.after, found.slopes, FREE, stated=True)
-    one = intervals(found.after, found.slopes, np.array([True, False]), stated=True)
-    assert np.isnan(one.half_widths[1])
-    assert one.half_widths[0] < both.half_widths[0]  # nothing is lost to the other one
-    assert np.isnan(one.correlations[0, 1])
+    both, *_ = intervals(found.after, found.slopes, FREE, stated=True)
+    one, correlations, *_ = intervals(found.after, found.slopes, np.array([True, False]), stated=True)
+    assert np.isnan(one[1])
+    assert one[0] < both[0]  # nothing is lost to the other one
+    assert np.isnan(correlations[0, 1])
 
 
 def test_the_correlation_is_that_of_the_normal_equations():
     slopes = [np.column_stack([np.ones(50), np.ones(50) + 0.1 * np.resize([1.0, -1.0], 50)])]
-    known = intervals([np.ones(50)], slopes, FREE, stated=True)
+    half_widths, correlations, *_ = intervals([np.ones(50)], slopes, FREE, stated=True)
     # J^T J = 50 [[1, 1], [1, 1.01]]: the errors' correlation is -1/sqrt(1.01).
-    assert known.correlations[0, 1] == pytest.approx(-1.0 / np.sqrt(1.01))
-    assert known.half_widths[1] == pytest.approx(1.96 / np.sqrt(50.0 * 0.01), rel=1e-3)
+    assert correlations[0, 1] == pytest.approx(-1.0 / np.sqrt(1.01))
+    assert half_widths[1] == pytest.approx(1.96 / np.sqrt(50.0 * 0.01), rel=1e-3)
 
 
 def test_what_cannot_be_told_is_named():

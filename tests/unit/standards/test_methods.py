@@ -130,9 +130,9 @@ def test_understeer_of_a_held_steering_wheel(side):
         "yaw_rate_radps": side * curvature * speed, "sideslip_rad": zero, "roll_rad": 0.01 * ay,
     })  # fmt: skip
     found = evaluate(run, car)
-    assert found.understeer_gradient_radpmps2 == pytest.approx(gradient, rel=1e-6)
-    assert found.steer_gradient_radpmps2 == pytest.approx(0.0, abs=1e-9)
-    assert found.roll_gradient_radpmps2 == pytest.approx(0.01, rel=1e-6)
+    assert found["understeer_gradient_radpmps2"] == pytest.approx(gradient, rel=1e-6)
+    assert found["steer_gradient_radpmps2"] == pytest.approx(0.0, abs=1e-9)
+    assert found["roll_gradient_radpmps2"] == pytest.approx(0.01, rel=1e-6)
 
 
 def test_weave_of_sines_with_a_known_lag():

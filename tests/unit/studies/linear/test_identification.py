@@ -9,7 +9,6 @@ import shutil
 import numpy as np
 import pytest
 
-from activesteer.analysis.handling import Handling
 from activesteer.config import read_toml
 from activesteer.controllers import SingleTrackParameters
 from activesteer.core.files import json_text
@@ -21,7 +20,7 @@ from tests.unit.analysis.synthetic import step_steer
 
 DEGPG = math.radians(1.0) / 9.81
 PARAMETERS = SingleTrackParameters(1400.0, 2100.0, 1.1, 1.5, 90e3, 140e3, 23.0)
-HANDLING = Handling(
+HANDLING = dict(
     understeer_gradient_radpmps2=2.5 * DEGPG,
     steer_gradient_radpmps2=5.0 * DEGPG,
     ackermann_gradient_radpmps2=2.5 * DEGPG,

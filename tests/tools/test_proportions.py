@@ -6,8 +6,8 @@ import pytest
 from scipy.stats import binomtest
 
 from activesteer.errors import ParameterError
-from activesteer.theory.proportions import ProportionVerdict, proportion_verdict, wilson_interval
 from tests.raising import raises
+from tools.proportions import ProportionVerdict, percent, proportion_verdict, wilson_interval
 
 
 @pytest.mark.parametrize(
@@ -59,3 +59,15 @@ def test_a_few_samples_allow_no_verdict() -> None:
     # 15 of 15 still leave a lower end of 79.6 %.
     assert proportion_verdict(*wilson_interval(15, 15)) is ProportionVerdict.DEPENDS
     assert proportion_verdict(*wilson_interval(16, 16)) is ProportionVerdict.HOLDS
+
+
+def test_a_small_share_is_not_rounded_to_another_one():
+    assert [percent(count / 500) for count in (0, 1, 3, 5, 210, 497, 500)] == [
+        "0",
+        "0.2",
+        "0.6",
+        "1",
+        "42",
+        "99.4",
+        "100",
+    ]
