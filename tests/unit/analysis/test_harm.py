@@ -198,3 +198,8 @@ def test_a_car_that_spins_says_for_how_long_its_actuators_were_at_their_limits(s
     made = [Channel(name, "", "", "vehicle", single=False) for name in channels]
     run = Recording(made, time_s, np.column_stack(list(channels.values())))
     assert list(actuators_at_limit(run)) == said
+
+
+def test_a_recording_without_a_sideslip_angle_says_nothing_about_actuators():
+    made = [Channel("yaw_rate_radps", "", "", "vehicle", single=False)]
+    assert list(actuators_at_limit(Recording(made, [0.0, 0.1], [[0.1], [0.2]]))) == []
