@@ -19,15 +19,7 @@ from activesteer.road.obstacles import Grid
 
 
 class Lane(NamedTuple):
-    """A section between two rows of cones, along the world's x.
-
-    Attributes:
-        name: Its name.
-        start_x_m: Its start [m].
-        end_x_m: Its end [m].
-        right_y_m: Its right edge [m].
-        left_y_m: Its left edge [m].
-    """
+    """A section between two rows of cones, along the world's x [m]."""
 
     name: str
     start_x_m: float
@@ -50,14 +42,10 @@ _ON_SIDE_M: Final = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Path, lanes and cones in the world frame: the car starts at the origin, heading along x.
+    """Path of the centre of gravity, lanes and cones in the world frame.
 
-    Attributes:
-        path: Path of the centre of gravity.
-        lanes: Lanes that the car has to stay in, in the order of travel.
-        cones_m: World x and y of the cones [m], shape (number of cones, 2).
-        last_gate_x_m: World x of the end of the last gate [m]; None for a path without gates.
-        width_m: Width of the road at the points of the path [m]; None if it is not known.
+    The car starts at the origin, heading along x. Lanes come in the order of travel. `cones_m` holds x and y, shape (n,
+    2); `width_m` the width of the road at the points of the path.
     """
 
     path: Path
@@ -78,10 +66,7 @@ class Course:
         return self._outward() != 0.0
 
     def cone_centres_m(self) -> Array:
-        """Return world x and y of the centres of the cones' bases [m], shape (number of cones, 2).
-
-        The cones that mark a lane stand outside it, since a lane is measured between its cones.
-        """
+        """Return world x and y of the cones' bases [m], shape (n, 2). They stand outside the lane that they mark."""
         return np.column_stack([self.cones_m[:, 0], self.cones_m[:, 1] + CONE_RADIUS_M * self._outward()])
 
     def _outward(self) -> Array:
@@ -151,13 +136,7 @@ _RANGE_M: Final = (0.01, 100.0)
 
 
 class Footprint(NamedTuple):
-    """Dimensions of a car. The defaults are usual ones, for drawing a car whose recording holds none.
-
-    Attributes:
-        width_m: Width of the body [m].
-        wheelbase_m: Distance between the axles [m].
-        tyre_width_m: Width of the front and of the rear tyres [m].
-    """
+    """Dimensions of a car, with the widths of front and rear tyres. The defaults are usual ones, for drawing."""
 
     width_m: float = 1.8
     wheelbase_m: float = 2.7

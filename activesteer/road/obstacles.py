@@ -29,15 +29,7 @@ from activesteer.native.records import numbers_type
 
 
 class Grid(NamedTuple):
-    """Heights over distance along the road and distance to the left.
-
-    Attributes:
-        s_m: First distance along the road [m].
-        step_s_m: Distance of the rows [m].
-        d_m: First distance to the left [m].
-        step_d_m: Distance of the columns [m].
-        z_m: Heights [m], shape (rows, columns), at least two of each.
-    """
+    """Heights [m] at even distances along the road (rows) and to the left of its middle (columns), two or more."""
 
     s_m: float
     step_s_m: float
@@ -63,10 +55,7 @@ class Grid(NamedTuple):
 
 
 def summed(fine: Grid, other: Grid) -> Grid:
-    """Return the sum of two grids on the columns and steps of the first one, over the rows of both.
-
-    Beyond its edges each grid is constant.
-    """
+    """Return the sum of two grids, constant beyond their edges, on the steps of the first over the rows of both."""
     first = min(0, round((other.s_m - fine.s_m) / fine.step_s_m))
     last = max(fine.z_m.shape[0], round((other.s[-1] - fine.s_m) / fine.step_s_m) + 1)
     s = fine.s_m + fine.step_s_m * np.arange(first, last)

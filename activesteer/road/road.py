@@ -122,14 +122,7 @@ class Area(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A quadrangle of an area, to be drawn.
-
-    Attributes:
-        area: Index of the area.
-        mu: Friction in its middle [-].
-        corners_m: World x and y of its corners: right and left edge at its start and end, anticlockwise [m], shape
-            (4, 2).
-    """
+    """A quadrangle to be drawn: index of its area, friction in its middle, corners anticlockwise [m], shape (4, 2)."""
 
     area: int
     mu: float

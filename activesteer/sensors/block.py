@@ -28,13 +28,9 @@ _MINUTE_S: Final = 60.0
 
 
 class SensorBlock:
-    """The sensors of one car.
+    """The sensors of one car: `CHAIN` records, and memory from which a run continues bit-identically.
 
-    Attributes:
-        chains: Constants of each sensor, records of `CHAIN`.
-        memory: Memory of all sensors as one array; a run continues from it bit for bit.
-        outputs: Current readings: the members of `Measurement` without its time, a view of the memory.
-        bias_rms: Standard deviation of the offset of each sensor.
+    `outputs` is a view of the memory: the members of `Measurement` without its time.
     """
 
     def __init__(self, sensors: Sensors, timestep_s: float) -> None:

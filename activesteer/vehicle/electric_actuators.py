@@ -235,12 +235,9 @@ def motor_records(motors: Motors, timestep_s: float) -> NDArray[Any]:
 
 
 class ElectricDrive(NamedTuple):
-    """Memory of the electric drive of one car.
+    """Memory of the electric drive of one car; no records and no numbers in `state` without motors.
 
-    Attributes:
-        motors: `MOTOR` records; none for a car without motors.
-        battery: A `BATTERY`, shape (1,).
-        state: A `BATTERY_STATE` followed by a `MOTOR_STATE` for each motor, as numbers; empty without motors.
+    `state` is a `BATTERY_STATE` followed by a `MOTOR_STATE` for each motor, as numbers.
     """
 
     motors: NDArray[Any]

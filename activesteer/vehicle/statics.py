@@ -81,13 +81,7 @@ def _residual(model: mujoco.MjModel, data: mujoco.MjData, free: NDArray[np.intp]
 
 
 class MassProperties(NamedTuple):
-    """Mass properties of a group of bodies.
-
-    Attributes:
-        mass_kg: Mass [kg].
-        cg_m: Centre of gravity in the world frame, shape (3,) [m].
-        inertia_kgm2: Inertia tensor about it, world axes, shape (3, 3) [kg m2].
-    """
+    """Mass, centre of gravity in the world frame, shape (3,), and inertia tensor about it, world axes, shape (3, 3)."""
 
     mass_kg: float
     cg_m: Array

@@ -97,14 +97,10 @@ TAPE: Final = numbers_type(words=("room", "row", "row_bytes", "rows", "pose_ever
 
 
 class Tape:
-    """Memory that steps are recorded in.
+    """Memory that steps are recorded in; it owns what its `TAPE` record, shape (1,), points to.
 
-    Attributes:
-        record: A `TAPE`, shape (1,). `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row.
-            `rows`, `pose_every`: rows recorded so far, and rows between two poses. `position`, `quaternion`: addresses
-            of the next poses.
-        address: Address of the record.
-        memory: Owner of the memory that the addresses point to.
+    `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row. `rows`, `pose_every`: rows
+    recorded so far, and rows between two poses. `position`, `quaternion`: addresses of the next poses.
     """
 
     def __init__(self) -> None:
@@ -269,12 +265,7 @@ def engine_arrays(data: mujoco.MjData) -> dict[str, Array]:
 
 
 class RecordedArrays:
-    """The engine's arrays, the last commands, the measurement, the states of brakes and motors, and the estimate.
-
-    Attributes:
-        commands: Last commands of driver and controller, as `write_commands` leaves them.
-        estimate: Fields of an `Estimate`; empty if none is recorded.
-    """
+    """The engine's arrays, last commands, measurement, states of brakes and motors, and an estimate if recorded."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, measured: Array, brakes: Array, electric: Array
@@ -449,12 +440,7 @@ class ActuatorRecords:
 
 
 class SteeringRates(NamedTuple):
-    """Rates at the road wheels [rad/s], or infinite without such an actuator.
-
-    Attributes:
-        rear: Rear steering.
-        superposition: Front superposition.
-    """
+    """Rates of rear steering and superposition at the road wheels [rad/s], or infinite without such an actuator."""
 
     rear: float
     superposition: float

@@ -44,12 +44,9 @@ _FIT: Final = 2e-3
 
 
 class ToeLinkMap(NamedTuple):
-    """Steer angle and length of a toe link, both from the design position.
+    """Change of length of a toe link over its steer angle, and back, as coefficients of polynomials, shape (DEGREE,).
 
-    Attributes:
-        travel_of_angle: Coefficients of the change of length over the angle, its square ... [m], shape (DEGREE,).
-        angle_of_travel: Coefficients of the inverse map [rad].
-        travel_m: Largest change of length within the limit, to either side [m].
+    `travel_m` is the largest change of length within the limit, to either side.
     """
 
     travel_of_angle: NDArray[np.float64]

@@ -33,14 +33,7 @@ _SECTION = re.compile(r"\[\s*([^\[\]]{1,80}?)\s*\]")
 
 @dataclass(frozen=True)
 class Entry:
-    """One `KEY = value` of a file.
-
-    Attributes:
-        section: Section in upper case, empty before the first one.
-        key: Key in upper case.
-        value: A number, or the text between the quotes.
-        line: Line number, from 1.
-    """
+    """One `KEY = value` of a file: section and key in upper case, a number or the text between quotes, line from 1."""
 
     section: str
     key: str
@@ -197,16 +190,7 @@ def si_factor(quantity: str, units: Mapping[str, float]) -> float:
 
 
 class Coefficient(NamedTuple):
-    """One key of a .tir file.
-
-    Attributes:
-        name: Key as in the file, upper case.
-        section: Section that the writer puts it in.
-        default: Default in SI; None if another quantity replaces it.
-        required: Whether a file without the key is refused.
-        quantity: Kind of quantity, as in `DIMENSIONS`; `1` is a pure number.
-        meaning: One line.
-    """
+    """One key of a .tir file. A default of None means that another quantity replaces it."""
 
     name: str
     section: str

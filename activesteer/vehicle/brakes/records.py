@@ -202,19 +202,7 @@ def brake_setup(
     inertia_kgm2: Sequence[float],
     differential: Sequence[bool],
 ) -> NDArray[Any]:
-    """Build the constants of a car's brakes.
-
-    Args:
-        brakes: The table of the vehicle file.
-        timestep_s: Step of the engine [s].
-        rolling_radius_m: Radius of each wheel that turns its rotation into a speed [m].
-        drive_fraction: Fraction of the drive torque of each wheel.
-        inertia_kgm2: Inertia of each wheel about its axis [kg m2].
-        differential: Whether a differential drives the wheel.
-
-    Returns:
-        A `BRAKE_SETUP`, shape (1,).
-    """
+    """Return the constants of a car's brakes, a `BRAKE_SETUP` of shape (1,). Rows are in the order of `CORNERS`."""
     setup = np.zeros(1, BRAKE_SETUP)
     for part, names in ((brakes.hydraulics, _HYDRAULICS), (brakes.antilock, _ANTILOCK), (brakes.traction, _TRACTION)):
         for name in names:
@@ -233,13 +221,7 @@ def brake_setup(
 
 
 def reset(state: NDArray[Any], setup: NDArray[Any], speed_mps: float) -> None:
-    """Release the brakes of a car that rolls at a speed.
-
-    Args:
-        state: A `BRAKE_STATE`, shape (1,).
-        setup: Its `BRAKE_SETUP`.
-        speed_mps: Speed of car and wheels [m/s].
-    """
+    """Release the brakes, a `BRAKE_STATE` of shape (1,), of a car that rolls at a speed."""
     state[:] = 0
     state["limit_Pa"] = state["allowed_Pa"] = setup["full_pedal_pressure_Pa"]
     state["drive_limit_Nm"] = NO_LIMIT_NM

@@ -70,15 +70,9 @@ class AxialForce(NamedTuple):
 
 
 class Actuator(NamedTuple):
-    """Limits of an actuator that follows a command with a lag.
+    """Limits of an actuator that follows a command with a lag. Torques are infinite if there is no limit.
 
-    Attributes:
-        control: Place of the actuator among the commands and the forces.
-        activation: Place of the actuator among the activations.
-        lag_s: Time constant [s].
-        rate_radps: Largest rate.
-        low_rad: Lower limit of the angle; `high_rad` is the upper one.
-        low_Nm: Lower limit of the torque; `high_Nm` is the upper one. Infinite if there is no limit.
+    `control`: its place among the commands and the forces; `activation`: among the activations.
     """
 
     control: int
