@@ -7,12 +7,13 @@ torque of the superposition. Motor and gear replace the servo's lag and rate lim
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple, Self
 
 import mujoco
 import numpy as np
@@ -272,8 +273,14 @@ STOP_BEYOND: Final = 1.03
 
 @dataclass(frozen=True)
 class ElectricActuator:
-    """A motor behind a gear. Defaults come from the preset."""
+    """A motor behind a gear. Defaults come from the preset. With the model's own actuator, keys have no effect."""
 
+    TABLE: ClassVar[str]
+    """Table of the vehicle file, and of the presets."""
+    MODEL: ClassVar[str]
+    """Preset for the model's own actuator."""
+
+    preset: str
     gear: Annotated[float, Range(0.1, 200.0)] | None = None
     """Turns of the motor per turn of the driven part."""
     friction_torque_Nm: Annotated[float, Range(0.0, 10.0)] | None = None
@@ -302,15 +309,28 @@ class ElectricActuator:
     speed_gain_1ps: Annotated[float, Range(5.0, 700.0)] | None = None
     """Speed loop: rate at which a speed error decays, if the motor is strong enough [1/s]."""
 
-    def refuse_keys(self, problem: str) -> None:
-        """Refuse keys of a motor for an actuator without one."""
+    def __post_init__(self) -> None:
+        """Refuse a key without effect."""
         for item in fields(self):
-            if item.name != "preset" and (value := getattr(self, item.name)) is not None:
-                raise ParameterError(problem, key=item.name, value=value)
+            if not self.has_motor and item.name != "preset" and (value := getattr(self, item.name)) is not None:
+                problem = f"has no effect on the {self.MODEL}, whose numbers are in the model"
+                name = next(iter(presets_of(type(self))))
+                raise ParameterError(f"{problem}; preset {name} has a motor", key=item.name, value=value)
 
-    def filled(self, preset: Mapping[str, Any]) -> Self:
+    @property
+    def has_motor(self) -> bool:
+        """True if a motor moves the part, through a screw or a gear."""
+        return self.preset != self.MODEL
+
+    def resolved(self) -> Self:
         """Return it with the preset's value for every missing key."""
+        preset = presets_of(type(self))[self.preset]
         return replace(self, **{key: value for key, value in preset.items() if getattr(self, key) is None})
+
+    def smooth(self) -> Self:
+        """Return it without play, dry friction and tolerance of the position, within which slopes mean nothing."""
+        loose = [item.name for item in fields(self) if item.name.startswith(_LOOSE)]
+        return replace(self, **dict.fromkeys(loose, 0.0)) if self.has_motor else self
 
     @property
     def voltage_ratio(self) -> float:
@@ -334,12 +354,21 @@ class ElectricActuator:
         }
 
 
-def presets_of(kind: type[ElectricActuator], table: str) -> dict[str, dict[str, Any]]:
+_LOOSE: Final = ("backlash", "friction_torque", "load_friction", "position_tolerance")
+
+
+@functools.cache
+def presets_of(kind: type[ElectricActuator]) -> dict[str, dict[str, Any]]:
     """Return the presets of a kind of actuator: name -> key -> value in SI."""
     given, source = read_toml(Path(__file__).with_name("actuator_presets.toml"))
-    built = {name: build(kind, {"preset": name, **keys}, source, (table, name)) for name, keys in given[table].items()}
-    return {name: {key: value for key, value in vars(preset).items() if value is not None and key != "preset"}
-            for name, preset in built.items()}  # fmt: skip
+    presets = {
+        name: vars(build(kind, {"preset": name, **keys}, source, (kind.TABLE, name)))
+        for name, keys in given[kind.TABLE].items()
+    }
+    return {
+        name: {key: value for key, value in preset.items() if value is not None and key != "preset"}
+        for name, preset in presets.items()
+    }
 
 
 def known(value: float | None) -> float:
@@ -348,12 +377,12 @@ def known(value: float | None) -> float:
     return value
 
 
-_HINGE: Final = "hinge"
-
-
 @dataclass(frozen=True)
 class RearActuator(ElectricActuator):
     """The rear steering actuator. With `hinge` the other keys have no effect."""
+
+    TABLE: ClassVar = "rear_actuator"
+    MODEL: ClassVar = "hinge"
 
     preset: Literal["hinge", "screw_3deg", "screw_10deg"] = "hinge"
     """`hinge`: the model's own; `screw_3deg`, `screw_10deg`: screws in the toe links, with the keys below as overrides.
@@ -371,34 +400,10 @@ class RearActuator(ElectricActuator):
     position_tolerance_m: Annotated[float, Range(0.0, 1e-3)] | None = None
     """Error of the screw's position at which the motor is switched off, if the screw then holds by itself [m]."""
 
-    def __post_init__(self) -> None:
-        """Refuse a key without effect."""
-        if self.preset == _HINGE:
-            self.refuse_keys("has no effect on the hinge, whose numbers are in the model; preset screw_3deg is a screw")
-
-    @property
-    def is_screw(self) -> bool:
-        """True if screws move the toe links."""
-        return self.preset != _HINGE
-
     @property
     def is_central(self) -> bool:
         """True if one screw in the middle moves both toe links."""
-        return self.is_screw and self.resolved().arrangement == "central"
-
-    def smooth(self) -> Self:
-        """Return it without play, dry friction and position tolerance, within which slopes mean nothing."""
-        if not self.is_screw:
-            return self
-        return replace(self, backlash_m=0.0, friction_torque_Nm=0.0, load_friction=0.0, position_tolerance_m=0.0)
-
-    def resolved(self) -> Self:
-        """Return it with the preset's value for every missing key."""
-        return self.filled(PRESETS[self.preset])
-
-
-PRESETS: Final = presets_of(RearActuator, "rear_actuator")
-"""Preset -> defaults of its keys."""
+        return self.has_motor and self.resolved().arrangement == "central"
 
 
 NAME: Final = "superposition"
@@ -411,38 +416,15 @@ _COLUMN: Final = "steering_column"
 class SuperpositionActuator(ElectricActuator):
     """The superposition actuator. With `servo` the other keys have no effect."""
 
+    TABLE: ClassVar = "superposition_actuator"
+    MODEL: ClassVar = "servo"
+
     preset: Literal["servo", "strain_wave"] = "servo"
     """`servo`: the model's own; `strain_wave`: a motor and a strain-wave gear, with the other keys as overrides."""
     lock_torque_Nm: Annotated[float, Range(0.0, 50.0)] | None = None
     """Holding torque of the electromagnetic lock at the motor without supply [N m]."""
     position_tolerance_rad: Annotated[float, Range(0.0, 0.1)] | None = None
     """Error of the angle behind the gear at which the motor is switched off, if the gear then holds by itself [rad]."""
-
-    def __post_init__(self) -> None:
-        """Refuse a key without effect."""
-        if not self.is_geared:
-            self.refuse_keys(
-                "has no effect on the servo, whose numbers are in the model; preset strain_wave has a motor"
-            )
-
-    @property
-    def is_geared(self) -> bool:
-        """True if a motor turns it through a gear."""
-        return self.preset != "servo"
-
-    def smooth(self) -> Self:
-        """Return it without dry friction and angle tolerance, within which slopes mean nothing."""
-        if not self.is_geared:
-            return self
-        return replace(self, friction_torque_Nm=0.0, load_friction=0.0, position_tolerance_rad=0.0)
-
-    def resolved(self) -> Self:
-        """Return it with the preset's value for every missing key."""
-        return self.filled(STRAIN_WAVE)
-
-
-STRAIN_WAVE: Final = presets_of(SuperpositionActuator, "superposition_actuator")["strain_wave"]
-"""Defaults of the preset `strain_wave`."""
 
 
 def fit_motor(spec: mujoco.MjSpec) -> None:

@@ -326,7 +326,7 @@ class VehicleParameters:
                     problem = f"has no effect: motors drive all driven wheels; motors.*.{place} is theirs"
                     raise ParameterError(problem, key=f"powertrain.{key}", value=getattr(engine, key))
         lag = self.factors.servo_lag
-        if lag != 1.0 and self.rear_actuator.is_screw and self.superposition_actuator.is_geared:
+        if lag != 1.0 and self.rear_actuator.has_motor and self.superposition_actuator.has_motor:
             raise ParameterError(
                 "has no effect on screws and a geared motor, whose lag follows from their own numbers",
                 key="factors.servo_lag",

@@ -451,7 +451,7 @@ def steering_rates(model: mujoco.MjModel, parameters: VehicleParameters) -> Stee
     rear, superposition = parameters.rear_actuator, parameters.superposition_actuator
     present = {model.actuator(index).name for index in range(model.nu)}
     front_radps = rear_radps = math.inf
-    if rear.is_screw:
+    if rear.has_motor:
         kind = rear.resolved()
         # The travel of a screw over the angle of its wheel, near the middle.
         rear_radps = min(
@@ -460,7 +460,7 @@ def steering_rates(model: mujoco.MjModel, parameters: VehicleParameters) -> Stee
         )
     elif "rl_steer" in present:
         rear_radps = float(model.actuator("rl_steer").dynprm[1])
-    if superposition.is_geared:
+    if superposition.has_motor:
         front_radps = _speed_radps(superposition.resolved()) / known(superposition.resolved().gear)
     elif NAME in present:
         front_radps = float(model.actuator(NAME).dynprm[1])
