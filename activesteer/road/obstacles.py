@@ -74,7 +74,8 @@ _SHAPES: Final = {
     "cross_slope_ramp": CROSS_SLOPE, "sine_wave": SINE,
 }  # fmt: skip
 Kind = Literal["cosine_bump", "cleat", "kerb", "pothole", "cross_slope_ramp", "sine_wave"]
-_SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
+SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
+"""Name of a side -> its right and left border [m]."""
 FIRST_START_M: Final = 2.0
 """Least distance of an obstacle from the start [m]: the front wheels stand some 1.3 m ahead of the origin."""
 _SMOOTH: Final = ("cosine_bump", "cross_slope_ramp", "sine_wave")
@@ -147,7 +148,7 @@ class Obstacle:
     @property
     def borders(self) -> tuple[float, float]:
         """Right and left border [m], or infinite where there is none."""
-        right, left = _SIDES[self.side]
+        right, left = SIDES[self.side]
         return (right if self.right_m is None else self.right_m), (left if self.left_m is None else self.left_m)
 
     @property

@@ -20,10 +20,10 @@ from activesteer.config import Range, Source, build
 from activesteer.core.conventions import Array
 from activesteer.core.limits import fail, table_of
 from activesteer.core.path import Path
-from activesteer.errors import ManeuverError, RecordingError, nearest_names
+from activesteer.errors import ManeuverError, RecordingError
 from activesteer.road.course import Course, ProfileTable, course_of
 from activesteer.road.crg import unpacked
-from activesteer.road.obstacles import Grid, Obstacle, Roughness, summed
+from activesteer.road.obstacles import SIDES, Grid, Obstacle, Roughness, Side, summed
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 
@@ -31,8 +31,6 @@ _MAX_POINTS: Final = 100_000
 _MAX_LENGTH_M: Final = 100_000.0
 _SAMPLE_M: Final = 0.25
 """Distance of the samples of a banking [m]: bank runs over tens of metres."""
-_SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
-"""Name of a side -> its right and left border [m]."""
 _SLICES: Final = 20
 """Pieces in which a patch with changing friction is drawn."""
 _SLICE_M: Final = 2.0
@@ -52,7 +50,7 @@ class RoadPatch:
     """End along x or along the path, not included [m]."""
     mu: Friction
     """Friction relative to that in the tyre files [-]."""
-    side: str = "both"
+    side: Side = "both"
     """`both`, `left` (y > 0, or left of the path) or `right` (y <= 0)."""
     mu_end: Friction | None = None
     """Friction at the end [-], linear from `mu` at the start. Default: `mu` throughout."""
@@ -63,8 +61,6 @@ class RoadPatch:
             raise ManeuverError(
                 f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
             )
-        if self.side not in _SIDES:
-            raise ManeuverError(f"is {self.side!r}; {nearest_names(self.side, _SIDES)}", key="side", value=self.side)
 
 
 @dataclass(frozen=True)
@@ -274,8 +270,8 @@ class Road:
     def areas(self) -> tuple[Area, ...]:
         """Return the areas whose friction is not `mu`. Where areas overlap, the later one counts."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
-        split = [Area(-math.inf, math.inf, *_SIDES[side], mu) for side, mu in sides if mu is not None]
-        return (*split, *(Area(it.start_m, it.end_m, *_SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
+        split = [Area(-math.inf, math.inf, *SIDES[side], mu) for side, mu in sides if mu is not None]
+        return (*split, *(Area(it.start_m, it.end_m, *SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
         """Return quadrangles that show the areas within a rectangle of the world [m]; later ones hide earlier ones."""
