@@ -15,6 +15,7 @@ from numba import from_dtype, types
 
 from activesteer.core.conventions import Array
 from activesteer.core.signals import Channel
+from activesteer.core.units import unit_of
 from activesteer.native.compilation import compiled_call, inlined
 from activesteer.native.memory import f64_pointer
 from activesteer.vehicle.force_block import sensor_columns
@@ -109,9 +110,9 @@ class Signal(NamedTuple):
     values: Values
 
 
-def signal(group: str, name: str, unit: str, meaning: str, values: Values) -> Signal:
-    """Return a signal of a channel that is stored with 32 bits (see `Channel`)."""
-    return Signal(Channel(name, unit, meaning, group), values)
+def signal(group: str, name: str, meaning: str, values: Values) -> Signal:
+    """Return a signal of a channel that is stored with 32 bits (see `Channel`), in the unit at the end of its name."""
+    return Signal(Channel(name, unit_of(name), meaning, group), values)
 
 
 _ROWS_AT_ONCE: Final = 8
