@@ -297,42 +297,33 @@ class TyreParameters(Mapping[str, float]):
 
 def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
     """Return every coefficient: the given value, the default, or the quantity that replaces it."""
+
+    def fail(key: str, value: float, problem: str) -> ParameterError:
+        return ParameterError(f"is {value:g}; {problem}", file=source, key=key, value=value)
+
     for key, value in given.items():
         if key not in BY_NAME:
             raise ParameterError(
                 f"is not a tyre coefficient; {nearest_names(key, BY_NAME)}", file=source, key=key, value=key
             )
         if not math.isfinite(value):
-            raise ParameterError(f"is {value}; must be finite", file=source, key=key, value=value)
-    missing = [
-        coefficient.name for coefficient in COEFFICIENTS if coefficient.required and coefficient.name not in given
-    ]
-    if missing:
+            raise fail(key, value, "must be finite")
+    if missing := [each.name for each in COEFFICIENTS if each.required and each.name not in given]:
         needed = "it" if len(missing) == 1 else "them"
         raise ParameterError(f"missing; a tyre needs {needed}", file=source, key=", ".join(missing))
-    values = {
-        coefficient.name: float(given.get(coefficient.name, coefficient.default or 0.0)) for coefficient in COEFFICIENTS
-    }
+    values = {each.name: float(given.get(each.name, each.default or 0.0)) for each in COEFFICIENTS}
     if values["FITTYP"] not in _MF_VERSIONS:
-        known = ", ".join(str(version) for version in _MF_VERSIONS)
-        raise ParameterError(
-            f"is {values['FITTYP']:g}; allowed are {known}", file=source, key="FITTYP", value=values["FITTYP"]
-        )
+        raise fail("FITTYP", values["FITTYP"], f"allowed are {', '.join(str(version) for version in _MF_VERSIONS)}")
     _fill(values, given, source)
     for key in _POSITIVE:
         if not (value := values[key]) > 0.0:
-            raise ParameterError(f"is {value:g}; must be greater than 0", file=source, key=key, value=value)
+            raise fail(key, value, "must be greater than 0")
     for low, high in _RANGES:
         if not values[low] < values[high]:
-            raise ParameterError(
-                f"is {values[low]:g}; must be less than {high}, {values[high]:g}",
-                file=source,
-                key=low,
-                value=values[low],
-            )
+            raise fail(low, values[low], f"must be less than {high}, {values[high]:g}")
     for key in ("VXLOW", "FZMIN"):
         if (value := values[key]) < 0.0:
-            raise ParameterError(f"is {value:g}; must not be negative", file=source, key=key, value=value)
+            raise fail(key, value, "must not be negative")
     return values
 
 

@@ -4,7 +4,7 @@ A file states base units; the unit of every other quantity follows from them, so
 millimetres is in newton per millimetre. Magic Formula coefficients are pure numbers in every system of units.
 
 The columns of the table are: key, default, quantity, meaning. A default of `!` means that the file must give the key;
-`-` means that it may be absent and that another quantity replaces it (see `parameters.parameter_array`).
+`-` means that it may be absent and that another quantity replaces it (see `tyre_parameters._fill`).
 The quantity decides how `[UNITS]` of a file is applied; `1` is a pure number.
 
 Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, appendix 3; the names are those of the TNO/Siemens MF-Tyre
@@ -20,11 +20,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from activesteer.config import read_toml
 from activesteer.core import limits
 from activesteer.core.files import read_bytes
 from activesteer.errors import TyreFileError
-
-"""Size of the largest file that is read. Real ones have some tens of kilobytes."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d{1,4})?\Z")
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*\Z")
@@ -132,37 +131,7 @@ def parse(text: str, source: str) -> Syntax:
     return Syntax(tuple(entries), {name: tuple(rows) for name, rows in tables.items()})
 
 
-_LENGTH = {
-    "meter": 1.0, "metre": 1.0, "meters": 1.0, "m": 1.0, "millimeter": 1e-3, "millimetre": 1e-3, "mm": 1e-3,
-    "centimeter": 1e-2, "centimetre": 1e-2, "cm": 1e-2, "kilometer": 1e3, "km": 1e3, "inch": 0.0254, "in": 0.0254,
-    "foot": 0.3048, "ft": 0.3048,
-}  # fmt: skip
-_FORCE = {
-    "newton": 1.0, "newtons": 1.0, "n": 1.0, "kilonewton": 1e3, "knewton": 1e3, "kn": 1e3,
-    "pound_force": 4.4482216152605, "pound": 4.4482216152605, "lbf": 4.4482216152605,
-    "kilogram_force": 9.80665, "kg_force": 9.80665, "kgf": 9.80665,
-}  # fmt: skip
-_ANGLE = {
-    "radian": 1.0, "radians": 1.0, "rad": 1.0, "degree": math.pi / 180, "degrees": math.pi / 180, "deg": math.pi / 180,
-}  # fmt: skip
-_MASS = {
-    "kilogram": 1.0, "kilograms": 1.0, "kg": 1.0, "gram": 1e-3, "g": 1e-3, "tonne": 1e3, "pound_mass": 0.45359237,
-    "pound": 0.45359237, "lbm": 0.45359237, "lb": 0.45359237, "slug": 14.593902937206,
-}  # fmt: skip
-_TIME = {
-    "second": 1.0, "seconds": 1.0, "sec": 1.0, "s": 1.0, "millisecond": 1e-3, "ms": 1e-3, "minute": 60.0, "min": 60.0,
-    "hour": 3600.0,
-}  # fmt: skip
-_PRESSURE = {"pascal": 1.0, "pa": 1.0, "kilopascal": 1e3, "kpa": 1e3, "bar": 1e5, "psi": 6894.757293168}
-
-BASE_UNITS: dict[str, dict[str, float]] = {
-    "LENGTH": _LENGTH,
-    "FORCE": _FORCE,
-    "ANGLE": _ANGLE,
-    "MASS": _MASS,
-    "TIME": _TIME,
-    "PRESSURE": _PRESSURE,
-}
+BASE_UNITS: dict[str, dict[str, float]] = read_toml(Path(__file__).with_name("units.toml"))[0]
 """Keys of `[UNITS]`, the unit names that each accepts (in lower case), and the size of the unit in SI."""
 
 DIMENSIONS: dict[str, dict[str, int]] = {
