@@ -261,9 +261,8 @@ def _force_block(
         sections["curve_axle_wheels"], sections["curves"] = curve_axle_records(model, parameters.curves)
     places: dict[str, tuple[float, int]] = {}
     if parameters.rear_actuator.has_motor:
-        screws = screw_records(model, parameters.rear_actuator.resolved())
-        sections["links"], sections["screws"] = screws.links, screws.screws
-        places |= screws.places
+        resolved = parameters.rear_actuator.resolved()
+        sections["links"], sections["screws"], places = screw_records(model, resolved)
     if parameters.superposition_actuator.has_motor:
         motors = sections.setdefault("screws", [])
         places |= {NAME: (fb.KIND_SCREW, len(motors)), NAME + SPEED_STATE: (fb.KIND_MOTOR, len(motors))}

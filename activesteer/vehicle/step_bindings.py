@@ -37,29 +37,6 @@ _N_WHEELS: Final = len(CORNERS)
 NOTHING, ENGINE, MOTOR = 0, 1, 2
 """Sources of a wheel's drive torque."""
 
-
-class Wheels(NamedTuple):
-    """Actuators of the four wheels, order of `CORNERS`.
-
-    Attributes:
-        drives: Places of the drive torques in `ctrl`.
-        brakes: Places of the brake torques in `ctrl`.
-        drive_fractions: Fraction of the driver's demand that each wheel gets.
-        driven_by: `ENGINE`, `MOTOR` or `NOTHING` for each wheel.
-        spins: Their degrees of freedom of rotation.
-        free_kgm2: Inertia that each wheel carries beside its own with the clutch open.
-        engaged_kgm2: The same in a gear.
-    """
-
-    drives: Sequence[int]
-    brakes: Sequence[int]
-    drive_fractions: Sequence[float]
-    driven_by: Sequence[int]
-    spins: Sequence[int]
-    free_kgm2: Sequence[float]
-    engaged_kgm2: Sequence[float]
-
-
 _INPUTS: Final = {
     "steering_wheel": "steering_wheel", "superposition": "superposition", "rear_left": "rl_steer",
     "rear_right": "rr_steer",
@@ -115,7 +92,7 @@ def bind_step(
     data: mujoco.MjData,
     implicit: NDArray[Any],
     recorded: RawRows,
-    wheels: Wheels,
+    wheels: WheelSet,
     ratio: float,
     sensors: SensorBlock | None,
     brakes: tuple[NDArray[Any], NDArray[Any]],
@@ -145,9 +122,7 @@ def bind_step(
         **{name: find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) for name, actuator in _INPUTS.items()},
         **{name: sensor_columns(model, sensor).start for name, sensor in _SENSORS.items()},
     }
-    for name, value in wheels._asdict().items():
-        bindings[name] = value
-    for name, value in values.items():
+    for name, value in (*wheels.bound.items(), *values.items()):
         bindings[name] = value
     armature = model.dof_armature
     bindings["armature"] = [armature.ctypes.data + dof * armature.strides[0] for dof in wheels.spins]
@@ -314,7 +289,9 @@ class WheelSet:
     """The wheels of a car, in the order of `CORNERS`.
 
     Attributes:
-        torques: Controls of drive and brakes.
+        bound: Fields of `STEP_BINDINGS`: places of the drive and the brake torques in `ctrl`, fraction of the driver's
+            demand, `ENGINE`, `MOTOR` or `NOTHING`, degree of freedom of rotation, and inertia that each wheel carries
+            beside its own with the clutch open and in a gear.
         spins: Their degrees of freedom of rotation.
     """
 
@@ -333,15 +310,17 @@ class WheelSet:
         self.spins: list[int] = model.jnt_dofadr[found(mujoco.mjtObj.mjOBJ_JOINT, "_spin")].tolist()
         engine_kgm2 = parameters.powertrain.inertia_kgm2
         free_kgm2: list[float] = model.dof_armature[self.spins].tolist()
-        self.torques = Wheels(
-            found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_drive"),
-            found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_brake"),
-            parameters.powertrain.wheel_fractions,
-            driven_by,
-            self.spins,
-            free_kgm2,
-            [own + engine_kgm2 * part for own, part in zip(free_kgm2, parameters.engine_fractions, strict=True)],
-        )
+        self.bound: dict[str, Sequence[float]] = {
+            "drives": found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_drive"),
+            "brakes": found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_brake"),
+            "drive_fractions": parameters.powertrain.wheel_fractions,
+            "driven_by": driven_by,
+            "spins": self.spins,
+            "free_kgm2": free_kgm2,
+            "engaged_kgm2": [
+                own + engine_kgm2 * part for own, part in zip(free_kgm2, parameters.engine_fractions, strict=True)
+            ],
+        }
         self._bodies = found(mujoco.mjtObj.mjOBJ_BODY, "_wheel")
 
     def check_driven(self, torques_Nm: Sequence[float]) -> None:
@@ -358,7 +337,7 @@ class WheelSet:
     def apply(self, torques: WheelTorques) -> None:
         """Set the torques of single wheels, at once and without the limits of the engine."""
         numbers = torque_numbers(torques)
-        self._ctrl[self.torques.drives], self._ctrl[self.torques.brakes] = numbers[:4], numbers[4:]
+        self._ctrl[self.bound["drives"]], self._ctrl[self.bound["brakes"]] = numbers[:4], numbers[4:]
 
     def heights_m(self) -> Array:
         """Return the heights of the wheels' centres, shape (4,) [m]: roughly their rolling radii."""
@@ -456,7 +435,7 @@ def steering_rates(model: mujoco.MjModel, parameters: VehicleParameters) -> Stee
         # The travel of a screw over the angle of its wheel, near the middle.
         rear_radps = min(
             _speed_radps(kind) * float(screw["lead_mprad"][0]) / abs(float(screw["travel"][0][0]))
-            for screw in screw_records(model, kind).screws
+            for screw in screw_records(model, kind)[1]
         )
     elif "rl_steer" in present:
         rear_radps = float(model.actuator("rl_steer").dynprm[1])
