@@ -16,12 +16,12 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
 
-from activesteer.config import Range, Source, build
+from activesteer.config import Range, Source, build, check_points
 from activesteer.core.conventions import Array
 from activesteer.core.limits import fail, table_of
 from activesteer.core.path import Path
 from activesteer.errors import ManeuverError, RecordingError
-from activesteer.road.course import Course, ProfileTable, course_of
+from activesteer.road.course import Course, ProfileTable, course_of, sampled
 from activesteer.road.crg import unpacked
 from activesteer.road.obstacles import SIDES, Grid, Obstacle, Roughness, Side, summed
 
@@ -74,11 +74,7 @@ class BankingTable:
 
     def __post_init__(self) -> None:
         """Check the points."""
-        count = len(self.s_m)
-        if count != len(self.bank_rad) or not 2 <= count <= _MAX_POINTS:
-            raise ManeuverError(f"has {count} s_m and {len(self.bank_rad)} bank; 2 to {_MAX_POINTS} of each are needed")
-        if not all(a < b for a, b in zip(self.s_m, self.s_m[1:], strict=False)):
-            raise ManeuverError("does not increase", key="s_m")
+        check_points("s_m", self.s_m, {"bank_rad": self.bank_rad}, Range(2, _MAX_POINTS), ManeuverError)
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
             raise ManeuverError(f"is longer than {_MAX_LENGTH_M:g} m", key="s_m")
         if any(abs(bank) > math.pi / 4.0 for bank in self.bank_rad):
@@ -86,11 +82,8 @@ class BankingTable:
 
     def sampled(self) -> tuple[float, float, Array]:
         """Return first distance, step [m] and cross slopes."""
-        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415 - slow to import, and needed for few roads
-
-        count = max(2, math.ceil((self.s_m[-1] - self.s_m[0]) / _SAMPLE_M) + 1)
-        s, step = np.linspace(self.s_m[0], self.s_m[-1], count, retstep=True)
-        return self.s_m[0], float(step), np.tan(PchipInterpolator(self.s_m, self.bank_rad)(s))
+        step_m, banks_rad = sampled(self.s_m, self.bank_rad, _SAMPLE_M)
+        return self.s_m[0], step_m, np.tan(banks_rad)
 
 
 class Area(NamedTuple):

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.config import Range, build, read_toml
+from activesteer.config import Range, build, check_points, read_toml
 from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
 from activesteer.native.records import numbers_type
@@ -67,18 +67,9 @@ class Motor:
 
     def __post_init__(self) -> None:
         """Check the map and the differential."""
-        count = len(self.speed_radps)
-        if not 2 <= count <= MAX_MAP_POINTS or len(self.torque_Nm) != count:
-            raise ParameterError(
-                f"{count} speeds and {len(self.torque_Nm)} torques given; 2 to {MAX_MAP_POINTS} points are needed, as "
-                "many speeds as torques",
-                key="torque_Nm",
-            )
-        if self.speed_radps[0] != 0.0 or any(right <= left for left, right in pairwise(self.speed_radps)):
-            raise ParameterError(
-                f"is {list(self.speed_radps)} rad/s; speeds that begin at 0 and increase are needed",
-                key="speed_radps",
-            )
+        check_points("speed_radps", self.speed_radps, {"torque_Nm": self.torque_Nm}, Range(2, MAX_MAP_POINTS))
+        if self.speed_radps[0] != 0.0:
+            raise ParameterError(f"begins at {self.speed_radps[0]:g} rad/s; 0 is needed", key="speed_radps")
         if min(self.torque_Nm) < 0.0 or max(self.torque_Nm) == 0.0:
             raise ParameterError(
                 f"is {list(self.torque_Nm)} N m; torques of 0 or more are needed, not all 0", key="torque_Nm"

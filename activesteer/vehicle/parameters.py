@@ -18,12 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Annotated, ClassVar, Final
 
 from numba import types
 
-from activesteer.config import Range
+from activesteer.config import Range, check_points
 from activesteer.errors import ParameterError
 from activesteer.native.compilation import compiled, compiled_call
 from activesteer.native.shared_laws import shared
@@ -86,14 +85,7 @@ class DamperCurve:
 
     def __post_init__(self) -> None:
         """Check the points."""
-        count = len(self.velocity_mps)
-        if not 2 <= count <= MAX_CURVE_POINTS or len(self.force_N) != count:
-            raise ParameterError(
-                f"{count} velocities and {len(self.force_N)} forces given; 2 to {MAX_CURVE_POINTS} points are needed, "
-                "as many velocities as forces"
-            )
-        if any(right <= left for left, right in pairwise(self.velocity_mps)):
-            raise ParameterError(f"the velocities {list(self.velocity_mps)} m/s do not increase")
+        check_points("velocity_mps", self.velocity_mps, {"force_N": self.force_N}, Range(2, MAX_CURVE_POINTS))
 
 
 @dataclass(frozen=True)
