@@ -44,19 +44,6 @@ class Entry:
         return TyreFileError(problem, file=str(source), line=self.line, key=self.key, value=self.value)
 
 
-@dataclass(frozen=True)
-class Syntax:
-    """Content of a .tir file, in its order.
-
-    Attributes:
-        entries: Keys and values.
-        tables: Rows of numbers, by section in upper case (`[SHAPE]`, deflection curves).
-    """
-
-    entries: tuple[Entry, ...]
-    tables: dict[str, tuple[tuple[float, ...], ...]]
-
-
 def read_text(path: Path) -> str:
     """Read a file of limited size as Latin-1, in which every byte is a character."""
     raw = read_bytes(path, TyreFileError, limits.MAX_TYRE_BYTES)
@@ -94,8 +81,8 @@ def _value(text: str) -> float | str:
     return text
 
 
-def parse(text: str, source: str) -> Syntax:
-    """Split a .tir file into its entries and tables."""
+def parse(text: str, source: str) -> tuple[tuple[Entry, ...], dict[str, tuple[tuple[float, ...], ...]]]:
+    """Split a .tir file into its entries, and its rows of numbers by section (`[SHAPE]`, deflection curves)."""
     section = ""
     entries: list[Entry] = []
     tables: dict[str, list[tuple[float, ...]]] = {}
@@ -128,7 +115,7 @@ def parse(text: str, source: str) -> Syntax:
                 f"{what} is neither KEY = value, [SECTION], {{heading}} nor a row of numbers", file=source, line=count
             )
         tables.setdefault(section, []).append(tuple(value for value in row if value is not None))
-    return Syntax(tuple(entries), {name: tuple(rows) for name, rows in tables.items()})
+    return tuple(entries), {name: tuple(rows) for name, rows in tables.items()}
 
 
 BASE_UNITS: dict[str, dict[str, float]] = read_toml(Path(__file__).with_name("units.toml"))[0]
