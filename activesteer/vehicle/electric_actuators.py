@@ -246,18 +246,12 @@ class ElectricDrive(NamedTuple):
         """Allocate the memory of a car that has given no power yet."""
         records = motor_records(motors, timestep_s)
         size = BATTERY_STATE.itemsize + len(records) * MOTOR_STATE.itemsize if len(records) else 0
-        return cls(records, battery_record(battery), np.zeros(size // 8))
+        limits = (battery.discharge_power_W, battery.charge_power_W)
+        most_W = (_UNLIMITED if limit is None else limit for limit in limits)
+        own = np.array([(*most_W, battery.auxiliary_power_W)], BATTERY)
+        return cls(records, own, np.zeros(size // 8))
 
 
-def battery_record(battery: Battery) -> NDArray[Any]:
-    """Return the record of a battery, shape (1,)."""
-    limits = (battery.discharge_power_W, battery.charge_power_W)
-    return np.array(
-        [(*(_UNLIMITED if limit is None else limit for limit in limits), battery.auxiliary_power_W)], BATTERY
-    )
-
-
-Positive = Annotated[float, Range(1e-9)]
 STOP_BEYOND: Final = 1.03
 """Position of the end stops over the travel at the limit: an assumption."""
 
@@ -281,15 +275,15 @@ class ElectricActuator:
     it is self-locking."""
     rotor_inertia_kgm2: Annotated[float, Range(1e-7, 1e-2)] | None = None
     """Inertia of everything that turns with the motor [kg m2]."""
-    peak_torque_Nm: Positive | None = None
+    peak_torque_Nm: _Positive | None = None
     """Highest torque of the motor, by its current limit [N m]."""
-    stall_torque_Nm: Positive | None = None
+    stall_torque_Nm: _Positive | None = None
     """Torque at rest without that limit, at nominal voltage [N m]."""
-    no_load_speed_radps: Positive | None = None
+    no_load_speed_radps: _Positive | None = None
     """Speed at which no torque is left, at nominal voltage [rad/s]."""
-    speed_limit_radps: Positive | None = None
+    speed_limit_radps: _Positive | None = None
     """Highest speed demand of its controller [rad/s]."""
-    nominal_voltage_V: Positive | None = None
+    nominal_voltage_V: _Positive | None = None
     """Voltage of these values [V]."""
     supply_voltage_V: Annotated[float, Range(0.0, 1000.0)] | None = None
     """Supply voltage; 0: unpowered [V]."""

@@ -101,7 +101,9 @@ def mass_properties(
     model: mujoco.MjModel, data: mujoco.MjData | None = None, *, without: Collection[str] = ()
 ) -> MassProperties:
     """Return the mass properties of a car."""
-    placed = _in_design_position(model) if data is None else data
+    placed = mujoco.MjData(model) if data is None else data
+    if data is None:
+        mujoco.mj_fwdPosition(model, placed)
     places, frames = placed.xipos, placed.ximat
     left_out = {0, *(model.body(name).id for name in without)}
     bodies = [body for body in range(model.nbody) if body not in left_out]
@@ -118,12 +120,6 @@ def mass_properties(
 def point_mass_inertia(offset_m: Array) -> Array:
     """Return the inertia tensor, per mass, of a point mass at a distance `offset_m` from a point [m2] (Steiner)."""
     return np.asarray(offset_m @ offset_m * np.eye(3) - np.outer(offset_m, offset_m))
-
-
-def _in_design_position(model: mujoco.MjModel) -> mujoco.MjData:
-    data = mujoco.MjData(model)
-    mujoco.mj_fwdPosition(model, data)
-    return data
 
 
 YAW_DOF: Final = 5

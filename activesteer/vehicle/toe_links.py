@@ -52,12 +52,6 @@ class ToeLinkMap(NamedTuple):
     angle_of_travel: NDArray[np.float64]
     travel_m: float
 
-    def mirrored(self) -> ToeLinkMap:
-        """Return the map of the other side, where angles have the opposite sign."""
-        signs = np.array([(-1.0) ** (power + 1) for power in range(DEGREE)])
-        # travel(-angle), and minus the angle that belongs to a travel.
-        return ToeLinkMap(self.travel_of_angle * signs, -self.angle_of_travel, self.travel_m)
-
 
 def evaluated(coefficients: NDArray[np.float64], x: NDArray[np.float64] | float) -> NDArray[np.float64]:
     """Evaluate a polynomial without a constant term."""

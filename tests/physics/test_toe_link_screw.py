@@ -167,7 +167,7 @@ def test_the_mapping_is_that_of_the_model(vehicle: str, link: str) -> None:
     there_and_back = evaluated(left.angle_of_travel, evaluated(left.travel_of_angle, angles))
     np.testing.assert_allclose(there_and_back, angles, atol=math.radians(0.01))
     np.testing.assert_allclose(
-        evaluated(right.travel_of_angle, angles), evaluated(left.mirrored().travel_of_angle, angles), atol=1e-8
+        evaluated(right.travel_of_angle, angles), evaluated(left.travel_of_angle, -angles), atol=1e-8
     )
     # The compact's toe link is ahead of the wheel: longer steers the left one to the left; the sedan's is behind.
     assert bool(left.travel_of_angle[0] > 0.0) is (vehicle == "compact")

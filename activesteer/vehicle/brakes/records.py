@@ -166,11 +166,11 @@ PER_WHEEL: Final = (
     "demand_Pa", "pressure_Pa", "limit_Pa", "allowed_Pa", "traction_Pa", "phase", "phase_s", "friction_Nm",
     "borne_Nm", "mean_Nm", "regained_mps2", "wheel_mps", "wheel_mps2",
 )  # fmt: skip
-ALONE: Final = (
+_ALONE: Final = (
     "drive_limit_Nm", "traction_Nm", "reference_mps", "offset_mps2", "side_Pa", "steps_left",
     "tcs_active",
 )  # fmt: skip
-BRAKE_STATE: Final = numbers_type(*((name, len(CORNERS)) for name in PER_WHEEL), *ALONE)
+BRAKE_STATE: Final = numbers_type(*((name, len(CORNERS)) for name in PER_WHEEL), *_ALONE)
 """Variables, saved and restored with the engine's state.
 
 demand_Pa: pressure that driver and controller demand;
@@ -185,9 +185,7 @@ control acts; reference_mps: estimated speed of the car; offset_mps2: estimated 
 allowed difference of the front wheels' pressures; steps_left: steps until the next decision.
 """
 
-PLACES: Final = {name: len(CORNERS) * index for index, name in enumerate(PER_WHEEL)} | {
-    name: len(CORNERS) * len(PER_WHEEL) + index for index, name in enumerate(ALONE)
-}
+PLACES: Final = {name: place[1] // 8 for name, place in (BRAKE_STATE.fields or {}).items()}
 """Field of a `BRAKE_STATE` -> its (first) place among the numbers."""
 
 NO_LIMIT_NM: Final = 1e9
