@@ -74,7 +74,7 @@ class BankingTable:
 
     def __post_init__(self) -> None:
         """Check the points."""
-        check_points("s_m", self.s_m, {"bank_rad": self.bank_rad}, Range(2, _MAX_POINTS), ManeuverError)
+        check_points("s_m", self.s_m, {"bank_deg": self.bank_rad}, Range(2, _MAX_POINTS), ManeuverError)
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
             raise ManeuverError(f"is longer than {_MAX_LENGTH_M:g} m", key="s_m")
         if any(abs(bank) > math.pi / 4.0 for bank in self.bank_rad):

@@ -39,7 +39,7 @@ from activesteer.coupling.car.variables import (
 )  # fmt: skip
 from activesteer.errors import ModelError, ParameterError
 from activesteer.scenario import Scenario
-from activesteer.sensors.signal_chain import CHAIN
+from activesteer.sensors.block import CHAIN
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.tyre_parameters import TYRE_RECORD
