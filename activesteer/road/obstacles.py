@@ -78,7 +78,6 @@ SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right":
 """Name of a side -> its right and left border [m]."""
 FIRST_START_M: Final = 2.0
 """Least distance of an obstacle from the start [m]: the front wheels stand some 1.3 m ahead of the origin."""
-_SMOOTH: Final = ("cosine_bump", "cross_slope_ramp", "sine_wave")
 _LONG_M: Final = 1.5
 """Length from which a smooth obstacle hardly bends within the contact patch [m]: ten patches of 0.15 m."""
 
@@ -154,7 +153,7 @@ class Obstacle:
     @property
     def is_smooth(self) -> bool:
         """True if the obstacle hardly bends within the contact patch, so that one point of contact tells enough."""
-        return self.kind in _SMOOTH and self.length_m is not None and self.length_m >= _LONG_M
+        return _SHAPES[self.kind] != PLATEAU and self.length_m is not None and self.length_m >= _LONG_M
 
     def record(self) -> Any:
         """Return the obstacle for the kernels, an `OBSTACLE`."""

@@ -25,7 +25,6 @@ _BAR_PA: Final = 1e5
 _INCH_M: Final = 0.0254
 _LOADS: Final = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """Loads of the table, over the nominal one."""
-_NAMES: Final = {52: "MF 5.2", 60: "MF 6.0", 61: "MF 6.1", 62: "MF 6.2"}
 
 
 def _within(params: TyreParameters, low: str, high: str, widest: float, count: int = 801) -> np.ndarray:
@@ -43,7 +42,7 @@ def key_figures(params: TyreParameters) -> dict[str, Any]:
     loads = [fraction * nominal for fraction in _LOADS if params["FZMIN"] <= fraction * nominal <= params["FZMAX"]]
     return {
         "file": str(params.source) if params.source else None,
-        "version": _NAMES[params.version],
+        "version": f"MF {params.version / 10:.1f}",
         "fittyp": int(params["FITTYP"]),
         "side": params.side,
         "size": size(params),
