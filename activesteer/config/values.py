@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import json
 import math
 import re
@@ -458,6 +459,21 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
 def checked_number(key: str, value: object, limits: Range) -> float:
     """Check the argument `key` of a Python function like a number in a file, and return it."""
     return _scalar(float, value, 1.0, limits, Source(""), (key,))
+
+
+def check_points(
+    key: str, points: Sequence[float], columns: Mapping[str, Sequence[float] | None], count: Range,
+    error: type[ActiveSteerError] = ParameterError,
+) -> None:  # fmt: skip
+    """Refuse points of a curve that do not increase, or of another number, and columns of another length."""
+    if not count.low <= len(points) <= count.high:
+        raise error(f"has {len(points)} points; allowed is {count}", key=key)
+    for before, after in itertools.pairwise(points):
+        if not before < after:
+            raise error(f"does not increase from {before:g} to {after:g}", key=key)
+    for name, column in columns.items():
+        if column is not None and len(column) != len(points):
+            raise error(f"has {len(column)} values beside {len(points)} of {key}", key=name)
 
 
 def to_table(value: Any, *, defaults: bool = True) -> Any:

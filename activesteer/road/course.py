@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.config import Range
+from activesteer.config import Range, check_points
 from activesteer.core.conventions import Array
 from activesteer.core.limits import fail, number, numbers, sequence, table_of, text
 from activesteer.core.path import MIN_CHORD_M, Path
@@ -19,15 +19,7 @@ from activesteer.road.obstacles import Grid
 
 
 class Lane(NamedTuple):
-    """A section between two rows of cones, along the world's x.
-
-    Attributes:
-        name: Its name.
-        start_x_m: Its start [m].
-        end_x_m: Its end [m].
-        right_y_m: Its right edge [m].
-        left_y_m: Its left edge [m].
-    """
+    """A section between two rows of cones, along the world's x [m]."""
 
     name: str
     start_x_m: float
@@ -50,14 +42,10 @@ _ON_SIDE_M: Final = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Path, lanes and cones in the world frame: the car starts at the origin, heading along x.
+    """Path of the centre of gravity, lanes and cones in the world frame.
 
-    Attributes:
-        path: Path of the centre of gravity.
-        lanes: Lanes that the car has to stay in, in the order of travel.
-        cones_m: World x and y of the cones [m], shape (number of cones, 2).
-        last_gate_x_m: World x of the end of the last gate [m]; None for a path without gates.
-        width_m: Width of the road at the points of the path [m]; None if it is not known.
+    The car starts at the origin, heading along x. Lanes come in the order of travel. `cones_m` holds x and y, shape (n,
+    2); `width_m` the width of the road at the points of the path.
     """
 
     path: Path
@@ -78,10 +66,7 @@ class Course:
         return self._outward() != 0.0
 
     def cone_centres_m(self) -> Array:
-        """Return world x and y of the centres of the cones' bases [m], shape (number of cones, 2).
-
-        The cones that mark a lane stand outside it, since a lane is measured between its cones.
-        """
+        """Return world x and y of the cones' bases [m], shape (n, 2). They stand outside the lane that they mark."""
         return np.column_stack([self.cones_m[:, 0], self.cones_m[:, 1] + CONE_RADIUS_M * self._outward()])
 
     def _outward(self) -> Array:
@@ -151,13 +136,7 @@ _RANGE_M: Final = (0.01, 100.0)
 
 
 class Footprint(NamedTuple):
-    """Dimensions of a car. The defaults are usual ones, for drawing a car whose recording holds none.
-
-    Attributes:
-        width_m: Width of the body [m].
-        wheelbase_m: Distance between the axles [m].
-        tyre_width_m: Width of the front and of the rear tyres [m].
-    """
+    """Dimensions of a car, with the widths of front and rear tyres. The defaults are usual ones, for drawing."""
 
     width_m: float = 1.8
     wheelbase_m: float = 2.7
@@ -213,28 +192,25 @@ class ProfileTable:
 
     def __post_init__(self) -> None:
         """Check the points."""
-        count = len(self.s_m)
-        for key in ("left_z_m", "right_z_m"):
-            values = getattr(self, key)
-            if values is not None and len(values) != count:
-                raise ManeuverError(f"has {len(values)} values beside {count} s_m", key=key)
-            if values is not None and any(abs(value) > _HIGHEST_M for value in values):
+        tracks = {"left_z_m": self.left_z_m, "right_z_m": self.right_z_m}
+        check_points("s_m", self.s_m, tracks, Range(2), ManeuverError)
+        for key, values in tracks.items():
+            if any(abs(value) > _HIGHEST_M for value in values or ()):
                 raise ManeuverError(f"is higher than {_HIGHEST_M:g} m", key=key)
-        if count < 2:
-            raise ManeuverError(f"has {count} values; at least 2 are needed", key="s_m")
-        for index in range(1, count):
-            if not self.s_m[index - 1] < self.s_m[index]:
-                problem = f"does not increase from point {index} ({self.s_m[index - 1]:g} m) to {self.s_m[index]:g} m"
-                raise ManeuverError(problem, key="s_m")
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
             raise ManeuverError(f"is {self.s_m[-1] - self.s_m[0]:g} m long, at most {_MAX_LENGTH_M:g} m", key="s_m")
 
     def grid(self) -> Grid:
         """Return the surface."""
-        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415 - slow to import, and needed for few roads
-
-        count = max(2, math.ceil((self.s_m[-1] - self.s_m[0]) / STEP_M) + 1)
-        s, step = np.linspace(self.s_m[0], self.s_m[-1], count, retstep=True)
         right = self.left_z_m if self.right_z_m is None else self.right_z_m
-        columns = [PchipInterpolator(self.s_m, track)(s) for track in (right, self.left_z_m)]
-        return Grid(self.s_m[0], float(step), -0.5 * self.track_m, self.track_m, np.column_stack(columns))
+        (step, right_z), (_, left_z) = (sampled(self.s_m, track, STEP_M) for track in (right, self.left_z_m))
+        return Grid(self.s_m[0], step, -0.5 * self.track_m, self.track_m, np.column_stack([right_z, left_z]))
+
+
+def sampled(s_m: tuple[float, ...], values: tuple[float, ...], step_m: float) -> tuple[float, Array]:
+    """Return the step [m], at most `step_m`, and values at even places of a smooth curve (monotone cubics)."""
+    from scipy.interpolate import PchipInterpolator  # noqa: PLC0415 - slow to import, and needed for few roads
+
+    count = max(2, math.ceil((s_m[-1] - s_m[0]) / step_m) + 1)
+    places, step = np.linspace(s_m[0], s_m[-1], count, retstep=True)
+    return float(step), PchipInterpolator(s_m, values)(places)

@@ -46,22 +46,10 @@ _ZERO, _KEEP_LAST = 1, 2
 
 
 class CrgRoad(NamedTuple):
-    """A surface of an OpenCRG file.
-
-    Attributes:
-        grid: Heights, with slope and banking; s from 0 at the beginning of the reference line.
-        line: The reference line, from the origin along x; None if it is straight.
-    """
+    """Heights from the beginning of the reference line on, and that line, from the origin along x, if it is curved."""
 
     grid: Grid
     line: Path | None
-
-
-class _Blocks(NamedTuple):
-    """A file: block -> its lines, and its data."""
-
-    blocks: dict[str, list[str]]
-    data: bytes
 
 
 def packed(files: Mapping[str, bytes]) -> tuple[str, ...]:
@@ -92,7 +80,7 @@ def unpacked(texts: tuple[str, ...]) -> CrgRoad:
 
 def referenced(content: bytes) -> str | None:
     """Return the name of the file that an OpenCRG file refers to, or None."""
-    lines = _split(content).blocks.get("ROAD_CRG_FILE")
+    lines = _split(content)[0].get("ROAD_CRG_FILE")
     if lines is None:
         return None
     name = "".join(lines)
@@ -103,23 +91,23 @@ def referenced(content: bytes) -> str | None:
 
 def read_crg(name: str, content_of: Callable[[str], bytes]) -> CrgRoad:
     """Read a surface."""
-    file = _split(content_of(name))
-    mods = file.blocks.get("ROAD_CRG_MODS")
+    blocks, data = _split(content_of(name))
+    mods = blocks.get("ROAD_CRG_MODS")
     for _ in range(limits.MAX_CRG_FILES):
-        if "ROAD_CRG_FILE" not in file.blocks:
+        if "ROAD_CRG_FILE" not in blocks:
             break
-        file = _split(content_of("".join(file.blocks["ROAD_CRG_FILE"])))
-        mods = file.blocks.get("ROAD_CRG_MODS") if mods is None else mods
+        blocks, data = _split(content_of("".join(blocks["ROAD_CRG_FILE"])))
+        mods = blocks.get("ROAD_CRG_MODS") if mods is None else mods
     else:
         raise ManeuverError(f"refers to more than {limits.MAX_CRG_FILES} files in a chain")
     for block in ("ROAD_CRG", "KD_DEFINITION"):
-        if block not in file.blocks:
+        if block not in blocks:
             raise ManeuverError(f"is no OpenCRG file: there is no block ${block}")
-    return _road(_values(file.blocks["ROAD_CRG"]), _values(mods or []), file)
+    return _road(_values(blocks["ROAD_CRG"]), _values(mods or []), blocks["KD_DEFINITION"], data)
 
 
-def _split(content: bytes) -> _Blocks:
-    """Split a file into the blocks of its header and its data."""
+def _split(content: bytes) -> tuple[dict[str, list[str]], bytes]:
+    """Split a file into the blocks of its header, block -> its lines, and its data."""
     end = re.search(rb"^\$\$\$\$[^\r\n]*\r?\n", content, re.MULTILINE)
     head = content[: end.start()] if end else content
     blocks: dict[str, list[str]] = {}
@@ -134,7 +122,7 @@ def _split(content: bytes) -> _Blocks:
                 lines = blocks.setdefault(text[1:].split()[0].upper(), [])
         elif text:
             lines.append(text)
-    return _Blocks(blocks, content[end.end() :] if end else b"")
+    return blocks, content[end.end() :] if end else b""
 
 
 def _values(lines: list[str]) -> dict[str, float]:
@@ -157,13 +145,13 @@ def _number(text: str, key: str) -> float:
     return value
 
 
-def _road(head: dict[str, float], mods: dict[str, float], file: _Blocks) -> CrgRoad:
-    columns, form = _columns(file.blocks["KD_DEFINITION"])
+def _road(head: dict[str, float], mods: dict[str, float], definition: list[str], content: bytes) -> CrgRoad:
+    columns, form = _columns(definition)
     scale = {name: mods.get(name, 1.0) for name in _SCALES}
     step = head.get("reference_line_increment", 0.0) * scale["scale_length"]
     if not 1e-3 <= step <= 1000.0:
         raise ManeuverError(f"REFERENCE_LINE_INCREMENT is {step:g} m, 0.001 to 1000 m are allowed")
-    data = _data(file.data, form, len(columns))
+    data = _data(content, form, len(columns))
     limits.check_numbers(data, ManeuverError, key="data")
     if "reference_line_end_u" in head:
         span = (head["reference_line_end_u"] - head.get("reference_line_start_u", 0.0)) * scale["scale_length"]

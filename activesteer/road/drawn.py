@@ -23,13 +23,7 @@ _EDGE_M: Final = 1e-3
 
 
 class DrawnSurface(NamedTuple):
-    """Heights of a surface at places along (rows) and across (columns) the road.
-
-    Attributes:
-        s_m: Distances along the road [m], increasing.
-        d_m: Distances to the left of its middle [m], increasing.
-        z_m: Heights [m], shape (rows, columns).
-    """
+    """Heights, shape (rows, columns), at increasing distances along and to the left of the middle of the road [m]."""
 
     s_m: Array
     d_m: Array
@@ -45,7 +39,7 @@ class DrawnSurface(NamedTuple):
         return {name: np.round(values, 4).tolist() for name, values in self._asdict().items()}
 
     def mesh(self, road: Road) -> tuple[Array, NDArray[np.int64]]:
-        """Return corners in world axes [m], shape (n, 3), and triangles, shape (m, 3), anticlockwise from above.
+        """Return corners in world axes [m], shape (n, 3), and triangles, anticlockwise from above, shape (m, 3).
 
         Each quadrangle is divided along the diagonal that is nearer to level, so that a skew edge is no saw.
         """

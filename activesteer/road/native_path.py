@@ -20,12 +20,7 @@ from activesteer.native.compilation import compiled
 
 
 class PathSearch:
-    """Positions along a path, also before its start and beyond its end.
-
-    Attributes:
-        line: The path as `nearest` and `point_at` take it: distance of its points [m], their world x and y [m], heading
-            at both ends [rad].
-    """
+    """Positions along a path, also before its start and beyond its end. `line` holds the arguments of the kernels."""
 
     def __init__(self, path: Path) -> None:
         """Prepare the arguments of the kernels."""
@@ -132,17 +127,10 @@ _ON_EARLIER_M: Final = 1.0
 
 
 class PathGrid(NamedTuple):
-    """Arguments of `along_path`.
+    """Arguments of `along_path`: corner, side and numbers of the cells, and the path.
 
-    Attributes:
-        x0_m: World x of the grid's corner [m].
-        y0_m: World y of the grid's corner [m].
-        cell_m: Side of a cell [m].
-        columns: Number of cells along x.
-        rows: Number of cells along y.
-        spacing_m: Distance between two points of the path [m].
-        points: World x and y of the points in turn [m], shape (2 n,).
-        cells: Index of the point nearest to each cell's centre, row by row, shape (rows x columns,).
+    `points` holds x and y of its points in turn, shape (2 n,); `cells` the index of the point nearest to each cell's
+    centre, row by row.
     """
 
     x0_m: float

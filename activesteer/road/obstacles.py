@@ -29,15 +29,7 @@ from activesteer.native.records import numbers_type
 
 
 class Grid(NamedTuple):
-    """Heights over distance along the road and distance to the left.
-
-    Attributes:
-        s_m: First distance along the road [m].
-        step_s_m: Distance of the rows [m].
-        d_m: First distance to the left [m].
-        step_d_m: Distance of the columns [m].
-        z_m: Heights [m], shape (rows, columns), at least two of each.
-    """
+    """Heights [m] at even distances along the road (rows) and to the left of its middle (columns), two or more."""
 
     s_m: float
     step_s_m: float
@@ -63,10 +55,7 @@ class Grid(NamedTuple):
 
 
 def summed(fine: Grid, other: Grid) -> Grid:
-    """Return the sum of two grids on the columns and steps of the first one, over the rows of both.
-
-    Beyond its edges each grid is constant.
-    """
+    """Return the sum of two grids, constant beyond their edges, on the steps of the first over the rows of both."""
     first = min(0, round((other.s_m - fine.s_m) / fine.step_s_m))
     last = max(fine.z_m.shape[0], round((other.s[-1] - fine.s_m) / fine.step_s_m) + 1)
     s = fine.s_m + fine.step_s_m * np.arange(first, last)
@@ -85,10 +74,10 @@ _SHAPES: Final = {
     "cross_slope_ramp": CROSS_SLOPE, "sine_wave": SINE,
 }  # fmt: skip
 Kind = Literal["cosine_bump", "cleat", "kerb", "pothole", "cross_slope_ramp", "sine_wave"]
-_SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
+SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
+"""Name of a side -> its right and left border [m]."""
 FIRST_START_M: Final = 2.0
 """Least distance of an obstacle from the start [m]: the front wheels stand some 1.3 m ahead of the origin."""
-_SMOOTH: Final = ("cosine_bump", "cross_slope_ramp", "sine_wave")
 _LONG_M: Final = 1.5
 """Length from which a smooth obstacle hardly bends within the contact patch [m]: ten patches of 0.15 m."""
 
@@ -158,13 +147,13 @@ class Obstacle:
     @property
     def borders(self) -> tuple[float, float]:
         """Right and left border [m], or infinite where there is none."""
-        right, left = _SIDES[self.side]
+        right, left = SIDES[self.side]
         return (right if self.right_m is None else self.right_m), (left if self.left_m is None else self.left_m)
 
     @property
     def is_smooth(self) -> bool:
         """True if the obstacle hardly bends within the contact patch, so that one point of contact tells enough."""
-        return self.kind in _SMOOTH and self.length_m is not None and self.length_m >= _LONG_M
+        return _SHAPES[self.kind] != PLATEAU and self.length_m is not None and self.length_m >= _LONG_M
 
     def record(self) -> Any:
         """Return the obstacle for the kernels, an `OBSTACLE`."""

@@ -16,14 +16,14 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
 
-from activesteer.config import Range, Source, build
+from activesteer.config import Range, Source, build, check_points
 from activesteer.core.conventions import Array
 from activesteer.core.limits import fail, table_of
 from activesteer.core.path import Path
-from activesteer.errors import ManeuverError, RecordingError, nearest_names
-from activesteer.road.course import Course, ProfileTable, course_of
+from activesteer.errors import ManeuverError, RecordingError
+from activesteer.road.course import Course, ProfileTable, course_of, sampled
 from activesteer.road.crg import unpacked
-from activesteer.road.obstacles import Grid, Obstacle, Roughness, summed
+from activesteer.road.obstacles import SIDES, Grid, Obstacle, Roughness, Side, summed
 
 Friction = Annotated[float, Range(0.01, 2.0)]
 
@@ -31,8 +31,6 @@ _MAX_POINTS: Final = 100_000
 _MAX_LENGTH_M: Final = 100_000.0
 _SAMPLE_M: Final = 0.25
 """Distance of the samples of a banking [m]: bank runs over tens of metres."""
-_SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
-"""Name of a side -> its right and left border [m]."""
 _SLICES: Final = 20
 """Pieces in which a patch with changing friction is drawn."""
 _SLICE_M: Final = 2.0
@@ -52,7 +50,7 @@ class RoadPatch:
     """End along x or along the path, not included [m]."""
     mu: Friction
     """Friction relative to that in the tyre files [-]."""
-    side: str = "both"
+    side: Side = "both"
     """`both`, `left` (y > 0, or left of the path) or `right` (y <= 0)."""
     mu_end: Friction | None = None
     """Friction at the end [-], linear from `mu` at the start. Default: `mu` throughout."""
@@ -63,8 +61,6 @@ class RoadPatch:
             raise ManeuverError(
                 f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
             )
-        if self.side not in _SIDES:
-            raise ManeuverError(f"is {self.side!r}; {nearest_names(self.side, _SIDES)}", key="side", value=self.side)
 
 
 @dataclass(frozen=True)
@@ -78,11 +74,7 @@ class BankingTable:
 
     def __post_init__(self) -> None:
         """Check the points."""
-        count = len(self.s_m)
-        if count != len(self.bank_rad) or not 2 <= count <= _MAX_POINTS:
-            raise ManeuverError(f"has {count} s_m and {len(self.bank_rad)} bank; 2 to {_MAX_POINTS} of each are needed")
-        if not all(a < b for a, b in zip(self.s_m, self.s_m[1:], strict=False)):
-            raise ManeuverError("does not increase", key="s_m")
+        check_points("s_m", self.s_m, {"bank_deg": self.bank_rad}, Range(2, _MAX_POINTS), ManeuverError)
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
             raise ManeuverError(f"is longer than {_MAX_LENGTH_M:g} m", key="s_m")
         if any(abs(bank) > math.pi / 4.0 for bank in self.bank_rad):
@@ -90,11 +82,8 @@ class BankingTable:
 
     def sampled(self) -> tuple[float, float, Array]:
         """Return first distance, step [m] and cross slopes."""
-        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415 - slow to import, and needed for few roads
-
-        count = max(2, math.ceil((self.s_m[-1] - self.s_m[0]) / _SAMPLE_M) + 1)
-        s, step = np.linspace(self.s_m[0], self.s_m[-1], count, retstep=True)
-        return self.s_m[0], float(step), np.tan(PchipInterpolator(self.s_m, self.bank_rad)(s))
+        step_m, banks_rad = sampled(self.s_m, self.bank_rad, _SAMPLE_M)
+        return self.s_m[0], step_m, np.tan(banks_rad)
 
 
 class Area(NamedTuple):
@@ -122,14 +111,7 @@ class Area(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A quadrangle of an area, to be drawn.
-
-    Attributes:
-        area: Index of the area.
-        mu: Friction in its middle [-].
-        corners_m: World x and y of its corners: right and left edge at its start and end, anticlockwise [m], shape
-            (4, 2).
-    """
+    """A quadrangle to be drawn: index of its area, friction in its middle, corners anticlockwise [m], shape (4, 2)."""
 
     area: int
     mu: float
@@ -281,8 +263,8 @@ class Road:
     def areas(self) -> tuple[Area, ...]:
         """Return the areas whose friction is not `mu`. Where areas overlap, the later one counts."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
-        split = [Area(-math.inf, math.inf, *_SIDES[side], mu) for side, mu in sides if mu is not None]
-        return (*split, *(Area(it.start_m, it.end_m, *_SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
+        split = [Area(-math.inf, math.inf, *SIDES[side], mu) for side, mu in sides if mu is not None]
+        return (*split, *(Area(it.start_m, it.end_m, *SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
         """Return quadrangles that show the areas within a rectangle of the world [m]; later ones hide earlier ones."""

@@ -5,21 +5,6 @@ Out: measurements with noise, offset, quantisation and delay.
 """
 
 from activesteer.sensors.block import SensorBlock
-from activesteer.sensors.parameters import (
-    AccelerationSensor,
-    AngleSensor,
-    PressureSensor,
-    RateSensor,
-    Sensors,
-    WheelSpeedSensor,
-)
+from activesteer.sensors.parameters import Sensors
 
-__all__ = [
-    "AccelerationSensor",
-    "AngleSensor",
-    "PressureSensor",
-    "RateSensor",
-    "SensorBlock",
-    "Sensors",
-    "WheelSpeedSensor",
-]
+__all__ = ["SensorBlock", "Sensors"]

@@ -24,6 +24,10 @@ _Bandwidth = Annotated[float, Range(0.1, 1e4)]
 class Sensor:
     """Keys that all sensors have; the other keys carry the unit of the measured quantity.
 
+    `noise`: white noise of the samples, rms. `bias`: offset of a run, drawn from the seed, rms over seeds. `drift`:
+    random walk of the offset, rms of its change within a minute. `quantum`: step of quantisation. `limit`: saturation
+    to either side.
+
     The order is: bias and drift are added; the sum is low-pass filtered, sampled, given its noise, limited and
     quantised; the result appears after the delay.
     """
@@ -50,15 +54,10 @@ class RateSensor(Sensor):
     """A sensor of an angular rate."""
 
     noise_radps: _Amount | None = None
-    """White noise of the samples, rms [rad/s]."""
     bias_radps: _Amount | None = None
-    """Offset of a run, drawn from the seed: rms over seeds [rad/s]."""
     drift_radps: _Amount | None = None
-    """Random walk of the offset: rms of its change within a minute [rad/s]."""
     quantum_radps: _Amount | None = None
-    """Step of quantisation [rad/s]."""
     limit_radps: _Amount | None = None
-    """Saturation to either side [rad/s]."""
 
 
 @dataclass(frozen=True)
@@ -79,15 +78,10 @@ class AccelerationSensor(Sensor):
     """A sensor of an acceleration."""
 
     noise_mps2: _Amount | None = None
-    """White noise of the samples, rms [m/s2]."""
     bias_mps2: _Amount | None = None
-    """Offset of a run, drawn from the seed: rms over seeds [m/s2]."""
     drift_mps2: _Amount | None = None
-    """Random walk of the offset: rms of its change within a minute [m/s2]."""
     quantum_mps2: _Amount | None = None
-    """Step of quantisation [m/s2]."""
     limit_mps2: _Amount | None = None
-    """Saturation to either side [m/s2]."""
 
 
 @dataclass(frozen=True)
@@ -95,15 +89,10 @@ class PressureSensor(Sensor):
     """A sensor of a hydraulic pressure."""
 
     noise_Pa: _Amount | None = None
-    """White noise of the samples, rms [Pa]."""
     bias_Pa: _Amount | None = None
-    """Offset of a run, drawn from the seed: rms over seeds [Pa]."""
     drift_Pa: _Amount | None = None
-    """Random walk of the offset: rms of its change within a minute [Pa]."""
     quantum_Pa: _Amount | None = None
-    """Step of quantisation [Pa]."""
     limit_Pa: _Amount | None = None
-    """Saturation to either side [Pa]."""
 
 
 @dataclass(frozen=True)
@@ -111,15 +100,10 @@ class AngleSensor(Sensor):
     """A sensor of an angle."""
 
     noise_rad: _Amount | None = None
-    """White noise of the samples, rms [rad]."""
     bias_rad: _Amount | None = None
-    """Offset of a run, drawn from the seed: rms over seeds [rad]."""
     drift_rad: _Amount | None = None
-    """Random walk of the offset: rms of its change within a minute [rad]."""
     quantum_rad: _Amount | None = None
-    """Step of quantisation [rad]."""
     limit_rad: _Amount | None = None
-    """Saturation to either side [rad]."""
 
 
 RANDOM: Final = ("noise", "bias", "drift")

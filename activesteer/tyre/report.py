@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-import time
+import timeit
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -25,11 +25,15 @@ _BAR_PA: Final = 1e5
 _INCH_M: Final = 0.0254
 _LOADS: Final = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 """Loads of the table, over the nominal one."""
-_NAMES: Final = {52: "MF 5.2", 60: "MF 6.0", 61: "MF 6.1", 62: "MF 6.2"}
 
 
-def _slips(low: float, high: float) -> np.ndarray:
-    return np.linspace(low, high, 1201)
+def _within(params: TyreParameters, low: str, high: str, widest: float, count: int = 801) -> np.ndarray:
+    """Return even values within a range of the file, and not beyond `widest`."""
+    return np.linspace(max(params[low], -widest), min(params[high], widest), count)
+
+
+def _nominal(params: TyreParameters) -> float:
+    return min(max(params["FNOMIN"], params["FZMIN"]), params["FZMAX"])
 
 
 def key_figures(params: TyreParameters) -> dict[str, Any]:
@@ -38,7 +42,7 @@ def key_figures(params: TyreParameters) -> dict[str, Any]:
     loads = [fraction * nominal for fraction in _LOADS if params["FZMIN"] <= fraction * nominal <= params["FZMAX"]]
     return {
         "file": str(params.source) if params.source else None,
-        "version": _NAMES[params.version],
+        "version": f"MF {params.version / 10:.1f}",
         "fittyp": int(params["FITTYP"]),
         "side": params.side,
         "size": size(params),
@@ -55,7 +59,7 @@ def key_figures(params: TyreParameters) -> dict[str, Any]:
             "camber_rad": [params["CAMMIN"], params["CAMMAX"]],
             "pressure_Pa": [params["PRESMIN"], params["PRESMAX"]],
         },
-        "over_load": _over_load(params, np.asarray(loads or [min(max(nominal, params["FZMIN"]), params["FZMAX"])])),
+        "over_load": _over_load(params, np.asarray(loads or [_nominal(params)])),
         "remarks": [f"{what}: {why}" for what, why in remarks(params)],
     }
 
@@ -63,8 +67,8 @@ def key_figures(params: TyreParameters) -> dict[str, Any]:
 def _over_load(params: TyreParameters, loads: np.ndarray) -> dict[str, list[float]]:
     formula = MagicFormula(params)
     rolling = formula.evaluate(loads, 0.0, 0.0)
-    kappa = _slips(max(params["KPUMIN"], -1.0), min(params["KPUMAX"], 1.0))
-    alpha = _slips(max(params["ALPMIN"], -0.6), min(params["ALPMAX"], 0.6))
+    kappa = _within(params, "KPUMIN", "KPUMAX", 1.0, 1201)
+    alpha = _within(params, "ALPMIN", "ALPMAX", 0.6, 1201)
     fx = formula.evaluate(loads[:, None], kappa, 0.0).fx_N / loads[:, None]
     fy = formula.evaluate(loads[:, None], 0.0, alpha).fy_N / loads[:, None]
     columns = {
@@ -197,29 +201,13 @@ def _loads(params: TyreParameters) -> list[float]:
     """Loads of the curves [N], rounded to 100 N, within the range of the file."""
     low, high = params["FZMIN"], params["FZMAX"]
     loads = [max(round(fraction * params["FNOMIN"] / 100.0) * 100.0, 100.0) for fraction in _LOAD_FRACTIONS]
-    return [load for load in loads if low <= load <= high] or [min(max(params["FNOMIN"], low), high)]
-
-
-def _nominal(params: TyreParameters) -> float:
-    return min(max(params["FNOMIN"], params["FZMIN"]), params["FZMAX"])
-
-
-def _within(params: TyreParameters, low: str, high: str, widest: float, count: int = 801) -> np.ndarray:
-    return np.linspace(max(params[low], -widest), min(params[high], widest), count)
-
-
-def _angles(params: TyreParameters) -> np.ndarray:
-    return _within(params, "ALPMIN", "ALPMAX", _WIDEST_ANGLE_RAD)
-
-
-def _slips_of_picture(params: TyreParameters) -> np.ndarray:
-    return _within(params, "KPUMIN", "KPUMAX", _WIDEST_SLIP)
+    return [load for load in loads if low <= load <= high] or [_nominal(params)]
 
 
 def _side_force(formula: MagicFormula) -> Picture:
     """Side force above, aligning moment below; loads on the left, cambers on the right."""
     params, nominal = formula.parameters, _nominal(formula.parameters)
-    alpha = _angles(params)
+    alpha = _within(params, "ALPMIN", "ALPMAX", _WIDEST_ANGLE_RAD)
     cambers = np.unique(
         [np.clip(value, params["CAMMIN"], params["CAMMAX"]) for value in np.linspace(-1, 1, 5) * _WIDEST_CAMBER_RAD]
     )
@@ -243,7 +231,7 @@ def _side_force(formula: MagicFormula) -> Picture:
 
 def _longitudinal_force(formula: MagicFormula) -> Picture:
     params = formula.parameters
-    kappa = _slips_of_picture(params)
+    kappa = _within(params, "KPUMIN", "KPUMAX", _WIDEST_SLIP)
     curves = [
         _curve(100.0 * kappa, formula.evaluate(load, kappa, 0.0).fx_N / 1000.0, colour, f"{load / 1000:g} kN")
         for load, colour in zip(_loads(params), _COLOURS, strict=False)
@@ -290,7 +278,7 @@ def _friction_ellipse(formula: MagicFormula) -> Picture:
 def _combined_slip(formula: MagicFormula) -> Picture:
     """Forces over slip for slip angles, and forces against each other."""
     params = formula.parameters
-    nominal, kappa = _nominal(params), _slips_of_picture(params)
+    nominal, kappa = _nominal(params), _within(params, "KPUMIN", "KPUMAX", _WIDEST_SLIP)
     angles = [math.radians(value) for value in (0, 2, 4, 8, 12)]
     angles = [value for value in angles if params["ALPMIN"] <= -value <= params["ALPMAX"]]
     along, aside, both = [], [], []
@@ -352,23 +340,15 @@ def bench(params: TyreParameters, rounds: int = _ROUNDS) -> dict[str, float]:
     rows = [rng.uniform(low, high, _CALLS) for low, high in ((500, 8000), (-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.05))]
     formula = MagicFormula(params)
     single_calls = _CALLS // 100
-
-    def single() -> None:
-        for _ in range(single_calls):
-            formula.evaluate(4000.0, 0.05, 0.04, 0.02)
-
     return {
         "scalar_us": _best_us(lambda: _scalar_calls(record, _CALLS, pressure), _CALLS, rounds),
         "vectorised_us_per_row": _best_us(lambda: formula.evaluate(*rows), _CALLS, rounds),
-        "python_call_us": _best_us(single, single_calls, rounds),
+        "python_call_us": _best_us(
+            lambda: formula.evaluate(4000.0, 0.05, 0.04, 0.02), single_calls, rounds, calls=single_calls
+        ),
     }
 
 
-def _best_us(function: Callable[[], object], count: int, rounds: int) -> float:
+def _best_us(function: Callable[[], object], count: int, rounds: int, calls: int = 1) -> float:
     function()
-    best = float("inf")
-    for _ in range(rounds):
-        start = time.perf_counter()
-        function()
-        best = min(best, time.perf_counter() - start)
-    return best / count * 1e6
+    return min(timeit.repeat(function, number=calls, repeat=rounds)) / count * 1e6

@@ -13,10 +13,11 @@ from functools import lru_cache
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
+from activesteer.config import Range
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.native.compilation import compiled
 from activesteer.native.records import numbers_type
@@ -30,15 +31,6 @@ from activesteer.tyre.kernels.magic_formula import (
     rolling_rows,
 )
 
-_CHOICES: Final = {
-    "combined_slip": ("weights", "friction_ellipse"),
-    "friction_scales": ("formula", "peaks"),
-    "slip_velocity": ("contact_point", "wheel_centre"),
-    "rolling_radius": ("file", "third_of_deflection"),
-    "trail_load": ("nominal", "scaled"),
-}
-"""Allowed words of a key. The first is the default, the second is 1 in the tyre's record."""
-
 
 @dataclass(frozen=True)
 class TyreConventions:
@@ -50,55 +42,36 @@ class TyreConventions:
     relaxation: bool = True
     """Whether slip builds up over the relaxation length. Without it, forces follow slip within 20 mm of road, except at
     walking speed, where the standing tyre needs its carcass."""
-    combined_slip: str = "weights"
+    combined_slip: Literal["weights", "friction_ellipse"] = "weights"
     """`weights`: the cosine functions of the formula, which are 1 without R.. coefficients in the file;
     `friction_ellipse`: longitudinal and lateral force scaled down to an ellipse by the ratio of the slips."""
-    friction_scales: str = "formula"
+    friction_scales: Literal["formula", "peaks"] = "formula"
     """Effect of the road's friction. `formula`: it scales all that LMUX and LMUY scale. `peaks`: it scales the peaks
     D_x and D_y only, not shifts, trail and residual moment."""
-    slip_velocity: str = "contact_point"
+    slip_velocity: Literal["contact_point", "wheel_centre"] = "contact_point"
     """Point whose lateral velocity is the slip: `contact_point` (with a part from the camber rate) or `wheel_centre`.
     """
-    rolling_radius: str = "file"
+    rolling_radius: Literal["file", "third_of_deflection"] = "file"
     """Effective rolling radius. `file`: from BREFF, DREFF, FREFF. `third_of_deflection`: R_0 less a third of the
     deflection."""
-    trail_load: str = "nominal"
+    trail_load: Literal["nominal", "scaled"] = "nominal"
     """Reference load of the pneumatic trail. `nominal`: FNOMIN. `scaled`: LFZO FNOMIN."""
-    speed_offset_mps: float = 0.0
+    speed_offset_mps: Annotated[float, Range(0.0, 1.0)] = 0.0
     """Speed added to the divisor of slip velocities [m/s], against division by zero; 0.1 m/s makes slips 0.45 % smaller
     at 80 km/h."""
-    reference_friction: float = 1.0
+    reference_friction: Annotated[float, Range(0.1, 2.0)] = 1.0
     """Friction of the road to which the file's peaks belong. The road's friction is divided by it [-]."""
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        for key, words in _CHOICES.items():
-            if (word := getattr(self, key)) not in words:
-                raise ParameterError(f"there is no {word!r}; {nearest_names(str(word), words)}", key=key, value=word)
-        if not 0.0 <= self.speed_offset_mps <= 1.0:
-            raise ParameterError(
-                f"{self.speed_offset_mps:g} m/s is outside 0 to 1 m/s",
-                key="speed_offset_mps",
-                value=self.speed_offset_mps,
-            )
-        if not 0.1 <= self.reference_friction <= 2.0 or not math.isfinite(self.reference_friction):
-            raise ParameterError(
-                f"{self.reference_friction:g} is outside 0.1 to 2",
-                key="reference_friction",
-                value=self.reference_friction,
-            )
 
     def numbers(self) -> dict[str, float]:
         """Numbers for the kernels, by field of the tyre's record."""
-        second = {key: float(getattr(self, key) == words[1]) for key, words in _CHOICES.items()}
         return {
             "CAMBER_OFF": float(not self.camber),
             "RELAXATION_OFF": float(not self.relaxation),
-            "FRICTION_ELLIPSE": second["combined_slip"],
-            "SCALE_PEAKS_ONLY": second["friction_scales"],
-            "SLIP_AT_CENTRE": second["slip_velocity"],
-            "RADIUS_BY_DEFLECTION": second["rolling_radius"],
-            "TRAIL_BY_SCALED_LOAD": second["trail_load"],
+            "FRICTION_ELLIPSE": float(self.combined_slip == "friction_ellipse"),
+            "SCALE_PEAKS_ONLY": float(self.friction_scales == "peaks"),
+            "SLIP_AT_CENTRE": float(self.slip_velocity == "wheel_centre"),
+            "RADIUS_BY_DEFLECTION": float(self.rolling_radius == "third_of_deflection"),
+            "TRAIL_BY_SCALED_LOAD": float(self.trail_load == "scaled"),
             "SPEED_OFFSET": self.speed_offset_mps,
             "REFERENCE_FRICTION": self.reference_friction,
         }
@@ -324,42 +297,33 @@ class TyreParameters(Mapping[str, float]):
 
 def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
     """Return every coefficient: the given value, the default, or the quantity that replaces it."""
+
+    def fail(key: str, value: float, problem: str) -> ParameterError:
+        return ParameterError(f"is {value:g}; {problem}", file=source, key=key, value=value)
+
     for key, value in given.items():
         if key not in BY_NAME:
             raise ParameterError(
                 f"is not a tyre coefficient; {nearest_names(key, BY_NAME)}", file=source, key=key, value=key
             )
         if not math.isfinite(value):
-            raise ParameterError(f"is {value}; must be finite", file=source, key=key, value=value)
-    missing = [
-        coefficient.name for coefficient in COEFFICIENTS if coefficient.required and coefficient.name not in given
-    ]
-    if missing:
+            raise fail(key, value, "must be finite")
+    if missing := [each.name for each in COEFFICIENTS if each.required and each.name not in given]:
         needed = "it" if len(missing) == 1 else "them"
         raise ParameterError(f"missing; a tyre needs {needed}", file=source, key=", ".join(missing))
-    values = {
-        coefficient.name: float(given.get(coefficient.name, coefficient.default or 0.0)) for coefficient in COEFFICIENTS
-    }
+    values = {each.name: float(given.get(each.name, each.default or 0.0)) for each in COEFFICIENTS}
     if values["FITTYP"] not in _MF_VERSIONS:
-        known = ", ".join(str(version) for version in _MF_VERSIONS)
-        raise ParameterError(
-            f"is {values['FITTYP']:g}; allowed are {known}", file=source, key="FITTYP", value=values["FITTYP"]
-        )
+        raise fail("FITTYP", values["FITTYP"], f"allowed are {', '.join(str(version) for version in _MF_VERSIONS)}")
     _fill(values, given, source)
     for key in _POSITIVE:
         if not (value := values[key]) > 0.0:
-            raise ParameterError(f"is {value:g}; must be greater than 0", file=source, key=key, value=value)
+            raise fail(key, value, "must be greater than 0")
     for low, high in _RANGES:
         if not values[low] < values[high]:
-            raise ParameterError(
-                f"is {values[low]:g}; must be less than {high}, {values[high]:g}",
-                file=source,
-                key=low,
-                value=values[low],
-            )
+            raise fail(low, values[low], f"must be less than {high}, {values[high]:g}")
     for key in ("VXLOW", "FZMIN"):
         if (value := values[key]) < 0.0:
-            raise ParameterError(f"is {value:g}; must not be negative", file=source, key=key, value=value)
+            raise fail(key, value, "must not be negative")
     return values
 
 

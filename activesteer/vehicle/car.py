@@ -139,7 +139,7 @@ class Vehicle(Uncopyable):
         ratio = self.parameters.steering.ratio
         self._implicit = ImplicitPlan(model, data)
         self._bindings = bind_step(
-            model, data, self._implicit.plan, self.rows.live(), self.wheels.torques, ratio, self.sensors,
+            model, data, self._implicit.plan, self.rows.live(), self.wheels, ratio, self.sensors,
             self.brakes,
             self.electric,
         )  # fmt: skip

@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.config import Range
+from activesteer.config import Range, check_points
 from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
 from activesteer.native.compilation import inlined
@@ -143,16 +143,10 @@ def upper_triangle(matrix: NDArray[np.float64]) -> tuple[float, ...]:
 
 
 def _check_curves(curves: AxleCurves, over: str, names: tuple[str, ...]) -> None:
-    points = np.array(getattr(curves, over))
-    if not _POINTS.low <= len(points) <= _POINTS.high:
-        raise ParameterError(f"{len(points)} points given; allowed are {_POINTS.low:g} to {_POINTS.high:g}", key=over)
-    if not (np.diff(points) > 0.0).all():
-        raise ParameterError("the points do not increase", key=over)
+    points = getattr(curves, over)
+    check_points(over, points, {name: getattr(curves, name) for name in names}, _POINTS)
     if not points[0] < 0.0 < points[-1]:
         raise ParameterError(f"runs from {points[0]:g} to {points[-1]:g} m; it must contain 0", key=over)
-    for name in names:
-        if len(getattr(curves, name)) != len(points):
-            raise ParameterError(f"{len(getattr(curves, name))} values for {len(points)} points of {over}", key=name)
 
 
 @dataclass(frozen=True)

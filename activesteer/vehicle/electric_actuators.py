@@ -7,18 +7,19 @@ torque of the superposition. Motor and gear replace the servo's lag and rate lim
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple, Self
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.config import Range, build, read_toml
+from activesteer.config import Range, build, check_points, read_toml
 from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
 from activesteer.native.records import numbers_type
@@ -66,18 +67,9 @@ class Motor:
 
     def __post_init__(self) -> None:
         """Check the map and the differential."""
-        count = len(self.speed_radps)
-        if not 2 <= count <= MAX_MAP_POINTS or len(self.torque_Nm) != count:
-            raise ParameterError(
-                f"{count} speeds and {len(self.torque_Nm)} torques given; 2 to {MAX_MAP_POINTS} points are needed, as "
-                "many speeds as torques",
-                key="torque_Nm",
-            )
-        if self.speed_radps[0] != 0.0 or any(right <= left for left, right in pairwise(self.speed_radps)):
-            raise ParameterError(
-                f"is {list(self.speed_radps)} rad/s; speeds that begin at 0 and increase are needed",
-                key="speed_radps",
-            )
+        check_points("speed_radps", self.speed_radps, {"torque_Nm": self.torque_Nm}, Range(2, MAX_MAP_POINTS))
+        if self.speed_radps[0] != 0.0:
+            raise ParameterError(f"begins at {self.speed_radps[0]:g} rad/s; 0 is needed", key="speed_radps")
         if min(self.torque_Nm) < 0.0 or max(self.torque_Nm) == 0.0:
             raise ParameterError(
                 f"is {list(self.torque_Nm)} N m; torques of 0 or more are needed, not all 0", key="torque_Nm"
@@ -235,12 +227,9 @@ def motor_records(motors: Motors, timestep_s: float) -> NDArray[Any]:
 
 
 class ElectricDrive(NamedTuple):
-    """Memory of the electric drive of one car.
+    """Memory of the electric drive of one car; no records and no numbers in `state` without motors.
 
-    Attributes:
-        motors: `MOTOR` records; none for a car without motors.
-        battery: A `BATTERY`, shape (1,).
-        state: A `BATTERY_STATE` followed by a `MOTOR_STATE` for each motor, as numbers; empty without motors.
+    `state` is a `BATTERY_STATE` followed by a `MOTOR_STATE` for each motor, as numbers.
     """
 
     motors: NDArray[Any]
@@ -257,26 +246,26 @@ class ElectricDrive(NamedTuple):
         """Allocate the memory of a car that has given no power yet."""
         records = motor_records(motors, timestep_s)
         size = BATTERY_STATE.itemsize + len(records) * MOTOR_STATE.itemsize if len(records) else 0
-        return cls(records, battery_record(battery), np.zeros(size // 8))
+        limits = (battery.discharge_power_W, battery.charge_power_W)
+        most_W = (_UNLIMITED if limit is None else limit for limit in limits)
+        own = np.array([(*most_W, battery.auxiliary_power_W)], BATTERY)
+        return cls(records, own, np.zeros(size // 8))
 
 
-def battery_record(battery: Battery) -> NDArray[Any]:
-    """Return the record of a battery, shape (1,)."""
-    limits = (battery.discharge_power_W, battery.charge_power_W)
-    return np.array(
-        [(*(_UNLIMITED if limit is None else limit for limit in limits), battery.auxiliary_power_W)], BATTERY
-    )
-
-
-Positive = Annotated[float, Range(1e-9)]
 STOP_BEYOND: Final = 1.03
 """Position of the end stops over the travel at the limit: an assumption."""
 
 
 @dataclass(frozen=True)
 class ElectricActuator:
-    """A motor behind a gear. Defaults come from the preset."""
+    """A motor behind a gear. Defaults come from the preset. With the model's own actuator, keys have no effect."""
 
+    TABLE: ClassVar[str]
+    """Table of the vehicle file, and of the presets."""
+    MODEL: ClassVar[str]
+    """Preset for the model's own actuator."""
+
+    preset: str
     gear: Annotated[float, Range(0.1, 200.0)] | None = None
     """Turns of the motor per turn of the driven part."""
     friction_torque_Nm: Annotated[float, Range(0.0, 10.0)] | None = None
@@ -286,15 +275,15 @@ class ElectricActuator:
     it is self-locking."""
     rotor_inertia_kgm2: Annotated[float, Range(1e-7, 1e-2)] | None = None
     """Inertia of everything that turns with the motor [kg m2]."""
-    peak_torque_Nm: Positive | None = None
+    peak_torque_Nm: _Positive | None = None
     """Highest torque of the motor, by its current limit [N m]."""
-    stall_torque_Nm: Positive | None = None
+    stall_torque_Nm: _Positive | None = None
     """Torque at rest without that limit, at nominal voltage [N m]."""
-    no_load_speed_radps: Positive | None = None
+    no_load_speed_radps: _Positive | None = None
     """Speed at which no torque is left, at nominal voltage [rad/s]."""
-    speed_limit_radps: Positive | None = None
+    speed_limit_radps: _Positive | None = None
     """Highest speed demand of its controller [rad/s]."""
-    nominal_voltage_V: Positive | None = None
+    nominal_voltage_V: _Positive | None = None
     """Voltage of these values [V]."""
     supply_voltage_V: Annotated[float, Range(0.0, 1000.0)] | None = None
     """Supply voltage; 0: unpowered [V]."""
@@ -305,15 +294,28 @@ class ElectricActuator:
     speed_gain_1ps: Annotated[float, Range(5.0, 700.0)] | None = None
     """Speed loop: rate at which a speed error decays, if the motor is strong enough [1/s]."""
 
-    def refuse_keys(self, problem: str) -> None:
-        """Refuse keys of a motor for an actuator without one."""
+    def __post_init__(self) -> None:
+        """Refuse a key without effect."""
         for item in fields(self):
-            if item.name != "preset" and (value := getattr(self, item.name)) is not None:
-                raise ParameterError(problem, key=item.name, value=value)
+            if not self.has_motor and item.name != "preset" and (value := getattr(self, item.name)) is not None:
+                problem = f"has no effect on the {self.MODEL}, whose numbers are in the model"
+                name = next(iter(presets_of(type(self))))
+                raise ParameterError(f"{problem}; preset {name} has a motor", key=item.name, value=value)
 
-    def filled(self, preset: Mapping[str, Any]) -> Self:
+    @property
+    def has_motor(self) -> bool:
+        """True if a motor moves the part, through a screw or a gear."""
+        return self.preset != self.MODEL
+
+    def resolved(self) -> Self:
         """Return it with the preset's value for every missing key."""
+        preset = presets_of(type(self))[self.preset]
         return replace(self, **{key: value for key, value in preset.items() if getattr(self, key) is None})
+
+    def smooth(self) -> Self:
+        """Return it without play, dry friction and tolerance of the position, within which slopes mean nothing."""
+        loose = [item.name for item in fields(self) if item.name.startswith(_LOOSE)]
+        return replace(self, **dict.fromkeys(loose, 0.0)) if self.has_motor else self
 
     @property
     def voltage_ratio(self) -> float:
@@ -337,12 +339,21 @@ class ElectricActuator:
         }
 
 
-def presets_of(kind: type[ElectricActuator], table: str) -> dict[str, dict[str, Any]]:
+_LOOSE: Final = ("backlash", "friction_torque", "load_friction", "position_tolerance")
+
+
+@functools.cache
+def presets_of(kind: type[ElectricActuator]) -> dict[str, dict[str, Any]]:
     """Return the presets of a kind of actuator: name -> key -> value in SI."""
     given, source = read_toml(Path(__file__).with_name("actuator_presets.toml"))
-    built = {name: build(kind, {"preset": name, **keys}, source, (table, name)) for name, keys in given[table].items()}
-    return {name: {key: value for key, value in vars(preset).items() if value is not None and key != "preset"}
-            for name, preset in built.items()}  # fmt: skip
+    presets = {
+        name: vars(build(kind, {"preset": name, **keys}, source, (kind.TABLE, name)))
+        for name, keys in given[kind.TABLE].items()
+    }
+    return {
+        name: {key: value for key, value in preset.items() if value is not None and key != "preset"}
+        for name, preset in presets.items()
+    }
 
 
 def known(value: float | None) -> float:
@@ -351,12 +362,12 @@ def known(value: float | None) -> float:
     return value
 
 
-_HINGE: Final = "hinge"
-
-
 @dataclass(frozen=True)
 class RearActuator(ElectricActuator):
     """The rear steering actuator. With `hinge` the other keys have no effect."""
+
+    TABLE: ClassVar = "rear_actuator"
+    MODEL: ClassVar = "hinge"
 
     preset: Literal["hinge", "screw_3deg", "screw_10deg"] = "hinge"
     """`hinge`: the model's own; `screw_3deg`, `screw_10deg`: screws in the toe links, with the keys below as overrides.
@@ -374,34 +385,10 @@ class RearActuator(ElectricActuator):
     position_tolerance_m: Annotated[float, Range(0.0, 1e-3)] | None = None
     """Error of the screw's position at which the motor is switched off, if the screw then holds by itself [m]."""
 
-    def __post_init__(self) -> None:
-        """Refuse a key without effect."""
-        if self.preset == _HINGE:
-            self.refuse_keys("has no effect on the hinge, whose numbers are in the model; preset screw_3deg is a screw")
-
-    @property
-    def is_screw(self) -> bool:
-        """True if screws move the toe links."""
-        return self.preset != _HINGE
-
     @property
     def is_central(self) -> bool:
         """True if one screw in the middle moves both toe links."""
-        return self.is_screw and self.resolved().arrangement == "central"
-
-    def smooth(self) -> Self:
-        """Return it without play, dry friction and position tolerance, within which slopes mean nothing."""
-        if not self.is_screw:
-            return self
-        return replace(self, backlash_m=0.0, friction_torque_Nm=0.0, load_friction=0.0, position_tolerance_m=0.0)
-
-    def resolved(self) -> Self:
-        """Return it with the preset's value for every missing key."""
-        return self.filled(PRESETS[self.preset])
-
-
-PRESETS: Final = presets_of(RearActuator, "rear_actuator")
-"""Preset -> defaults of its keys."""
+        return self.has_motor and self.resolved().arrangement == "central"
 
 
 NAME: Final = "superposition"
@@ -414,38 +401,15 @@ _COLUMN: Final = "steering_column"
 class SuperpositionActuator(ElectricActuator):
     """The superposition actuator. With `servo` the other keys have no effect."""
 
+    TABLE: ClassVar = "superposition_actuator"
+    MODEL: ClassVar = "servo"
+
     preset: Literal["servo", "strain_wave"] = "servo"
     """`servo`: the model's own; `strain_wave`: a motor and a strain-wave gear, with the other keys as overrides."""
     lock_torque_Nm: Annotated[float, Range(0.0, 50.0)] | None = None
     """Holding torque of the electromagnetic lock at the motor without supply [N m]."""
     position_tolerance_rad: Annotated[float, Range(0.0, 0.1)] | None = None
     """Error of the angle behind the gear at which the motor is switched off, if the gear then holds by itself [rad]."""
-
-    def __post_init__(self) -> None:
-        """Refuse a key without effect."""
-        if not self.is_geared:
-            self.refuse_keys(
-                "has no effect on the servo, whose numbers are in the model; preset strain_wave has a motor"
-            )
-
-    @property
-    def is_geared(self) -> bool:
-        """True if a motor turns it through a gear."""
-        return self.preset != "servo"
-
-    def smooth(self) -> Self:
-        """Return it without dry friction and angle tolerance, within which slopes mean nothing."""
-        if not self.is_geared:
-            return self
-        return replace(self, friction_torque_Nm=0.0, load_friction=0.0, position_tolerance_rad=0.0)
-
-    def resolved(self) -> Self:
-        """Return it with the preset's value for every missing key."""
-        return self.filled(STRAIN_WAVE)
-
-
-STRAIN_WAVE: Final = presets_of(SuperpositionActuator, "superposition_actuator")["strain_wave"]
-"""Defaults of the preset `strain_wave`."""
 
 
 def fit_motor(spec: mujoco.MjSpec) -> None:

@@ -102,14 +102,9 @@ class Faults:
 
 
 class _Acting:
-    """A fault in a car.
+    """A fault in a car, which acts from step `begins` up to `ends`, and listens to the demands from `listens` on.
 
-    Attributes:
-        fault: The fault.
-        begins: Step at which it begins; `ends`: step from which the part works again.
-        delay: Steps by which it delays demands or readings.
-        listens: Step from which on it must know the demands.
-        memory: The last demands for a delay, or the demand at which a brake sticks; see `set_fault`.
+    `delay`: steps by which it delays demands or readings. `memory`: the last of them, see `native_faults.FAULT`.
     """
 
     def __init__(self, fault: Fault, timestep_s: float) -> None:

@@ -117,12 +117,7 @@ def _measure(model: mujoco.MjModel, data: mujoco.MjData, numbers: int) -> Engine
 
 @functools.cache
 def engine_layout() -> EngineLayout:
-    """Return the offsets, measured once per process (see `measure_engine_layout`)."""
-    return measure_engine_layout()
-
-
-def measure_engine_layout() -> EngineLayout:
-    """Measure the offsets and confirm them on a second, different model."""
+    """Return the offsets: measured once per process, and confirmed on a second, different model."""
     first = _measure(*_probe(7919, 0.00123456789), 7919)
     second = _measure(*_probe(6421, 0.00098765432), 6421)
     if first != second:

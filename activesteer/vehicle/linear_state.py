@@ -172,12 +172,8 @@ _MIN_LIKENESS: Final = 0.9
 class Mode:
     """One mode, or a conjugate pair.
 
-    Attributes:
-        name: Name of the part that takes part most; with `parallel` or `opposite` for wheels.
-        eigenvalue_1ps: s [1/s], imaginary part not negative.
-        participation: Participation factors of the parts, largest first; the sum is 1.
-        shape: Right eigenvector, complex, shape (n,).
-        left: Left eigenvector, complex, shape (n,); its product with `shape` is 1.
+    Its name is that of the part that takes part most. The eigenvalue has no negative imaginary part; the participation
+    factors have the sum 1, largest first. `shape` and `left` are right and left eigenvector, whose product is 1.
     """
 
     name: str

@@ -162,9 +162,9 @@ def _compile(
         # `integrator` makes damping implicit; the step must not be damped a second time.
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
         spec.nuserdata = len(CORNERS) * (fb.USERDATA_PER_WHEEL + 1) + 1
-        if parameters.rear_actuator.is_screw:
+        if parameters.rear_actuator.has_motor:
             fit_screws(spec, parameters.rear_actuator.resolved())
-        if parameters.superposition_actuator.is_geared:
+        if parameters.superposition_actuator.has_motor:
             fit_motor(spec)
         if parameters.curves.front or parameters.curves.rear:
             fit_curve_axles(spec, parameters.curves)
@@ -260,11 +260,10 @@ def _force_block(
     if parameters.curves.front or parameters.curves.rear:
         sections["curve_axle_wheels"], sections["curves"] = curve_axle_records(model, parameters.curves)
     places: dict[str, tuple[float, int]] = {}
-    if parameters.rear_actuator.is_screw:
-        screws = screw_records(model, parameters.rear_actuator.resolved())
-        sections["links"], sections["screws"] = screws.links, screws.screws
-        places |= screws.places
-    if parameters.superposition_actuator.is_geared:
+    if parameters.rear_actuator.has_motor:
+        resolved = parameters.rear_actuator.resolved()
+        sections["links"], sections["screws"], places = screw_records(model, resolved)
+    if parameters.superposition_actuator.has_motor:
         motors = sections.setdefault("screws", [])
         places |= {NAME: (fb.KIND_SCREW, len(motors)), NAME + SPEED_STATE: (fb.KIND_MOTOR, len(motors))}
         motors.append(motor_record(model, parameters.superposition_actuator.resolved()))

@@ -107,26 +107,23 @@ _N_GAIN, _N_BIAS = mujoco.mjNGAIN, mujoco.mjNBIAS
 
 
 @inlined
+def _exchange(healthy, index, numbers, place, save):
+    if save:
+        healthy[index] = numbers[place]
+    else:
+        numbers[place] = healthy[index]
+
+
+@inlined
 def exchange_health(part, block, gain, bias, healthy, save):
     """Save the numbers of a part that faults change, or restore them."""
     places = (part.record + _SCALE, part.record + _OFFSET, part.record + _RATE, part.seized, part.backlash)
     for index in range(len(places)):
-        if save:
-            healthy[index] = block[places[index]]
-        else:
-            block[places[index]] = healthy[index]
+        _exchange(healthy, index, block, places[index], save)
     for number in range(_N_GAIN):
-        place = part.actuator * _N_GAIN + number
-        if save:
-            healthy[5 + number] = gain[place]
-        else:
-            gain[place] = healthy[5 + number]
+        _exchange(healthy, 5 + number, gain, part.actuator * _N_GAIN + number, save)
     for number in range(_N_BIAS):
-        place = part.actuator * _N_BIAS + number
-        if save:
-            healthy[5 + _N_GAIN + number] = bias[place]
-        else:
-            bias[place] = healthy[5 + _N_GAIN + number]
+        _exchange(healthy, 5 + _N_GAIN + number, bias, part.actuator * _N_BIAS + number, save)
 
 
 @inlined

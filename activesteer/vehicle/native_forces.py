@@ -375,24 +375,27 @@ def install_native_forces() -> None:
         _install()
 
 
+_SLOTS: Final = (
+    ("mjcb_passive", mujoco.get_mjcb_passive, mujoco.set_mjcb_passive),
+    ("mjcb_act_dyn", mujoco.get_mjcb_act_dyn, mujoco.set_mjcb_act_dyn),
+    ("mjcb_sensor", mujoco.get_mjcb_sensor, mujoco.set_mjcb_sensor),
+)
+
+
 def _install() -> None:
-    slots = (
-        ("mjcb_passive", mujoco.get_mjcb_passive(), mujoco.set_mjcb_passive),
-        ("mjcb_act_dyn", mujoco.get_mjcb_act_dyn(), mujoco.set_mjcb_act_dyn),
-        ("mjcb_sensor", mujoco.get_mjcb_sensor(), mujoco.set_mjcb_sensor),
-    )
-    for name, present, _ in slots:
-        if present is not None and not any(present is ours for ours in _installed):
+    present = [get() for _, get, _ in _SLOTS]
+    for (name, *_), other in zip(_SLOTS, present, strict=True):
+        if other is not None and not any(other is ours for ours in _installed):
             raise ModelError(
-                f"MuJoCo's {name} is already taken by {present!r}; there is one per process and the tyre forces need "
+                f"MuJoCo's {name} is already taken by {other!r}; there is one per process and the tyre forces need "
                 f"it: call mujoco.set_{name}(None) before using activesteer",
                 value=name,
             )
     if not _installed:
         compiled = _make_callbacks(engine_layout())
         _installed.extend(callback.ctypes for callback in compiled)
-    for (_, present, install), ours in zip(slots, _installed, strict=True):
-        if present is None:
+    for (*_, install), before, ours in zip(_SLOTS, present, _installed, strict=True):
+        if before is None:
             install(ours)
     if mujoco.get_mjcb_time() is None:
         mujoco.set_mjcb_time(_no_clock.ctypes)
@@ -400,12 +403,9 @@ def _install() -> None:
 
 def remove_native_forces() -> None:
     """Remove our callbacks from this process, for example to measure the bare engine. Those of others stay."""
-    if any(mujoco.get_mjcb_passive() is ours for ours in _installed):
-        mujoco.set_mjcb_passive(None)
-    if any(mujoco.get_mjcb_act_dyn() is ours for ours in _installed):
-        mujoco.set_mjcb_act_dyn(None)
-    if any(mujoco.get_mjcb_sensor() is ours for ours in _installed):
-        mujoco.set_mjcb_sensor(None)
+    for _, present, install in _SLOTS:
+        if any(present() is ours for ours in _installed):
+            install(None)
     if mujoco.get_mjcb_time() is _no_clock.ctypes:
         mujoco.set_mjcb_time(None)
 

@@ -15,8 +15,7 @@ from activesteer.core.conventions import CORNERS
 from activesteer.core.signals import Measurement, Motion
 from activesteer.native.compilation import compiled_call, inlined
 from activesteer.native.memory import f64_pointer, load_numbers, native_type, pointer_to
-from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
-from activesteer.sensors.signal_chain import CHAIN
+from activesteer.sensors.block import AX, CHAIN, WHEEL_SPEEDS, measured
 from activesteer.vehicle.brakes.brake_control_unit import step_brakes
 from activesteer.vehicle.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.vehicle.channels.native_channels import ENGINE_ARRAYS

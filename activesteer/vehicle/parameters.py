@@ -18,12 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Annotated, ClassVar, Final
 
 from numba import types
 
-from activesteer.config import Range
+from activesteer.config import Range, check_points
 from activesteer.errors import ParameterError
 from activesteer.native.compilation import compiled, compiled_call
 from activesteer.native.shared_laws import shared
@@ -86,14 +85,7 @@ class DamperCurve:
 
     def __post_init__(self) -> None:
         """Check the points."""
-        count = len(self.velocity_mps)
-        if not 2 <= count <= MAX_CURVE_POINTS or len(self.force_N) != count:
-            raise ParameterError(
-                f"{count} velocities and {len(self.force_N)} forces given; 2 to {MAX_CURVE_POINTS} points are needed, "
-                "as many velocities as forces"
-            )
-        if any(right <= left for left, right in pairwise(self.velocity_mps)):
-            raise ParameterError(f"the velocities {list(self.velocity_mps)} m/s do not increase")
+        check_points("velocity_mps", self.velocity_mps, {"force_N": self.force_N}, Range(2, MAX_CURVE_POINTS))
 
 
 @dataclass(frozen=True)
@@ -326,7 +318,7 @@ class VehicleParameters:
                     problem = f"has no effect: motors drive all driven wheels; motors.*.{place} is theirs"
                     raise ParameterError(problem, key=f"powertrain.{key}", value=getattr(engine, key))
         lag = self.factors.servo_lag
-        if lag != 1.0 and self.rear_actuator.is_screw and self.superposition_actuator.is_geared:
+        if lag != 1.0 and self.rear_actuator.has_motor and self.superposition_actuator.has_motor:
             raise ParameterError(
                 "has no effect on screws and a geared motor, whose lag follows from their own numbers",
                 key="factors.servo_lag",

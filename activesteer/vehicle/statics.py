@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterable
 from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from activesteer.core.conventions import Array
 from activesteer.errors import ModelError
@@ -38,15 +38,7 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
     for _ in range(_ITERATIONS):
         if np.abs(residual).max() < _TOLERANCE_N:
             return
-        start = data.qpos.copy()
-        stiffness = np.empty((free.size, free.size))
-        move = np.zeros(model.nv)
-        for column, dof in enumerate(free):
-            move[:] = 0.0
-            move[dof] = _DIFFERENCE
-            mujoco.mj_integratePos(model, data.qpos, move, 1.0)
-            stiffness[:, column] = (_residual(model, data, free) - residual) / _DIFFERENCE
-            data.qpos[:] = start
+        stiffness = slopes(model, data, free, residual, lambda: _residual(model, data, free))
         try:
             step = np.linalg.lstsq(stiffness, -residual, rcond=None)[0]
         except np.linalg.LinAlgError as reason:
@@ -55,9 +47,7 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
             raise ModelError(f"no static equilibrium: the force at joint {joint!r} is not finite") from reason
         largest = np.abs(step).max()
         step *= min(1.0, _LARGEST_STEP / largest) if largest > 0.0 else 0.0
-        move[:] = 0.0
-        move[free] = step
-        mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+        move_by(model, data, free, step)
         smaller = _residual(model, data, free)
         if np.abs(residual).max() < _ROUNDING_N and (
             largest < 1e-12 or np.abs(smaller).max() >= np.abs(residual).max()
@@ -74,6 +64,25 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
     )
 
 
+def move_by(model: mujoco.MjModel, data: mujoco.MjData, dofs: list[int] | NDArray[np.intp], change: ArrayLike) -> None:
+    """Change the position along some degrees of freedom."""
+    move = np.zeros(model.nv)
+    move[dofs] = change
+    mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+
+
+def slopes(
+    model: mujoco.MjModel, data: mujoco.MjData, dofs: Iterable[int], present: Array, value: Callable[[], Array]
+) -> Array:
+    """Return the change of a vector along each degree of freedom, by finite differences; shape (present, dofs)."""
+    start, columns = data.qpos.copy(), []
+    for dof in dofs:
+        move_by(model, data, [dof], _DIFFERENCE)
+        columns.append((value() - present) / _DIFFERENCE)
+        data.qpos[:] = start
+    return np.array(columns).T.copy()
+
+
 def _residual(model: mujoco.MjModel, data: mujoco.MjData, free: NDArray[np.intp]) -> NDArray[np.float64]:
     """Return the generalised force that is not balanced, at rest, shape (free.size,)."""
     mujoco.mj_forward(model, data)
@@ -81,13 +90,7 @@ def _residual(model: mujoco.MjModel, data: mujoco.MjData, free: NDArray[np.intp]
 
 
 class MassProperties(NamedTuple):
-    """Mass properties of a group of bodies.
-
-    Attributes:
-        mass_kg: Mass [kg].
-        cg_m: Centre of gravity in the world frame, shape (3,) [m].
-        inertia_kgm2: Inertia tensor about it, world axes, shape (3, 3) [kg m2].
-    """
+    """Mass, centre of gravity in the world frame, shape (3,), and inertia tensor about it, world axes, shape (3, 3)."""
 
     mass_kg: float
     cg_m: Array
@@ -98,7 +101,9 @@ def mass_properties(
     model: mujoco.MjModel, data: mujoco.MjData | None = None, *, without: Collection[str] = ()
 ) -> MassProperties:
     """Return the mass properties of a car."""
-    placed = _in_design_position(model) if data is None else data
+    placed = mujoco.MjData(model) if data is None else data
+    if data is None:
+        mujoco.mj_fwdPosition(model, placed)
     places, frames = placed.xipos, placed.ximat
     left_out = {0, *(model.body(name).id for name in without)}
     bodies = [body for body in range(model.nbody) if body not in left_out]
@@ -115,12 +120,6 @@ def mass_properties(
 def point_mass_inertia(offset_m: Array) -> Array:
     """Return the inertia tensor, per mass, of a point mass at a distance `offset_m` from a point [m2] (Steiner)."""
     return np.asarray(offset_m @ offset_m * np.eye(3) - np.outer(offset_m, offset_m))
-
-
-def _in_design_position(model: mujoco.MjModel) -> mujoco.MjData:
-    data = mujoco.MjData(model)
-    mujoco.mj_fwdPosition(model, data)
-    return data
 
 
 YAW_DOF: Final = 5

@@ -37,29 +37,6 @@ _N_WHEELS: Final = len(CORNERS)
 NOTHING, ENGINE, MOTOR = 0, 1, 2
 """Sources of a wheel's drive torque."""
 
-
-class Wheels(NamedTuple):
-    """Actuators of the four wheels, order of `CORNERS`.
-
-    Attributes:
-        drives: Places of the drive torques in `ctrl`.
-        brakes: Places of the brake torques in `ctrl`.
-        drive_fractions: Fraction of the driver's demand that each wheel gets.
-        driven_by: `ENGINE`, `MOTOR` or `NOTHING` for each wheel.
-        spins: Their degrees of freedom of rotation.
-        free_kgm2: Inertia that each wheel carries beside its own with the clutch open.
-        engaged_kgm2: The same in a gear.
-    """
-
-    drives: Sequence[int]
-    brakes: Sequence[int]
-    drive_fractions: Sequence[float]
-    driven_by: Sequence[int]
-    spins: Sequence[int]
-    free_kgm2: Sequence[float]
-    engaged_kgm2: Sequence[float]
-
-
 _INPUTS: Final = {
     "steering_wheel": "steering_wheel", "superposition": "superposition", "rear_left": "rl_steer",
     "rear_right": "rr_steer",
@@ -97,14 +74,10 @@ TAPE: Final = numbers_type(words=("room", "row", "row_bytes", "rows", "pose_ever
 
 
 class Tape:
-    """Memory that steps are recorded in.
+    """Memory that steps are recorded in; it owns what its `TAPE` record, shape (1,), points to.
 
-    Attributes:
-        record: A `TAPE`, shape (1,). `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row.
-            `rows`, `pose_every`: rows recorded so far, and rows between two poses. `position`, `quaternion`: addresses
-            of the next poses.
-        address: Address of the record.
-        memory: Owner of the memory that the addresses point to.
+    `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row. `rows`, `pose_every`: rows
+    recorded so far, and rows between two poses. `position`, `quaternion`: addresses of the next poses.
     """
 
     def __init__(self) -> None:
@@ -119,7 +92,7 @@ def bind_step(
     data: mujoco.MjData,
     implicit: NDArray[Any],
     recorded: RawRows,
-    wheels: Wheels,
+    wheels: WheelSet,
     ratio: float,
     sensors: SensorBlock | None,
     brakes: tuple[NDArray[Any], NDArray[Any]],
@@ -149,9 +122,7 @@ def bind_step(
         **{name: find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) for name, actuator in _INPUTS.items()},
         **{name: sensor_columns(model, sensor).start for name, sensor in _SENSORS.items()},
     }
-    for name, value in wheels._asdict().items():
-        bindings[name] = value
-    for name, value in values.items():
+    for name, value in (*wheels.bound.items(), *values.items()):
         bindings[name] = value
     armature = model.dof_armature
     bindings["armature"] = [armature.ctypes.data + dof * armature.strides[0] for dof in wheels.spins]
@@ -269,12 +240,7 @@ def engine_arrays(data: mujoco.MjData) -> dict[str, Array]:
 
 
 class RecordedArrays:
-    """The engine's arrays, the last commands, the measurement, the states of brakes and motors, and the estimate.
-
-    Attributes:
-        commands: Last commands of driver and controller, as `write_commands` leaves them.
-        estimate: Fields of an `Estimate`; empty if none is recorded.
-    """
+    """The engine's arrays, last commands, measurement, states of brakes and motors, and an estimate if recorded."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, measured: Array, brakes: Array, electric: Array
@@ -323,7 +289,9 @@ class WheelSet:
     """The wheels of a car, in the order of `CORNERS`.
 
     Attributes:
-        torques: Controls of drive and brakes.
+        bound: Fields of `STEP_BINDINGS`: places of the drive and the brake torques in `ctrl`, fraction of the driver's
+            demand, `ENGINE`, `MOTOR` or `NOTHING`, degree of freedom of rotation, and inertia that each wheel carries
+            beside its own with the clutch open and in a gear.
         spins: Their degrees of freedom of rotation.
     """
 
@@ -342,15 +310,17 @@ class WheelSet:
         self.spins: list[int] = model.jnt_dofadr[found(mujoco.mjtObj.mjOBJ_JOINT, "_spin")].tolist()
         engine_kgm2 = parameters.powertrain.inertia_kgm2
         free_kgm2: list[float] = model.dof_armature[self.spins].tolist()
-        self.torques = Wheels(
-            found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_drive"),
-            found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_brake"),
-            parameters.powertrain.wheel_fractions,
-            driven_by,
-            self.spins,
-            free_kgm2,
-            [own + engine_kgm2 * part for own, part in zip(free_kgm2, parameters.engine_fractions, strict=True)],
-        )
+        self.bound: dict[str, Sequence[float]] = {
+            "drives": found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_drive"),
+            "brakes": found(mujoco.mjtObj.mjOBJ_ACTUATOR, "_brake"),
+            "drive_fractions": parameters.powertrain.wheel_fractions,
+            "driven_by": driven_by,
+            "spins": self.spins,
+            "free_kgm2": free_kgm2,
+            "engaged_kgm2": [
+                own + engine_kgm2 * part for own, part in zip(free_kgm2, parameters.engine_fractions, strict=True)
+            ],
+        }
         self._bodies = found(mujoco.mjtObj.mjOBJ_BODY, "_wheel")
 
     def check_driven(self, torques_Nm: Sequence[float]) -> None:
@@ -367,7 +337,7 @@ class WheelSet:
     def apply(self, torques: WheelTorques) -> None:
         """Set the torques of single wheels, at once and without the limits of the engine."""
         numbers = torque_numbers(torques)
-        self._ctrl[self.torques.drives], self._ctrl[self.torques.brakes] = numbers[:4], numbers[4:]
+        self._ctrl[self.bound["drives"]], self._ctrl[self.bound["brakes"]] = numbers[:4], numbers[4:]
 
     def heights_m(self) -> Array:
         """Return the heights of the wheels' centres, shape (4,) [m]: roughly their rolling radii."""
@@ -449,12 +419,7 @@ class ActuatorRecords:
 
 
 class SteeringRates(NamedTuple):
-    """Rates at the road wheels [rad/s], or infinite without such an actuator.
-
-    Attributes:
-        rear: Rear steering.
-        superposition: Front superposition.
-    """
+    """Rates of rear steering and superposition at the road wheels [rad/s], or infinite without such an actuator."""
 
     rear: float
     superposition: float
@@ -465,16 +430,16 @@ def steering_rates(model: mujoco.MjModel, parameters: VehicleParameters) -> Stee
     rear, superposition = parameters.rear_actuator, parameters.superposition_actuator
     present = {model.actuator(index).name for index in range(model.nu)}
     front_radps = rear_radps = math.inf
-    if rear.is_screw:
+    if rear.has_motor:
         kind = rear.resolved()
         # The travel of a screw over the angle of its wheel, near the middle.
         rear_radps = min(
             _speed_radps(kind) * float(screw["lead_mprad"][0]) / abs(float(screw["travel"][0][0]))
-            for screw in screw_records(model, kind).screws
+            for screw in screw_records(model, kind)[1]
         )
     elif "rl_steer" in present:
         rear_radps = float(model.actuator("rl_steer").dynprm[1])
-    if superposition.is_geared:
+    if superposition.has_motor:
         front_radps = _speed_radps(superposition.resolved()) / known(superposition.resolved().gear)
     elif NAME in present:
         front_radps = float(model.actuator(NAME).dynprm[1])

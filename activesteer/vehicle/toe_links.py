@@ -20,7 +20,6 @@ integral part counts as settled, so that it includes load and friction.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import mujoco
@@ -30,11 +29,11 @@ from numpy.typing import NDArray
 from activesteer.errors import ModelError
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.electric_actuators import SPEED_STATE, STOP_BEYOND, RearActuator, known
+from activesteer.vehicle.statics import move_by, slopes
 
 DEGREE: Final = 5
 """Degree of the polynomials. They have no constant term."""
 _POINTS: Final = 15
-_DIFFERENCE: Final = 1e-7
 _ITERATIONS: Final = 30
 _TOLERANCE_M: Final = 1e-10
 _BEYOND: Final = 1.05
@@ -44,23 +43,14 @@ _FIT: Final = 2e-3
 
 
 class ToeLinkMap(NamedTuple):
-    """Steer angle and length of a toe link, both from the design position.
+    """Change of length of a toe link over its steer angle, and back, as coefficients of polynomials, shape (DEGREE,).
 
-    Attributes:
-        travel_of_angle: Coefficients of the change of length over the angle, its square ... [m], shape (DEGREE,).
-        angle_of_travel: Coefficients of the inverse map [rad].
-        travel_m: Largest change of length within the limit, to either side [m].
+    `travel_m` is the largest change of length within the limit, to either side.
     """
 
     travel_of_angle: NDArray[np.float64]
     angle_of_travel: NDArray[np.float64]
     travel_m: float
-
-    def mirrored(self) -> ToeLinkMap:
-        """Return the map of the other side, where angles have the opposite sign."""
-        signs = np.array([(-1.0) ** (power + 1) for power in range(DEGREE)])
-        # travel(-angle), and minus the angle that belongs to a travel.
-        return ToeLinkMap(self.travel_of_angle * signs, -self.angle_of_travel, self.travel_m)
 
 
 def evaluated(coefficients: NDArray[np.float64], x: NDArray[np.float64] | float) -> NDArray[np.float64]:
@@ -160,22 +150,12 @@ class _Corner:
 
     def _solved(self, travel_m: float) -> float:
         model, data = self._model, self._data
-        move = np.zeros(model.nv)
         missing = self._missing(travel_m)
         for _ in range(_ITERATIONS):
             if np.abs(missing).max() < _TOLERANCE_M:
                 return self._steer() - self._design_rad
-            start = data.qpos.copy()
-            slopes = np.empty((len(self._tendons), len(self._dofs)))
-            for column, dof in enumerate(self._dofs):
-                move[:] = 0.0
-                move[dof] = _DIFFERENCE
-                mujoco.mj_integratePos(model, data.qpos, move, 1.0)
-                slopes[:, column] = (self._missing(travel_m) - missing) / _DIFFERENCE
-                data.qpos[:] = start
-            move[:] = 0.0
-            move[self._dofs] = np.linalg.lstsq(slopes, -missing, rcond=1e-9)[0]
-            mujoco.mj_integratePos(model, data.qpos, move, 1.0)
+            rates = slopes(model, data, self._dofs, missing, lambda: self._missing(travel_m))
+            move_by(model, data, self._dofs, np.linalg.lstsq(rates, -missing, rcond=1e-9)[0])
             missing = self._missing(travel_m)
         raise ModelError(f"the corner has no position in which its toe link is longer by {1e3 * travel_m:.3g} mm")
 
@@ -238,23 +218,10 @@ def toe_link_of(spec: Any, corner: str) -> Any:
     raise ModelError(f"the rear suspension has no toe link for a screw: a tendon {names} is needed")
 
 
-@dataclass(frozen=True)
-class Screws:
-    """The records of a car's screws, and their places for its actuators.
-
-    Attributes:
-        links: A `LINK` record for each rear wheel.
-        screws: A `SCREW` record for each screw.
-        places: Name of an actuator -> kind and place of its record among these.
-    """
-
-    links: list[NDArray[Any]]
-    screws: list[NDArray[Any]]
-    places: dict[str, tuple[float, int]]
-
-
-def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
-    """Solve the kinematics and build the records for the callbacks."""
+def screw_records(
+    model: mujoco.MjModel, actuator: RearActuator
+) -> tuple[list[NDArray[Any]], list[NDArray[Any]], dict[str, tuple[float, int]]]:
+    """Return the `LINK` and `SCREW` records, and kind and place of the record of each actuator."""
     limit = known(actuator.limit_rad)
     names = [_tendon(model, corner) for corner in CORNERS]
     left = toe_link_map(model, "rl", names[0], limit)
@@ -304,7 +271,7 @@ def screw_records(model: mujoco.MjModel, actuator: RearActuator) -> Screws:
             **actuator.motor_numbers(),
         )
         screws.append(screw)
-    return Screws(links, screws, places)
+    return links, screws, places
 
 
 def _act(model: mujoco.MjModel, actuator: str) -> int:

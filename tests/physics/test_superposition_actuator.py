@@ -13,7 +13,7 @@ from activesteer import ActuatorCommand, Recording
 from activesteer.config.faults import fault_table
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
-from activesteer.vehicle.electric_actuators import STRAIN_WAVE
+from activesteer.vehicle.electric_actuators import SuperpositionActuator, presets_of
 from tests.raising import raises
 
 GEARED = {"superposition_actuator.preset": "strain_wave"}
@@ -50,7 +50,8 @@ def geared() -> Recording:
 def test_it_gets_there_at_the_speed_of_its_motor(geared: Recording) -> None:
     assert geared["superposition_rad"][-1] == pytest.approx(math.radians(2.0), rel=0.01)
     ratio = load_car("compact").config.steering.ratio
-    slew = STRAIN_WAVE["speed_limit_radps"] / STRAIN_WAVE["gear"] / ratio
+    preset = presets_of(SuperpositionActuator)["strain_wave"]
+    slew = preset["speed_limit_radps"] / preset["gear"] / ratio
     # 400 rad/s through 50 : 1 and the steering ratio of 15.8.
     assert math.degrees(slew) == pytest.approx(29.0, abs=0.1)
     # The mean: the light gear rings on its stiffness from step to step.

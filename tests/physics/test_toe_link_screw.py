@@ -15,7 +15,7 @@ from activesteer.errors import ParameterError
 from activesteer.rigs import kinematics_compliance
 from activesteer.scenario import load_car
 from activesteer.studies.linear.linearisation import linearise
-from activesteer.vehicle.electric_actuators import PRESETS
+from activesteer.vehicle.electric_actuators import RearActuator, presets_of
 from activesteer.vehicle.toe_links import evaluated, toe_link_map
 from tests.physics.runs import assert_goes_on_bit_by_bit
 from tests.raising import raises
@@ -66,7 +66,7 @@ def test_the_wheels_of_both_cars_go_where_they_are_asked_to(vehicle: str, preset
 
 
 def test_the_speed_limit_of_the_motor_is_the_slew_of_the_wheel(three_degrees: Recording) -> None:
-    preset = PRESETS["screw_3deg"]
+    preset = presets_of(RearActuator)["screw_3deg"]
     slew = preset["speed_limit_radps"] * preset["lead_m"] / (2.0 * math.pi * preset["gear"]) / arm_m("compact")
     middle = slice(AT + 40, AT + 180)
     rate = np.gradient(three_degrees["rear_steer_rad"], 1e-3)[middle]
@@ -167,7 +167,7 @@ def test_the_mapping_is_that_of_the_model(vehicle: str, link: str) -> None:
     there_and_back = evaluated(left.angle_of_travel, evaluated(left.travel_of_angle, angles))
     np.testing.assert_allclose(there_and_back, angles, atol=math.radians(0.01))
     np.testing.assert_allclose(
-        evaluated(right.travel_of_angle, angles), evaluated(left.mirrored().travel_of_angle, angles), atol=1e-8
+        evaluated(right.travel_of_angle, angles), evaluated(left.travel_of_angle, -angles), atol=1e-8
     )
     # The compact's toe link is ahead of the wheel: longer steers the left one to the left; the sedan's is behind.
     assert bool(left.travel_of_angle[0] > 0.0) is (vehicle == "compact")

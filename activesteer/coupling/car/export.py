@@ -39,7 +39,7 @@ from activesteer.coupling.car.variables import (
 )  # fmt: skip
 from activesteer.errors import ModelError, ParameterError
 from activesteer.scenario import Scenario
-from activesteer.sensors.signal_chain import CHAIN
+from activesteer.sensors.block import CHAIN
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.tyre_parameters import TYRE_RECORD
@@ -228,7 +228,7 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
     block = int(model.numeric_data[-fb.TRAILER_SIZE])
     names = [variable.name for variable in variables]
     setup, chassis = vehicle.brakes[0][0], model.body("chassis").id
-    torques = vehicle.wheels.torques
+    torques = vehicle.wheels.bound
     place = {name: index for index, name in enumerate(names)}
     wheels, tyres = int(header["wheels"]), int(header["tyres"])
     result = ["sane", *(n.name for n in numbers_of(Measurement)), *(n.name for n in numbers_of(Motion))]
@@ -270,8 +270,8 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
     arrays: dict[str, tuple[str, Any]] = {
         "COMMANDS": ("double", base.values()),
         "COMMAND_INPUTS": ("int", [COMMANDS.index(name) for name in CARRIED_OUT]),
-        "SPIN_DOFS": ("int", torques.spins), "DRIVE_CONTROLS": ("int", torques.drives),
-        "BRAKE_CONTROLS": ("int", torques.brakes),
+        "SPIN_DOFS": ("int", torques["spins"]), "DRIVE_CONTROLS": ("int", torques["drives"]),
+        "BRAKE_CONTROLS": ("int", torques["brakes"]),
         "WHEEL_MU": ("int", [wheels + wheel * stride + offset(fb.WHEEL, "mu") // 8 for wheel in range(4)]),
         "TYRES": ("int", [tyres + wheel * (TYRE_RECORD.itemsize // 8) for wheel in range(4)]),
         "TORQUE_PER_PRESSURE": ("double", setup["torque_per_pressure_NmpPa"]),

@@ -236,7 +236,7 @@ def _sweeps(
         }
         sweeps[f"steering_{ending}"] = run(car, title, "steering wheel angle, positive to the left", "rad", cases)
     heights = {"": 0.0}
-    if vehicle.parameters.rear_actuator.is_screw:
+    if vehicle.parameters.rear_actuator.has_motor:
         heights |= {"_bump": _STEERED_BUMP_M, "_rebound": -_STEERED_BUMP_M}
     for ending, height_m in heights.items():
         title = "rear steering" + (f" with {ending[1:]} of {1e3 * abs(height_m):.0f} mm" if ending else "")

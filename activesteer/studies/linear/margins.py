@@ -148,7 +148,7 @@ def _calls(sensor: Sensor, unit_s: float) -> int:
 
 
 def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Response:
-    """Return the frequency response of a sensor: bandwidth, samples, delay (see `sensors.signal_chain`)."""
+    """Return the frequency response of a sensor: bandwidth, samples, delay (see `sensors.block`)."""
     share = -math.expm1(-2.0 * math.pi * sensor.bandwidth_Hz * step_s) if sensor.bandwidth_Hz else 1.0
     samples = _held(_calls(sensor, every * step_s), back**every)
     return share / (1.0 - (1.0 - share) * back) * samples * back ** round((sensor.delay_s or 0.0) / step_s)

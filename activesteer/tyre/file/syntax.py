@@ -4,7 +4,7 @@ A file states base units; the unit of every other quantity follows from them, so
 millimetres is in newton per millimetre. Magic Formula coefficients are pure numbers in every system of units.
 
 The columns of the table are: key, default, quantity, meaning. A default of `!` means that the file must give the key;
-`-` means that it may be absent and that another quantity replaces it (see `parameters.parameter_array`).
+`-` means that it may be absent and that another quantity replaces it (see `tyre_parameters._fill`).
 The quantity decides how `[UNITS]` of a file is applied; `1` is a pure number.
 
 Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, appendix 3; the names are those of the TNO/Siemens MF-Tyre
@@ -20,11 +20,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from activesteer.config import read_toml
 from activesteer.core import limits
 from activesteer.core.files import read_bytes
 from activesteer.errors import TyreFileError
-
-"""Size of the largest file that is read. Real ones have some tens of kilobytes."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d{1,4})?\Z")
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*\Z")
@@ -33,14 +32,7 @@ _SECTION = re.compile(r"\[\s*([^\[\]]{1,80}?)\s*\]")
 
 @dataclass(frozen=True)
 class Entry:
-    """One `KEY = value` of a file.
-
-    Attributes:
-        section: Section in upper case, empty before the first one.
-        key: Key in upper case.
-        value: A number, or the text between the quotes.
-        line: Line number, from 1.
-    """
+    """One `KEY = value` of a file: section and key in upper case, a number or the text between quotes, line from 1."""
 
     section: str
     key: str
@@ -50,19 +42,6 @@ class Entry:
     def fail(self, problem: str, source: Path) -> TyreFileError:
         """Return an error about this entry of a file."""
         return TyreFileError(problem, file=str(source), line=self.line, key=self.key, value=self.value)
-
-
-@dataclass(frozen=True)
-class Syntax:
-    """Content of a .tir file, in its order.
-
-    Attributes:
-        entries: Keys and values.
-        tables: Rows of numbers, by section in upper case (`[SHAPE]`, deflection curves).
-    """
-
-    entries: tuple[Entry, ...]
-    tables: dict[str, tuple[tuple[float, ...], ...]]
 
 
 def read_text(path: Path) -> str:
@@ -102,8 +81,8 @@ def _value(text: str) -> float | str:
     return text
 
 
-def parse(text: str, source: str) -> Syntax:
-    """Split a .tir file into its entries and tables."""
+def parse(text: str, source: str) -> tuple[tuple[Entry, ...], dict[str, tuple[tuple[float, ...], ...]]]:
+    """Split a .tir file into its entries, and its rows of numbers by section (`[SHAPE]`, deflection curves)."""
     section = ""
     entries: list[Entry] = []
     tables: dict[str, list[tuple[float, ...]]] = {}
@@ -136,40 +115,10 @@ def parse(text: str, source: str) -> Syntax:
                 f"{what} is neither KEY = value, [SECTION], {{heading}} nor a row of numbers", file=source, line=count
             )
         tables.setdefault(section, []).append(tuple(value for value in row if value is not None))
-    return Syntax(tuple(entries), {name: tuple(rows) for name, rows in tables.items()})
+    return tuple(entries), {name: tuple(rows) for name, rows in tables.items()}
 
 
-_LENGTH = {
-    "meter": 1.0, "metre": 1.0, "meters": 1.0, "m": 1.0, "millimeter": 1e-3, "millimetre": 1e-3, "mm": 1e-3,
-    "centimeter": 1e-2, "centimetre": 1e-2, "cm": 1e-2, "kilometer": 1e3, "km": 1e3, "inch": 0.0254, "in": 0.0254,
-    "foot": 0.3048, "ft": 0.3048,
-}  # fmt: skip
-_FORCE = {
-    "newton": 1.0, "newtons": 1.0, "n": 1.0, "kilonewton": 1e3, "knewton": 1e3, "kn": 1e3,
-    "pound_force": 4.4482216152605, "pound": 4.4482216152605, "lbf": 4.4482216152605,
-    "kilogram_force": 9.80665, "kg_force": 9.80665, "kgf": 9.80665,
-}  # fmt: skip
-_ANGLE = {
-    "radian": 1.0, "radians": 1.0, "rad": 1.0, "degree": math.pi / 180, "degrees": math.pi / 180, "deg": math.pi / 180,
-}  # fmt: skip
-_MASS = {
-    "kilogram": 1.0, "kilograms": 1.0, "kg": 1.0, "gram": 1e-3, "g": 1e-3, "tonne": 1e3, "pound_mass": 0.45359237,
-    "pound": 0.45359237, "lbm": 0.45359237, "lb": 0.45359237, "slug": 14.593902937206,
-}  # fmt: skip
-_TIME = {
-    "second": 1.0, "seconds": 1.0, "sec": 1.0, "s": 1.0, "millisecond": 1e-3, "ms": 1e-3, "minute": 60.0, "min": 60.0,
-    "hour": 3600.0,
-}  # fmt: skip
-_PRESSURE = {"pascal": 1.0, "pa": 1.0, "kilopascal": 1e3, "kpa": 1e3, "bar": 1e5, "psi": 6894.757293168}
-
-BASE_UNITS: dict[str, dict[str, float]] = {
-    "LENGTH": _LENGTH,
-    "FORCE": _FORCE,
-    "ANGLE": _ANGLE,
-    "MASS": _MASS,
-    "TIME": _TIME,
-    "PRESSURE": _PRESSURE,
-}
+BASE_UNITS: dict[str, dict[str, float]] = read_toml(Path(__file__).with_name("units.toml"))[0]
 """Keys of `[UNITS]`, the unit names that each accepts (in lower case), and the size of the unit in SI."""
 
 DIMENSIONS: dict[str, dict[str, int]] = {
@@ -197,16 +146,7 @@ def si_factor(quantity: str, units: Mapping[str, float]) -> float:
 
 
 class Coefficient(NamedTuple):
-    """One key of a .tir file.
-
-    Attributes:
-        name: Key as in the file, upper case.
-        section: Section that the writer puts it in.
-        default: Default in SI; None if another quantity replaces it.
-        required: Whether a file without the key is refused.
-        quantity: Kind of quantity, as in `DIMENSIONS`; `1` is a pure number.
-        meaning: One line.
-    """
+    """One key of a .tir file. A default of None means that another quantity replaces it."""
 
     name: str
     section: str

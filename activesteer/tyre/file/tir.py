@@ -67,12 +67,12 @@ def tir_from_text(
     text: str, source: Path, mounted: Side | None = None, *, slip_tangent: bool = False
 ) -> TyreParameters:
     """Read a tyre property file from memory. See `load_tir`. The source is the name in messages."""
-    syntax = parse(text, str(source))
-    units = _units(syntax.entries, source)
+    entries, tables = parse(text, str(source))
+    units = _units(entries, source)
     lines: dict[str, Entry] = {}
     texts: dict[tuple[str, str], str] = {}
     unused: dict[tuple[str, str], float] = {}
-    for entry in syntax.entries:
+    for entry in entries:
         if entry.section == "UNITS":
             continue
         name = ALIASES.get(entry.key, entry.key)
@@ -92,7 +92,7 @@ def tir_from_text(
         values["FITTYP"] = _version_without_fittyp(words, source)
     side = _side(words, source)
     try:
-        return TyreParameters(values, source, side, mounted or side, slip_tangent, texts, unused, syntax.tables)
+        return TyreParameters(values, source, side, mounted or side, slip_tangent, texts, unused, tables)
     except ParameterError as error:
         entry = lines.get(error.key or "")
         raise TyreFileError(

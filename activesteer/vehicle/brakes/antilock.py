@@ -206,14 +206,10 @@ def _wheel(setup, state, wheel, car_mps2, fed_Pa):
 
 @compiled
 def antilock(setup, state, ax_mps2, steered_Pa, fed_Pa):
-    """Decide once for all wheels.
+    """Decide once for all wheels: advance `limit_Pa`, `allowed_Pa`, the phases and `side_Pa`.
 
-    Args:
-        setup: A `BRAKE_SETUP`.
-        state: Its `BRAKE_STATE`; `limit_Pa`, the phases and `side_Pa` are advanced.
-        ax_mps2: Measured longitudinal acceleration [m/s2].
-        steered_Pa: Side-to-side difference that the controller steers against, in addition to the driver's [Pa].
-        fed_Pa: Pressure of the pedal [Pa]; a controller that demands more at a front wheel intervenes there.
+    `steered_Pa` is the side-to-side difference that the controller steers against, in addition to the driver's. A
+    controller that demands more than `fed_Pa`, the pressure of the pedal, at a front wheel intervenes there.
     """
     highest = setup.full_pedal_pressure_Pa
     slow = state.reference_mps < setup.lowest_speed_mps

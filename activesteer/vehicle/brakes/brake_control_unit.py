@@ -22,14 +22,7 @@ def pedal_pressure(setup, pedal):
 
 @compiled
 def ask(setup, state, pedal, asked_Nm):
-    """Add the pressures that driver and controller demand, between 0 and the highest.
-
-    Args:
-        setup: A `BRAKE_SETUP`.
-        state: Its `BRAKE_STATE`; `demand_Pa` is written.
-        pedal: Brake pedal position, 0 to 1.
-        asked_Nm: Brake torques that the controller demands [Nm], order of `CORNERS`.
-    """
+    """Add the pressures that driver and controller demand, between 0 and the highest. Write `demand_Pa`."""
     highest, fed = setup.full_pedal_pressure_Pa, pedal_pressure(setup, pedal)
     for wheel in range(4):
         pressure = fed
@@ -40,14 +33,9 @@ def ask(setup, state, pedal, asked_Nm):
 
 @compiled
 def flow(setup, state, pedal):
-    """Advance the pressures by one step.
+    """Advance the pressures by one step. Up to its pressure the pedal feeds a brake, beyond it the pump does.
 
     The torque of a brake is its torque per pressure, 2 mu_pad A_piston r_effective, times the pressure.
-
-    Args:
-        setup: A `BRAKE_SETUP`.
-        state: Its `BRAKE_STATE`; `pressure_Pa` is advanced.
-        pedal: Brake pedal position, 0 to 1; up to its pressure the pedal feeds a brake, beyond it the pump does.
     """
     fed = pedal_pressure(setup, pedal)
     for wheel in range(4):
@@ -74,13 +62,7 @@ _SMOOTH_S: Final = 0.005
 
 @compiled
 def follow_wheels(setup, state, speeds_radps):
-    """Update circumferential speeds and accelerations of the wheels, and their friction torques, after an interval.
-
-    Args:
-        setup: A `BRAKE_SETUP`.
-        state: Its `BRAKE_STATE`; `wheel_mps`, `wheel_mps2` and `friction_Nm` are written.
-        speeds_radps: Rotational speeds of the wheels [rad/s], order of `CORNERS`.
-    """
+    """Update circumferential speeds, accelerations and friction torques of the wheels after an interval."""
     fraction = setup.interval_s / (setup.interval_s + _SMOOTH_S)
     for wheel in range(4):
         speed = setup.rolling_radius_m[wheel] * speeds_radps[wheel]
@@ -95,14 +77,7 @@ def follow_wheels(setup, state, speeds_radps):
 
 @compiled
 def follow_car(setup, state, ax_mps2, braked):
-    """Update the reference speed after an interval.
-
-    Args:
-        setup: A `BRAKE_SETUP`.
-        state: Its `BRAKE_STATE`; `reference_mps` and `offset_mps2` are advanced.
-        ax_mps2: Measured longitudinal acceleration [m/s2].
-        braked: Whether a brake is applied or demanded.
-    """
+    """Update the reference speed, and the offset of the acceleration, after an interval."""
     fastest, slowest, rolling, free = -1e9, 1e9, 0.0, 0.0
     for wheel in range(4):
         fastest = max(fastest, state.wheel_mps[wheel])
@@ -126,17 +101,11 @@ def follow_car(setup, state, ax_mps2, braked):
 
 @compiled
 def traction(setup, state, torque_Nm, braked):
-    """Decide once.
+    """Decide once about `drive_limit_Nm`, `traction_Nm` and `traction_Pa`.
 
     The mean speed of the driven wheels may exceed that of the car by a fraction and a constant. A proportional and an
     integral part reduce the drive torque by the excess; the integral starts from the torque at that instant. Of two
     wheels behind a differential the faster one is braked, so that the differential passes its torque to the other.
-
-    Args:
-        setup: A `BRAKE_SETUP`.
-        state: Its `BRAKE_STATE`; `drive_limit_Nm`, `traction_Nm` and `traction_Pa` are advanced.
-        torque_Nm: Drive torque that driver and controller demand [Nm].
-        braked: Whether a brake is applied or demanded.
     """
     turning, other = 0.0, 0.0
     for wheel in range(4):
@@ -164,20 +133,10 @@ def traction(setup, state, torque_Nm, braked):
 
 @compiled
 def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm, steered_Pa):
-    """Make one step.
+    """Make one step, and return the drive torque that traction control leaves [Nm].
 
-    Args:
-        setup: A `BRAKE_SETUP`.
-        state: Its `BRAKE_STATE`.
-        speeds_radps: Measured rotational speeds of the wheels [rad/s], order of `CORNERS`.
-        ax_mps2: Measured longitudinal acceleration [m/s2].
-        pedal: Brake pedal position, 0 to 1.
-        drive_Nm: Drive torque that driver and controller demand [Nm].
-        asked_Nm: Brake torques that the controller demands [Nm], order of `CORNERS`.
-        steered_Pa: Side-to-side difference that the controller steers against [Pa].
-
-    Returns:
-        The drive torque that traction control leaves [Nm].
+    Speeds and acceleration are measured, `drive_Nm` and `asked_Nm` are the demands of driver and controller, and
+    `steered_Pa` is the side-to-side difference that the controller steers against.
     """
     ask(setup, state, pedal, asked_Nm)
     state.steps_left -= 1.0

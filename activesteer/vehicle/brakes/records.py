@@ -166,11 +166,11 @@ PER_WHEEL: Final = (
     "demand_Pa", "pressure_Pa", "limit_Pa", "allowed_Pa", "traction_Pa", "phase", "phase_s", "friction_Nm",
     "borne_Nm", "mean_Nm", "regained_mps2", "wheel_mps", "wheel_mps2",
 )  # fmt: skip
-ALONE: Final = (
+_ALONE: Final = (
     "drive_limit_Nm", "traction_Nm", "reference_mps", "offset_mps2", "side_Pa", "steps_left",
     "tcs_active",
 )  # fmt: skip
-BRAKE_STATE: Final = numbers_type(*((name, len(CORNERS)) for name in PER_WHEEL), *ALONE)
+BRAKE_STATE: Final = numbers_type(*((name, len(CORNERS)) for name in PER_WHEEL), *_ALONE)
 """Variables, saved and restored with the engine's state.
 
 demand_Pa: pressure that driver and controller demand;
@@ -185,9 +185,7 @@ control acts; reference_mps: estimated speed of the car; offset_mps2: estimated 
 allowed difference of the front wheels' pressures; steps_left: steps until the next decision.
 """
 
-PLACES: Final = {name: len(CORNERS) * index for index, name in enumerate(PER_WHEEL)} | {
-    name: len(CORNERS) * len(PER_WHEEL) + index for index, name in enumerate(ALONE)
-}
+PLACES: Final = {name: place[1] // 8 for name, place in (BRAKE_STATE.fields or {}).items()}
 """Field of a `BRAKE_STATE` -> its (first) place among the numbers."""
 
 NO_LIMIT_NM: Final = 1e9
@@ -202,19 +200,7 @@ def brake_setup(
     inertia_kgm2: Sequence[float],
     differential: Sequence[bool],
 ) -> NDArray[Any]:
-    """Build the constants of a car's brakes.
-
-    Args:
-        brakes: The table of the vehicle file.
-        timestep_s: Step of the engine [s].
-        rolling_radius_m: Radius of each wheel that turns its rotation into a speed [m].
-        drive_fraction: Fraction of the drive torque of each wheel.
-        inertia_kgm2: Inertia of each wheel about its axis [kg m2].
-        differential: Whether a differential drives the wheel.
-
-    Returns:
-        A `BRAKE_SETUP`, shape (1,).
-    """
+    """Return the constants of a car's brakes, a `BRAKE_SETUP` of shape (1,). Rows are in the order of `CORNERS`."""
     setup = np.zeros(1, BRAKE_SETUP)
     for part, names in ((brakes.hydraulics, _HYDRAULICS), (brakes.antilock, _ANTILOCK), (brakes.traction, _TRACTION)):
         for name in names:
@@ -233,13 +219,7 @@ def brake_setup(
 
 
 def reset(state: NDArray[Any], setup: NDArray[Any], speed_mps: float) -> None:
-    """Release the brakes of a car that rolls at a speed.
-
-    Args:
-        state: A `BRAKE_STATE`, shape (1,).
-        setup: Its `BRAKE_SETUP`.
-        speed_mps: Speed of car and wheels [m/s].
-    """
+    """Release the brakes, a `BRAKE_STATE` of shape (1,), of a car that rolls at a speed."""
     state[:] = 0
     state["limit_Pa"] = state["allowed_Pa"] = setup["full_pedal_pressure_Pa"]
     state["drive_limit_Nm"] = NO_LIMIT_NM

@@ -63,7 +63,7 @@ class ChannelMap:
             *(Signal(channel, Column("commands", place)) for channel, place in COMMAND_CHANNELS.items()),
             *(
                 signal(
-                    "measured", f"measured_{number.name}", number.recorded.unit, f"{number.recorded.meaning}, measured",
+                    "measured", f"measured_{number.name}", f"{number.recorded.meaning}, measured",
                     Column("measured", place),
                 )
                 for place, number in enumerate(measured)
@@ -72,7 +72,7 @@ class ChannelMap:
             *brake_signals(),
             *electric_signals(parameters.motors),
             signal(
-                "vehicle", "active_faults", "", "number of active faults of actuators and sensors",
+                "vehicle", "active_faults", "number of active faults of actuators and sensors",
                 Column("userdata", model.nuserdata - 1),
             ),
         ]  # fmt: skip

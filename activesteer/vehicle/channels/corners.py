@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from functools import partial
+from pathlib import Path
 from typing import Final
 
 import mujoco
 import numpy as np
 from numba import types
 
+from activesteer.config import read_toml
 from activesteer.core.conventions import CORNERS, Array
 from activesteer.core.signals import CORNERS_IN_WORDS, Channel
+from activesteer.core.units import unit_of
 from activesteer.native.compilation import compiled_call, inlined
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.brakes.records import PER_WHEEL, PLACES
@@ -32,89 +34,43 @@ from activesteer.vehicle.force_block import find, is_there, tendon_arms
 from activesteer.vehicle.parameters import Steering
 from activesteer.vehicle.toe_links import SCREW
 
-_TYRE: Final = (
-    ("fx_N", "tyre_fx_N", "N", "longitudinal tyre force at the contact point, ISO-W"),
-    ("fy_N", "tyre_fy_N", "N", "lateral tyre force at the contact point, ISO-W, left positive"),
-    ("fz_N", "tyre_fz_N", "N", "vertical tyre force"),
-    ("mx_Nm", "tyre_mx_Nm", "Nm", "overturning moment"),
-    ("my_Nm", "tyre_my_Nm", "Nm", "rolling resistance moment, negative rolling forward"),
-    ("mz_Nm", "tyre_mz_Nm", "Nm", "aligning moment"),
-    ("slip_ratio", "slip_ratio", "", "transient longitudinal slip, positive drives"),
-    ("slip_angle_rad", "slip_angle_rad", "rad", "transient slip angle, positive gives negative force"),
-    ("inclination_rad", "inclination_rad", "rad", "inclination of the wheel against the road about +x"),
-    ("loaded_radius_m", "loaded_radius_m", "m", "distance between wheel centre and contact point"),
-    ("limited", "tyre_limited", "", "1 if the tyre is outside its file's range of validity"),
-    ("contact_x_m", "contact_x_m", "m", "contact point with the road, world x"),
-    ("contact_y_m", "contact_y_m", "m", "contact point with the road, world y"),
-    ("mu", "mu", "", "friction of the road at the contact point"),
-    (
-        "friction_utilisation", "friction_utilisation", "",
-        "used fraction of the tyre's peak friction at its load",
-    ),
-)  # fmt: skip
-"""Output of the native forces -> its channel: name, unit, meaning."""
-_ROAD: Final = (
-    ("road_z_m", "road_z_m", "m", "height of the plane that the tyre feels, below the wheel"),
-    ("road_slope_x", "road_slope_x", "", "forward slope of that plane, positive uphill"),
-    ("road_slope_y", "road_slope_y", "", "sideways slope of that plane, positive where the left side is higher"),
-)
-"""The same on an uneven road only."""
-_BRAKES: Final = (
-    ("demand_Pa", "brake_pressure_demand_Pa", "Pa", "brake pressure demand of driver and controller", "corners"),
-    ("pressure_Pa", "brake_pressure_Pa", "Pa", "pressure in the wheel brake", "corners"),
-    (
-        "phase",
-        "abs_phase",
-        "",
-        "anti-lock control: 0 off, 1 releases, 2 recovers, 3 builds up, 4 holds pressure",
-        "corners",
-    ),
-    (
-        "reference_mps",
-        "abs_speed_mps",
-        "m/s",
-        "speed of the car, estimated by the control unit of the brakes",
-        "vehicle",
-    ),
-    ("tcs_active", "tcs_active", "", "1 while traction control limits the drive", "vehicle"),
-)
-"""Field of `BRAKE_STATE` -> its channels: name, unit, meaning, group."""
+_MEANINGS: Final = read_toml(Path(__file__).with_name("channels.toml"))[0]
+_BRAKE_FIELDS: Final = ("demand_Pa", "pressure_Pa", "phase", "reference_mps", "tcs_active")
+"""Fields of `BRAKE_STATE` whose channels are those of the table `brakes`."""
+
+
+def _of_wheel(table: str, index: int, name: str, values: Values) -> Signal:
+    corner = CORNERS[index]
+    return signal("corners", f"{corner}_{name}", f"{_MEANINGS[table][name]}, {CORNERS_IN_WORDS[corner]}", values)
 
 
 def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
     """Yield the signals of each wheel: its tyre, and its position relative to the chassis."""
     heights_m = design_heights_m(model)
-    outputs = _TYRE if fb.header_of(model)["n_surfaces"][0] == 0.0 else (*_TYRE, *_ROAD)
-    for index, (corner, words) in enumerate(CORNERS_IN_WORDS.items()):
-
-        def of(
-            name: str, unit: str, meaning: str, values: Values, *, corner: str = corner, words: str = words
-        ) -> Signal:
-            return signal("corners", f"{corner}_{name}", unit, f"{meaning}, {words}", values)
-
-        for field, name, unit, meaning in outputs:
-            yield of(name, unit, meaning, Column("userdata", fb.output_slot(index, field)))
+    tables = ("tyre",) if fb.header_of(model)["n_surfaces"][0] == 0.0 else ("tyre", "road")
+    for index, corner in enumerate(CORNERS):
+        for table in tables:
+            for name in _MEANINGS[table]:
+                output = fb.output_slot(index, name.removeprefix("tyre_"))
+                yield _of_wheel(table, index, name, Column("userdata", output))
         *_, height = sensor(model, f"{corner}_wheel_position")
         axis = sensor(model, f"{corner}_wheel_axis")
         (speed,) = sensor(model, f"{corner}_wheel_speed")
         damper = Column("userdata", len(CORNERS) * fb.USERDATA_PER_WHEEL + index)
-        travel, steer, camber = _against_chassis(height, heights_m[index], axis)
-        yield of("wheel_speed_radps", "rad/s", "rotational speed", speed)
-        yield of("travel_m", "m", "wheel travel from the design position, bump positive", travel)
-        yield of("steer_rad", "rad", "steer angle of the wheel against the chassis, left positive", steer)
-        yield of("camber_rad", "rad", "inclination of the wheel against the chassis about +x", camber)
-        yield of("damper_force_N", "N", "damper force, positive resists compression", damper)
+        values = (speed, *_against_chassis(height, heights_m[index], axis), damper)
+        for name, value in zip(_MEANINGS["wheel"], values, strict=True):
+            yield _of_wheel("wheel", index, name, value)
 
 
 def brake_signals() -> Iterator[Signal]:
     """Yield the pressures, and the signals of the control unit of the brakes."""
-    for field, name, unit, meaning, group in _BRAKES:
+    for field, (name, meaning) in zip(_BRAKE_FIELDS, _MEANINGS["brakes"].items(), strict=True):
         first = PLACES[field]
-        if field in PER_WHEEL:
-            for index, (corner, words) in enumerate(CORNERS_IN_WORDS.items()):
-                yield signal(group, f"{corner}_{name}", unit, f"{meaning}, {words}", Column("brakes", first + index))
-        else:
-            yield signal(group, name, unit, meaning, Column("brakes", first))
+        if field not in PER_WHEEL:
+            yield signal("vehicle", name, meaning, Column("brakes", first))
+            continue
+        for index in range(len(CORNERS)):
+            yield _of_wheel("brakes", index, name, Column("brakes", first + index))
 
 
 def toe(forward: Array, left: Array) -> Array:
@@ -151,30 +107,9 @@ ROCKS_BACK_MPS: Final = 1.0
 _EXACT: Final = ("x_m", "y_m", "yaw_rad", "front_axle_x_m", "front_axle_y_m")
 """Channels that grow with the distance and need more than 32 bits in a file."""
 MOTION_CHANNELS: Final = tuple(
-    Channel(name, unit, meaning, "vehicle", name not in _EXACT)
-    for name, unit, meaning in (
-        ("x_m", "m", "position of the centre of gravity, world x"),
-        ("y_m", "m", "position of the centre of gravity, world y (left)"),
-        ("z_m", "m", "height of the centre of gravity above the road"),
-        ("yaw_rad", "rad", "yaw angle, left positive, unwrapped"),
-        ("roll_rad", "rad", "roll angle, positive to the right"),
-        ("pitch_rad", "rad", "pitch angle, positive nose down"),
-        ("vx_mps", "m/s", "longitudinal velocity of the centre of gravity, in the road plane"),
-        ("vy_mps", "m/s", "lateral velocity of the centre of gravity, in the road plane, left positive"),
-        ("vz_mps", "m/s", "vertical velocity of the centre of gravity"),
-        ("speed_mps", "m/s", "speed of the centre of gravity over the road"),
-        ("yaw_rate_radps", "rad/s", "yaw rate, left positive"),
-        ("roll_rate_radps", "rad/s", "roll rate, body-fixed"),
-        ("pitch_rate_radps", "rad/s", "pitch rate, body-fixed"),
-        ("ax_mps2", "m/s2", "longitudinal acceleration, in the road plane"),
-        ("ay_mps2", "m/s2", "lateral acceleration, in the road plane, left positive"),
-        ("az_mps2", "m/s2", "vertical acceleration"),
-        ("sideslip_rad", "rad", "sideslip angle at the centre of gravity, atan(vy/vx); fades to 0 below 1 m/s"),
-        ("front_axle_x_m", "m", "position of the middle of the front axle, world x"),
-        ("front_axle_y_m", "m", "position of the middle of the front axle, world y"),
-    )
+    Channel(name, unit_of(name), meaning, "vehicle", name not in _EXACT)
+    for name, meaning in _MEANINGS["motion"].items()
 )
-"""Channels of the motion. A channel that is computed has the name of its attribute of `CarMotion`."""
 
 
 def motion_copied(model: mujoco.MjModel) -> dict[str, Column]:
@@ -295,20 +230,20 @@ def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:
     for index in range(model.nu):
         name, force = model.actuator(index).name, Column("actuator_force", index)
         if name.endswith(("_drive", "_brake")):
-            yield signal("vehicle", f"{name}_torque_Nm", "Nm", f"torque of {name} on the wheel", force)
+            yield signal("vehicle", f"{name}_torque_Nm", f"torque of {name} on the wheel", force)
         elif name.endswith("_friction"):
             part = name.removesuffix("_friction")
             sign = "positive resists compression" if part.endswith("damper") else "positive pushes to the left"
-            yield signal("links", f"{name}_N", "N", f"dry friction of {part}, {sign}", force)
+            yield signal("links", f"{name}_N", f"dry friction of {part}, {sign}", force)
         elif (
             model.actuator_actadr[index] >= 0
             and model.actuator_gainprm[index, 0] > 0.0
             and model.actuator_trntype[index] != int(mujoco.mjtTrn.mjTRN_TENDON)
             and not _has_motor(model, name)
         ):
-            yield signal("vehicle", f"{name}_torque_Nm", "Nm", f"torque of the servo of {name}", force)
+            yield signal("vehicle", f"{name}_torque_Nm", f"torque of the servo of {name}", force)
             meaning = f"1 if {name} is at its angle, rate or torque limit"
-            yield signal("vehicle", f"{name}_saturated", "", meaning, _limits(model, index))
+            yield signal("vehicle", f"{name}_saturated", meaning, _limits(model, index))
 
 
 def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
@@ -320,14 +255,16 @@ def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
         if not _has_motor(model, name):
             continue
         torque, limited = sensor(model, name + SPEED_STATE)[:2]
-        flag = "saturated" if name == NAME else "steer_saturated"
-        for what, unit, meaning, values in (
-            *([] if name == NAME else [("screw_m", "m", "travel of the screw", _state(model, name + SCREW))]),
-            ("motor_speed_radps", "rad/s", "speed of the motor", _state(model, name + SPEED_STATE)),
-            ("motor_torque_Nm", "Nm", "torque of the motor", torque),
-            (flag, "", "1 at a limit of angle, speed, torque or supply of the motor", limited),
-        ):
-            yield signal("vehicle", f"{name}_{what}", unit, f"{meaning} {words}", values)
+        values = {
+            "screw_m": None if name == NAME else _state(model, name + SCREW),
+            "motor_speed_radps": _state(model, name + SPEED_STATE),
+            "motor_torque_Nm": torque,
+            "saturated": limited,
+        }
+        for what, value in values.items():
+            part = f"{name}_steer" if what == "saturated" and name != NAME else name
+            if value is not None:
+                yield signal("vehicle", f"{part}_{what}", f"{_MEANINGS['screw'][what]} {words}", value)
 
 
 def electric_signals(motors: Motors) -> Iterator[Signal]:
@@ -335,22 +272,12 @@ def electric_signals(motors: Motors) -> Iterator[Signal]:
     if not list(motors):
         return
     place = itertools.count()
-    for name, unit, meaning in (
-        ("power_W", "W", "power at the terminals of the battery, positive when it gives power"),
-        ("energy_J", "J", "energy that the battery has given since the start"),
-        ("limited", "", "1 while a limit of the battery reduces the torques"),
-    ):
-        yield signal("vehicle", f"battery_{name}", unit, meaning, Column("electric", next(place)))
+    for name, meaning in _MEANINGS["battery"].items():
+        yield signal("vehicle", f"battery_{name}", meaning, Column("electric", next(place)))
     for motor, _ in motors:
-        for name, unit, meaning in (
-            ("torque_Nm", "Nm", "torque at its wheels together, forward positive"),
-            ("difference_Nm", "Nm", "torque of the right wheel less that of the left one"),
-            ("demand_Nm", "Nm", "torque demand at its wheels together"),
-            ("power_W", "W", "electric power, positive when it drives"),
-            ("limited", "", "1 while a limit of speed, torque, power or battery acts"),
-        ):
+        for name, meaning in _MEANINGS["motor"].items():
             column = Column("electric", next(place))
-            yield signal("vehicle", f"motor_{motor}_{name}", unit, f"{meaning}, motor {motor}", column)
+            yield signal("vehicle", f"motor_{motor}_{name}", f"{meaning}, motor {motor}", column)
 
 
 def _has_motor(model: mujoco.MjModel, name: str) -> bool:
@@ -378,7 +305,7 @@ def link_signals(model: mujoco.MjModel) -> Iterator[Signal]:
             continue
         # The stiffness of a damper's tendon represents the stops at both ends of its travel.
         name = model.tendon(index).name.replace("_damper", "_stop")
-        yield signal("links", f"{name}_force_N", "N", f"axial force of {name}, tension positive", _force(model, index))
+        yield signal("links", f"{name}_force_N", f"axial force of {name}, tension positive", _force(model, index))
 
 
 def axial_force(model: mujoco.MjModel, tendon: int) -> AxialForce:
@@ -405,7 +332,7 @@ def _force(model: mujoco.MjModel, tendon: int) -> Values:
 
 def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
     """Return angles of steering wheel, superposition and wheels, torque of the hands, travel of the rack."""
-    of, ratio, felt = partial(signal, "vehicle"), steering.ratio, 1.0 - steering.assist_fraction
+    ratio, felt = steering.ratio, 1.0 - steering.assist_fraction
     wheel, added, rack, rl, rr = (
         column
         for name in ("steering_wheel_angle", "superposition_angle", "rack_travel", "rl_steer_angle", "rr_steer_angle")
@@ -413,33 +340,17 @@ def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
     )
     fl_axis, fr_axis = (sensor(model, f"{corner}_wheel_axis")[:2] for corner in ("fl", "fr"))
     demand = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, "steering_wheel")
-    return [
-        of(
-            "steering_wheel_rad", "rad", "steering wheel angle, left positive, not wrapped",
-            wheel,
-        ),
-        of(
-            "steering_wheel_demand_rad", "rad", "steering wheel angle demand of the driver", Column("ctrl", demand),
-        ),
-        of(
-            "hand_torque_Nm", "Nm", "torque of the hands at the steering wheel, left positive",
-            _column_torque(model, felt)
-            or Computed(lambda torque_Nm: felt * torque_Nm, (Column("actuator_force", demand),)),
-        ),
-        of(
-            "front_steer_rad", "rad", "mean steer angle of the front wheels against the chassis",
-            Computed(lambda *axes: 0.5 * (toe(*axes[:2]) + toe(*axes[2:])), (*fl_axis, *fr_axis)),
-        ),
-        of(
-            "superposition_rad", "rad", "angle added by the front superposition, at the road wheel",
-            Computed(lambda angle_rad: angle_rad / ratio, (added,)),
-        ),
-        of(
-            "rear_steer_rad", "rad", "mean angle of the rear steering actuators",
-            Computed(lambda left_rad, right_rad: 0.5 * (left_rad + right_rad), (rl, rr)),
-        ),
-        of("rack_m", "m", "rack travel, positive steers left", rack),
-    ]  # fmt: skip
+    values = {
+        "steering_wheel_rad": wheel,
+        "steering_wheel_demand_rad": Column("ctrl", demand),
+        "hand_torque_Nm": _column_torque(model, felt)
+        or Computed(lambda torque_Nm: felt * torque_Nm, (Column("actuator_force", demand),)),
+        "front_steer_rad": Computed(lambda *axes: 0.5 * (toe(*axes[:2]) + toe(*axes[2:])), (*fl_axis, *fr_axis)),
+        "superposition_rad": Computed(lambda angle_rad: angle_rad / ratio, (added,)),
+        "rear_steer_rad": Computed(lambda left_rad, right_rad: 0.5 * (left_rad + right_rad), (rl, rr)),
+        "rack_m": rack,
+    }
+    return [signal("vehicle", name, _MEANINGS["steering"][name], value) for name, value in values.items()]
 
 
 def _column_torque(model: mujoco.MjModel, felt: float) -> AxialForce | None:

@@ -15,6 +15,7 @@ from numba import from_dtype, types
 
 from activesteer.core.conventions import Array
 from activesteer.core.signals import Channel
+from activesteer.core.units import unit_of
 from activesteer.native.compilation import compiled_call, inlined
 from activesteer.native.memory import f64_pointer
 from activesteer.vehicle.force_block import sensor_columns
@@ -70,15 +71,9 @@ class AxialForce(NamedTuple):
 
 
 class Actuator(NamedTuple):
-    """Limits of an actuator that follows a command with a lag.
+    """Limits of an actuator that follows a command with a lag. Torques are infinite if there is no limit.
 
-    Attributes:
-        control: Place of the actuator among the commands and the forces.
-        activation: Place of the actuator among the activations.
-        lag_s: Time constant [s].
-        rate_radps: Largest rate.
-        low_rad: Lower limit of the angle; `high_rad` is the upper one.
-        low_Nm: Lower limit of the torque; `high_Nm` is the upper one. Infinite if there is no limit.
+    `control`: its place among the commands and the forces; `activation`: among the activations.
     """
 
     control: int
@@ -115,9 +110,9 @@ class Signal(NamedTuple):
     values: Values
 
 
-def signal(group: str, name: str, unit: str, meaning: str, values: Values) -> Signal:
-    """Return a signal of a channel that is stored with 32 bits (see `Channel`)."""
-    return Signal(Channel(name, unit, meaning, group), values)
+def signal(group: str, name: str, meaning: str, values: Values) -> Signal:
+    """Return a signal of a channel that is stored with 32 bits (see `Channel`), in the unit at the end of its name."""
+    return Signal(Channel(name, unit_of(name), meaning, group), values)
 
 
 _ROWS_AT_ONCE: Final = 8

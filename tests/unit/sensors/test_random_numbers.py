@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.sensors import Sensors
-from activesteer.sensors.signal_chain import _uniform
+from activesteer.sensors.block import _uniform
 from tests.unit.sensors.runs import said_of
 
 TEETH = 48

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from activesteer.config import Source, build
 from activesteer.errors import ParameterError
 from activesteer.tyre import MagicFormula, load_tir
 from activesteer.tyre.tyre_parameters import TyreConventions, TyreParameters
@@ -94,8 +95,8 @@ def test_the_trail_is_related_to_the_scaled_load(tyre: TyreParameters) -> None:
     [("combined_slip", "ellipse"), ("speed_offset_mps", -0.1), ("reference_friction", 0.0)],
 )
 def test_what_does_not_exist_is_refused(key: str, value: object) -> None:
-    with raises(ParameterError, key=key, value=value):
-        TyreConventions(**{key: value})  # type: ignore[arg-type]
+    with raises(ParameterError, key=f"tyres.conventions.{key}", value=value):
+        build(TyreConventions, {key: value}, Source("car.toml"), ("tyres", "conventions"))
 
 
 def test_without_relaxation_the_evaluation_has_the_length_that_the_contact_has(tyre: TyreParameters) -> None:

@@ -78,14 +78,14 @@ def test_bump_of_a_wheel_compresses_its_damper() -> None:
 @pytest.mark.parametrize(
     ("velocity_mps", "force_N", "key"),
     [
-        ([0.0, 0.1, 0.1], [0.0, 1.0, 2.0], "dampers.rear"),
-        ([0.2, 0.1], [0.0, 1.0], "dampers.rear"),
-        ([0.0, 0.1], [0.0, 1.0, 2.0], "dampers.rear"),
-        ([0.0], [0.0], "dampers.rear"),
-        ([0.1 * i for i in range(13)], [0.0] * 13, "dampers.rear"),
+        ([0.0, 0.1, 0.1], [0.0, 1.0, 2.0], "dampers.rear.velocity_mps"),
+        ([0.2, 0.1], [0.0, 1.0], "dampers.rear.velocity_mps"),
+        ([0.0, 0.1], [0.0, 1.0, 2.0], "dampers.rear.force_N"),
+        ([0.0], [0.0], "dampers.rear.velocity_mps"),
+        ([0.1 * i for i in range(13)], [0.0] * 13, "dampers.rear.velocity_mps"),
     ],
 )
-def test_a_wrong_curve_is_an_error_that_names_file_and_axle(
+def test_a_wrong_curve_is_an_error_that_names_file_and_key(
     velocity_mps: list[float], force_N: list[float], key: str
 ) -> None:
     with raises(ParameterError, file="compact.toml", key=key):

@@ -9,7 +9,7 @@ import pytest
 
 from activesteer.errors import ModelError
 from activesteer.vehicle import force_block
-from activesteer.vehicle.force_block import measure_engine_layout
+from activesteer.vehicle.force_block import engine_layout
 from tests.raising import raises
 from tests.unit.vehicle.cars import standing
 
@@ -21,7 +21,7 @@ def word(address: int) -> int:
 def test_every_offset_leads_to_the_car_s_own_array() -> None:
     vehicle = standing()
     model, data = vehicle.model, vehicle.data
-    layout = measure_engine_layout()
+    layout = engine_layout.__wrapped__()
     for field in layout._fields:
         if field.startswith("d_") and field != "d_time":
             array = getattr(data, field.removeprefix("d_"))
@@ -35,7 +35,7 @@ def test_every_offset_leads_to_the_car_s_own_array() -> None:
 
 
 def test_offsets_differ_and_are_aligned() -> None:
-    layout = measure_engine_layout()
+    layout = engine_layout.__wrapped__()
     model_part, data_part = layout[:3], layout[3:]
     assert len(set(model_part)) == len(model_part)
     assert len(set(data_part)) == len(data_part)
@@ -45,21 +45,21 @@ def test_offsets_differ_and_are_aligned() -> None:
 def test_an_unknown_struct_is_an_error_that_names_the_member(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(force_block, "_DATA_BYTES", 64)
     with raises(ModelError, value="mjData.qvel"):
-        measure_engine_layout()
+        engine_layout.__wrapped__()
 
 
 def test_two_models_that_disagree_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = measure_engine_layout()
+    found = engine_layout.__wrapped__()
     answers = found, found._replace(d_qvel=found.d_qvel + 8)
     given = iter(answers)
     monkeypatch.setattr(force_block, "_measure", lambda *_: next(given))
     with raises(ModelError, value=answers):
-        measure_engine_layout()
+        engine_layout.__wrapped__()
 
 
 def test_arrays_that_are_found_are_views_of_the_engine_s_memory() -> None:
     vehicle = standing()
-    data, layout = vehicle.data, measure_engine_layout()
+    data, layout = vehicle.data, engine_layout.__wrapped__()
     address = word(data._address + layout.d_qvel)
     view = np.ctypeslib.as_array((ctypes.c_double * vehicle.model.nv).from_address(address))
     data.qvel[3] = 0.125

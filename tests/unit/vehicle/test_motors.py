@@ -214,7 +214,7 @@ GOOD: dict[str, Any] = {"speed_radps": (0.0, 100.0), "torque_Nm": (10.0, 5.0)}
 @pytest.mark.parametrize(
     ("make", "key"),
     [
-        (lambda: Motor((0.0,), (10.0,)), "torque_Nm"),
+        (lambda: Motor((0.0,), (10.0,)), "speed_radps"),
         (lambda: Motor((0.0, 100.0), (10.0, -5.0)), "torque_Nm"),
         (lambda: Motor((10.0, 100.0), (10.0, 5.0)), "speed_radps"),
         (lambda: Motor(**GOOD, split_torque_Nm=10.0), "split_torque_Nm"),

@@ -89,7 +89,7 @@ def test_actuators_and_sensors_of_a_table_are_those_of_the_new_car(tmp_path: Pat
     made = new_vehicle("own", own, tmp_path / "own").vehicle_file
     config, asked = load_car(made).config, tomllib.loads(HARDWARE)
     assert config.rear_actuator == build(RearActuator, asked["rear_actuator"], Source("asked"))
-    assert config.superposition_actuator.is_geared
+    assert config.superposition_actuator.has_motor
     wanted = build(Sensors, asked["sensors"], Source("asked"))
     assert config.sensors.yaw_rate.noise_radps == pytest.approx(wanted.yaw_rate.noise_radps, rel=1e-6)
     assert dataclasses.replace(config.sensors, yaw_rate=wanted.yaw_rate) == wanted
