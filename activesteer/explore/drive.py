@@ -37,21 +37,13 @@ _PLANE: Final = "straight_line"
 
 
 class DrivingCourse(NamedTuple):
-    """A place to drive.
+    """A place to drive."""
 
-    Attributes:
-        title: Its name in words.
-        maneuver: Manoeuvre whose road and course it has.
-        speed_kmh: Speed at the start [km/h].
-        radius_m: Radius of a circle to the left that begins at the start [m]; 0 for none.
-        mu: Friction of the road [-].
-    """
-
-    title: str
-    maneuver: Any
-    speed_kmh: float
-    radius_m: float = 0.0
-    mu: float = 0.9
+    title: str  # its name in words
+    maneuver: Any  # manoeuvre whose road and course it has
+    speed_kmh: float  # speed at the start [km/h]
+    radius_m: float = 0.0  # radius of a circle to the left that begins at the start [m]; 0 for none
+    mu: float = 0.9  # friction of the road [-]
 
 
 COURSES: Final = {

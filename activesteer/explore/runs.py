@@ -38,15 +38,10 @@ _CHUNK: Final = 500
 
 
 class Reply(NamedTuple):
-    """A message to the page.
+    """A message to the page."""
 
-    Attributes:
-        header: JSON values; `kind` names the message.
-        arrays: Numbers that follow the header, 32 bits each.
-    """
-
-    header: dict[str, Any]
-    arrays: tuple[NDArray[np.float32], ...] = ()
+    header: dict[str, Any]  # JSON values; `kind` names the message
+    arrays: tuple[NDArray[np.float32], ...] = ()  # numbers that follow the header, 32 bits each
 
 
 class Runs:

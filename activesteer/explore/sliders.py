@@ -48,27 +48,16 @@ _COVERED: Final = ("controllers", "single_track", "two_track")
 
 
 class Slider(NamedTuple):
-    """A slider.
+    """A slider."""
 
-    Attributes:
-        key: Key as `--set` takes it.
-        label: Label in words.
-        unit: Unit of its value; empty for a pure number.
-        group: `manoeuvre`, `car`, or the name of a controller or of a table of gains, in words.
-        low: Least value.
-        high: Greatest value.
-        step: Distance between two values.
-        value: Value of the files.
-    """
-
-    key: str
-    label: str
-    unit: str
-    group: str
-    low: float
-    high: float
-    step: float
-    value: float
+    key: str  # key as `--set` takes it
+    label: str  # label in words
+    unit: str  # unit of its value; empty for a pure number
+    group: str  # `manoeuvre`, `car`, or the name of a controller or of a table of gains, in words
+    low: float  # least value
+    high: float  # greatest value
+    step: float  # distance between two values
+    value: float  # value of the files
 
 
 def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Path] | None = None) -> list[Slider]:

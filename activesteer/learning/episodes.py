@@ -160,25 +160,16 @@ SENSORS: Final = ("ideal", "production")
 
 
 class Outcome(NamedTuple):
-    """Outcome of a step, for all cars.
+    """Outcome of a step, for all cars."""
 
-    Attributes:
-        observation: Shape (n, numbers), float32.
-        reward: Shape (n,).
-        terminated: Whether the car is lost, has left its course, or the simulation diverged, shape (n,).
-        truncated: Whether the manoeuvre is over, shape (n,).
-        terms: Term of the reward -> its part, shape (n,).
-        sideslip_rad: Shape (n,).
-        end: Reason of the end: "", "lost", "off course", "stopped", "diverged" or "time", shape (n,).
-    """
-
-    observation: NDArray[np.float32]
-    reward: Array
+    observation: NDArray[np.float32]  # shape (n, numbers), float32
+    reward: Array  # shape (n,)
+    # Whether the car is lost, has left its course, or the simulation diverged, shape (n,)
     terminated: NDArray[np.bool_]
-    truncated: NDArray[np.bool_]
-    terms: dict[str, Array]
-    sideslip_rad: Array
-    end: NDArray[Any]
+    truncated: NDArray[np.bool_]  # whether the manoeuvre is over, shape (n,)
+    terms: dict[str, Array]  # term of the reward -> its part, shape (n,)
+    sideslip_rad: Array  # shape (n,)
+    end: NDArray[Any]  # reason of the end: "", "lost", "off course", "stopped", "diverged" or "time", shape (n,)
 
 
 class Episodes:

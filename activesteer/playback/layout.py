@@ -77,13 +77,7 @@ _SHORTEST_S: Final = 0.05
 
 
 class Event(NamedTuple):
-    """Begin or end of a fault or a saturation, or a recorded event.
-
-    Attributes:
-        time_s: Time of the event [s].
-        text: Description.
-        level: Level of the viewer's log.
-    """
+    """Begin or end of a fault or a saturation, or a recorded event."""
 
     time_s: float
     text: str

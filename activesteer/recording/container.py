@@ -48,19 +48,12 @@ _CHUNK_HEAD = struct.Struct("<BQQQQII")
 
 
 class ChunkData(NamedTuple):
-    """Messages of a chunk, encoded.
+    """Messages of a chunk, encoded."""
 
-    Attributes:
-        start_ns: Log time of the first message [ns].
-        end_ns: Log time of the last message [ns].
-        records: Message records, uncompressed.
-        indexes: MCAP channel id -> number of messages, and MessageIndex record.
-    """
-
-    start_ns: int
-    end_ns: int
-    records: bytes
-    indexes: Mapping[int, tuple[int, bytes]]
+    start_ns: int  # log time of the first message [ns]
+    end_ns: int  # log time of the last message [ns]
+    records: bytes  # message records, uncompressed
+    indexes: Mapping[int, tuple[int, bytes]]  # MCAP channel id -> number of messages, and MessageIndex record
 
 
 class McapFile:

@@ -35,18 +35,13 @@ _INFO: Final = 2
 
 
 class Event(NamedTuple):
-    """An event.
+    """An event."""
 
-    Attributes:
-        time_s: Time at which the next step began [s].
-        kind: `set` for a changed key, `fail` for a fault, `phase` for a phase of the manoeuvre, `note` for a limit of
-            accuracy.
-        what: The change (`road.mu = 0.3`), the fault (`rear:stuck`), the name of the phase, or the limit in words.
-    """
-
-    time_s: float
+    time_s: float  # time at which the next step began [s]
+    # `set` for a changed key, `fail` for a fault, `phase` for a phase of the manoeuvre, `note` for a limit of
+    # accuracy
     kind: str
-    what: str
+    what: str  # the change (`road.mu = 0.3`), the fault (`rear:stuck`), the name of the phase, or the limit in words
 
 
 def events_of(metadata: Mapping[str, Any]) -> list[Event]:

@@ -72,26 +72,18 @@ _REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
 
 @dataclass
 class Records:
-    """Records of a file, chunks as places.
+    """Records of a file, chunks as places."""
 
-    Attributes:
-        position: End of the last record.
-        crc: Checksum of all bytes up to `position`.
-        complete: Whether the end of the data section was reached; the rest only repeats information.
-        damage: Description of the damage.
-        reason: The error behind the damage, if it is one of ours.
-    """
-
-    position: int = len(MCAP0_MAGIC)
-    crc: int = zlib.crc32(MCAP0_MAGIC)
+    position: int = len(MCAP0_MAGIC)  # end of the last record
+    crc: int = zlib.crc32(MCAP0_MAGIC)  # checksum of all bytes up to `position`
     schemas: dict[int, Schema] = field(default_factory=dict)
     topics: dict[int, Channel] = field(default_factory=dict)
     metadata: list[Metadata] = field(default_factory=list)
     attachments: dict[str, bytes] = field(default_factory=dict)
     chunks: list[tuple[int, int]] = field(default_factory=list)
-    complete: bool = False
-    damage: str = ""
-    reason: RecordingError | None = None
+    complete: bool = False  # whether the end of the data section was reached; the rest only repeats information
+    damage: str = ""  # description of the damage
+    reason: RecordingError | None = None  # the error behind the damage, if it is one of ours
     _bytes: int = 0
     _count: int = 0
 
@@ -182,29 +174,18 @@ _END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
 class Contents(NamedTuple):
-    """Contents of a file.
-
-    Attributes:
-        channels: The channels.
-        time_s: Time of each row [s], shape (n,).
-        values: Channel values, shape (n, number of channels); or the rows of a long recording, still in the file.
-        poses: Poses of the bodies; None where they are still in the file.
-        metadata: Metadata without metrics; `complete` tells whether the file ends properly.
-        metrics: Metrics by name.
-        attachments: Attachments by name.
-        scene: Shape of the car: solids in body frames, and links between bodies.
-        damage: Description of the damage; empty for a sound file. All other fields then hold the part before it.
-    """
+    """Contents of a file."""
 
     channels: ChannelTable
-    time_s: NDArray[np.float64]
+    time_s: NDArray[np.float64]  # time of each row [s], shape (n,)
+    # Channel values, shape (n, number of channels); or the rows of a long recording, still in the file
     values: NDArray[np.float64] | FileRows
-    poses: Poses | None
-    metadata: dict[str, Any]
-    metrics: dict[str, float]
-    attachments: dict[str, bytes]
-    scene: tuple[ScenePart, ...]
-    damage: str
+    poses: Poses | None  # poses of the bodies; None where they are still in the file
+    metadata: dict[str, Any]  # metadata without metrics; `complete` tells whether the file ends properly
+    metrics: dict[str, float]  # metrics by name
+    attachments: dict[str, bytes]  # attachments by name
+    scene: tuple[ScenePart, ...]  # shape of the car: solids in body frames, and links between bodies
+    damage: str  # description of the damage; empty for a sound file. All other fields then hold the part before it
 
 
 def read_mcap(path: Path) -> Contents:

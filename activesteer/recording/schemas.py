@@ -43,19 +43,12 @@ _CONTINUES = np.array([0x80, 0x80, 0x80, 0x80, 0], np.uint64)
 
 @dataclass(frozen=True)
 class ColumnRun:
-    """Numbers at a constant distance in a message.
+    """Numbers at a constant distance in a message."""
 
-    Attributes:
-        dtype: Little-endian numpy type of one number.
-        offset: Position of the first number in the message [byte].
-        stride: Distance from one number to the next [byte].
-        count: How many there are.
-    """
-
-    dtype: str
-    offset: int
-    stride: int
-    count: int
+    dtype: str  # little-endian numpy type of one number
+    offset: int  # position of the first number in the message [byte]
+    stride: int  # distance from one number to the next [byte]
+    count: int  # how many there are
 
 
 def varint(value: int) -> bytes:

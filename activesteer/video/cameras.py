@@ -23,17 +23,11 @@ _WHEELS_SEEN: Final = 0.25
 
 
 class View(NamedTuple):
-    """A camera on a car.
+    """A camera on a car."""
 
-    Attributes:
-        aim: Function that aims a MuJoCo camera for an instant [s].
-        shell_opacity: Opacity of the car's shell, 0 to 1; low for a view of the suspension.
-        marked: Whether the view shows the wedges and arrows beside the car.
-    """
-
-    aim: Callable[[mujoco.MjvCamera, float], None]
-    shell_opacity: float
-    marked: bool = True
+    aim: Callable[[mujoco.MjvCamera, float], None]  # function that aims a MuJoCo camera for an instant [s]
+    shell_opacity: float  # opacity of the car's shell, 0 to 1; low for a view of the suspension
+    marked: bool = True  # whether the view shows the wedges and arrows beside the car
 
 
 def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:

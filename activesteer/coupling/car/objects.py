@@ -27,15 +27,10 @@ PROCESSOR: Final = "x86-64-v3"
 
 
 class Code(NamedTuple):
-    """Compiled code of one function.
+    """Compiled code of one function."""
 
-    Attributes:
-        name: Name of the function in the object.
-        content: The object file.
-    """
-
-    name: str
-    content: bytes
+    name: str  # name of the function in the object
+    content: bytes  # the object file
 
 
 def car_code() -> dict[str, Code]:
@@ -89,36 +84,22 @@ word of such a struct points."""
 
 
 class Relocation(NamedTuple):
-    """A word that holds an address.
+    """A word that holds an address."""
 
-    Attributes:
-        place: Offset of the word in the memory of the car.
-        kind: What it points to.
-        base: Place of the function in `Memory.functions`, or offset of the word in the engine's struct.
-        added: Distance from there.
-    """
-
-    place: int
-    kind: int
-    base: int
-    added: int
+    place: int  # offset of the word in the memory of the car
+    kind: int  # what it points to
+    base: int  # place of the function in `Memory.functions`, or offset of the word in the engine's struct
+    added: int  # distance from there
 
 
 class Memory(NamedTuple):
-    """Native memory of a car.
+    """Native memory of a car."""
 
-    Attributes:
-        content: Its bytes, with zeros in place of addresses.
-        relocations: The addresses.
-        functions: Names of the engine's functions that are called by address.
-        places: Name of a part -> its offset.
-        targets: Name of an array that a recorded row is copied from -> what its address points to, and its size.
-    """
-
-    content: bytes
+    content: bytes  # its bytes, with zeros in place of addresses
     relocations: list[Relocation]
-    functions: list[str]
-    places: dict[str, int]
+    functions: list[str]  # names of the engine's functions that are called by address
+    places: dict[str, int]  # name of a part -> its offset
+    # Name of an array that a recorded row is copied from -> what its address points to, and its size
     targets: dict[str, tuple[Relocation, int]]
 
 

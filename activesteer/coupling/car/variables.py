@@ -43,40 +43,24 @@ PLACES: Final = [name for names in PLACE_GROUPS for name in names]
 
 
 class Variable(NamedTuple):
-    """A variable of an exported car.
-
-    Attributes:
-        name: Its name.
-        unit: Unit; empty for a pure number.
-        meaning: One line, with the sign convention where it matters.
-        causality: `INPUT`, `OUTPUT` or `PARAMETER`.
-        start: Start value.
-        low: Least value; `high` is the largest.
-        source: Place of its array in `RawRows`, or another source.
-        column: Place in the source.
-    """
+    """A variable of an exported car."""
 
     name: str
-    unit: str
-    meaning: str
-    causality: str
-    start: float = 0.0
-    low: float = -math.inf
+    unit: str  # unit; empty for a pure number
+    meaning: str  # one line, with the sign convention where it matters
+    causality: str  # `INPUT`, `OUTPUT` or `PARAMETER`
+    start: float = 0.0  # start value
+    low: float = -math.inf  # least value; `high` is the largest
     high: float = math.inf
-    source: int = FROM_INPUT
-    column: int = 0
+    source: int = FROM_INPUT  # place of its array in `RawRows`, or another source
+    column: int = 0  # place in the source
 
 
 class Laws(NamedTuple):
-    """Laws of the outputs that are computed.
+    """Laws of the outputs that are computed."""
 
-    Attributes:
-        forces: Axial forces of springs, stops and links.
-        limits: Limits of actuators.
-    """
-
-    forces: list[AxialForce]
-    limits: list[Actuator]
+    forces: list[AxialForce]  # axial forces of springs, stops and links
+    limits: list[Actuator]  # limits of actuators
 
 
 _MEANINGS: Final = {

@@ -120,62 +120,34 @@ _HERTZ: Final = re.compile(r"k?Hz|rev.*|r/.*|rpm")
 
 
 class Variable(NamedTuple):
-    """A variable of an FMU that holds numbers.
-
-    Attributes:
-        name: Its name.
-        reference: Value reference.
-        kind: Type, as in the names of FMI's functions (`Real`, `Float64`, `Boolean`).
-        form: Format of `struct` of an element.
-        size: Number of elements.
-        start: Start value; None if there is none.
-        unit: Unit; None if the FMU declares none or one that nobody knows.
-        unit_name: Name of the unit; None if the FMU declares none.
-        low: Least value; `high` is the largest.
-    """
+    """A variable of an FMU that holds numbers."""
 
     name: str
-    reference: int
-    kind: str
-    form: str
-    size: int
-    start: float | None
-    unit: Unit | None
-    unit_name: str | None
-    low: float
+    reference: int  # value reference
+    kind: str  # type, as in the names of FMI's functions (`Real`, `Float64`, `Boolean`)
+    form: str  # format of `struct` of an element
+    size: int  # number of elements
+    start: float | None  # start value; None if there is none
+    unit: Unit | None  # unit; None if the FMU declares none or one that nobody knows
+    unit_name: str | None  # name of the unit; None if the FMU declares none
+    low: float  # least value; `high` is the largest
     high: float
 
 
 class Description(NamedTuple):
-    """Description of an FMU.
+    """Description of an FMU."""
 
-    Attributes:
-        version: 2 or 3.
-        identifier: Model identifier.
-        token: GUID or instantiation token.
-        inputs: Name -> input.
-        outputs: Name -> output.
-        parameters: Name -> parameter that can be set before the initialisation.
-        library: Member of the archive with the code for this platform.
-        saves_state: Whether the FMU can save and restore its state.
-        serialises_state: Whether the FMU can turn a saved state into bytes.
-        alone: Whether a process can hold only one instance.
-        fixed_step_s: Step that the FMU must keep [s]; None if it can make every step.
-        usual_step_s: Step that the FMU suggests [s].
-    """
-
-    version: int
-    identifier: str
-    token: str
-    inputs: Mapping[str, Variable]
-    outputs: Mapping[str, Variable]
-    parameters: Mapping[str, Variable]
-    library: str
-    saves_state: bool
-    serialises_state: bool
-    alone: bool
-    fixed_step_s: float | None
-    usual_step_s: float | None
+    version: int  # 2 or 3
+    identifier: str  # model identifier
+    token: str  # GUID or instantiation token
+    inputs: Mapping[str, Variable]  # name -> input
+    outputs: Mapping[str, Variable]  # name -> output
+    parameters: Mapping[str, Variable]  # name -> parameter that can be set before the initialisation
+    library: str  # member of the archive with the code for this platform
+    saves_state: bool  # whether the FMU can save and restore its state
+    serialises_state: bool  # whether the FMU can turn a saved state into bytes
+    fixed_step_s: float | None  # step that the FMU must keep [s]; None if it can make every step
+    usual_step_s: float | None  # step that the FMU suggests [s]
 
 
 def describe_fmu(archive: Archive, kind: Kind) -> Description:
@@ -220,7 +192,7 @@ def describe_fmu(archive: Archive, kind: Kind) -> Description:
         description.fmiMajorVersion, str(simulation.modelIdentifier), str(description.guid), by_causality["input"],
         by_causality["output"], by_causality["parameter"], _library(archive, str(simulation.modelIdentifier), kind),
         bool(simulation.canGetAndSetFMUstate), bool(simulation.canSerializeFMUstate),
-        bool(simulation.canBeInstantiatedOnlyOncePerProcess), fixed_s, usual_s,
+        fixed_s, usual_s,
     )  # fmt: skip
 
 

@@ -36,45 +36,27 @@ class FmuFault(Exception):  # noqa: N818 - a fault of the FMU
 
 
 class Group(NamedTuple):
-    """Variables of one type, which one call sets or gets.
+    """Variables of one type, which one call sets or gets."""
 
-    Attributes:
-        kind: Type in the names of FMI's functions.
-        form: Format of `struct` of an element.
-        references: Value references.
-        size: Number of elements of all variables together.
-    """
-
-    kind: str
-    form: str
-    references: list[int]
-    size: int
+    kind: str  # type in the names of FMI's functions
+    form: str  # format of `struct` of an element
+    references: list[int]  # value references
+    size: int  # number of elements of all variables together
 
 
 class Spec(NamedTuple):
-    """Everything that an instance is made from.
+    """Everything that an instance is made from."""
 
-    Attributes:
-        library: Path of the shared library.
-        version: 2 or 3.
-        token: GUID or instantiation token.
-        resources: Path of the resources.
-        step_s: Time between two steps [s].
-        inputs: Inputs, group by group.
-        outputs: Outputs, group by group.
-        parameters: Parameters that differ from their start values, group by group, with their values.
-        name: Name of the instance.
-    """
-
-    library: str
-    version: int
-    token: str
-    resources: str
-    step_s: float
-    inputs: list[Group]
-    outputs: list[Group]
+    library: str  # path of the shared library
+    version: int  # 2 or 3
+    token: str  # GUID or instantiation token
+    resources: str  # path of the resources
+    step_s: float  # time between two steps [s]
+    inputs: list[Group]  # inputs, group by group
+    outputs: list[Group]  # outputs, group by group
+    # Parameters that differ from their start values, group by group, with their values
     parameters: list[tuple[Group, list[float]]]
-    name: str
+    name: str  # name of the instance
 
 
 class Instance(Protocol):

@@ -32,49 +32,29 @@ _KEYS: Final = ("signal", "unit")
 
 
 class Place(NamedTuple):
-    """A number within the messages of a block.
+    """A number within the messages of a block."""
 
-    Attributes:
-        message: Place of the message among them.
-        field: Place of its field.
-        wheel: Place in a field of the four wheels; None for a single number.
-    """
-
-    message: int
-    field: int
-    wheel: int | None
+    message: int  # place of the message among them
+    field: int  # place of its field
+    wheel: int | None  # place in a field of the four wheels; None for a single number
 
 
 class Link(NamedTuple):
-    """A variable of an FMU and its signal: signal = factor times element + offset.
-
-    Attributes:
-        variable: The variable.
-        signal: Name of the signal.
-        places: Number of each element.
-        factor: Factor from the FMU's unit to ours.
-        offset: Offset, in our unit.
-    """
+    """A variable of an FMU and its signal: signal = factor times element + offset."""
 
     variable: Variable
-    signal: str
-    places: tuple[Place, ...]
-    factor: float
-    offset: float
+    signal: str  # name of the signal
+    places: tuple[Place, ...]  # number of each element
+    factor: float  # factor from the FMU's unit to ours
+    offset: float  # offset, in our unit
 
 
 class Signals(NamedTuple):
-    """Signals of some messages.
+    """Signals of some messages."""
 
-    Attributes:
-        places: Name -> its numbers.
-        others: Names of fields that are no numbers.
-        words: The messages, in words.
-    """
-
-    places: Mapping[str, tuple[Place, ...]]
-    others: frozenset[str]
-    words: str
+    places: Mapping[str, tuple[Place, ...]]  # name -> its numbers
+    others: frozenset[str]  # names of fields that are no numbers
+    words: str  # the messages, in words
 
     def full(self, name: str) -> str | None:
         """Return the name of a signal that is given with or without its unit, or None if there is none."""
@@ -176,25 +156,15 @@ _ANY: Final = (-_LARGEST, _LARGEST)
 
 
 class Wiring(NamedTuple):
-    """An FMU and its connection with the messages of a block.
-
-    Attributes:
-        spec: The instance.
-        inputs: Links of the inputs, by type.
-        outputs: Links of the outputs, by type.
-        every: Steps of the block's caller between two steps of the FMU, whose outputs are held between.
-        isolate_s: Time limit of a call, in a process of its own [s]; None for an instance in this process.
-        keeps: Flag of an FMU that can save its state; `serialises` also turns it into bytes.
-        serialises: See `keeps`.
-    """
+    """An FMU and its connection with the messages of a block."""
 
     spec: Spec
-    inputs: list[Link]
-    outputs: list[Link]
-    every: int
-    isolate_s: float | None
-    keeps: bool
-    serialises: bool
+    inputs: list[Link]  # links of the inputs, by type
+    outputs: list[Link]  # links of the outputs, by type
+    every: int  # steps of the block's caller between two steps of the FMU, whose outputs are held between
+    isolate_s: float | None  # time limit of a call, in a process of its own [s]; None for an instance in this process
+    keeps: bool  # flag of an FMU that can save its state; `serialises` also turns it into bytes
+    serialises: bool  # see `keeps`
 
 
 class FmuBlock:
