@@ -17,10 +17,9 @@ from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoin
 from activesteer.driver import DriverSetup
 from activesteer.driver.open_loop import SpeedHold
 from activesteer.errors import ActiveSteerError
-from activesteer.explore.car_shape import BODIES, shape_of
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Act, Start
-from activesteer.explore.runs import Reply, free_path
+from activesteer.explore.runs import BODIES, Reply, free_path, shape_of
 from activesteer.road.course import CONE_RADIUS_M, Footprint
 from activesteer.scenario import resolve
 from activesteer.simulation.live_view import FramePacer

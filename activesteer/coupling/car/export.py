@@ -65,6 +65,11 @@ _LINKING: Final = (
     "-shared", "-Wl,-rpath,$ORIGIN", "-Wl,-Bsymbolic", "-Wl,-z,defs", "-Wl,-z,nodelete", "-Wl,--gc-sections",
 )  # fmt: skip
 
+_LICENSES: Final = (
+    "activesteer and MuJoCo are under the Apache License 2.0, https://www.apache.org/licenses/LICENSE-2.0.\n"
+    "MuJoCo: Copyright DeepMind Technologies Limited. Its library is included under another name.\n"
+)
+
 
 class Export(NamedTuple):
     """A car in the form in which it is exported.
@@ -96,7 +101,7 @@ def export_fmu(scenario: Scenario, path: Path, version: int = 2) -> Export:
         archive.writestr("modelDescription.xml", description)
         archive.writestr(f"{folder}/{name}.so", export.library)
         archive.writestr(f"{folder}/{export.engine[0]}", export.engine[1])
-        archive.writestr("documentation/licenses/license.txt", _licenses())
+        archive.writestr("documentation/licenses/license.txt", _LICENSES)
     return export
 
 
@@ -113,7 +118,7 @@ def export_library(scenario: Scenario, folder: Path) -> Export:
         export.engine[0]: export.engine[1],
         "activesteer_car.h": (_SOURCES / "activesteer_car.h").read_bytes(),
         "variables.csv": table.getvalue().encode(),
-        "license.txt": _licenses().encode(),
+        "license.txt": _LICENSES.encode(),
     }
     for name, content in files.items():
         with atomic_write(folder / name, ParameterError) as target:
@@ -144,9 +149,8 @@ def _export(scenario: Scenario) -> Export:
         "seeds.bin": _seeds(loop),
         "data.h": _data(loop, memory, variables, laws).encode(),
     }
-    code = car_code()
     sources = {path.name: path.read_bytes() for path in sorted(_SOURCES.iterdir())}
-    objects = {f"{name}.o": part.content for name, part in code.items()}
+    objects = {f"{name}.o": content for name, content in car_code().items()}
     engine_path = Path(mujoco.__file__).parent / f"libmujoco.so.{mujoco.__version__}"
     everything = {**files, **sources, **objects}
     digest = hashlib.sha256(b"".join(name.encode() + content for name, content in sorted(everything.items())))
@@ -345,10 +349,3 @@ def _compiled(files: Mapping[str, bytes], engine: tuple[str, bytes], token: str)
             errors = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
             raise ModelError(f"{compiler} cannot build the car: {' '.join(errors[:3]) or done.stderr[:300]}")
         return (folder / "car.so").read_bytes()
-
-
-def _licenses() -> str:
-    return (
-        "activesteer and MuJoCo are under the Apache License 2.0, https://www.apache.org/licenses/LICENSE-2.0.\n"
-        "MuJoCo: Copyright DeepMind Technologies Limited. Its library is included under another name.\n"
-    )

@@ -26,15 +26,8 @@ PROCESSOR: Final = "x86-64-v3"
 """Processor for which code is made: x86-64 with AVX2 and FMA (Haswell, 2013; Zen, 2017)."""
 
 
-class Code(NamedTuple):
-    """Compiled code of one function."""
-
-    name: str  # name of the function in the object
-    content: bytes  # the object file
-
-
-def car_code() -> dict[str, Code]:
-    """Return the code of the functions in `entry` and of the callbacks `passive`, `act_dyn`, `sensor`."""
+def car_code() -> dict[str, bytes]:
+    """Return the object files of the functions in `entry` and of the callbacks `passive`, `act_dyn`, `sensor`."""
     # Compiles for half a minute at first use.
     from activesteer.coupling.car.entry import car_step, change, derive, fault  # noqa: PLC0415
     from activesteer.vehicle.force_block import engine_layout  # noqa: PLC0415
@@ -48,7 +41,7 @@ def car_code() -> dict[str, Code]:
     return {name: _code(name, function) for name, function in functions.items()}
 
 
-def _code(name: str, function: Any) -> Code:
+def _code(name: str, function: Any) -> bytes:
     import llvmlite.binding as llvm  # noqa: PLC0415
     import numba  # noqa: PLC0415
 
@@ -70,7 +63,7 @@ def _code(name: str, function: Any) -> Code:
     machine = llvm.Target.from_triple("x86_64-unknown-linux-gnu").create_target_machine(
         cpu=PROCESSOR, opt=3, reloc="pic", codemodel="default"
     )
-    return Code(entry.name, machine.emit_object(module))
+    return machine.emit_object(module)
 
 
 _ALIGNMENT: Final = 64

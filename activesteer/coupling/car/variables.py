@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final, NamedTuple
 from xml.sax.saxutils import quoteattr
+
+from jinja2 import Environment, StrictUndefined
 
 from activesteer.config.faults import ACTUATORS
 from activesteer.controllers import CONTROLLER
@@ -191,71 +194,20 @@ def parameters_of(speed_mps: float, seed: int) -> list[Variable]:
 assert {*_FACTORS} <= {*Factors.__dataclass_fields__}
 
 
-_ABOUT: Final = (
-    "Multibody car in MuJoCo; SI and radians; axes and signs of ISO 8855: x forward, y left, z up, left positive"
-)
-
-
 def model_description(
     variables: Sequence[Variable], identifier: str, token: str, version: int, timestep_s: float
 ) -> str:
-    """Return the content of modelDescription.xml."""
+    """Return the content of modelDescription.xml, from the template of that name."""
     units = dict.fromkeys(variable.unit for variable in variables if variable.unit)
-    defined = "".join(f"<Unit name={quoteattr(unit)}>{_base(unit)}</Unit>" for unit in units)
-    state = "canGetAndSetFMU{0}='true' canSerializeFMU{0}='true'".format("state" if version == 2 else "State")
-    can = f"canHandleVariableCommunicationStepSize='true' {state}"
-    step = _number(timestep_s)
-    elements = [_element(place, variable, version) for place, variable in enumerate(variables)]
-    outputs = [place for place, variable in enumerate(variables) if variable.causality == OUTPUT]
-    if version == 2:
-        head = f"fmiVersion='2.0' guid='{token}'"
-        can += " canNotUseMemoryManagementFunctions='true'"
-        unknown = "".join(f"<Unknown index='{place + 1}'/>" for place in outputs)
-        structure = f"<Outputs>{unknown}</Outputs><InitialUnknowns>{unknown}</InitialUnknowns>"
-    else:
-        head = f"fmiVersion='3.0' instantiationToken='{token}'"
-        can += f" fixedInternalStepSize='{step}'"
-        elements.append(
-            f"<Float64 name='time' valueReference='{len(variables)}' causality='independent' variability='continuous'/>"
-        )
-        structure = "".join(f"<Output valueReference='{place}'/>" for place in outputs)
-        structure += "".join(f"<InitialUnknown valueReference='{place}'/>" for place in outputs)
-    newline = "\n"
-    return (
-        f"<?xml version='1.0' encoding='UTF-8'?>\n<fmiModelDescription {head} modelName={quoteattr(identifier)} "
-        f"description={quoteattr(_ABOUT)} generationTool='activesteer {__version__}' "
-        f"variableNamingConvention='flat'>\n<CoSimulation modelIdentifier='{identifier}' {can}/>\n"
-        f"<UnitDefinitions>{defined}</UnitDefinitions>\n"
-        f"<LogCategories><Category name='error' description='Failures'/></LogCategories>\n"
-        f"<DefaultExperiment startTime='0' stopTime='10' stepSize='{step}'/>\n"
-        f"<ModelVariables>\n{newline.join(elements)}\n</ModelVariables>\n"
-        f"<ModelStructure>{structure}</ModelStructure>\n</fmiModelDescription>\n"
+    known = {name: unit.dimension if (unit := find_unit(name)) else () for name in units}
+    bases = {name: dict(zip(("kg", "m", "s", "rad"), exponents, strict=False)) for name, exponents in known.items()}
+    environment = Environment(
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )
-
-
-def _base(name: str) -> str:
-    unit = find_unit(name)
-    given = zip(("kg", "m", "s", "rad"), unit.dimension if unit else (), strict=False)
-    exponents = " ".join(f"{base}='{exponent}'" for base, exponent in given if exponent)
-    return f"<BaseUnit {exponents}/>" if exponents else ""
-
-
-def _number(value: float) -> str:
-    return repr(float(value))
-
-
-def _element(place: int, variable: Variable, version: int) -> str:
-    """Return the element of a variable."""
-    variability = {INPUT: "continuous", OUTPUT: "continuous", PARAMETER: "fixed"}[variable.causality]
-    initial = {INPUT: "", OUTPUT: " initial='calculated'", PARAMETER: " initial='exact'"}[variable.causality]
-    common = (
-        f"name={quoteattr(variable.name)} valueReference='{place}' description={quoteattr(variable.meaning)} "
-        f"causality='{variable.causality}' variability='{variability}'{initial}"
-    )
-    value = f" unit={quoteattr(variable.unit)}" if variable.unit else ""
-    value += f" min='{_number(variable.low)}'" if math.isfinite(variable.low) else ""
-    value += f" max='{_number(variable.high)}'" if math.isfinite(variable.high) else ""
-    value += "" if variable.causality == OUTPUT else f" start='{_number(variable.start)}'"
-    if version == 2:
-        return f"<ScalarVariable {common}><Real{value}/></ScalarVariable>"
-    return f"<Float64 {common}{value}/>"
+    environment.filters |= {"attribute": quoteattr, "number": lambda value: repr(float(value))}
+    template = (Path(__file__).parent / "modelDescription.xml").read_text("utf-8")
+    return environment.from_string(template).render(
+        variables=variables, identifier=identifier, token=token, version=version, timestep_s=timestep_s, units=bases,
+        release=__version__, outputs=[place for place, each in enumerate(variables) if each.causality == OUTPUT],
+        isfinite=math.isfinite,
+    )  # fmt: skip

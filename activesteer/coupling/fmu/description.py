@@ -13,7 +13,7 @@ import stat
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, NamedTuple
 
@@ -29,8 +29,6 @@ DESCRIPTION: Final = "modelDescription.xml"
 BINARIES: Final = ("binaries/linux64/", "binaries/x86_64-linux/")
 """Folders of the binaries for Linux on x86-64, of FMI 2 and of FMI 3."""
 _NEEDED: Final = (DESCRIPTION, "resources/", *BINARIES)
-
-Fail = Callable[..., Exception]
 
 
 class Archive:

@@ -12,7 +12,7 @@ import os
 import struct
 import weakref
 from collections.abc import Callable, Sequence
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 from activesteer.core.child_process import Child, ChildFault
 
@@ -57,42 +57,6 @@ class Spec(NamedTuple):
     # Parameters that differ from their start values, group by group, with their values
     parameters: list[tuple[Group, list[float]]]
     name: str  # name of the instance
-
-
-class Instance(Protocol):
-    """An instance in this process or in another one. A saved state is a number."""
-
-    def step(self, values: Sequence[float]) -> tuple[float, ...]:
-        """Set the inputs, advance by one step, and return the outputs."""
-        ...
-
-    def save(self) -> int:
-        """Save the state."""
-        ...
-
-    def restore(self, state: int) -> None:
-        """Return to a saved state."""
-        ...
-
-    def forget(self, state: int) -> None:
-        """Free a saved state."""
-        ...
-
-    def serialise(self, state: int) -> bytes:
-        """Return a saved state as bytes."""
-        ...
-
-    def deserialise(self, content: bytes) -> int:
-        """Return the saved state that bytes hold."""
-        ...
-
-    def close(self) -> None:
-        """Free the instance."""
-        ...
-
-
-class _Callbacks(ctypes.Structure):
-    _fields_ = [("logger", _P), ("allocate", _P), ("free", _P), ("finished", _P), ("environment", _P)]
 
 
 class _Buffer:
@@ -141,7 +105,7 @@ class LocalInstance:
             self._last = (False, at, at + 1, at + 2, ctypes.addressof(self._time))
 
     def step(self, values: Sequence[float]) -> tuple[float, ...]:
-        """See `Instance`."""
+        """Set the inputs, advance by one step, and return the outputs."""
         first = 0
         for call, buffer in self._sets:
             size = buffer.size
@@ -153,7 +117,8 @@ class LocalInstance:
         if status > _WARNING:
             raise self._failed("DoStep", status)
         if self._flags is not None and any(self._flags[1:]):
-            raise self._ended()
+            what = "asks to end the simulation" if self._flags[1] else "returned early from its step"
+            raise FmuFault(f"{what}{self._words()}")
         self._steps += 1
         result: tuple[float, ...] = ()
         for call, buffer in self._gets:
@@ -163,25 +128,25 @@ class LocalInstance:
         return result
 
     def save(self) -> int:
-        """See `Instance`."""
+        """Save the state, and return its number."""
         state = ctypes.c_void_p()
         name = f"Get{self._state}"
         self._must(name, self._function(name, _P, _P)(self._component, ctypes.byref(state)))
         return self._kept(state, self._steps)
 
     def restore(self, state: int) -> None:
-        """See `Instance`."""
+        """Return to a saved state."""
         pointer, self._steps = self._states[state]
         self._must(f"Set{self._state}", self._function(f"Set{self._state}", _P, _P)(self._component, pointer))
 
     def forget(self, state: int) -> None:
-        """See `Instance`."""
+        """Free a saved state."""
         pointer, _ = self._states.pop(state)
         if self._finalizer.alive:
             self._function(f"Free{self._state}", _P, _P)(self._component, ctypes.byref(pointer))
 
     def serialise(self, state: int) -> bytes:
-        """See `Instance`."""
+        """Return a saved state as bytes."""
         (pointer, steps), size = self._states[state], ctypes.c_size_t()
         name = "SerializedFMUstateSize" if self._spec.version == 2 else "SerializedFMUStateSize"
         self._must(name, self._function(name, _P, _P, _P)(self._component, pointer, ctypes.byref(size)))
@@ -192,7 +157,7 @@ class LocalInstance:
         return struct.pack("=q", steps) + content.raw[: size.value]
 
     def deserialise(self, content: bytes) -> int:
-        """See `Instance`."""
+        """Return the number of the saved state that bytes hold."""
         (steps,), state = struct.unpack_from("=q", content), ctypes.c_void_p()
         name = "DeSerializeFMUstate" if self._spec.version == 2 else "DeserializeFMUState"
         call = self._function(name, _P, _S, _N, _P)
@@ -200,7 +165,7 @@ class LocalInstance:
         return self._kept(state, steps)
 
     def close(self) -> None:
-        """See `Instance`."""
+        """Free the instance."""
         self._finalizer()
 
     @property
@@ -230,15 +195,15 @@ class LocalInstance:
         """Return the address of a new instance."""
         spec, name, token = self._spec, self._spec.name.encode(), self._spec.token.encode()
         if spec.version == 2:
-            self._logger: Any = ctypes.CFUNCTYPE(None, _P, _S, _I, _S, _S)(self._said2)
+            self._logger: Any = ctypes.CFUNCTYPE(None, _P, _S, _I, _S, _S)(self._said)
             libc = ctypes.CDLL(None)
-            addresses = [ctypes.cast(part, _P) for part in (self._logger, libc.calloc, libc.free)]
-            self._callbacks = _Callbacks(*addresses, None, None)
+            addresses = [ctypes.cast(part, _P).value for part in (self._logger, libc.calloc, libc.free)]
+            self._callbacks = (_P * 5)(*addresses, None, None)  # two more: asynchronous steps, environment
             make = self._function("Instantiate", _S, _I, _S, _S, _P, _I, _I, result=_P)
             resources = f"file://{spec.resources}".encode()
             component = make(name, 1, token, resources, ctypes.byref(self._callbacks), 0, 0)
         else:
-            self._logger = ctypes.CFUNCTYPE(None, _P, _I, _S, _S)(self._said3)
+            self._logger = ctypes.CFUNCTYPE(None, _P, _I, _S, _S)(self._said)
             make = self._function("InstantiateCoSimulation", _S, _S, _S, _B, _B, _B, _B, _P, _N, _P, _P, _P, result=_P)
             logger = ctypes.cast(self._logger, _P)
             resources = os.path.join(spec.resources, "").encode()
@@ -276,18 +241,12 @@ class LocalInstance:
         word = _STATUS.get(status, f"status {status}")
         return FmuFault(f"{self._prefix}{call} returned {word}{self._words()}")
 
-    def _ended(self) -> FmuFault:
-        what = "asks to end the simulation" if self._flags[1] else "returned early from its step"
-        return FmuFault(f"{what}{self._words()}")
-
     def _words(self) -> str:
         return f": {self._log[:_MAX_LOG]}" if self._log else ""
 
-    def _said2(self, _environment: Any, _name: Any, _status: int, _category: Any, text: bytes | None) -> None:
-        self._log = (text or b"").decode(errors="replace")
-
-    def _said3(self, _environment: Any, _status: int, _category: Any, text: bytes | None) -> None:
-        self._log = (text or b"").decode(errors="replace")
+    def _said(self, *message: Any) -> None:
+        """Keep the text of a log message, which is the last argument of both versions."""
+        self._log = (message[-1] or b"").decode(errors="replace")
 
 
 def _free(terminate: Any, free: Any, component: int) -> None:
@@ -311,7 +270,7 @@ class IsolatedInstance:
         self._ask(json.dumps(spec).encode(), "its initialisation", limit_s=max(limit_s, START_LIMIT_S))
 
     def step(self, values: Sequence[float]) -> tuple[float, ...]:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         doing = f"the step at {self._steps * self._step_s:g} s"
         answer = self._ask(_STEP + struct.pack(f"={len(values)}d", *values), doing, self._step_bytes)
         if len(answer) != self._step_bytes:
@@ -320,28 +279,28 @@ class IsolatedInstance:
         return self._unpack(answer)
 
     def save(self) -> int:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         return self._number(_SAVE)
 
     def restore(self, state: int) -> None:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         self._ask(_RESTORE + str(state).encode())
 
     def forget(self, state: int) -> None:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         if self._child.alive:
             self._ask(_FORGET + str(state).encode())
 
     def serialise(self, state: int) -> bytes:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         return self._ask(_SERIALISE + str(state).encode(), most_bytes=_MAX_STATE_BYTES)
 
     def deserialise(self, content: bytes) -> int:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         return self._number(_DESERIALISE + content)
 
     def close(self) -> None:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         self._child.close()
 
     def _number(self, request: bytes) -> int:
@@ -364,11 +323,6 @@ class IsolatedInstance:
         if answer[:1] != _GOOD:
             raise self._nonsense(doing, answer)
         return answer[1:]
-
-
-def make_instance(spec: Spec, isolate_s: float | None) -> Instance:
-    """Return an instance of an FMU."""
-    return LocalInstance(spec) if isolate_s is None else IsolatedInstance(spec, isolate_s)
 
 
 def _spec(text: bytes) -> Spec:

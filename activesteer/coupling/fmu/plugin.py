@@ -20,7 +20,7 @@ from activesteer.core.files import is_file, shown_path, user_path, why_no_file
 from activesteer.core.signals import DriverCommand, Measurement, Motion, PerWheel, Setpoint, new_message
 from activesteer.core.units import UNIT_NAMES, find_unit, split_ending
 from activesteer.coupling.fmu.description import Archive, Variable, describe_fmu
-from activesteer.coupling.fmu.instance import FmuFault, Group, Instance, Spec, make_instance
+from activesteer.coupling.fmu.instance import FmuFault, Group, IsolatedInstance, LocalInstance, Spec
 from activesteer.errors import nearest_names, shown
 from activesteer.plugins import Kind, Plugin
 from activesteer.plugins.file import parse_parameters
@@ -178,7 +178,10 @@ class FmuBlock:
         """Instantiate and initialise the FMU."""
         self._about = wiring, kind, name, setup, revive
         try:
-            shared = _Shared(make_instance(wiring.spec, wiring.isolate_s))
+            if wiring.isolate_s is None:
+                shared = _Shared(LocalInstance(wiring.spec))
+            else:
+                shared = _Shared(IsolatedInstance(wiring.spec, wiring.isolate_s))
         except FmuFault as fault:
             raise kind.fail(name, str(fault)) from fault
         self._bind(shared, None, 0)
@@ -186,7 +189,7 @@ class FmuBlock:
     def _bind(self, shared: _Shared, held: Any, steps: int) -> None:
         """Join the users of an instance."""
         wiring, kind, *_ = self._about
-        self._shared, self._block = shared, shared.add()
+        self._shared, self._block = shared, shared.new_block()
         self._held, self._steps, self._every = held, steps, wiring.every
         self._reads: list[Any] = [
             (*place, 1.0 / link.factor, link.offset) for link in wiring.inputs for place in link.places
@@ -277,7 +280,15 @@ class FmuBlock:
         *_, revive = self._about
         if not self._about[0].serialises:
             raise self._stateless("turn its state into bytes (canSerializeFMUstate), as another process needs it")
-        content = self._call(lambda shared: _serialised(shared.instance))
+
+        def serialised(shared: _Shared) -> bytes:
+            state = shared.instance.save()
+            try:
+                return shared.instance.serialise(state)
+            finally:
+                shared.instance.forget(state)
+
+        content = self._call(serialised)
         return _revived, (revive, self._about[3], content, self._held, self._steps)
 
     def _call(self, use: Callable[[_Shared], Any]) -> Any:
@@ -304,16 +315,12 @@ class FmuBlock:
 class _Shared:
     """An instance, and the states of the blocks that take turns with it."""
 
-    def __init__(self, instance: Instance) -> None:
+    def __init__(self, instance: LocalInstance | IsolatedInstance) -> None:
         self.instance, self.lock = instance, threading.Lock()
         self.user: int | None = None
         self.states: dict[int, int] = {}
         self.gone: list[int] = []
-        self._blocks = 0
-
-    def add(self) -> int:
-        self._blocks += 1
-        return self._blocks
+        self.new_block = itertools.count(1).__next__
 
     def turn_to(self, block: int) -> None:
         """Give the instance the state of a block."""
@@ -329,14 +336,6 @@ class _Shared:
                 self.instance.restore(state)
                 self.instance.forget(state)
             self.user = block
-
-
-def _serialised(instance: Instance) -> bytes:
-    state = instance.save()
-    try:
-        return instance.serialise(state)
-    finally:
-        instance.forget(state)
 
 
 def _revived(revive: Callable[[Any], FmuBlock], setup: Any, content: bytes, held: Any, steps: int) -> FmuBlock:
@@ -442,7 +441,7 @@ class Fmu:
         )  # fmt: skip
         keeps = about.saves_state
         wiring = Wiring(spec, self._inputs, self._outputs, every, isolate_s, keeps, keeps and about.serialises_state)
-        again = functools.partial(_from_vehicle, self, {**parameters, ISOLATE: isolate_s})
+        again = functools.partial(self.from_vehicle, **{**parameters, ISOLATE: isolate_s})
         return FmuBlock(wiring, self.kind, self.path.name, setup, again)
 
     def _changed(self, name: str, value: Any) -> tuple[Group, list[float]]:
@@ -451,10 +450,6 @@ class Fmu:
 
     def __reduce__(self) -> Any:
         return Fmu, (self.path, self.kind)
-
-
-def _from_vehicle(fmu: Fmu, parameters: Mapping[str, Any], setup: Any) -> FmuBlock:
-    return fmu.from_vehicle(setup, **parameters)
 
 
 def _declared(variable: Variable) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import MAX_WAITING, Act, Describe, End, Message, RunRequest, Start, add, read
 from activesteer.explore.runs import Runs
-from activesteer.explore.sliders import sliders
+from activesteer.explore.runs import sliders
 from activesteer.scenario import resolve
 
 OWN = """
