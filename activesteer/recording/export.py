@@ -9,19 +9,20 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from activesteer.core.conventions import Array
 from activesteer.core.files import atomic_write, finite
 from activesteer.errors import RecordingError, not_installed
 from activesteer.recording.contents import metadata_texts
-from activesteer.recording.schemas import TIME, ChannelTable
+from activesteer.recording.schemas import TIME
 
 if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
+
+    from activesteer.recording.recording import Recording
 
 MATLAB_NAME_LENGTH: Final = 63
 """Longest name of a variable or field in MATLAB (`namelengthmax`)."""
@@ -30,33 +31,7 @@ MATLAB_TABLES: Final = ("units", "meanings", "metrics", "metadata")
 """Variables besides the channels."""
 
 
-class Exportable(Protocol):
-    """Interface of an exported recording."""
-
-    metadata: dict[str, Any]
-    metrics: dict[str, float]
-
-    @property
-    def channels(self) -> ChannelTable:
-        """The channels in column order."""
-        ...
-
-    @property
-    def time_s(self) -> Array:
-        """Time of each row [s], shape (n,)."""
-        ...
-
-    @property
-    def values(self) -> Array:
-        """All channel values, shape (n, number of channels)."""
-        ...
-
-    def __getitem__(self, name: str, /) -> Array:
-        """A channel over time, shape (n,)."""
-        ...
-
-
-def to_dataframe(recording: Exportable) -> pd.DataFrame:
+def to_dataframe(recording: Recording) -> pd.DataFrame:
     """Return a data frame with a column per channel and the time as index.
 
     Returns:
@@ -76,7 +51,7 @@ def to_dataframe(recording: Exportable) -> pd.DataFrame:
     return frame
 
 
-def to_csv(recording: Exportable, path: str | os.PathLike[str]) -> Path:
+def to_csv(recording: Recording, path: str | os.PathLike[str]) -> Path:
     """Write a line of names and a line per row: `time_s`, then the channels. An existing file is replaced.
 
     Numbers have enough digits to restore the same values; channels with `single` have 32 bit.
@@ -95,7 +70,7 @@ def to_csv(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     return _written(path, write)
 
 
-def to_parquet(recording: Exportable, path: str | os.PathLike[str]) -> Path:
+def to_parquet(recording: Recording, path: str | os.PathLike[str]) -> Path:
     """Write `time_s` and the channels as columns. An existing file is replaced.
 
     Channels with `single` have 32 bit. Each field carries `unit` and `meaning`, the schema `metadata` and `metrics` as
@@ -109,7 +84,7 @@ def to_parquet(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     return _written(path, lambda target: parquet.write_table(_table(recording), target, compression="zstd"))
 
 
-def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
+def to_mat(recording: Recording, path: str | os.PathLike[str]) -> Path:
     """Write a MATLAB file of version 5, which every MATLAB and Octave can load. An existing file is replaced.
 
     `time_s` and every channel is a column of doubles, since single precision would spread to all results.
@@ -145,7 +120,7 @@ def to_mat(recording: Exportable, path: str | os.PathLike[str]) -> Path:
     return _written(path, write)
 
 
-def _table(recording: Exportable) -> pa.Table:
+def _table(recording: Recording) -> pa.Table:
     import pyarrow as pa  # noqa: PLC0415 - slow to import
 
     columns = [pa.array(recording.time_s)]
@@ -159,7 +134,7 @@ def _table(recording: Exportable) -> pa.Table:
     return pa.table(columns, schema=pa.schema(fields, metadata=about))
 
 
-def _metadata(recording: Exportable) -> str:
+def _metadata(recording: Recording) -> str:
     texts, _ = metadata_texts(recording.metadata)
     return json.dumps({key: json.loads(text) for key, text in texts.items()}, ensure_ascii=False)
 

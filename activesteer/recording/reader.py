@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from google.protobuf.message import DecodeError
@@ -36,14 +36,12 @@ from activesteer.recording.contents import (
     SCENE_TOPIC,
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
-    ScenePart,
     check_bodies,
     check_metadata,
     check_metrics,
     check_names,
     decode_event,
     decode_scene,
-    tables_of,
 )
 from activesteer.recording.rows import (
     BROKEN,
@@ -173,26 +171,11 @@ are needed."""
 _END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
-class Contents(NamedTuple):
-    """Contents of a file."""
-
-    channels: ChannelTable
-    time_s: NDArray[np.float64]  # time of each row [s], shape (n,)
-    # Channel values, shape (n, number of channels); or the rows of a long recording, still in the file
-    values: NDArray[np.float64] | FileRows
-    poses: Poses | None  # poses of the bodies; None where they are still in the file
-    metadata: dict[str, Any]  # metadata without metrics; `complete` tells whether the file ends properly
-    metrics: dict[str, float]  # metrics by name
-    attachments: dict[str, bytes]  # attachments by name
-    scene: tuple[ScenePart, ...]  # shape of the car: solids in body frames, and links between bodies
-    damage: str  # description of the damage; empty for a sound file. All other fields then hold the part before it
-
-
-def read_mcap(path: Path) -> Contents:
-    """Read a file written by `McapWriter`.
+def read_mcap(path: Path) -> tuple[dict[str, Any], str]:
+    """Read a file written by `McapWriter`. Return the arguments of `Recording`, and the description of a damage.
 
     A file that ends too early, as after a killed process, gives all its complete blocks. A damaged file gives the part
-    before the damage, and describes the damage in `damage`.
+    before the damage. The values of a long recording are its rows, still in the file; its poses are then None.
     """
     descriptor = opened(path)
     kept = False
@@ -206,21 +189,21 @@ def read_mcap(path: Path) -> Contents:
         records = read_records(descriptor, size)
         try:
             contents = _decode(descriptor, records)
+            kept = isinstance(contents["values"], FileRows)
         except RecordingError as error:
             damage = f" ({records.damage})" if records.damage else ""
             reason = records.reason or error
             value = path if reason.value is None else reason.value
             raise RecordingError(f"{shown_path(path)}: {error}{damage}", value=value, allowed=reason.allowed) from None
-        kept = isinstance(contents.values, FileRows)
     except (*BROKEN, DecodeError, LookupError, TypeError, AttributeError) as error:
         raise RecordingError(f"{shown_path(path)} is damaged: {words_of(error)}", value=path) from None
     finally:
         if not kept:
             os.close(descriptor)
-    return contents
+    return contents, records.damage
 
 
-def _decode(descriptor: int, records: Records) -> Contents:
+def _decode(descriptor: int, records: Records) -> dict[str, Any]:
     metadata, metrics = _metadata(records)
     topics: dict[str, Channel] = {}
     for topic in records.topics.values():
@@ -256,11 +239,12 @@ def _decode(descriptor: int, records: Records) -> Contents:
         raise RecordingError(f"there are {len(scenes)} scenes")
     parts = decode_scene(scenes[0]) if scenes else ()
     if events:
-        metadata["events"] = tables_of(map(decode_event, events))
+        metadata["events"] = [decode_event(event)._asdict() for event in events]
     values, poses = rows.collected(descriptor, decoder, list(channels))
-    return Contents(
-        channels, rows.time_s(), values, poses, metadata, metrics, records.attachments, parts, records.damage
-    )
+    return {
+        "channels": channels, "time_s": rows.time_s(), "values": values, "poses": poses, "metadata": metadata,
+        "metrics": metrics, "attachments": records.attachments, "scene": parts,
+    }  # fmt: skip
 
 
 def _content(descriptor: int, start: int, length: int) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +18,6 @@ from activesteer.recording.reader import read_mcap
 from activesteer.recording.rows import FileRows, Poses, values_of
 from activesteer.recording.schemas import ChannelTable, nanoseconds, shaped
 from activesteer.recording.writer import McapWriter
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 class Recording:
@@ -106,29 +103,19 @@ class Recording:
         Raises:
             RecordingError: the file cannot be opened, is no recording, or is damaged; the message says what is left.
         """
-        contents = read_mcap(Path(path))
-        if contents.damage and not recover:
-            rows = len(contents.time_s)
-            message = f"{path} is damaged: {contents.damage}. "
+        contents, damage = read_mcap(Path(path))
+        if damage and not recover:
+            rows = len(contents["time_s"])
+            message = f"{path} is damaged: {damage}. "
             if rows:
-                message += f"The {rows} rows up to {contents.time_s[-1]:.3f} s can be read"
+                message += f"The {rows} rows up to {contents['time_s'][-1]:.3f} s can be read"
             else:
                 message += "Metadata and attachments can be read, but no rows"
             raise RecordingError(message + ", with Recording.open(path, recover=True)", value=path, allowed=rows)
-        metadata = contents.metadata
-        if contents.damage:
-            metadata.setdefault("error", f"the file is damaged: {contents.damage}")
+        if damage:
+            contents["metadata"].setdefault("error", f"the file is damaged: {damage}")
         try:
-            return cls(
-                contents.channels,
-                contents.time_s,
-                contents.values,
-                poses=contents.poses,
-                metadata=metadata,
-                metrics=contents.metrics,
-                attachments=contents.attachments,
-                scene=contents.scene,
-            )
+            return cls(**contents)
         except RecordingError as error:
             raise RecordingError(f"{path}: {error}", value=error.value, allowed=error.allowed) from None
 
@@ -159,21 +146,7 @@ class Recording:
                 values = values_of([block], len(block.row_ns), len(self._channels))
                 writer.write(block.row_ns / 1e9, values, block.pose_ns / 1e9, block.positions_m, block.quaternions)
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """A pandas data frame (see `activesteer.recording.export.to_dataframe`)."""
-        return export.to_dataframe(self)
-
-    def to_csv(self, path: str | Path) -> Path:
-        """Write a CSV file (see `activesteer.recording.export.to_csv`)."""
-        return export.to_csv(self, path)
-
-    def to_parquet(self, path: str | Path) -> Path:
-        """Write a Parquet file (see `activesteer.recording.export.to_parquet`)."""
-        return export.to_parquet(self, path)
-
-    def to_mat(self, path: str | Path) -> Path:
-        """Write a MATLAB file (see `activesteer.recording.export.to_mat`)."""
-        return export.to_mat(self, path)
+    to_dataframe, to_csv, to_parquet, to_mat = export.to_dataframe, export.to_csv, export.to_parquet, export.to_mat
 
     @property
     def time_s(self) -> NDArray[np.float64]:
