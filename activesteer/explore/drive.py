@@ -60,11 +60,7 @@ class HandDriver:
 
     The hands turn the wheel at a limited rate towards the angle asked for. Full steering is the angle of a steady turn
     at `_FASTEST_MPS2`, a (l / v^2) (1 + (v / v_ch)^2) times the steering ratio, and at most the lock. Without a foot on
-    a pedal, the driver holds the speed.
-
-    Attributes:
-        hands: What is asked for now.
-        hold_mps: Speed that is held [m/s]; None if the car shall coast.
+    a pedal, the driver holds the speed `hold_mps`, or coasts if it is None. `hands` is what is asked for now.
     """
 
     def __init__(self, setup: DriverSetup, hold_mps: float | None) -> None:
@@ -109,11 +105,7 @@ def _towards(value: float, target: float, most: float) -> float:
 
 
 class DriveSession:
-    """A car that waits at the start of a course, and its drive in real time, recorded to a file.
-
-    Attributes:
-        path: File of the drive; None while the car waits.
-    """
+    """A car that waits at the start of a course, and its drive in real time, recorded to the file `path`."""
 
     def __init__(self, choice: Start, folder: Folder, pacer: FramePacer | None = None) -> None:
         """Put the car at the start of a course."""

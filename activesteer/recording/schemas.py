@@ -77,12 +77,7 @@ def timestamps(time_ns: NDArray[np.uint64]) -> NDArray[np.uint8]:
 
 
 class FixedMessage:
-    """Message of constant length: constant bytes, and numbers at fixed places.
-
-    Attributes:
-        template: The message with all numbers zero.
-        runs: Places of the numbers, in the order of addition.
-    """
+    """Message of constant length: a template with all numbers zero, and the places of the numbers."""
 
     def __init__(self) -> None:
         """Start with an empty message."""

@@ -32,13 +32,7 @@ _NEEDED: Final = (DESCRIPTION, "resources/", *BINARIES)
 
 
 class Archive:
-    """An FMU file, unpacked at first use and deleted at the end of the process.
-
-    Attributes:
-        path: The file.
-        key: Digest of its content.
-        names: Names of its members.
-    """
+    """An FMU file with the digest `key`, unpacked at first use and deleted at the end of the process."""
 
     def __init__(self, path: Path, kind: Kind) -> None:
         """Read and check the archive without unpacking it."""

@@ -12,8 +12,7 @@ import pytest
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import MAX_WAITING, Act, Describe, End, Message, RunRequest, Start, add, read
-from activesteer.explore.runs import Runs
-from activesteer.explore.runs import sliders
+from activesteer.explore.runs import Runs, sliders
 from activesteer.scenario import resolve
 
 OWN = """
