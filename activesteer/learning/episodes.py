@@ -89,17 +89,7 @@ TASKS: Final[dict[str, Task]] = {
 
 
 def sampled_overrides(task: Task, vehicle: Any, count: int, seed: int) -> list[dict[str, Any]]:
-    """Draw cars, roads and drivers from the ranges of the package's population.
-
-    Args:
-        task: The task.
-        vehicle: The vehicle.
-        count: Number of samples.
-        seed: Seed; the samples of another seed are independent.
-
-    Returns:
-        Overrides of each sample, beside those of the task. What the task sets itself does not vary.
-    """
+    """Draw overrides of cars, roads and drivers from the package's population, without those that the task sets."""
     population = read_study(_POPULATION)
     keys = [key for key in population.keys if not key.startswith(("controllers.", "sensors."))]
     factors = [one for one in population.factors if one.key in keys and one.key not in task.overrides]
@@ -271,15 +261,9 @@ class Episodes:
         self._started = np.zeros(n, dtype=bool)
 
     def reset(self, episodes: Sequence[int], generators: Sequence[np.random.Generator]) -> NDArray[np.float32]:
-        """Start some episodes anew, each with a car that its generator draws. Return the observations of all.
-
-        Args:
-            episodes: Numbers of the episodes.
-            generators: A generator for each of these episodes.
-        """
+        """Start some episodes anew, each with a car that its generator draws. Return the observations of all."""
         for episode, generator in zip(episodes, generators, strict=True):
-            car = int(generator.integers(self._cars))
-            self._active[episode] = episode * self._cars + car
+            self._active[episode] = episode * self._cars + int(generator.integers(self._cars))
         cars = self._active[list(episodes)]
         self.batch.reset(cars)
         self._along_m[cars] = 0.0
@@ -293,8 +277,7 @@ class Episodes:
 
     def loop(self, episode: int) -> Any:
         """Return the closed loop of the car that drives in an episode."""
-        car = int(self._active[episode])
-        return self.batch.loops[car]
+        return self.batch.loops[int(self._active[episode])]
 
     def step(self, actions: ArrayLike, episodes: Sequence[int] | NDArray[Any] | None = None) -> Outcome:
         """Carry out the actions until the next decision.
@@ -350,14 +333,9 @@ class Episodes:
         self.batch.advance(self.steps, *self.commands(every), self._active[chosen])
 
     def commands(self, actions: Array) -> tuple[DriverCommand | None, ActuatorCommand]:
-        """Return actions within their bounds as commands.
+        """Return actions within their bounds, shape (n, numbers), as commands of driver and controller.
 
-        Args:
-            actions: Shape (n, numbers).
-
-        Returns:
-            Command of the driver, None if the agent does not drive, and command of the controller; each field is an
-            array of length n, or zero.
+        Each field is an array of length n, or zero. There is no command of the driver if the agent does not drive.
         """
         columns: dict[str, Any] = {
             name: scale * actions[:, place] for place, (name, _, scale) in enumerate(self.actions)

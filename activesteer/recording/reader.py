@@ -226,7 +226,8 @@ def _decode(descriptor: int, records: Records) -> dict[str, Any]:
     events: list[bytes] = []
     for start, length in records.chunks:
         try:
-            data, crc = messages_of(_content(descriptor, start, length))
+            limits.check_count(length, limits.MAX_CHUNK_BYTES, "bytes", RecordingError)
+            data, crc = messages_of(read_bytes(descriptor, start, length))
             block = rows.add(Place(start, length, crc), data, decoder)
         except (RecordingError, *BROKEN) as error:
             records.damage = f"the chunk in bytes {start} to {start + length} cannot be read: {words_of(error)}"
@@ -245,11 +246,6 @@ def _decode(descriptor: int, records: Records) -> dict[str, Any]:
         "channels": channels, "time_s": rows.time_s(), "values": values, "poses": poses, "metadata": metadata,
         "metrics": metrics, "attachments": records.attachments, "scene": parts,
     }  # fmt: skip
-
-
-def _content(descriptor: int, start: int, length: int) -> bytes:
-    limits.check_count(length, limits.MAX_CHUNK_BYTES, "bytes", RecordingError)
-    return read_bytes(descriptor, start, length)
 
 
 class _Rows:

@@ -291,21 +291,17 @@ def state_schema(group: str, channels: Iterable[Channel]) -> bytes:
 
 def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessage]:
     """Return the field names of a schema of `state_schema` in their order, and the layout of the messages."""
-    for file in FileDescriptorSet.FromString(schema).file:
-        for message in file.message_type:
-            if f"{file.package}.{message.name}" == schema_name:
-                return [field.name for field in message.field], _layout(message)
-    raise RecordingError(f"the schema of {schema_name} does not define it")
-
-
-def _layout(message: DescriptorProto) -> FixedMessage:
+    files = FileDescriptorSet.FromString(schema).file
+    messages = [each for file in files for each in file.message_type if f"{file.package}.{each.name}" == schema_name]
+    if not messages:
+        raise RecordingError(f"the schema of {schema_name} does not define it")
     layout = FixedMessage()
     kinds = {FieldDescriptorProto.TYPE_FLOAT: "<f4", FieldDescriptorProto.TYPE_DOUBLE: "<f8"}
-    for field in message.field:
+    for field in messages[0].field:
         if field.type not in kinds or field.label == FieldDescriptorProto.LABEL_REPEATED:
-            raise RecordingError(f"field {field.name} of {message.name} is neither float nor double")
+            raise RecordingError(f"field {field.name} of {messages[0].name} is neither float nor double")
         layout.number(field.number, kinds[field.type])
-    return layout
+    return [field.name for field in messages[0].field], layout
 
 
 def state_layout(channels: Iterable[Channel]) -> FixedMessage:

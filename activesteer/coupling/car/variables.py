@@ -59,13 +59,6 @@ class Variable(NamedTuple):
     column: int = 0  # place in the source
 
 
-class Laws(NamedTuple):
-    """Laws of the outputs that are computed."""
-
-    forces: list[AxialForce]  # axial forces of springs, stops and links
-    limits: list[Actuator]  # limits of actuators
-
-
 _MEANINGS: Final = {
     "steering_wheel_demand_rad": ("rad", "steering wheel angle demand, left positive"),
     "gear": ("", "1 forward, -1 reverse, 0 with the clutch open"),
@@ -128,8 +121,8 @@ def _fault_inputs(part: str) -> list[Variable]:
     ]
 
 
-def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], Laws]:
-    """Return the outputs: measurement, motion, and the recorded channels, with the laws of those that are computed."""
+def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], list[AxialForce], list[Actuator]]:
+    """Return the outputs: measurement, motion, and the recorded channels, with the laws of computed ones."""
     found = [
         Variable(f"measured_{number.name}", number.recorded.unit, f"{number.recorded.meaning}, measured", OUTPUT,
                  source=FROM_RESULT, column=1 + place)
@@ -142,7 +135,8 @@ def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], Laws]
                  source=FROM_MOTION, column=place)
         for place, name in enumerate(MOTION)
     ]  # fmt: skip
-    laws = Laws([], [])
+    forces: list[AxialForce] = []
+    limits: list[Actuator] = []
     names = taken | {variable.name for variable in found}
     for channel, values in loop.vehicle.channels.signals():
         if channel.name in names or (isinstance(values, Column) and values.array == "commands"):
@@ -150,15 +144,15 @@ def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], Laws]
         if isinstance(values, Column):
             source, column = RawRows._fields.index(values.array), values.column
         elif isinstance(values, AxialForce):
-            source, column = FROM_FORCE, len(laws.forces)
-            laws.forces.append(values)
+            source, column = FROM_FORCE, len(forces)
+            forces.append(values)
         elif isinstance(values, Actuator):
-            source, column = FROM_LIMIT, len(laws.limits)
-            laws.limits.append(values)
+            source, column = FROM_LIMIT, len(limits)
+            limits.append(values)
         else:
             continue
         found.append(Variable(channel.name, channel.unit, channel.meaning, OUTPUT, source=source, column=column))
-    return found, laws
+    return found, forces, limits
 
 
 _FACTORS: Final = ("tyre_friction", "tyre_cornering_stiffness", "front_cornering_stiffness", "rear_cornering_stiffness",

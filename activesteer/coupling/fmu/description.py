@@ -130,7 +130,6 @@ class Description(NamedTuple):
     """Description of an FMU."""
 
     version: int  # 2 or 3
-    identifier: str  # model identifier
     token: str  # GUID or instantiation token
     inputs: Mapping[str, Variable]  # name -> input
     outputs: Mapping[str, Variable]  # name -> output
@@ -181,7 +180,7 @@ def describe_fmu(archive: Archive, kind: Kind) -> Description:
     if not simulation.canHandleVariableCommunicationStepSize:
         fixed_s = fixed_s or usual_s
     return Description(
-        description.fmiMajorVersion, str(simulation.modelIdentifier), str(description.guid), by_causality["input"],
+        description.fmiMajorVersion, str(description.guid), by_causality["input"],
         by_causality["output"], by_causality["parameter"], _library(archive, str(simulation.modelIdentifier), kind),
         bool(simulation.canGetAndSetFMUstate), bool(simulation.canSerializeFMUstate),
         fixed_s, usual_s,

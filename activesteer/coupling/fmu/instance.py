@@ -164,10 +164,6 @@ class LocalInstance:
         self._must(name, call(self._component, content[8:], len(content) - 8, ctypes.byref(state)))
         return self._kept(state, steps)
 
-    def close(self) -> None:
-        """Free the instance."""
-        self._finalizer()
-
     @property
     def _state(self) -> str:
         """The word for a state in the names of functions."""
@@ -299,10 +295,6 @@ class IsolatedInstance:
         """See `LocalInstance`."""
         return self._number(_DESERIALISE + content)
 
-    def close(self) -> None:
-        """See `LocalInstance`."""
-        self._child.close()
-
     def _number(self, request: bytes) -> int:
         answer = self._ask(request)
         if not (answer.isdigit() and len(answer) < _MAX_DIGITS):
@@ -310,7 +302,7 @@ class IsolatedInstance:
         return int(answer)
 
     def _nonsense(self, doing: str, answer: bytes) -> FmuFault:
-        self.close()
+        self._child.close()
         return FmuFault(f"answers nonsense in {doing}: {answer[:_MAX_DIGITS]!r}")
 
     def _ask(self, request: bytes, doing: str = "a call", most_bytes: int = 0, limit_s: float | None = None) -> bytes:
