@@ -159,7 +159,7 @@ class DriveSession:
     def act(self, message: Act) -> None:
         """Carry out a message of the page: hands, controller, speed to hold, friction."""
         if message.controller:
-            self._folder.check_controller(message.controller)
+            self._folder.check_name("controller", message.controller)
             loop, name = self._simulation.loop, self._folder.located(message.controller)
             loop.replace_controller(name)
             self._names["controller"] = message.controller

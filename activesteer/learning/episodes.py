@@ -111,11 +111,6 @@ def sampled_overrides(task: Task, vehicle: Any, count: int, seed: int) -> list[d
     return [dict(to_overrides.overrides(0, 0, samples[number])) for number in range(count)]
 
 
-def bounds(parts: Sequence[tuple[str, float, float]]) -> tuple[Any, Any]:
-    """Return lower and upper bounds of a space as float32."""
-    return np.array([low for _, low, _ in parts], np.float32), np.array([high for _, _, high in parts], np.float32)
-
-
 _MEASURED: Final = (
     ("speed_mps", -100.0, 100.0),
     ("yaw_rate_radps", -5.0, 5.0),
@@ -216,7 +211,7 @@ class Episodes:
         Raises:
             ActiveSteerError: an input is wrong.
         """
-        self.task = task = _task(task)
+        self.task = task = task if isinstance(task, Task) else TASKS[_one_of("task", task, tuple(TASKS))]
         used = tuple(task.actuators if actuators is None else actuators)
         self._agent_drives = _one_of("driver", driver or task.driver, ("driver", "agent")) == "agent"
         for name in used:
@@ -247,7 +242,8 @@ class Episodes:
         self.observations = (*_MEASURED, *_SPEEDS, *_DEMANDS, *road)
         self._measured = [_MEASUREMENTS.index(name) for name, _, _ in (*_MEASURED, *_SPEEDS)]
         self._demands = [_COMMANDS.index(name) for name, _, _ in _DEMANDS]
-        self._bounds = bounds(self.observations)
+        lows, highs = (np.array([part[side] for part in self.observations], np.float32) for side in (1, 2))
+        self._bounds = lows, highs
         ones = np.ones(len(self.actions), np.float32)
         self.action_space = gymnasium.spaces.Box(self._low.astype(np.float32), ones)
         self.observation_space = gymnasium.spaces.Box(*self._bounds)
@@ -294,7 +290,9 @@ class Episodes:
         if not self._started[chosen].all():
             raise ParameterError("reset the environment before its first step", key="step")
         given = self.within_bounds(np.where(chosen[:, np.newaxis], given, 0.0))
-        self._drive(given, chosen)
+        every = np.zeros((len(self.batch), len(self.actions)))
+        every[self._active] = given
+        self.batch.advance(self.steps, *self.commands(every), self._active[chosen])
         tracked = self._tracked()
         terms, sideslip = self._terms(given, tracked)
         cars = self._active
@@ -326,11 +324,6 @@ class Episodes:
     def within_bounds(self, actions: Array) -> Array:
         """Limit actions to their bounds."""
         return np.clip(actions, self._low, 1.0)
-
-    def _drive(self, actions: Array, chosen: NDArray[np.bool_]) -> None:
-        every = np.zeros((len(self.batch), len(self.actions)))
-        every[self._active] = actions
-        self.batch.advance(self.steps, *self.commands(every), self._active[chosen])
 
     def commands(self, actions: Array) -> tuple[DriverCommand | None, ActuatorCommand]:
         """Return actions within their bounds, shape (n, numbers), as commands of driver and controller.
@@ -396,12 +389,6 @@ class Episodes:
         }
         weights = {name: weight for name, weight in task.weights.items() if name in formulas}
         return {name: weight * self.interval_s * formulas[name]() for name, weight in weights.items()}, sideslip
-
-
-def _task(task: str | Task) -> Task:
-    if isinstance(task, Task):
-        return task
-    return TASKS[_one_of("task", task, tuple(TASKS))]
 
 
 def _one_of(key: str, value: Any, allowed: tuple[str, ...]) -> Any:

@@ -130,14 +130,13 @@ class LocalInstance:
     def save(self) -> int:
         """Save the state, and return its number."""
         state = ctypes.c_void_p()
-        name = f"Get{self._state}"
-        self._must(name, self._function(name, _P, _P)(self._component, ctypes.byref(state)))
+        self._must(f"Get{self._state}", (_P,), ctypes.byref(state))
         return self._kept(state, self._steps)
 
     def restore(self, state: int) -> None:
         """Return to a saved state."""
         pointer, self._steps = self._states[state]
-        self._must(f"Set{self._state}", self._function(f"Set{self._state}", _P, _P)(self._component, pointer))
+        self._must(f"Set{self._state}", (_P,), pointer)
 
     def forget(self, state: int) -> None:
         """Free a saved state."""
@@ -149,19 +148,18 @@ class LocalInstance:
         """Return a saved state as bytes."""
         (pointer, steps), size = self._states[state], ctypes.c_size_t()
         name = "SerializedFMUstateSize" if self._spec.version == 2 else "SerializedFMUStateSize"
-        self._must(name, self._function(name, _P, _P, _P)(self._component, pointer, ctypes.byref(size)))
+        self._must(name, (_P, _P), pointer, ctypes.byref(size))
         if size.value > _MAX_STATE_BYTES:
             raise FmuFault(f"says that its state has {size.value} bytes")
-        content, name = ctypes.create_string_buffer(max(1, size.value)), f"Serialize{self._state}"
-        self._must(name, self._function(name, _P, _P, _P, _N)(self._component, pointer, content, size))
+        content = ctypes.create_string_buffer(max(1, size.value))
+        self._must(f"Serialize{self._state}", (_P, _P, _N), pointer, content, size)
         return struct.pack("=q", steps) + content.raw[: size.value]
 
     def deserialise(self, content: bytes) -> int:
         """Return the number of the saved state that bytes hold."""
         (steps,), state = struct.unpack_from("=q", content), ctypes.c_void_p()
         name = "DeSerializeFMUstate" if self._spec.version == 2 else "DeserializeFMUState"
-        call = self._function(name, _P, _S, _N, _P)
-        self._must(name, call(self._component, content[8:], len(content) - 8, ctypes.byref(state)))
+        self._must(name, (_S, _N, _P), content[8:], len(content) - 8, ctypes.byref(state))
         return self._kept(state, steps)
 
     @property
@@ -211,25 +209,25 @@ class LocalInstance:
 
     def _initialise(self) -> None:
         """Set the parameters and initialise."""
-        spec, component = self._spec, self._component
+        spec = self._spec
         if spec.version == 2:
-            setup = self._function("SetupExperiment", _P, _I, _D, _D, _I, _D)
-            self._must("SetupExperiment", setup(component, 0, 0.0, 0.0, 0, 0.0))
+            self._must("SetupExperiment", (_I, _D, _D, _I, _D), 0, 0.0, 0.0, 0, 0.0)
         for group, values in spec.parameters:
             call, buffer = self._access("Set", group)
             buffer.put(values)
-            self._must("Set (of its parameters)", call())
+            if (status := call()) > _WARNING:
+                raise self._failed("Set (of its parameters)", status)
         if spec.version == 2:
-            status = self._function("EnterInitializationMode", _P)(component)
+            self._must("EnterInitializationMode", ())
         else:
-            enter = self._function("EnterInitializationMode", _P, _B, _D, _D, _B, _D)
-            status = enter(component, False, 0.0, 0.0, False, 0.0)
-        self._must("EnterInitializationMode", status)
-        self._must("ExitInitializationMode", self._function("ExitInitializationMode", _P)(component))
+            self._must("EnterInitializationMode", (_B, _D, _D, _B, _D), False, 0.0, 0.0, False, 0.0)
+        self._must("ExitInitializationMode", ())
 
-    def _must(self, call: str, status: int) -> None:
+    def _must(self, name: str, types: Sequence[Any], *arguments: Any) -> None:
+        """Call a function that has to succeed."""
+        status = self._function(name, _P, *types)(self._component, *arguments)
         if status > _WARNING:
-            raise self._failed(call, status)
+            raise self._failed(name, status)
 
     def _failed(self, call: str, status: int) -> FmuFault:
         if status == _FATAL:
