@@ -28,6 +28,7 @@ _Friction = Annotated[float, Meta(ge=0.1, le=1.2)]
 class Choice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind"):
     """A run, or a drive by hand, as the page chose it."""
 
+    id: _Number = 0  # number that the replies repeat
     maneuver: _Name  # manoeuvre, or course of a drive
     vehicle: _Name = "compact"
     driver: _Name = DEFAULT_DRIVER  # not used in a drive by hand
@@ -37,13 +38,10 @@ class Choice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_
 class Describe(Choice, frozen=True, tag="describe"):
     """The page asks for the sliders and the car of a choice."""
 
-    id: _Number = 0  # number that the reply repeats
-
 
 class RunRequest(Choice, frozen=True, tag="run"):
     """The page asks for runs."""
 
-    id: _Number = 0  # number that the replies repeat
     dragging: bool = False  # whether a slider is being moved: the amplitude of the steering wheel is then held
     values: Annotated[dict[_Name, float], Meta(max_length=_MAX_NUMBERS)] = {}  # key of a slider -> value
 
@@ -51,7 +49,6 @@ class RunRequest(Choice, frozen=True, tag="run"):
 class Start(Choice, frozen=True, tag="start"):
     """The page asks for a car at the start of a course. It waits there for `Act.go`."""
 
-    id: _Number = 0  # number that the reply repeats
     speed_kmh: _Speed | None = None  # speed at the start; that of the course by default
     mu: _Friction | None = None  # friction of the road; that of the course by default
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Mapping
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -99,20 +99,10 @@ class McapFile:
 
     def add_attachment(self, name: str, data: bytes) -> None:
         """Write an attachment at time zero."""
-        kind = "application/octet-stream"
+        about: Any = {"create_time": 0, "log_time": 0, "name": name, "media_type": "application/octet-stream"}
         offset = self._position
-        length = self._put_record(Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=data))
-        self._attachments.append(
-            AttachmentIndex(
-                offset=offset,
-                length=length,
-                log_time=0,
-                create_time=0,
-                data_size=len(data),
-                name=name,
-                media_type=kind,
-            )
-        )
+        length = self._put_record(Attachment(**about, data=data))
+        self._attachments.append(AttachmentIndex(**about, offset=offset, length=length, data_size=len(data)))
 
     def add_chunk(self, chunk: ChunkData) -> None:
         """Compress and write a chunk and the index of its messages, and flush the stream.

@@ -273,20 +273,15 @@ def message_class(name: str) -> Any:
     return GetMessageClass(pool.FindMessageTypeByName(name))
 
 
-def state_schema_name(group: str) -> str:
-    """Return the full name of the message for the channels of a group."""
-    return f"activesteer.{group.capitalize()}"
-
-
-def state_schema(group: str, channels: Iterable[Channel]) -> bytes:
-    """Return the serialised `FileDescriptorSet` of a group: one field per channel, numbered from 1."""
+def state_schema(group: str, channels: Iterable[Channel]) -> tuple[str, bytes]:
+    """Return name and serialised `FileDescriptorSet` of a group: one field per channel, numbered from 1."""
     fields = ", ".join(
         f"{'float' if channel.single else 'double'} {channel.name} = {number}"
         for number, channel in enumerate(channels, start=1)
     )
     file = FileDescriptorProto(name=f"activesteer/{group}.proto", package="activesteer", syntax="proto3")
     file.message_type.append(_define("activesteer", group.capitalize(), fields))
-    return FileDescriptorSet(file=[file]).SerializeToString()
+    return f"activesteer.{group.capitalize()}", FileDescriptorSet(file=[file]).SerializeToString()
 
 
 def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessage]:
