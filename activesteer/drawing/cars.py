@@ -114,23 +114,14 @@ _COLOURS: Final = {
 
 
 class BodySurface(NamedTuple):
-    """A surface of one colour, fixed in the frame of a body.
+    """A surface of one colour, fixed in the frame of a body."""
 
-    Attributes:
-        body: Name of the body.
-        name: Name of the part, such as `glass`.
-        vertices_m: Its points in the frame of the body [m], shape (n, 3).
-        normals: Directions of the surface there, shape (n, 3).
-        faces: Corners of its triangles, counter-clockwise from outside, shape (m, 3).
-        rgb: Its colour, 0 to 1; None for the paint of the car.
-    """
-
-    body: str
-    name: str
-    vertices_m: Array
-    normals: Array
-    faces: NDArray[np.int32]
-    rgb: tuple[float, float, float] | None
+    body: str  # name of the body
+    name: str  # name of the part, such as `glass`
+    vertices_m: Array  # its points in the frame of the body [m], shape (n, 3)
+    normals: Array  # directions of the surface there, shape (n, 3)
+    faces: NDArray[np.int32]  # corners of its triangles, counter-clockwise from outside, shape (m, 3)
+    rgb: tuple[float, float, float] | None  # its colour, 0 to 1; None for the paint of the car
 
     @property
     def shell(self) -> bool:

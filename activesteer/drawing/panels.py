@@ -38,25 +38,15 @@ def drawn_values(recording: Channels, channel: str) -> Array:
 
 
 class Line(NamedTuple):
-    """A line of a panel.
-
-    Attributes:
-        channel: Its channel.
-        name: Its name where a panel has several lines of a run.
-        colour: Its colour where a single run is drawn; empty for the colour of the run.
-        width: Its width [pt].
-        demand: Channel that is zero throughout if the line has no meaning, such as the demand of an actuator.
-        beside: Channel without which the line is not drawn.
-        views: Views that draw the line.
-    """
+    """A line of a panel."""
 
     channel: str
-    name: str = ""
-    colour: str = ""
-    width: float = 1.5
-    demand: str = ""
-    beside: str = ""
-    views: tuple[str, ...] = _EVERYWHERE
+    name: str = ""  # its name where a panel has several lines of a run
+    colour: str = ""  # its colour where a single run is drawn; empty for the colour of the run
+    width: float = 1.5  # its width [pt]
+    demand: str = ""  # channel that is zero throughout if the line has no meaning, such as the demand of an actuator
+    beside: str = ""  # channel without which the line is not drawn
+    views: tuple[str, ...] = _EVERYWHERE  # views that draw the line
 
     def of(self, recording: Channels) -> Array | None:
         """Return the values of a run [SI], or None if they have no meaning."""
@@ -72,24 +62,15 @@ class Panel(NamedTuple):
 
     One run has the colours of its lines. Several runs have a colour each; the first line of a run is full, and views
     on paper draw the others dotted.
-
-    Attributes:
-        title: Its title.
-        quantity: Quantity that gives unit, name of the axis, and the least height of the axis.
-        lines: Its lines.
-        note: Meaning of a dotted line.
-        in_rerun: Title in rerun, if it tells the lines apart.
-        extreme: Extreme of the four wheels that stands for them where a run has one line.
-        joined: Whether rerun keeps all lines in one entity, which makes the file smaller.
     """
 
     title: str
-    quantity: Quantity
+    quantity: Quantity  # quantity that gives unit, name of the axis, and the least height of the axis
     lines: tuple[Line, ...]
-    note: str = ""
-    in_rerun: str = ""
-    extreme: np.ufunc | None = None
-    joined: bool = False
+    note: str = ""  # meaning of a dotted line
+    in_rerun: str = ""  # title in rerun, if it tells the lines apart
+    extreme: np.ufunc | None = None  # extreme of the four wheels that stands for them where a run has one line
+    joined: bool = False  # whether rerun keeps all lines in one entity, which makes the file smaller
 
     @property
     def title_with_unit(self) -> str:

@@ -77,17 +77,11 @@ def tips_beside(size: Footprint) -> Array:
 
 
 class Plan(NamedTuple):
-    """A car in plan view. Every part is a closed line in the axes of the car.
+    """A car in plan view. Every part is a closed line in the axes of the car."""
 
-    Attributes:
-        body: Outline of the body [m], shape (points, 2).
-        wheels: Outlines of the wheels [m], turned by the enlarged angles, shape (..., 4, 4, 2).
-        wedges: The enlarged angles, their tips at the wheels [m], shape (..., 4, SLICES + 2, 2).
-    """
-
-    body: Array
-    wheels: Array
-    wedges: Array
+    body: Array  # outline of the body [m], shape (points, 2)
+    wheels: Array  # outlines of the wheels [m], turned by the enlarged angles, shape (..., 4, 4, 2)
+    wedges: Array  # the enlarged angles, their tips at the wheels [m], shape (..., 4, SLICES + 2, 2)
 
 
 def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:

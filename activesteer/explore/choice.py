@@ -55,19 +55,15 @@ class Folder:
     def check(self, choice: Choice, courses: Mapping[str, Any] | None = None) -> None:
         """Check the names of a choice."""
         if courses is None:
-            self._check("maneuver", choice.maneuver)
+            self.check_name("maneuver", choice.maneuver)
         elif choice.maneuver not in courses:
             raise ParameterError(nearest_names(choice.maneuver, courses), key="maneuver", value=choice.maneuver)
-        self._check("vehicle", choice.vehicle)
-        self._check("driver", choice.driver)
+        self.check_name("vehicle", choice.vehicle)
+        self.check_name("driver", choice.driver)
         for controller in choice.controllers:
-            self._check("controller", controller)
+            self.check_name("controller", controller)
 
-    def check_controller(self, name: str) -> None:
-        """Check the name of a controller, as `check` does."""
-        self._check("controller", name)
-
-    def _check(self, key: str, name: str) -> None:
+    def check_name(self, key: str, name: str) -> None:
         """Check that the package knows a name, or that it is the name of a file in the folder."""
         kind = f"{key}s"
         if name in _of_package()[kind]:

@@ -17,10 +17,9 @@ from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoin
 from activesteer.driver import DriverSetup
 from activesteer.driver.open_loop import SpeedHold
 from activesteer.errors import ActiveSteerError
-from activesteer.explore.car_shape import BODIES, shape_of
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Act, Start
-from activesteer.explore.runs import Reply, free_path
+from activesteer.explore.runs import BODIES, Reply, free_path, shape_of
 from activesteer.road.course import CONE_RADIUS_M, Footprint
 from activesteer.scenario import resolve
 from activesteer.simulation.live_view import FramePacer
@@ -37,21 +36,13 @@ _PLANE: Final = "straight_line"
 
 
 class DrivingCourse(NamedTuple):
-    """A place to drive.
+    """A place to drive."""
 
-    Attributes:
-        title: Its name in words.
-        maneuver: Manoeuvre whose road and course it has.
-        speed_kmh: Speed at the start [km/h].
-        radius_m: Radius of a circle to the left that begins at the start [m]; 0 for none.
-        mu: Friction of the road [-].
-    """
-
-    title: str
-    maneuver: Any
-    speed_kmh: float
-    radius_m: float = 0.0
-    mu: float = 0.9
+    title: str  # its name in words
+    maneuver: Any  # manoeuvre whose road and course it has
+    speed_kmh: float  # speed at the start [km/h]
+    radius_m: float = 0.0  # radius of a circle to the left that begins at the start [m]; 0 for none
+    mu: float = 0.9  # friction of the road [-]
 
 
 COURSES: Final = {
@@ -69,11 +60,7 @@ class HandDriver:
 
     The hands turn the wheel at a limited rate towards the angle asked for. Full steering is the angle of a steady turn
     at `_FASTEST_MPS2`, a (l / v^2) (1 + (v / v_ch)^2) times the steering ratio, and at most the lock. Without a foot on
-    a pedal, the driver holds the speed.
-
-    Attributes:
-        hands: What is asked for now.
-        hold_mps: Speed that is held [m/s]; None if the car shall coast.
+    a pedal, the driver holds the speed `hold_mps`, or coasts if it is None. `hands` is what is asked for now.
     """
 
     def __init__(self, setup: DriverSetup, hold_mps: float | None) -> None:
@@ -118,11 +105,7 @@ def _towards(value: float, target: float, most: float) -> float:
 
 
 class DriveSession:
-    """A car that waits at the start of a course, and its drive in real time, recorded to a file.
-
-    Attributes:
-        path: File of the drive; None while the car waits.
-    """
+    """A car that waits at the start of a course, and its drive in real time, recorded to the file `path`."""
 
     def __init__(self, choice: Start, folder: Folder, pacer: FramePacer | None = None) -> None:
         """Put the car at the start of a course."""
@@ -176,7 +159,7 @@ class DriveSession:
     def act(self, message: Act) -> None:
         """Carry out a message of the page: hands, controller, speed to hold, friction."""
         if message.controller:
-            self._folder.check_controller(message.controller)
+            self._folder.check_name("controller", message.controller)
             loop, name = self._simulation.loop, self._folder.located(message.controller)
             loop.replace_controller(name)
             self._names["controller"] = message.controller

@@ -28,66 +28,44 @@ _Friction = Annotated[float, Meta(ge=0.1, le=1.2)]
 class Choice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind"):
     """A run, or a drive by hand, as the page chose it."""
 
-    maneuver: _Name
-    """Manoeuvre, or course of a drive."""
+    id: _Number = 0  # number that the replies repeat
+    maneuver: _Name  # manoeuvre, or course of a drive
     vehicle: _Name = "compact"
-    """Car."""
-    driver: _Name = DEFAULT_DRIVER
-    """Driver. A drive by hand needs none."""
+    driver: _Name = DEFAULT_DRIVER  # not used in a drive by hand
     controllers: Annotated[tuple[_Name, ...], Meta(min_length=1, max_length=MAX_CONTROLLERS)] = ("none",)
-    """Controllers."""
 
 
 class Describe(Choice, frozen=True, tag="describe"):
     """The page asks for the sliders and the car of a choice."""
 
-    id: _Number = 0
-    """Number that the reply repeats."""
-
 
 class RunRequest(Choice, frozen=True, tag="run"):
     """The page asks for runs."""
 
-    id: _Number = 0
-    """Number that the replies repeat."""
-    dragging: bool = False
-    """Whether a slider is being moved: the amplitude of the steering wheel is then held."""
-    values: Annotated[dict[_Name, float], Meta(max_length=_MAX_NUMBERS)] = {}
-    """Key of a slider -> value."""
+    dragging: bool = False  # whether a slider is being moved: the amplitude of the steering wheel is then held
+    values: Annotated[dict[_Name, float], Meta(max_length=_MAX_NUMBERS)] = {}  # key of a slider -> value
 
 
 class Start(Choice, frozen=True, tag="start"):
     """The page asks for a car at the start of a course. It waits there for `Act.go`."""
 
-    id: _Number = 0
-    """Number that the reply repeats."""
-    speed_kmh: _Speed | None = None
-    """Speed at the start; that of the course by default."""
-    mu: _Friction | None = None
-    """Friction of the road; that of the course by default."""
+    speed_kmh: _Speed | None = None  # speed at the start; that of the course by default
+    mu: _Friction | None = None  # friction of the road; that of the course by default
 
 
 class Act(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="act"):
     """Hands and feet, controller, speed and friction during a drive. What is unset stays as it is."""
 
+    # Position of the steering, -1 full right to 1 full left. Throttle, brake and direct count with it
     steer: Annotated[float, Meta(ge=-1.0, le=1.0)] | UnsetType = UNSET
-    """Position of the steering, -1 full right to 1 full left. Throttle, brake and direct count with it."""
     throttle: _Pedal = 0.0
-    """Throttle pedal."""
     brake: _Pedal = 0.0
-    """Brake pedal."""
-    direct: bool = False
-    """Whether `steer` is the position of a gamepad's stick or a slider, and not of a key."""
-    number: _Number = 0
-    """Number of these hands, which the next frame repeats."""
-    controller: _Name | UnsetType = UNSET
-    """Controller that takes over."""
-    speed_kmh: _Speed | UnsetType | None = UNSET
-    """Speed to hold without a foot on a pedal; null lets the car coast."""
-    mu: _Friction | UnsetType = UNSET
-    """Friction of the road from now on."""
-    go: bool = False
-    """Whether the car at the start begins to drive."""
+    direct: bool = False  # whether `steer` is the position of a gamepad's stick or a slider, and not of a key
+    number: _Number = 0  # number of these hands, which the next frame repeats
+    controller: _Name | UnsetType = UNSET  # controller that takes over
+    speed_kmh: _Speed | UnsetType | None = UNSET  # speed to hold without a foot on a pedal; null lets the car coast
+    mu: _Friction | UnsetType = UNSET  # friction of the road from now on
+    go: bool = False  # whether the car at the start begins to drive
 
 
 class Save(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="save"):

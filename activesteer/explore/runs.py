@@ -5,8 +5,12 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -17,36 +21,179 @@ from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.run_page import write_report
-from activesteer.controllers import controller_spec
-from activesteer.core.conventions import run_looks
+from activesteer.config import field_in_unit, leaf_keys, spellings
+from activesteer.controllers import controller_spec, declared_parameters
+from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.core.metric_table import Better, recorded_metric
+from activesteer.core.units import parameter_label, parameter_words
+from activesteer.drawing.car_model import scene_of
+from activesteer.drawing.cars import CHASSIS, dressed
 from activesteer.drawing.panels import EXPLORE
 from activesteer.errors import ActiveSteerError, ParameterError
-from activesteer.explore.car_shape import poses_of, shape_of
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import Choice, Describe, RunRequest
-from activesteer.explore.sliders import Slider, sliders
-from activesteer.plugins import Plugin
+from activesteer.plugins import Declared, Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import Scenario, resolve
+from activesteer.road.course import Footprint
+from activesteer.scenario import Scenario, resolve, value_of
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.simulation import Simulation
+from activesteer.vehicle import Vehicle
+
+_MANEUVER: Final = {
+    "speed_kmh": (20.0, 160.0, 1.0),
+    "road.mu": (0.1, 1.1, 0.01),
+    "steer.lateral_acceleration_mps2": (0.5, 9.0, 0.1),
+    "steer.amplitude_factor": (0.5, 8.0, 0.1),
+    "cones.spacing_m": (20.0, 60.0, 0.5),
+    "cones.offset_m": (0.5, 4.0, 0.05),
+    "brake.pedal": (0.0, 1.0, 0.01),
+}
+"""Key of a manoeuvre -> least and greatest value, and step, of its slider. The ranges are those of passenger cars."""
+_CAR: Final = {
+    "factors.mass": (0.8, 1.4, 0.01),
+    "factors.yaw_inertia": (0.7, 1.4, 0.01),
+    "load.cg_forward_change_m": (-0.3, 0.3, 0.005),
+    "factors.front_cornering_stiffness": (0.6, 1.4, 0.01),
+    "factors.rear_cornering_stiffness": (0.6, 1.4, 0.01),
+    "factors.tyre_friction": (0.5, 1.2, 0.01),
+    "factors.damper": (0.3, 2.0, 0.05),
+    "factors.anti_roll_bar": (0.0, 2.0, 0.05),
+    "factors.servo_lag": (0.2, 4.0, 0.1),
+}
+"""The same for keys of a vehicle."""
+_TIMES: Final = 4.0
+"""Greatest value of the slider of a gain, in multiples of its present value."""
+_STEPS: Final = 200
+_COVERED: Final = ("controllers", "single_track", "two_track")
+"""Tables of a vehicle that controllers read; the controllers declare what they take from them."""
+
+
+class Slider(NamedTuple):
+    """A slider."""
+
+    key: str  # key as `--set` takes it
+    label: str  # label in words
+    unit: str  # unit of its value; empty for a pure number
+    group: str  # `manoeuvre`, `car`, or the name of a controller or of a table of gains, in words
+    low: float  # least value
+    high: float  # greatest value
+    step: float  # distance between two values
+    value: float  # value of the files
+
+
+def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Path] | None = None) -> list[Slider]:
+    """Return the sliders of a run; those of `own`, group -> file of the user, include all numbers of the file."""
+    found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
+    for group, file in (own or {}).items():
+        found += _of_file(group, scenario, file)
+    for name in controllers:
+        for key, declared in declared_parameters(name, scenario.car.config.controllers).items():
+            if (gain := _gain(key, declared)) is not None:
+                found.append(gain)
+    first: dict[str, Slider] = {}
+    for slider in found:
+        first.setdefault(slider.key, slider)
+    return list(first.values())
+
+
+def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float, float]]) -> Iterator[Slider]:
+    for key, (low, high, step) in ranges.items():
+        with suppress(ParameterError):  # not every manoeuvre has every key
+            value = value_of(scenario, key)
+            if _is_number(value):
+                yield Slider(key, *_label(key), group, min(low, value), max(high, value), step, value)
+
+
+def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
+    """Yield sliders of the positive numbers in a file, from half of each to its double."""
+    table = tomllib.loads(file.read_text("utf-8"))
+    for path in leaf_keys(table):
+        key = ".".join(path)
+        if path[0] in _COVERED or not _is_number(reduce(getitem, path, table)):
+            continue
+        with suppress(ParameterError):  # such as the keys of a table that is read from another file
+            value = value_of(scenario, key)
+            if isinstance(value, float) and value > 0.0:
+                label, unit = _label(key)
+                high = 1.0 if not unit and value <= 1.0 else 2.0 * value
+                digits = 4 - math.floor(math.log10(high))
+                yield Slider(key, label, unit, group, 0.5 * value, high, round(high / _STEPS, digits), value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _label(key: str) -> tuple[str, str]:
+    """Return label and unit of a key, without the tables that only sort it."""
+    words, unit = parameter_label(key)
+    return words.removeprefix("factors: ").removeprefix("load: "), unit
+
+
+def _gain(key: str, declared: Declared) -> Slider | None:
+    """Return the slider of a gain, from zero to some multiples of its value, or None if it is no number."""
+    if not _is_number(declared.default):
+        return None
+    tables, _, name = key.rpartition(".")
+    shown = spellings(name)[-1]
+    _, factor = field_in_unit(shown, (name,))
+    value, (low, high) = declared.default / factor, (limit / factor for limit in declared.limits)
+    top = min(high, _TIMES * abs(value) if value else 1.0)
+    bottom = max(low, 0.0 if value >= 0.0 else -top)
+    digits = 4 - math.floor(math.log10(max(top - bottom, 1e-9)))
+    label, unit = _label(f"{tables}.{shown}")
+    group = parameter_words(tables.split(".")[1] if "." in tables else tables)
+    return Slider(
+        f"{tables}.{shown}", label, unit or declared.unit, group, bottom, round(top, digits),
+        round((top - bottom) / _STEPS, digits), value,
+    )  # fmt: skip
+
+
+BODIES: Final = (CHASSIS, *(f"{corner}_wheel" for corner in CORNERS))
+"""Bodies whose poses the page gets, in this order."""
+POSE_HZ: Final = 50.0
+"""Rate of the poses of a recorded run [1/s]; the page interpolates between them."""
+
+
+def shape_of(vehicle: Vehicle) -> tuple[dict[str, Any], list[NDArray[np.float32]]]:
+    """Return the surfaces of a car."""
+    size = Footprint.from_table(vehicle.dimensions())
+    _, panels = dressed(scene_of(vehicle.model), size)
+    shown = [panel for panel in panels if panel.body in BODIES]
+    header = {
+        "bodies": list(BODIES),
+        "size": {"front_m": size.front_m, "rear_m": size.rear_m, "width_m": size.width_m},
+        "panels": [{"body": panel.body, "rgb": panel.rgb} for panel in shown],
+    }
+    arrays = [
+        np.asarray(values[panel.faces.reshape(-1)], np.float32)
+        for panel in shown
+        for values in (panel.vertices_m, panel.normals)
+    ]
+    return header, arrays
+
+
+def poses_of(recording: Recording) -> tuple[float, NDArray[np.float32]]:
+    """Return the poses of `BODIES` of a recorded run."""
+    poses = recording.poses
+    step_s = float(np.median(np.diff(poses.time_s))) if len(poses.time_s) > 1 else 1.0 / POSE_HZ
+    every = max(1, round(1.0 / (POSE_HZ * step_s)))
+    columns = [poses.names.index(name) for name in BODIES]
+    both = np.concatenate([poses.positions_m[::every, columns], poses.quaternions[::every, columns]], axis=2)
+    return every * step_s, both.astype(np.float32)
+
 
 _CHUNK: Final = 500
 """Steps between two looks for a newer choice; about 10 ms."""
 
 
 class Reply(NamedTuple):
-    """A message to the page.
+    """A message to the page."""
 
-    Attributes:
-        header: JSON values; `kind` names the message.
-        arrays: Numbers that follow the header, 32 bits each.
-    """
-
-    header: dict[str, Any]
-    arrays: tuple[NDArray[np.float32], ...] = ()
+    header: dict[str, Any]  # JSON values; `kind` names the message
+    arrays: tuple[NDArray[np.float32], ...] = ()  # numbers that follow the header, 32 bits each
 
 
 class Runs:

@@ -51,11 +51,7 @@ class ExploreServer:
     """The server and its worker process."""
 
     def __init__(self, folder: Path, port: int) -> None:
-        """Open the port and start the worker process.
-
-        Attributes:
-            saved: Files of the folder that the page has saved.
-        """
+        """Open the port and start the worker process."""
         self._socket = socket.socket()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -71,7 +67,7 @@ class ExploreServer:
         self.url = f"http://{self._host}/{self._token}/"
         self._report = ""
         self._given_folder, self._folder = folder, str(folder.resolve())
-        self.saved: list[Path] = []
+        self.saved: list[Path] = []  # files of the folder that the page has saved
         self._waiting: deque[Message] = deque()
         self._came = asyncio.Event()
         self._ready: tuple[dict[str, Any], list[Any]] | None = None
@@ -208,9 +204,8 @@ class ExploreServer:
                 if self._ready is None:  # another one would end, too
                     await self._say("the worker process has ended; start `activesteer explore` again")
                     return
-                await asyncio.sleep(
-                    1.0
-                )  # at the end of the program its signal ends the worker first, and then this task
+                # At the end of the program its signal ends the worker first, and then this task.
+                await asyncio.sleep(1.0)
                 self._pipe.close()
                 self._ready = None
                 await loop.run_in_executor(None, self._start_worker)

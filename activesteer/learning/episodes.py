@@ -89,17 +89,7 @@ TASKS: Final[dict[str, Task]] = {
 
 
 def sampled_overrides(task: Task, vehicle: Any, count: int, seed: int) -> list[dict[str, Any]]:
-    """Draw cars, roads and drivers from the ranges of the package's population.
-
-    Args:
-        task: The task.
-        vehicle: The vehicle.
-        count: Number of samples.
-        seed: Seed; the samples of another seed are independent.
-
-    Returns:
-        Overrides of each sample, beside those of the task. What the task sets itself does not vary.
-    """
+    """Draw overrides of cars, roads and drivers from the package's population, without those that the task sets."""
     population = read_study(_POPULATION)
     keys = [key for key in population.keys if not key.startswith(("controllers.", "sensors."))]
     factors = [one for one in population.factors if one.key in keys and one.key not in task.overrides]
@@ -119,11 +109,6 @@ def sampled_overrides(task: Task, vehicle: Any, count: int, seed: int) -> list[d
     study = read_study(table)
     to_overrides, (samples, *_) = FactorValues(study), study.samples()
     return [dict(to_overrides.overrides(0, 0, samples[number])) for number in range(count)]
-
-
-def bounds(parts: Sequence[tuple[str, float, float]]) -> tuple[Any, Any]:
-    """Return lower and upper bounds of a space as float32."""
-    return np.array([low for _, low, _ in parts], np.float32), np.array([high for _, _, high in parts], np.float32)
 
 
 _MEASURED: Final = (
@@ -160,25 +145,16 @@ SENSORS: Final = ("ideal", "production")
 
 
 class Outcome(NamedTuple):
-    """Outcome of a step, for all cars.
+    """Outcome of a step, for all cars."""
 
-    Attributes:
-        observation: Shape (n, numbers), float32.
-        reward: Shape (n,).
-        terminated: Whether the car is lost, has left its course, or the simulation diverged, shape (n,).
-        truncated: Whether the manoeuvre is over, shape (n,).
-        terms: Term of the reward -> its part, shape (n,).
-        sideslip_rad: Shape (n,).
-        end: Reason of the end: "", "lost", "off course", "stopped", "diverged" or "time", shape (n,).
-    """
-
-    observation: NDArray[np.float32]
-    reward: Array
+    observation: NDArray[np.float32]  # shape (n, numbers), float32
+    reward: Array  # shape (n,)
+    # Whether the car is lost, has left its course, or the simulation diverged, shape (n,)
     terminated: NDArray[np.bool_]
-    truncated: NDArray[np.bool_]
-    terms: dict[str, Array]
-    sideslip_rad: Array
-    end: NDArray[Any]
+    truncated: NDArray[np.bool_]  # whether the manoeuvre is over, shape (n,)
+    terms: dict[str, Array]  # term of the reward -> its part, shape (n,)
+    sideslip_rad: Array  # shape (n,)
+    end: NDArray[Any]  # reason of the end: "", "lost", "off course", "stopped", "diverged" or "time", shape (n,)
 
 
 class Episodes:
@@ -235,7 +211,7 @@ class Episodes:
         Raises:
             ActiveSteerError: an input is wrong.
         """
-        self.task = task = _task(task)
+        self.task = task = task if isinstance(task, Task) else TASKS[_one_of("task", task, tuple(TASKS))]
         used = tuple(task.actuators if actuators is None else actuators)
         self._agent_drives = _one_of("driver", driver or task.driver, ("driver", "agent")) == "agent"
         for name in used:
@@ -266,7 +242,8 @@ class Episodes:
         self.observations = (*_MEASURED, *_SPEEDS, *_DEMANDS, *road)
         self._measured = [_MEASUREMENTS.index(name) for name, _, _ in (*_MEASURED, *_SPEEDS)]
         self._demands = [_COMMANDS.index(name) for name, _, _ in _DEMANDS]
-        self._bounds = bounds(self.observations)
+        lows, highs = (np.array([part[side] for part in self.observations], np.float32) for side in (1, 2))
+        self._bounds = lows, highs
         ones = np.ones(len(self.actions), np.float32)
         self.action_space = gymnasium.spaces.Box(self._low.astype(np.float32), ones)
         self.observation_space = gymnasium.spaces.Box(*self._bounds)
@@ -280,15 +257,9 @@ class Episodes:
         self._started = np.zeros(n, dtype=bool)
 
     def reset(self, episodes: Sequence[int], generators: Sequence[np.random.Generator]) -> NDArray[np.float32]:
-        """Start some episodes anew, each with a car that its generator draws. Return the observations of all.
-
-        Args:
-            episodes: Numbers of the episodes.
-            generators: A generator for each of these episodes.
-        """
+        """Start some episodes anew, each with a car that its generator draws. Return the observations of all."""
         for episode, generator in zip(episodes, generators, strict=True):
-            car = int(generator.integers(self._cars))
-            self._active[episode] = episode * self._cars + car
+            self._active[episode] = episode * self._cars + int(generator.integers(self._cars))
         cars = self._active[list(episodes)]
         self.batch.reset(cars)
         self._along_m[cars] = 0.0
@@ -302,8 +273,7 @@ class Episodes:
 
     def loop(self, episode: int) -> Any:
         """Return the closed loop of the car that drives in an episode."""
-        car = int(self._active[episode])
-        return self.batch.loops[car]
+        return self.batch.loops[int(self._active[episode])]
 
     def step(self, actions: ArrayLike, episodes: Sequence[int] | NDArray[Any] | None = None) -> Outcome:
         """Carry out the actions until the next decision.
@@ -320,7 +290,9 @@ class Episodes:
         if not self._started[chosen].all():
             raise ParameterError("reset the environment before its first step", key="step")
         given = self.within_bounds(np.where(chosen[:, np.newaxis], given, 0.0))
-        self._drive(given, chosen)
+        every = np.zeros((len(self.batch), len(self.actions)))
+        every[self._active] = given
+        self.batch.advance(self.steps, *self.commands(every), self._active[chosen])
         tracked = self._tracked()
         terms, sideslip = self._terms(given, tracked)
         cars = self._active
@@ -353,20 +325,10 @@ class Episodes:
         """Limit actions to their bounds."""
         return np.clip(actions, self._low, 1.0)
 
-    def _drive(self, actions: Array, chosen: NDArray[np.bool_]) -> None:
-        every = np.zeros((len(self.batch), len(self.actions)))
-        every[self._active] = actions
-        self.batch.advance(self.steps, *self.commands(every), self._active[chosen])
-
     def commands(self, actions: Array) -> tuple[DriverCommand | None, ActuatorCommand]:
-        """Return actions within their bounds as commands.
+        """Return actions within their bounds, shape (n, numbers), as commands of driver and controller.
 
-        Args:
-            actions: Shape (n, numbers).
-
-        Returns:
-            Command of the driver, None if the agent does not drive, and command of the controller; each field is an
-            array of length n, or zero.
+        Each field is an array of length n, or zero. There is no command of the driver if the agent does not drive.
         """
         columns: dict[str, Any] = {
             name: scale * actions[:, place] for place, (name, _, scale) in enumerate(self.actions)
@@ -427,12 +389,6 @@ class Episodes:
         }
         weights = {name: weight for name, weight in task.weights.items() if name in formulas}
         return {name: weight * self.interval_s * formulas[name]() for name, weight in weights.items()}, sideslip
-
-
-def _task(task: str | Task) -> Task:
-    if isinstance(task, Task):
-        return task
-    return TASKS[_one_of("task", task, tuple(TASKS))]
 
 
 def _one_of(key: str, value: Any, allowed: tuple[str, ...]) -> Any:

@@ -21,7 +21,7 @@ from activesteer.drawing.cars import (
     share_seen,
 )
 from activesteer.drawing.tyre_forces import CHANNELS, force_arrows, force_scale
-from activesteer.playback.runs import ReplayedRun, times
+from activesteer.playback.runs import ReplayedRun, send, times
 from activesteer.recording import Link, Primitive, ScenePart
 from activesteer.road.course import Footprint, footprint_of
 
@@ -102,13 +102,11 @@ def _send_rods(stream: rr.RecordingStream, run: ReplayedRun, links: list[Link]) 
     if not parts:
         return
     lengths, centres, turns = (np.stack(values, axis=1).astype(np.float32) for values in zip(*parts, strict=True))
-    path = f"{run.scene}/links"
-    stream.log(path, rr.Cylinders3D.from_fields(radii=radii, colors=colours, fill_mode="solid"), static=True)
+    style = rr.Cylinders3D.from_fields(radii=radii, colors=colours, fill_mode="solid")
     columns = rr.Cylinders3D.columns(
         lengths=lengths.reshape(-1), centers=centres.reshape(-1, 3), quaternions=turns.reshape(-1, 4)
     )
-    when = times(run.recording.poses.time_s[run.poses])
-    stream.send_columns(path, when, columns.partition(lengths=[len(parts)] * len(run.poses)))
+    send(stream, f"{run.scene}/links", style, run.recording.poses.time_s[run.poses], columns, len(parts))
 
 
 def _send_spring(stream: rr.RecordingStream, run: ReplayedRun, spring: Link) -> None:
@@ -152,24 +150,14 @@ def send_tyre_forces(stream: rr.RecordingStream, run: ReplayedRun, runs: Sequenc
     colours = use_colours(np.stack([run.channel(name) for name in _USED], axis=1))
     # A run that diverged ends with values that cannot be drawn.
     good = np.isfinite(origins).all(axis=(1, 2)) & np.isfinite(vectors).all(axis=(1, 2))
-    when, four = times(run.recording.time_s[good]), [len(CORNERS)] * int(good.sum())
-    painted = colours[good].reshape(-1)
-    arrows = f"{run.scene}/tyres/force"
-    stream.log(arrows, rr.Arrows3D.from_fields(radii=[_ARROW_RADIUS_M], colors=[_ARROW_COLOUR]), static=True)
-    stream.send_columns(
-        arrows,
-        when,
-        rr.Arrows3D.columns(origins=origins[good].reshape(-1, 3), vectors=vectors[good].reshape(-1, 3)).partition(
-            lengths=four
-        ),
-    )
-    discs = f"{run.scene}/tyres/friction_utilisation"
+    time_s, painted = run.recording.time_s[good], colours[good].reshape(-1)
+    style = rr.Arrows3D.from_fields(radii=[_ARROW_RADIUS_M], colors=[_ARROW_COLOUR])
+    arrows = rr.Arrows3D.columns(origins=origins[good].reshape(-1, 3), vectors=vectors[good].reshape(-1, 3))
+    send(stream, f"{run.scene}/tyres/force", style, time_s, arrows, len(CORNERS))
     size = rr.Cylinders3D.from_fields(radii=[_DISC_RADIUS_M], lengths=[0.02], fill_mode="solid")
-    stream.log(discs, size, static=True)
     flat = origins[good] * np.array((1.0, 1.0, 0.0), np.float32)
-    stream.send_columns(
-        discs, when, rr.Cylinders3D.columns(centers=flat.reshape(-1, 3), colors=painted).partition(lengths=four)
-    )
+    discs = rr.Cylinders3D.columns(centers=flat.reshape(-1, 3), colors=painted)
+    send(stream, f"{run.scene}/tyres/friction_utilisation", size, time_s, discs, len(CORNERS))
 
 
 def use_colours(friction_utilisation: NDArray[np.float64]) -> NDArray[np.uint32]:

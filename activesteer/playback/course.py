@@ -12,7 +12,7 @@ from activesteer.core.conventions import Array, yaw_of
 from activesteer.core.limits import LIMIT_M
 from activesteer.drawing.cars import CHASSIS, bytes_of, height_colours
 from activesteer.playback.car import rotated
-from activesteer.playback.runs import ReplayedRun, times
+from activesteer.playback.runs import ReplayedRun, send
 from activesteer.road.course import CONE_HEIGHT_M, CONE_RADIUS_M, Course, Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
 from activesteer.road.road import road_of
@@ -135,15 +135,11 @@ def send_track(stream: rr.RecordingStream, run: ReplayedRun, number: int) -> Non
         static=True,
     )
     strokes = _outline(run).astype(np.float32)
-    path = f"{MAP}/{run.name}/car"
-    stream.log(path, rr.LineStrips2D.from_fields(colors=[colour], radii=_points(1.8), draw_order=5.0), static=True)
+    style = rr.LineStrips2D.from_fields(colors=[colour], radii=_points(1.8), draw_order=5.0)
     # Sending an array of two-point strokes is a hundred times as fast as sending a list of strokes.
     columns = rr.LineStrips2D.columns(strips=strokes.reshape(-1, 2, 2))
-    stream.send_columns(
-        path,
-        times(run.recording.poses.time_s[run.poses]),
-        columns.partition(lengths=[strokes.shape[1]] * len(strokes)),
-    )
+    time_s = run.recording.poses.time_s[run.poses]
+    send(stream, f"{MAP}/{run.name}/car", style, time_s, columns, strokes.shape[1])
 
 
 def _outline(run: ReplayedRun) -> Array:

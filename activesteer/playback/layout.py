@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -77,13 +77,7 @@ _SHORTEST_S: Final = 0.05
 
 
 class Event(NamedTuple):
-    """Begin or end of a fault or a saturation, or a recorded event.
-
-    Attributes:
-        time_s: Time of the event [s].
-        text: Description.
-        level: Level of the viewer's log.
-    """
+    """Begin or end of a fault or a saturation, or a recorded event."""
 
     time_s: float
     text: str
@@ -92,24 +86,20 @@ class Event(NamedTuple):
 
 def events(run: ReplayedRun) -> list[Event]:
     """Return the faults of the manoeuvre, the recorded events and the saturations, sorted by time."""
-    found = [*_faults(run), *_recorded(run), *_limits(run)]
-    return sorted(found, key=lambda event: event.time_s)
+    return sorted([*_faults(run), *_recorded(run), *_limits(run)], key=lambda event: event.time_s)
 
 
-def _recorded(run: ReplayedRun) -> list[Event]:
+def _recorded(run: ReplayedRun) -> Iterator[Event]:
     levels = {"fail": ("FAULT ", rr.TextLogLevel.ERROR)}
-    found = []
     for event in events_of(run.recording.metadata):
         start, level = levels.get(event.kind, (f"{event.kind}: ", rr.TextLogLevel.INFO))
-        found.append(Event(event.time_s, start + event.what, level))
-    return found
+        yield Event(event.time_s, start + event.what, level)
 
 
-def _faults(run: ReplayedRun) -> list[Event]:
+def _faults(run: ReplayedRun) -> Iterator[Event]:
     maneuver = run.recording.metadata.get("maneuver")
     faults = maneuver.get("fault") if isinstance(maneuver, Mapping) else None
     last_s = float(run.recording.time_s[-1])
-    found = []
     for fault in faults if isinstance(faults, list | tuple) else ():
         if not isinstance(fault, Mapping):
             continue
@@ -118,8 +108,7 @@ def _faults(run: ReplayedRun) -> list[Event]:
         for key, text, level in ends:
             time_s = fault.get(key)
             if isinstance(time_s, int | float) and time_s <= last_s:
-                found.append(Event(float(time_s), text, level))
-    return found
+                yield Event(float(time_s), text, level)
 
 
 def _size(fault: Mapping[str, Any]) -> str:
@@ -134,17 +123,15 @@ def _size(fault: Mapping[str, Any]) -> str:
     return said
 
 
-def _limits(run: ReplayedRun) -> list[Event]:
-    found = []
+def _limits(run: ReplayedRun) -> Iterator[Event]:
     time_s = run.recording.time_s
     for channel in run.recording.channels:
         if not channel.name.endswith(_LIMIT):
             continue
         begins, ends = _spans(run.channel(channel.name) > 0.5, time_s)
         what = channel.name.removesuffix(_LIMIT).replace("_", " ")
-        found += [Event(float(when), f"{what} at its limit", rr.TextLogLevel.WARN) for when in begins]
-        found += [Event(float(when), f"{what} no longer at its limit", rr.TextLogLevel.INFO) for when in ends]
-    return found
+        yield from (Event(float(when), f"{what} at its limit", rr.TextLogLevel.WARN) for when in begins)
+        yield from (Event(float(when), f"{what} no longer at its limit", rr.TextLogLevel.INFO) for when in ends)
 
 
 def _spans(active: np.ndarray, time_s: np.ndarray) -> tuple[list[float], list[float]]:

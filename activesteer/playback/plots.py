@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from activesteer.core.conventions import CORNERS
 from activesteer.drawing.cars import bytes_of
 from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Line, Panel, drawn_values, link_panels, panels_in
-from activesteer.playback.runs import ReplayedRun, times
+from activesteer.playback.runs import ReplayedRun, send
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
 """Number of plots on a page -> number of tick labels that fit on one axis in a window of 1280 x 800."""
@@ -37,7 +37,6 @@ def links(run: ReplayedRun) -> tuple[Panel, ...]:
 
 def send_plots(stream: rr.RecordingStream, run: ReplayedRun, *, alone: bool) -> None:
     """Send the signals of every plot."""
-    when = times(run.recording.time_s)
     for plot in (*OF_CAR, *panels_in(WHEELS), *links(run)):
         own_colours = alone or plot not in OF_CAR
         for path, lines in _entities(run, plot):
@@ -46,12 +45,11 @@ def send_plots(stream: rr.RecordingStream, run: ReplayedRun, *, alone: bool) -> 
                 colors=[bytes_of(_paint(run, line, alone=own_colours)) for line in lines],
                 widths=[line.width for line in lines],
             )
-            stream.log(path, style, static=True)
             values = np.stack(
                 [drawn_values(run.recording, line.channel) * plot.quantity.factor for line in lines], axis=1
             )
             columns = rr.Scalars.columns(scalars=values.reshape(-1))
-            stream.send_columns(path, when, columns.partition(lengths=[len(lines)] * len(run.recording)))
+            send(stream, path, style, run.recording.time_s, columns, len(lines))
 
 
 def _name(run: ReplayedRun, line: Line, *, alone: bool) -> str:

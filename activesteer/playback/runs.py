@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from activesteer.core.conventions import run_looks
+from activesteer.core.conventions import Array, run_looks
 from activesteer.drawing.cars import CHASSIS
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
@@ -22,6 +22,12 @@ TIMELINE: Final = "time"
 def times(time_s: NDArray[np.float64]) -> list[rr.TimeColumn]:
     """Return the time index of columns."""
     return [rr.TimeColumn(TIMELINE, duration=np.rint(time_s * 1e9).astype("timedelta64[ns]"))]
+
+
+def send(stream: rr.RecordingStream, path: str, style: Any, time_s: Array, columns: Any, each: int) -> None:
+    """Send the static style of an entity, and its values over time, `each` of them at a time."""
+    stream.log(path, style, static=True)
+    stream.send_columns(path, times(time_s), columns.partition(lengths=[each] * len(time_s)))
 
 
 class Showing(NamedTuple):

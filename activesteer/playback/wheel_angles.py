@@ -23,7 +23,7 @@ from activesteer.drawing.wheel_angles import (
     wheel_centres,
     words,
 )  # fmt: skip
-from activesteer.playback.runs import ReplayedRun, times
+from activesteer.playback.runs import ReplayedRun, send
 from activesteer.road.course import Footprint, footprint_of
 
 PLAN: Final = "plan"
@@ -47,10 +47,9 @@ def send_wheel_angles(stream: rr.RecordingStream, run: ReplayedRun, runs: Sequen
     angles = angles_at(recording, time_s)
     factor = factors([other.recording for other in runs])
     texts = [words(float(angle)) for row in angles for angle in row]
-    when = times(time_s)
     enlarged = [f"{text}, x{larger}" if text else "" for text, larger in zip(texts, cycle(factor), strict=False)]
-    _send_wedges(stream, run, when, wedges(angles, factor), enlarged, size)
-    _send_plan(stream, run, runs.index(run), when, (angles, factor), texts, size)
+    _send_wedges(stream, run, time_s, wedges(angles, factor), enlarged, size)
+    _send_plan(stream, run, runs.index(run), time_s, (angles, factor), texts, size)
 
 
 def wedges_path(run: ReplayedRun) -> str:
@@ -78,37 +77,35 @@ def plan_view(runs: Sequence[ReplayedRun]) -> rrb.Spatial2DView:
 def _send_wedges(
     stream: rr.RecordingStream,
     run: ReplayedRun,
-    when: list[rr.TimeColumn],
+    time_s: Array,
     shapes: Array,
     texts: list[str],
     size: Footprint,
 ) -> None:
-    tips, rows, corners = tips_beside(size), len(shapes), len(CORNERS)
+    tips, corners = tips_beside(size), len(CORNERS)
     placed = np.full((*shapes.shape[:-1], 3), _ABOVE_ROAD_M, np.float32)
     placed[..., :2] = shapes + tips[:, None]
     path, colour = wedges_path(run), bytes_of(run.colour)
     per_wedge = shapes.shape[2]
     fan = np.array([(0, slice_ + 1, slice_ + 2) for slice_ in range(SLICES)])
     faces = (np.arange(corners)[:, None, None] * per_wedge + fan).reshape(-1, 3)
-    stream.log(f"{path}/wedge", rr.Mesh3D.from_fields(triangle_indices=faces, albedo_factor=colour), static=True)
+    fans = rr.Mesh3D.from_fields(triangle_indices=faces, albedo_factor=colour)
     columns = rr.Mesh3D.columns(vertex_positions=placed.reshape(-1, 3))
-    stream.send_columns(f"{path}/wedge", when, columns.partition(lengths=[corners * per_wedge] * rows))
-    stream.log(f"{path}/wheel", rr.LineStrips3D.from_fields(colors=[colour], radii=[0.02]), static=True)
+    send(stream, f"{path}/wedge", fans, time_s, columns, corners * per_wedge)
     lines = rr.LineStrips3D.columns(strips=placed[:, :, [0, -1]].reshape(-1, 2, 3))
-    stream.send_columns(f"{path}/wheel", when, lines.partition(lengths=[corners] * rows))
+    send(stream, f"{path}/wheel", rr.LineStrips3D.from_fields(colors=[colour], radii=[0.02]), time_s, lines, corners)
     ahead = rr.LineStrips3D(placed[0][:, [0, 1]], colors=[_AHEAD], radii=[0.015])
     stream.log(f"{path}/ahead", ahead, static=True)
     beside = np.column_stack([tips * (1.0, 2.5), np.full(corners, _ABOVE_ROAD_M)])
-    style: dict[str, Any] = {"colors": [colour], "radii": [0.02], "show_labels": True}
-    stream.log(f"{path}/angle", rr.Points3D.from_fields(positions=beside, **style), static=True)
-    stream.send_columns(f"{path}/angle", when, rr.Points3D.columns(labels=texts).partition(lengths=[corners] * rows))
+    label = rr.Points3D.from_fields(positions=beside, colors=[colour], radii=[0.02], show_labels=True)
+    send(stream, f"{path}/angle", label, time_s, rr.Points3D.columns(labels=texts), corners)
 
 
 def _send_plan(
     stream: rr.RecordingStream,
     run: ReplayedRun,
     number: int,
-    when: list[rr.TimeColumn],
+    time_s: Array,
     angles: tuple[Array, Sequence[int]],
     texts: list[str],
     size: Footprint,
@@ -132,12 +129,10 @@ def _send_plan(
     rays = np.stack([tips, drawn.wedges[..., _RAYS, :]], axis=-2)
     for part, strokes, paint in (("wheels", sides, _AHEAD), ("wedges", rays, colour)):
         flat = placed(strokes).reshape(rows, -1, 2, 2)
-        stream.log(f"{path}/{part}", rr.LineStrips2D.from_fields(colors=[paint], radii=[0.04]), static=True)
-        columns = rr.LineStrips2D.columns(strips=flat.reshape(-1, 2, 2))
-        stream.send_columns(f"{path}/{part}", when, columns.partition(lengths=[flat.shape[1]] * rows))
+        style, columns = rr.LineStrips2D.from_fields(colors=[paint], radii=[0.04]), flat.reshape(-1, 2, 2)
+        send(stream, f"{path}/{part}", style, time_s, rr.LineStrips2D.columns(strips=columns), flat.shape[1])
     # There is room for one number per axle: the angle of the left wheel.
     at = placed(wheel_centres(size)[[0, 2]] * (1.0, 0.0) + [(2.3, 0.0), (-1.2, 0.0)])
     label = rr.Points2D.from_fields(positions=at, colors=[colour], radii=[0.01], show_labels=True)
-    stream.log(f"{path}/angle", label, static=True)
     shown = [text for row in range(rows) for text in (texts[4 * row], texts[4 * row + 2])]
-    stream.send_columns(f"{path}/angle", when, rr.Points2D.columns(labels=shown).partition(lengths=[2] * rows))
+    send(stream, f"{path}/angle", label, time_s, rr.Points2D.columns(labels=shown), 2)

@@ -203,39 +203,23 @@ _OTHERS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 
 
 class Group(NamedTuple):
-    """Channels of a topic.
+    """Channels of a topic."""
 
-    Attributes:
-        topic: Name of the topic.
-        names: Names of its fields.
-        columns: Columns of its fields.
-        layout: Layout of its messages.
-    """
-
-    topic: str
-    names: list[str]
-    columns: list[int]
-    layout: FixedMessage
+    topic: str  # name of the topic
+    names: list[str]  # names of its fields
+    columns: list[int]  # columns of its fields
+    layout: FixedMessage  # layout of its messages
 
 
 class Block(NamedTuple):
-    """Contents of a chunk.
+    """Contents of a chunk."""
 
-    Attributes:
-        row_ns: Time of each row [ns], shape (n,).
-        columns: Column -> values, 32 or 64 bit, shape (n,).
-        pose_ns: Time of each set of poses [ns], shape (k,).
-        positions_m: Positions of the bodies [m], shape (k, number of bodies, 3).
-        quaternions: Orientations of the bodies, w x y z, shape (k, number of bodies, 4).
-        others: MCAP channel id -> messages of other topics.
-    """
-
-    row_ns: NDArray[np.uint64]
-    columns: Mapping[int, NDArray]
-    pose_ns: NDArray[np.uint64]
-    positions_m: NDArray[np.float64]
-    quaternions: NDArray[np.float64]
-    others: Mapping[int, list[bytes]]
+    row_ns: NDArray[np.uint64]  # time of each row [ns], shape (n,)
+    columns: Mapping[int, NDArray]  # column -> values, 32 or 64 bit, shape (n,)
+    pose_ns: NDArray[np.uint64]  # time of each set of poses [ns], shape (k,)
+    positions_m: NDArray[np.float64]  # positions of the bodies [m], shape (k, number of bodies, 3)
+    quaternions: NDArray[np.float64]  # orientations of the bodies, w x y z, shape (k, number of bodies, 4)
+    others: Mapping[int, list[bytes]]  # MCAP channel id -> messages of other topics
 
 
 class BlockDecoder:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Mapping
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -48,19 +48,12 @@ _CHUNK_HEAD = struct.Struct("<BQQQQII")
 
 
 class ChunkData(NamedTuple):
-    """Messages of a chunk, encoded.
+    """Messages of a chunk, encoded."""
 
-    Attributes:
-        start_ns: Log time of the first message [ns].
-        end_ns: Log time of the last message [ns].
-        records: Message records, uncompressed.
-        indexes: MCAP channel id -> number of messages, and MessageIndex record.
-    """
-
-    start_ns: int
-    end_ns: int
-    records: bytes
-    indexes: Mapping[int, tuple[int, bytes]]
+    start_ns: int  # log time of the first message [ns]
+    end_ns: int  # log time of the last message [ns]
+    records: bytes  # message records, uncompressed
+    indexes: Mapping[int, tuple[int, bytes]]  # MCAP channel id -> number of messages, and MessageIndex record
 
 
 class McapFile:
@@ -106,20 +99,10 @@ class McapFile:
 
     def add_attachment(self, name: str, data: bytes) -> None:
         """Write an attachment at time zero."""
-        kind = "application/octet-stream"
+        about: Any = {"create_time": 0, "log_time": 0, "name": name, "media_type": "application/octet-stream"}
         offset = self._position
-        length = self._put_record(Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=data))
-        self._attachments.append(
-            AttachmentIndex(
-                offset=offset,
-                length=length,
-                log_time=0,
-                create_time=0,
-                data_size=len(data),
-                name=name,
-                media_type=kind,
-            )
-        )
+        length = self._put_record(Attachment(**about, data=data))
+        self._attachments.append(AttachmentIndex(**about, offset=offset, length=length, data_size=len(data)))
 
     def add_chunk(self, chunk: ChunkData) -> None:
         """Compress and write a chunk and the index of its messages, and flush the stream.

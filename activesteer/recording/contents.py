@@ -35,18 +35,13 @@ _INFO: Final = 2
 
 
 class Event(NamedTuple):
-    """An event.
+    """An event."""
 
-    Attributes:
-        time_s: Time at which the next step began [s].
-        kind: `set` for a changed key, `fail` for a fault, `phase` for a phase of the manoeuvre, `note` for a limit of
-            accuracy.
-        what: The change (`road.mu = 0.3`), the fault (`rear:stuck`), the name of the phase, or the limit in words.
-    """
-
-    time_s: float
+    time_s: float  # time at which the next step began [s]
+    # `set` for a changed key, `fail` for a fault, `phase` for a phase of the manoeuvre, `note` for a limit of
+    # accuracy
     kind: str
-    what: str
+    what: str  # the change (`road.mu = 0.3`), the fault (`rear:stuck`), the name of the phase, or the limit in words
 
 
 def events_of(metadata: Mapping[str, Any]) -> list[Event]:
@@ -54,11 +49,6 @@ def events_of(metadata: Mapping[str, Any]) -> list[Event]:
     listed = sequence(metadata.get("events", ()), "events")
     limits.check_count(len(listed), limits.MAX_EVENTS, "entries", RecordingError, file="the metadata", key="events")
     return [_event(entry, f"events.{index}") for index, entry in enumerate(listed)]
-
-
-def tables_of(events: Iterable[Event]) -> list[dict[str, Any]]:
-    """Return events as the list of tables that the metadata hold."""
-    return [event._asdict() for event in events]
 
 
 def encode_event(event: Event) -> tuple[int, bytes]:
@@ -384,11 +374,7 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
                 value=primitive.kind,
             )
         if primitive.body not in entities:
-            entity = entities[primitive.body] = update.entities.add(
-                frame_id=primitive.body, id=primitive.body, frame_locked=True
-            )
-            entity.timestamp.SetInParent()
-            entity.lifetime.SetInParent()
+            entities[primitive.body] = _new_entity(update, primitive.body, primitive.body)
         solid = getattr(entities[primitive.body], _FIELDS[primitive.kind]).add()
         if primitive.kind == "cylinder":
             solid.bottom_scale = solid.top_scale = 1.0
@@ -418,25 +404,22 @@ def _add_link(update: Any, link: Link) -> None:
         raise RecordingError(
             f"link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}", key=link.name, value=link.kind
         )
+    if len(link.points) < 2:
+        raise RecordingError(f"has {len(link.points)} points, at least 2 are needed", key=link.name)
     try:
-        text = json.dumps(_link_table(link))
-        _link_of(json.loads(text))
+        text = json.dumps(_link_of(link._asdict())._asdict())
     except (TypeError, ValueError) as error:
         raise RecordingError(
             f"a number of the {link.kind} is missing or wrong: {link} ({error})", key=link.name
         ) from None
-    entity = update.entities.add(frame_id=link.points[0][0], id=link.name, frame_locked=True)
+    _new_entity(update, link.points[0][0], link.name).metadata.add(key=_LINK_KEY, value=text)
+
+
+def _new_entity(update: Any, frame: str, name: str) -> Any:
+    entity = update.entities.add(frame_id=frame, id=name, frame_locked=True)
     entity.timestamp.SetInParent()
     entity.lifetime.SetInParent()
-    entity.metadata.add(key=_LINK_KEY, value=text)
-
-
-def _link_table(link: Link) -> dict[str, Any]:
-    points = [[body, [float(value) for value in point]] for body, point in link.points]
-    if len(points) < 2:
-        raise ValueError("two points at least")
-    colour = [float(value) for value in link.rgba]
-    return {"name": link.name, "kind": link.kind, "points": points, "radius_m": float(link.radius_m), "rgba": colour}
+    return entity
 
 
 def _link_of(table: dict[str, Any]) -> Link:

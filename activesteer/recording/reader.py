@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from google.protobuf.message import DecodeError
@@ -36,14 +36,12 @@ from activesteer.recording.contents import (
     SCENE_TOPIC,
     STATE_TOPIC,
     TRANSFORMS_TOPIC,
-    ScenePart,
     check_bodies,
     check_metadata,
     check_metrics,
     check_names,
     decode_event,
     decode_scene,
-    tables_of,
 )
 from activesteer.recording.rows import (
     BROKEN,
@@ -72,26 +70,18 @@ _REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
 
 @dataclass
 class Records:
-    """Records of a file, chunks as places.
+    """Records of a file, chunks as places."""
 
-    Attributes:
-        position: End of the last record.
-        crc: Checksum of all bytes up to `position`.
-        complete: Whether the end of the data section was reached; the rest only repeats information.
-        damage: Description of the damage.
-        reason: The error behind the damage, if it is one of ours.
-    """
-
-    position: int = len(MCAP0_MAGIC)
-    crc: int = zlib.crc32(MCAP0_MAGIC)
+    position: int = len(MCAP0_MAGIC)  # end of the last record
+    crc: int = zlib.crc32(MCAP0_MAGIC)  # checksum of all bytes up to `position`
     schemas: dict[int, Schema] = field(default_factory=dict)
     topics: dict[int, Channel] = field(default_factory=dict)
     metadata: list[Metadata] = field(default_factory=list)
     attachments: dict[str, bytes] = field(default_factory=dict)
     chunks: list[tuple[int, int]] = field(default_factory=list)
-    complete: bool = False
-    damage: str = ""
-    reason: RecordingError | None = None
+    complete: bool = False  # whether the end of the data section was reached; the rest only repeats information
+    damage: str = ""  # description of the damage
+    reason: RecordingError | None = None  # the error behind the damage, if it is one of ours
     _bytes: int = 0
     _count: int = 0
 
@@ -181,37 +171,11 @@ are needed."""
 _END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
-class Contents(NamedTuple):
-    """Contents of a file.
-
-    Attributes:
-        channels: The channels.
-        time_s: Time of each row [s], shape (n,).
-        values: Channel values, shape (n, number of channels); or the rows of a long recording, still in the file.
-        poses: Poses of the bodies; None where they are still in the file.
-        metadata: Metadata without metrics; `complete` tells whether the file ends properly.
-        metrics: Metrics by name.
-        attachments: Attachments by name.
-        scene: Shape of the car: solids in body frames, and links between bodies.
-        damage: Description of the damage; empty for a sound file. All other fields then hold the part before it.
-    """
-
-    channels: ChannelTable
-    time_s: NDArray[np.float64]
-    values: NDArray[np.float64] | FileRows
-    poses: Poses | None
-    metadata: dict[str, Any]
-    metrics: dict[str, float]
-    attachments: dict[str, bytes]
-    scene: tuple[ScenePart, ...]
-    damage: str
-
-
-def read_mcap(path: Path) -> Contents:
-    """Read a file written by `McapWriter`.
+def read_mcap(path: Path) -> tuple[dict[str, Any], str]:
+    """Read a file written by `McapWriter`. Return the arguments of `Recording`, and the description of a damage.
 
     A file that ends too early, as after a killed process, gives all its complete blocks. A damaged file gives the part
-    before the damage, and describes the damage in `damage`.
+    before the damage. The values of a long recording are its rows, still in the file; its poses are then None.
     """
     descriptor = opened(path)
     kept = False
@@ -225,21 +189,21 @@ def read_mcap(path: Path) -> Contents:
         records = read_records(descriptor, size)
         try:
             contents = _decode(descriptor, records)
+            kept = isinstance(contents["values"], FileRows)
         except RecordingError as error:
             damage = f" ({records.damage})" if records.damage else ""
             reason = records.reason or error
             value = path if reason.value is None else reason.value
             raise RecordingError(f"{shown_path(path)}: {error}{damage}", value=value, allowed=reason.allowed) from None
-        kept = isinstance(contents.values, FileRows)
     except (*BROKEN, DecodeError, LookupError, TypeError, AttributeError) as error:
         raise RecordingError(f"{shown_path(path)} is damaged: {words_of(error)}", value=path) from None
     finally:
         if not kept:
             os.close(descriptor)
-    return contents
+    return contents, records.damage
 
 
-def _decode(descriptor: int, records: Records) -> Contents:
+def _decode(descriptor: int, records: Records) -> dict[str, Any]:
     metadata, metrics = _metadata(records)
     topics: dict[str, Channel] = {}
     for topic in records.topics.values():
@@ -262,7 +226,8 @@ def _decode(descriptor: int, records: Records) -> Contents:
     events: list[bytes] = []
     for start, length in records.chunks:
         try:
-            data, crc = messages_of(_content(descriptor, start, length))
+            limits.check_count(length, limits.MAX_CHUNK_BYTES, "bytes", RecordingError)
+            data, crc = messages_of(read_bytes(descriptor, start, length))
             block = rows.add(Place(start, length, crc), data, decoder)
         except (RecordingError, *BROKEN) as error:
             records.damage = f"the chunk in bytes {start} to {start + length} cannot be read: {words_of(error)}"
@@ -275,16 +240,12 @@ def _decode(descriptor: int, records: Records) -> Contents:
         raise RecordingError(f"there are {len(scenes)} scenes")
     parts = decode_scene(scenes[0]) if scenes else ()
     if events:
-        metadata["events"] = tables_of(map(decode_event, events))
+        metadata["events"] = [decode_event(event)._asdict() for event in events]
     values, poses = rows.collected(descriptor, decoder, list(channels))
-    return Contents(
-        channels, rows.time_s(), values, poses, metadata, metrics, records.attachments, parts, records.damage
-    )
-
-
-def _content(descriptor: int, start: int, length: int) -> bytes:
-    limits.check_count(length, limits.MAX_CHUNK_BYTES, "bytes", RecordingError)
-    return read_bytes(descriptor, start, length)
+    return {
+        "channels": channels, "time_s": rows.time_s(), "values": values, "poses": poses, "metadata": metadata,
+        "metrics": metrics, "attachments": records.attachments, "scene": parts,
+    }  # fmt: skip
 
 
 class _Rows:

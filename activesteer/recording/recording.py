@@ -1,26 +1,37 @@
-"""A recording in memory, and the names of several."""
+"""A recording in memory with its exports, and the names of several.
+
+CSV and Parquet are written with pyarrow and need no pandas.
+"""
 
 from __future__ import annotations
 
+import json
+import os
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from activesteer.core.files import atomic_write, finite
 from activesteer.core.signals import Channel
-from activesteer.errors import RecordingError
-from activesteer.recording import export
-from activesteer.recording.contents import ScenePart
+from activesteer.errors import RecordingError, not_installed
+from activesteer.recording.contents import ScenePart, metadata_texts
 from activesteer.recording.reader import read_mcap
 from activesteer.recording.rows import FileRows, Poses, values_of
-from activesteer.recording.schemas import ChannelTable, nanoseconds, shaped
+from activesteer.recording.schemas import TIME, ChannelTable, nanoseconds, shaped
 from activesteer.recording.writer import McapWriter
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
+
+_MATLAB_NAME_LENGTH: Final = 63
+"""Longest name of a variable or field in MATLAB (`namelengthmax`)."""
+_MATLAB_TABLES: Final = ("units", "meanings", "metrics", "metadata")
+"""Variables of a MATLAB file besides the channels."""
 
 
 class Recording:
@@ -106,29 +117,19 @@ class Recording:
         Raises:
             RecordingError: the file cannot be opened, is no recording, or is damaged; the message says what is left.
         """
-        contents = read_mcap(Path(path))
-        if contents.damage and not recover:
-            rows = len(contents.time_s)
-            message = f"{path} is damaged: {contents.damage}. "
+        contents, damage = read_mcap(Path(path))
+        if damage and not recover:
+            rows = len(contents["time_s"])
+            message = f"{path} is damaged: {damage}. "
             if rows:
-                message += f"The {rows} rows up to {contents.time_s[-1]:.3f} s can be read"
+                message += f"The {rows} rows up to {contents['time_s'][-1]:.3f} s can be read"
             else:
                 message += "Metadata and attachments can be read, but no rows"
             raise RecordingError(message + ", with Recording.open(path, recover=True)", value=path, allowed=rows)
-        metadata = contents.metadata
-        if contents.damage:
-            metadata.setdefault("error", f"the file is damaged: {contents.damage}")
+        if damage:
+            contents["metadata"].setdefault("error", f"the file is damaged: {damage}")
         try:
-            return cls(
-                contents.channels,
-                contents.time_s,
-                contents.values,
-                poses=contents.poses,
-                metadata=metadata,
-                metrics=contents.metrics,
-                attachments=contents.attachments,
-                scene=contents.scene,
-            )
+            return cls(**contents)
         except RecordingError as error:
             raise RecordingError(f"{path}: {error}", value=error.value, allowed=error.allowed) from None
 
@@ -160,20 +161,89 @@ class Recording:
                 writer.write(block.row_ns / 1e9, values, block.pose_ns / 1e9, block.positions_m, block.quaternions)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """A pandas data frame (see `activesteer.recording.export.to_dataframe`)."""
-        return export.to_dataframe(self)
+        """Return a data frame with a column per channel and the time as index.
 
-    def to_csv(self, path: str | Path) -> Path:
-        """Write a CSV file (see `activesteer.recording.export.to_csv`)."""
-        return export.to_csv(self, path)
+        Returns:
+            The frame, a copy; `attrs["units"]` has the units by column, `attrs["metrics"]` the metrics.
 
-    def to_parquet(self, path: str | Path) -> Path:
-        """Write a Parquet file (see `activesteer.recording.export.to_parquet`)."""
-        return export.to_parquet(self, path)
+        Raises:
+            RecordingError: pandas is not installed.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415 - an extra, and slow to import
+        except ImportError as reason:
+            raise not_installed(RecordingError, "to_dataframe", "pandas", "data") from reason
+        index = pd.Index(self.time_s, name=TIME)
+        frame = pd.DataFrame(self.values, index=index, columns=list(self.channels.names), copy=True)
+        frame.attrs["units"] = {channel.name: channel.unit for channel in self.channels}
+        frame.attrs["metrics"] = dict(self.metrics)
+        return frame
 
-    def to_mat(self, path: str | Path) -> Path:
-        """Write a MATLAB file (see `activesteer.recording.export.to_mat`)."""
-        return export.to_mat(self, path)
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write a line of names and a line per row: `time_s`, then the channels. An existing file is replaced.
+
+        Numbers have enough digits to restore the same values; channels with `single` have 32 bit.
+
+        Raises:
+            RecordingError: the file cannot be written.
+        """
+        from pyarrow import csv  # noqa: PLC0415 - slow to import
+
+        def write(target: Path) -> None:
+            with target.open("wb") as stream:
+                # pyarrow would quote the names, and some readers keep the quotes.
+                stream.write((",".join((TIME, *self.channels.names)) + "\n").encode())
+                csv.write_csv(_table(self), stream, csv.WriteOptions(include_header=False))
+
+        return _written(path, write)
+
+    def to_parquet(self, path: str | os.PathLike[str]) -> Path:
+        """Write `time_s` and the channels as columns. An existing file is replaced.
+
+        Channels with `single` have 32 bit. Each field carries `unit` and `meaning`, the schema `metadata` and `metrics`
+        as JSON texts.
+
+        Raises:
+            RecordingError: the file cannot be written.
+        """
+        from pyarrow import parquet  # noqa: PLC0415 - slow to import
+
+        return _written(path, lambda target: parquet.write_table(_table(self), target, compression="zstd"))
+
+    def to_mat(self, path: str | os.PathLike[str]) -> Path:
+        """Write a MATLAB file of version 5, which every MATLAB and Octave can load. An existing file is replaced.
+
+        `time_s` and every channel is a column of doubles, since single precision would spread to all results.
+        Structs `units`, `meanings` and `metrics` have a field for each name; `metadata` is JSON text, for `jsondecode`.
+
+        Raises:
+            RecordingError: the file cannot be written, or a name is taken or too long for MATLAB.
+        """
+        from scipy.io import savemat  # noqa: PLC0415 - slow to import
+
+        taken = {TIME, *_MATLAB_TABLES}
+        for name in (*self.channels.names, *self.metrics):
+            if len(name) > _MATLAB_NAME_LENGTH:
+                raise RecordingError(
+                    f"{name!r} has {len(name)} letters; MATLAB allows {_MATLAB_NAME_LENGTH}",
+                    value=name,
+                    allowed=_MATLAB_NAME_LENGTH,
+                )
+        if clash := taken.intersection(self.channels.names):
+            name = clash.pop()
+            raise RecordingError(f"a channel is called {name!r}, the name of another variable in the file", value=name)
+        variables: dict[str, Any] = {TIME: self.time_s}
+        variables |= {name: self[name] for name in self.channels.names}
+        variables["units"] = {channel.name: channel.unit for channel in self.channels}
+        variables["meanings"] = {channel.name: channel.meaning for channel in self.channels}
+        variables["metrics"] = dict(self.metrics)
+        variables["metadata"] = _metadata(self)
+
+        def write(target: Path) -> None:
+            # Field names longer than 31 letters need MATLAB 7.6 (2008) or later.
+            savemat(target, variables, appendmat=False, long_field_names=True, do_compression=True, oned_as="column")
+
+        return _written(path, write)
 
     @property
     def time_s(self) -> NDArray[np.float64]:
@@ -242,6 +312,32 @@ def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
     view = array.view()
     view.flags.writeable = False
     return view
+
+
+def _table(recording: Recording) -> pa.Table:
+    import pyarrow as pa  # noqa: PLC0415 - slow to import
+
+    columns = [pa.array(recording.time_s)]
+    fields = [pa.field(TIME, pa.float64(), metadata={"unit": "s", "meaning": "time since the recording began"})]
+    for channel in recording.channels:
+        kind = np.float32 if channel.single else np.float64
+        columns.append(pa.array(recording[channel.name].astype(kind)))
+        notes = {"unit": channel.unit, "meaning": channel.meaning}
+        fields.append(pa.field(channel.name, pa.from_numpy_dtype(kind), metadata=notes))
+    about = {"metadata": _metadata(recording), "metrics": json.dumps(finite(recording.metrics))}
+    return pa.table(columns, schema=pa.schema(fields, metadata=about))
+
+
+def _metadata(recording: Recording) -> str:
+    texts, _ = metadata_texts(recording.metadata)
+    return json.dumps({key: json.loads(text) for key, text in texts.items()}, ensure_ascii=False)
+
+
+def _written(path: str | os.PathLike[str], write: Callable[[Path], object]) -> Path:
+    target = Path(path)
+    with atomic_write(target, RecordingError) as part:
+        write(part)
+    return target
 
 
 def run_names(sources: Sequence[str | Path], recordings: Iterable[Recording]) -> list[str]:

@@ -68,19 +68,11 @@ _SMALLEST: Final = 1e-6
 
 
 class Place(NamedTuple):
-    """Place and contents of a chunk.
+    """Place and contents of a chunk."""
 
-    Attributes:
-        start: First byte of the content of its record.
-        length: Length of the content [bytes].
-        crc: Checksum of its messages.
-        rows: Number of rows.
-        poses: Number of sets of poses.
-    """
-
-    start: int
-    length: int
-    crc: int
+    start: int  # first byte of the content of its record
+    length: int  # length of the content [bytes]
+    crc: int  # checksum of its messages
     rows: int = 0
     poses: int = 0
 

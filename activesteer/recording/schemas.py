@@ -43,19 +43,12 @@ _CONTINUES = np.array([0x80, 0x80, 0x80, 0x80, 0], np.uint64)
 
 @dataclass(frozen=True)
 class ColumnRun:
-    """Numbers at a constant distance in a message.
+    """Numbers at a constant distance in a message."""
 
-    Attributes:
-        dtype: Little-endian numpy type of one number.
-        offset: Position of the first number in the message [byte].
-        stride: Distance from one number to the next [byte].
-        count: How many there are.
-    """
-
-    dtype: str
-    offset: int
-    stride: int
-    count: int
+    dtype: str  # little-endian numpy type of one number
+    offset: int  # position of the first number in the message [byte]
+    stride: int  # distance from one number to the next [byte]
+    count: int  # how many there are
 
 
 def varint(value: int) -> bytes:
@@ -84,12 +77,7 @@ def timestamps(time_ns: NDArray[np.uint64]) -> NDArray[np.uint8]:
 
 
 class FixedMessage:
-    """Message of constant length: constant bytes, and numbers at fixed places.
-
-    Attributes:
-        template: The message with all numbers zero.
-        runs: Places of the numbers, in the order of addition.
-    """
+    """Message of constant length: a template with all numbers zero, and the places of the numbers."""
 
     def __init__(self) -> None:
         """Start with an empty message."""
@@ -285,39 +273,30 @@ def message_class(name: str) -> Any:
     return GetMessageClass(pool.FindMessageTypeByName(name))
 
 
-def state_schema_name(group: str) -> str:
-    """Return the full name of the message for the channels of a group."""
-    return f"activesteer.{group.capitalize()}"
-
-
-def state_schema(group: str, channels: Iterable[Channel]) -> bytes:
-    """Return the serialised `FileDescriptorSet` of a group: one field per channel, numbered from 1."""
+def state_schema(group: str, channels: Iterable[Channel]) -> tuple[str, bytes]:
+    """Return name and serialised `FileDescriptorSet` of a group: one field per channel, numbered from 1."""
     fields = ", ".join(
         f"{'float' if channel.single else 'double'} {channel.name} = {number}"
         for number, channel in enumerate(channels, start=1)
     )
     file = FileDescriptorProto(name=f"activesteer/{group}.proto", package="activesteer", syntax="proto3")
     file.message_type.append(_define("activesteer", group.capitalize(), fields))
-    return FileDescriptorSet(file=[file]).SerializeToString()
+    return f"activesteer.{group.capitalize()}", FileDescriptorSet(file=[file]).SerializeToString()
 
 
 def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessage]:
     """Return the field names of a schema of `state_schema` in their order, and the layout of the messages."""
-    for file in FileDescriptorSet.FromString(schema).file:
-        for message in file.message_type:
-            if f"{file.package}.{message.name}" == schema_name:
-                return [field.name for field in message.field], _layout(message)
-    raise RecordingError(f"the schema of {schema_name} does not define it")
-
-
-def _layout(message: DescriptorProto) -> FixedMessage:
+    files = FileDescriptorSet.FromString(schema).file
+    messages = [each for file in files for each in file.message_type if f"{file.package}.{each.name}" == schema_name]
+    if not messages:
+        raise RecordingError(f"the schema of {schema_name} does not define it")
     layout = FixedMessage()
     kinds = {FieldDescriptorProto.TYPE_FLOAT: "<f4", FieldDescriptorProto.TYPE_DOUBLE: "<f8"}
-    for field in message.field:
+    for field in messages[0].field:
         if field.type not in kinds or field.label == FieldDescriptorProto.LABEL_REPEATED:
-            raise RecordingError(f"field {field.name} of {message.name} is neither float nor double")
+            raise RecordingError(f"field {field.name} of {messages[0].name} is neither float nor double")
         layout.number(field.number, kinds[field.type])
-    return layout
+    return [field.name for field in messages[0].field], layout
 
 
 def state_layout(channels: Iterable[Channel]) -> FixedMessage:

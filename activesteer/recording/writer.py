@@ -52,7 +52,6 @@ from activesteer.recording.schemas import (
     nanoseconds,
     shaped,
     state_schema,
-    state_schema_name,
 )
 
 _START_BYTES: Final = 64
@@ -201,9 +200,7 @@ class McapWriter:
                 )
                 for column in columns
             }
-            group_ids[group] = self._file.add_topic(
-                STATE_TOPIC + group, state_schema_name(group), state_schema(group, members), described
-            )
+            group_ids[group] = self._file.add_topic(STATE_TOPIC + group, *state_schema(group, members), described)
         bodies = {"bodies": json.dumps(self.body_names)}
         transforms_id = self._file.add_topic(TRANSFORMS_TOPIC, TRANSFORMS_SCHEMA, foxglove_schema(), bodies)
         scene_id = self._file.add_topic(SCENE_TOPIC, SCENE_SCHEMA, foxglove_schema(), {}) if scene else None

@@ -21,7 +21,7 @@ from activesteer.maneuver import Maneuver
 from activesteer.road.course import Footprint
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.video import FilmedCar, RenderScene
-from activesteer.video.cameras import CUTAWAY
+from activesteer.video.film import CUTAWAY
 from activesteer.video.gauges import MIN_SPEED_MPS
 
 FRAME_S: Final = 0.016

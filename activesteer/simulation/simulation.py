@@ -21,7 +21,7 @@ from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
 from activesteer.recording import McapWriter, Recording
-from activesteer.recording.contents import Event, tables_of
+from activesteer.recording.contents import Event
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, Scenario
 from activesteer.scenario.run_context import RunContext
@@ -421,7 +421,7 @@ class Simulation(Copyable):
         if self._link is not None:
             recording.metadata[self._link.name] = dict(self._link.report)
         if self.events:
-            recording.metadata["events"] = tables_of(self.events)
+            recording.metadata["events"] = [event._asdict() for event in self.events]
         if failure is not None:
             recording.metadata["error"] = f"{type(failure).__name__}: {failure}"
         elif not self.done:

@@ -1,8 +1,14 @@
-"""Films of recordings, frame by frame."""
+"""Films of recordings: cameras behind the car, above it or beside a wheel, and files as MP4 or GIF."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import importlib
+import math
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
@@ -10,20 +16,92 @@ from typing import Any, Final, NamedTuple, Self
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from activesteer.core.conventions import CORNERS, run_looks
-from activesteer.errors import ParameterError, nearest_names
+from activesteer.core.files import atomic_write
+from activesteer.errors import ParameterError, PlaybackError, nearest_names, not_installed
 from activesteer.recording import Recording
 from activesteer.road.course import Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
 from activesteer.road.road import road_of
-from activesteer.video.cameras import CUTAWAY, view
-from activesteer.video.encoder import check, encoder, frame_rate
 from activesteer.video.gauges import Dials, Gauges, LargeSideslip, used
 from activesteer.video.offscreen import Offscreen
 from activesteer.video.render_scene import FilmedCar, RenderScene
 from activesteer.video.road import edges_beside
 from activesteer.video.track import Markings, Traces, Track
+
+CAMERAS: Final = ("chase", "top", "wheel")
+"""Names of the cameras."""
+CUTAWAY: Final = 0.12
+"""Opacity of a shell that lets the suspension be seen."""
+
+_WHEELS_SEEN: Final = 0.25
+"""Opacity of a shell that lets the wheels be seen from above."""
+
+
+class View(NamedTuple):
+    """A camera on a car."""
+
+    aim: Callable[[mujoco.MjvCamera, float], None]  # function that aims a MuJoCo camera for an instant [s]
+    shell_opacity: float  # opacity of the car's shell, 0 to 1; low for a view of the suspension
+    marked: bool = True  # whether the view shows the wedges and arrows beside the car
+
+
+def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
+    """Return the camera of a name."""
+    if name == "chase":
+        return View(_chase(track), 1.0)
+    if name == "top":
+        return View(_top(track), _WHEELS_SEEN)
+    if name == "wheel":
+        return View(_wheel(track, corner), CUTAWAY, marked=False)
+    raise ParameterError(f"there is no camera {name!r}; {nearest_names(name, CAMERAS)}", value=name)
+
+
+def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
+    """Place the camera behind and above the car, seen in its direction of motion, looking over the roof at the road.
+
+    A car that slides turns in the picture.
+    """
+
+    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
+        direction = track.direction(time_s)
+        ahead = np.array([math.cos(direction), math.sin(direction), 0.0])
+        camera.lookat = track.middle(time_s) + 0.9 * ahead + np.array([0.0, 0.0, 0.15])
+        camera.distance, camera.elevation, camera.azimuth = 8.3, -20.0, math.degrees(direction)
+
+    return aim
+
+
+def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
+    """Place the camera above the car, x to the right and y up as in the plots. It does not rotate with the car."""
+
+    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
+        camera.lookat = track.middle(time_s)
+        camera.distance, camera.elevation, camera.azimuth = 15.0, -90.0, 90.0
+
+    return aim
+
+
+def _wheel(track: Track, corner: str) -> Callable[[mujoco.MjvCamera, float], None]:
+    """Place the camera inboard of a wheel, where its links are. It follows the chassis without roll and heave."""
+    if corner not in CORNERS:
+        raise ParameterError(f"there is no corner {corner!r}; {nearest_names(corner, CORNERS)}", value=corner)
+    place = track.wheel_place(corner)
+    side, end = (1.0 if corner[1] == "l" else -1.0), (1.0 if corner[0] == "f" else -1.0)
+    # Look from the end of the car towards its middle, and outwards by 28 degrees.
+    azimuth = side * (90.0 + 62.0 * end)
+
+    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
+        heading = track.heading(time_s)
+        cos, sin = math.cos(heading), math.sin(heading)
+        x, y, z = place
+        camera.lookat = track.chassis(time_s) + np.array([cos * x - sin * y, sin * x + cos * y, z + 0.05])
+        camera.distance, camera.elevation, camera.azimuth = 1.9, -10.0, math.degrees(heading) + azimuth
+
+    return aim
+
 
 LAYOUTS: Final = ("overlay", "side-by-side")
 """Layouts of several cars: one view with all but the first car transparent, or a pane for each car."""
@@ -217,6 +295,118 @@ class _Pane:
         if self._markings is not None:
             self._markings.add(scene, time_s)
         return self._gauges.draw(self._canvas.draw(), time_s)
+
+
+Pixels = NDArray[np.uint8]
+
+FORMATS: Final = (".mp4", ".gif")
+"""Suffixes of the files that can be written."""
+
+_GIF_TICKS_HZ: Final = 100.0
+_COLOURS: Final = 128
+_SIDE_LIMIT: Final = 8192
+
+
+def frame_rate(path: Path, wanted_hz: float) -> float:
+    """Return the nearest frame rate that a format can have: a GIF shows each frame for whole hundredths of a second."""
+    if path.suffix.lower() != ".gif":
+        return wanted_hz
+    return _GIF_TICKS_HZ / max(2, round(_GIF_TICKS_HZ / wanted_hz))  # browsers show less than two hundredths as ten
+
+
+def check(path: Path, size: tuple[int, int]) -> None:
+    """Check the conditions for writing before anything is drawn."""
+    if path.suffix.lower() not in FORMATS:
+        raise ParameterError(f"a video's name must end in {' or '.join(FORMATS)}", file=str(path), allowed=FORMATS)
+    if min(size) < 16 or max(size) > _SIDE_LIMIT:
+        raise ParameterError(
+            f"a picture of {size[0]} x {size[1]} pixels cannot be made; each side must be 16 to {_SIDE_LIMIT}",
+            value=size,
+            allowed=(16, _SIDE_LIMIT),
+        )
+    if not path.parent.is_dir():
+        raise PlaybackError(f"cannot write {path}: there is no folder {path.parent}", value=path.parent)
+    if path.suffix.lower() == ".mp4":
+        if size[0] % 2 or size[1] % 2:
+            raise ParameterError(f"{size[0]} x {size[1]} pixels: an MP4 needs an even width and height", value=size)
+        ffmpeg()
+
+
+def encoder(
+    path: Path, size: tuple[int, int], rate_hz: float, samples: Iterable[Pixels]
+) -> AbstractContextManager[Callable[[Pixels], None]]:
+    """Context that yields a function to append a frame of shape (height, width, 3).
+
+    The file appears when the context ends without an error. Otherwise nothing is left.
+    """
+    if path.suffix.lower() == ".gif":
+        return _gif(path, rate_hz, samples)
+    return _mp4(path, size, rate_hz)
+
+
+def ffmpeg() -> str:
+    """Return the ffmpeg program of the package imageio-ffmpeg, or else of the system."""
+    with suppress(ImportError, RuntimeError):
+        return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
+    if found := shutil.which("ffmpeg"):
+        return found
+    what = "no program ffmpeg is found (apt-get install ffmpeg; a .gif needs none): an MP4"
+    raise not_installed(PlaybackError, what, "imageio-ffmpeg", "video")
+
+
+@contextmanager
+def _mp4(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Callable[[Pixels], None]]:
+    with atomic_write(path, PlaybackError) as part, tempfile.TemporaryFile() as log:
+        part.open("wb").close()  # a folder that cannot be written is an error before anything is drawn
+        command = [
+            ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
+            "-r", f"{rate_hz:.6g}", "-i", "-", "-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20",
+            # Every player and browser supports this, and can start before the whole file has arrived.
+            "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(part),
+        ]  # fmt: skip
+        try:
+            process: Any = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=log)
+        except OSError as reason:
+            raise PlaybackError(f"{command[0]} does not start: {reason.strerror or reason}") from None
+
+        def failure() -> PlaybackError:
+            log.seek(0)
+            said = (log.read().decode(errors="replace").strip().splitlines() or ["nothing"])[-1]
+            return PlaybackError(f"cannot write {path}: ffmpeg says: {said}", value=said)
+
+        def write(pixels: Pixels) -> None:
+            try:
+                process.stdin.write(np.ascontiguousarray(pixels).data)
+            except OSError:
+                process.wait()
+                raise failure() from None
+
+        try:
+            yield write
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            with suppress(OSError):
+                process.stdin.close()
+            status = process.wait()
+        if status != 0:
+            raise failure()
+
+
+@contextmanager
+def _gif(path: Path, rate_hz: float, samples: Iterable[Pixels]) -> Iterator[Callable[[Pixels], None]]:
+    # All frames share one palette; with a palette for each frame, the colours of still objects would flicker.
+    palette = Image.fromarray(np.concatenate(list(samples))).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
+    pictures: list[Image.Image] = []
+    with atomic_write(path, PlaybackError) as part:
+        part.open("wb").close()  # a folder that cannot be written is an error before anything is drawn
+        yield lambda pixels: pictures.append(
+            Image.fromarray(np.ascontiguousarray(pixels)).quantize(palette=palette, dither=Image.Dither.NONE)
+        )
+        first, *others = pictures
+        duration_ms = round(1000.0 / rate_hz)
+        first.save(part, "GIF", save_all=True, append_images=others, duration=duration_ms, loop=0, optimize=False)
 
 
 class FilmInfo(NamedTuple):

@@ -63,17 +63,11 @@ _WIDEST: Final = {"speed_mps": "188.8", "sideslip_rad": "-18.8"}
 
 
 class Dials(NamedTuple):
-    """The gauges of one run.
-
-    Attributes:
-        recording: The run.
-        label: Name of the run.
-        colour: Colour of its car, `#rrggbb`.
-    """
+    """The gauges of one run."""
 
     recording: Recording
-    label: str
-    colour: str
+    label: str  # name of the run
+    colour: str  # colour of its car, `#rrggbb`
 
     def value(self, channel: str, time_s: float) -> float:
         """Return a channel at an instant, or nan if it is not recorded."""

@@ -10,8 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -132,20 +131,10 @@ class Offscreen:
         return self._pixels[::-1]
 
     def close(self) -> None:
-        """Gives the graphics memory back."""
+        """Free the graphics memory."""
         self._context.make_current()
         self._drawer.free()
         self._context.free()
-
-    def __enter__(self) -> Self:
-        """Return the canvas with its context current."""
-        return self
-
-    def __exit__(
-        self, _kind: type[BaseException] | None, _error: BaseException | None, _: TracebackType | None
-    ) -> None:
-        """Gives the graphics memory back."""
-        self.close()
 
 
 @contextmanager

@@ -63,25 +63,16 @@ _BASE: Final = """
 
 
 class FilmedCar(NamedTuple):
-    """A car in the scene.
+    """A car in the scene."""
 
-    Attributes:
-        parts: Parts of the car.
-        bodies: Names of its bodies, in the order of the poses.
-        colour: Colour of its shell, `#rrggbb`; empty for the colour of the model.
-        shell_opacity: Opacity of its shell, 0 to 1.
-        ghost: Whether all of the car is transparent.
-        size: Size of the car, which determines its bodywork and wheels; if unknown, the model's solids are drawn.
-        tail_opens: Whether `open_tail` can make the tail of its body transparent.
-    """
-
-    parts: tuple[ScenePart, ...]
-    bodies: tuple[str, ...]
-    colour: str = ""
-    shell_opacity: float = 1.0
-    ghost: bool = False
+    parts: tuple[ScenePart, ...]  # parts of the car
+    bodies: tuple[str, ...]  # names of its bodies, in the order of the poses
+    colour: str = ""  # colour of its shell, `#rrggbb`; empty for the colour of the model
+    shell_opacity: float = 1.0  # opacity of its shell, 0 to 1
+    ghost: bool = False  # whether all of the car is transparent
+    # Size of the car, which determines its bodywork and wheels; if unknown, the model's solids are drawn
     size: Footprint | None = None
-    tail_opens: bool = False
+    tail_opens: bool = False  # whether `open_tail` can make the tail of its body transparent
 
 
 class RenderScene:

@@ -128,17 +128,11 @@ def add_course(spec: mujoco.MjSpec, course: Course) -> None:
 
 
 class Edges(NamedTuple):
-    """Edges of a straight road along x.
+    """Edges of a straight road along x."""
 
-    Attributes:
-        start_m: Where the edges start, world x [m].
-        end_m: Where they end [m].
-        half_width_m: Distance of an edge from the x axis [m].
-    """
-
-    start_m: float
-    end_m: float
-    half_width_m: float
+    start_m: float  # where the edges start, world x [m]
+    end_m: float  # where they end [m]
+    half_width_m: float  # distance of an edge from the x axis [m]
 
     def posts_m(self) -> Array:
         """Return world x of the posts [m]."""

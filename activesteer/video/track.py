@@ -41,13 +41,7 @@ _SHOWN_RAD: Final = np.radians(0.3)
 
 
 class Track:
-    """Poses of a car over time.
-
-    Attributes:
-        bodies: Names of the bodies.
-        start_s: Time of the first pose [s].
-        end_s: Time of the last pose [s].
-    """
+    """Poses of a car over time, from the first usable one at `start_s` to the last at `end_s`."""
 
     def __init__(self, recording: Recording, name: str) -> None:
         """Read the poses that can be drawn. A run that diverged ends with poses that cannot."""
@@ -179,11 +173,7 @@ def _strip(scene: mujoco.MjvScene, start: Array, stop: Array, width_m: float, rg
 
 
 class Markings:
-    """The markings of one car.
-
-    Attributes:
-        note: Scale of the arrows in words; empty if there are no arrows.
-    """
+    """The markings of one car; `note` gives the scale of the arrows in words and is empty without arrows."""
 
     def __init__(
         self, recording: Recording, track: Track, size: Footprint, colour: str, shown_with: Sequence[Recording]

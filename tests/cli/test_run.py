@@ -272,7 +272,10 @@ def test_nothing_is_better_or_worse_next_to_a_run_that_is_lost(monkeypatch, caps
         assert comparison(runs, partial(run_command._paint, runs)) == comparison(runs)
     runs = {"none": kept, "ars": lost, "afs": better}
     assert comparison(runs, partial(run_command._paint, runs)).count("\x1b[32m") == 2
-    run_command._print_outcomes({"none": lost, "ars": kept})
+    recordings = {
+        name: Recording((), (), np.empty((0, 0)), metrics=found) for name, found in (("none", lost), ("ars", kept))
+    }
+    run_command._print_outcomes(recordings)
     told = capsys.readouterr().out
     assert "none: \x1b[31mlost at 46 deg of sideslip\x1b[0m" in told
     assert "ars: \x1b[31mhits 2 cones\x1b[0m" in told

@@ -196,7 +196,7 @@ def test_side_by_side_every_car_has_a_picture_of_its_own(drives, folder):
 
 @pytest.mark.slow
 def test_shadow_is_dark_at_the_car_and_has_no_edge(drives, monkeypatch):
-    monkeypatch.setattr("activesteer.video.cameras._WHEELS_SEEN", 1.0)  # a body to be seen through has little shadow
+    monkeypatch.setattr("activesteer.video.film._WHEELS_SEEN", 1.0)  # a body to be seen through has little shadow
     with Film({"none": drives["none"]}, Settings(size=(640, 480), camera="top")) as film:
         pixels = film.picture(0.2).astype(int)
     # From the road behind the car, which begins 80 pixels behind the middle, to its end, beside the path.

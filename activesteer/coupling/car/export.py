@@ -29,7 +29,6 @@ from activesteer.coupling.car.variables import (
     PARAMETER,
     PLACES,
     SEEDS,
-    Laws,
     Variable,
     faulty_parts,
     inputs_of,
@@ -46,6 +45,7 @@ from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.brakes.records import BRAKE_SETUP
 from activesteer.vehicle.channels.corners import design_heights_m
+from activesteer.vehicle.channels.native_channels import Actuator, AxialForce
 from activesteer.vehicle.faults import part_of
 from activesteer.vehicle.force_block import sensor_columns
 from activesteer.vehicle.native_faults import N_HEALTH
@@ -64,6 +64,11 @@ _OPTIONS: Final = (
 _LINKING: Final = (
     "-shared", "-Wl,-rpath,$ORIGIN", "-Wl,-Bsymbolic", "-Wl,-z,defs", "-Wl,-z,nodelete", "-Wl,--gc-sections",
 )  # fmt: skip
+
+_LICENSES: Final = (
+    "activesteer and MuJoCo are under the Apache License 2.0, https://www.apache.org/licenses/LICENSE-2.0.\n"
+    "MuJoCo: Copyright DeepMind Technologies Limited. Its library is included under another name.\n"
+)
 
 
 class Export(NamedTuple):
@@ -96,7 +101,7 @@ def export_fmu(scenario: Scenario, path: Path, version: int = 2) -> Export:
         archive.writestr("modelDescription.xml", description)
         archive.writestr(f"{folder}/{name}.so", export.library)
         archive.writestr(f"{folder}/{export.engine[0]}", export.engine[1])
-        archive.writestr("documentation/licenses/license.txt", _licenses())
+        archive.writestr("documentation/licenses/license.txt", _LICENSES)
     return export
 
 
@@ -113,7 +118,7 @@ def export_library(scenario: Scenario, folder: Path) -> Export:
         export.engine[0]: export.engine[1],
         "activesteer_car.h": (_SOURCES / "activesteer_car.h").read_bytes(),
         "variables.csv": table.getvalue().encode(),
-        "license.txt": _licenses().encode(),
+        "license.txt": _LICENSES.encode(),
     }
     for name, content in files.items():
         with atomic_write(folder / name, ParameterError) as target:
@@ -133,7 +138,7 @@ def _export(scenario: Scenario) -> Export:
     loop = ClosedLoop(scenario)
     sensors = scenario.car.config.sensors
     inputs = inputs_of(loop, scenario.maneuver.road.mu)
-    outputs, laws = outputs_of(loop, {variable.name for variable in inputs})
+    outputs, forces, limits = outputs_of(loop, {variable.name for variable in inputs})
     parameters = parameters_of(scenario.maneuver.speed_mps, sensors.seed or 0)
     variables = [*inputs, *parameters, *outputs]
     memory = native_memory(loop.vehicle)
@@ -142,11 +147,10 @@ def _export(scenario: Scenario) -> Export:
         "memory.bin": memory.content,
         "state.bin": _state(loop, memory, variables).tobytes(),
         "seeds.bin": _seeds(loop),
-        "data.h": _data(loop, memory, variables, laws).encode(),
+        "data.h": _data(loop, memory, variables, forces, limits).encode(),
     }
-    code = car_code()
     sources = {path.name: path.read_bytes() for path in sorted(_SOURCES.iterdir())}
-    objects = {f"{name}.o": part.content for name, part in code.items()}
+    objects = {f"{name}.o": content for name, content in car_code().items()}
     engine_path = Path(mujoco.__file__).parent / f"libmujoco.so.{mujoco.__version__}"
     everything = {**files, **sources, **objects}
     digest = hashlib.sha256(b"".join(name.encode() + content for name, content in sorted(everything.items())))
@@ -221,7 +225,9 @@ def _real(value: float) -> str:
     return "INFINITY" if value == np.inf else "-INFINITY" if value == -np.inf else repr(value)
 
 
-def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws: Laws) -> str:
+def _data(
+    loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], forces: list[AxialForce], limits: list[Actuator]
+) -> str:
     """Return the tables of car.c."""
     vehicle, model = loop.vehicle, loop.vehicle.model
     header = fb.header_of(model)[0]
@@ -242,8 +248,8 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
     constants: dict[str, Any] = {
         "TIMESTEP_S": vehicle.timestep_s, "STEERING_RATIO": vehicle.parameters.steering.ratio,
         "ENGINE_VERSION": mujoco.mj_version(), "STATE_SIZE": mujoco.mj_stateSize(model, _STATE),
-        "N_VARIABLES": len(variables), "N_RESULT": len(result) - 1, "N_FORCES": len(laws.forces),
-        "N_LIMITS": len(laws.limits), "N_MOTION": len(MOTION), "N_TARGETS": len(memory.targets),
+        "N_VARIABLES": len(variables), "N_RESULT": len(result) - 1, "N_FORCES": len(forces),
+        "N_LIMITS": len(limits), "N_MOTION": len(MOTION), "N_TARGETS": len(memory.targets),
         "N_RELOCATIONS": len(memory.relocations), "N_COMMANDS": len(COMMANDS), "N_COMMAND_INPUTS": len(CARRIED_OUT),
         "MOTION_SPEED": n_measurement + Motion._fields.index("speed_mps"), "RESULT_X": n_measurement,
         "IN_GEAR": place["gear"], "IN_DRIVE": place["drive_torque_demand_Nm"], "IN_ROAD_MU": place["road_mu"],
@@ -291,8 +297,8 @@ def _data(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable], laws:
         "Target TARGETS": [(t.kind, t.base, t.added, size) for t, size in memory.targets.values()],
         "Target KEPT": kept,
         "Part PARTS": parts_that_fail,
-        "Force FORCES": [tuple(force) for force in laws.forces],
-        "Limit LIMITS": [tuple(limit) for limit in laws.limits],
+        "Force FORCES": [tuple(force) for force in forces],
+        "Limit LIMITS": [tuple(limit) for limit in limits],
     }
     for name, entries in tables.items():
         words = ", ".join(f"{{{_numbers(_plain(entry))}}}" for entry in entries)
@@ -345,10 +351,3 @@ def _compiled(files: Mapping[str, bytes], engine: tuple[str, bytes], token: str)
             errors = [line for line in done.stderr.splitlines() if "error" in line or "undefined" in line]
             raise ModelError(f"{compiler} cannot build the car: {' '.join(errors[:3]) or done.stderr[:300]}")
         return (folder / "car.so").read_bytes()
-
-
-def _licenses() -> str:
-    return (
-        "activesteer and MuJoCo are under the Apache License 2.0, https://www.apache.org/licenses/LICENSE-2.0.\n"
-        "MuJoCo: Copyright DeepMind Technologies Limited. Its library is included under another name.\n"
-    )

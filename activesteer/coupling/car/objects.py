@@ -26,20 +26,8 @@ PROCESSOR: Final = "x86-64-v3"
 """Processor for which code is made: x86-64 with AVX2 and FMA (Haswell, 2013; Zen, 2017)."""
 
 
-class Code(NamedTuple):
-    """Compiled code of one function.
-
-    Attributes:
-        name: Name of the function in the object.
-        content: The object file.
-    """
-
-    name: str
-    content: bytes
-
-
-def car_code() -> dict[str, Code]:
-    """Return the code of the functions in `entry` and of the callbacks `passive`, `act_dyn`, `sensor`."""
+def car_code() -> dict[str, bytes]:
+    """Return the object files of the functions in `entry` and of the callbacks `passive`, `act_dyn`, `sensor`."""
     # Compiles for half a minute at first use.
     from activesteer.coupling.car.entry import car_step, change, derive, fault  # noqa: PLC0415
     from activesteer.vehicle.force_block import engine_layout  # noqa: PLC0415
@@ -53,7 +41,7 @@ def car_code() -> dict[str, Code]:
     return {name: _code(name, function) for name, function in functions.items()}
 
 
-def _code(name: str, function: Any) -> Code:
+def _code(name: str, function: Any) -> bytes:
     import llvmlite.binding as llvm  # noqa: PLC0415
     import numba  # noqa: PLC0415
 
@@ -75,7 +63,7 @@ def _code(name: str, function: Any) -> Code:
     machine = llvm.Target.from_triple("x86_64-unknown-linux-gnu").create_target_machine(
         cpu=PROCESSOR, opt=3, reloc="pic", codemodel="default"
     )
-    return Code(entry.name, machine.emit_object(module))
+    return machine.emit_object(module)
 
 
 _ALIGNMENT: Final = 64
@@ -89,36 +77,22 @@ word of such a struct points."""
 
 
 class Relocation(NamedTuple):
-    """A word that holds an address.
+    """A word that holds an address."""
 
-    Attributes:
-        place: Offset of the word in the memory of the car.
-        kind: What it points to.
-        base: Place of the function in `Memory.functions`, or offset of the word in the engine's struct.
-        added: Distance from there.
-    """
-
-    place: int
-    kind: int
-    base: int
-    added: int
+    place: int  # offset of the word in the memory of the car
+    kind: int  # what it points to
+    base: int  # place of the function in `Memory.functions`, or offset of the word in the engine's struct
+    added: int  # distance from there
 
 
 class Memory(NamedTuple):
-    """Native memory of a car.
+    """Native memory of a car."""
 
-    Attributes:
-        content: Its bytes, with zeros in place of addresses.
-        relocations: The addresses.
-        functions: Names of the engine's functions that are called by address.
-        places: Name of a part -> its offset.
-        targets: Name of an array that a recorded row is copied from -> what its address points to, and its size.
-    """
-
-    content: bytes
+    content: bytes  # its bytes, with zeros in place of addresses
     relocations: list[Relocation]
-    functions: list[str]
-    places: dict[str, int]
+    functions: list[str]  # names of the engine's functions that are called by address
+    places: dict[str, int]  # name of a part -> its offset
+    # Name of an array that a recorded row is copied from -> what its address points to, and its size
     targets: dict[str, tuple[Relocation, int]]
 
 

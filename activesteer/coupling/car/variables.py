@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final, NamedTuple
 from xml.sax.saxutils import quoteattr
+
+from jinja2 import Environment, StrictUndefined
 
 from activesteer.config.faults import ACTUATORS
 from activesteer.controllers import CONTROLLER
@@ -43,40 +46,17 @@ PLACES: Final = [name for names in PLACE_GROUPS for name in names]
 
 
 class Variable(NamedTuple):
-    """A variable of an exported car.
-
-    Attributes:
-        name: Its name.
-        unit: Unit; empty for a pure number.
-        meaning: One line, with the sign convention where it matters.
-        causality: `INPUT`, `OUTPUT` or `PARAMETER`.
-        start: Start value.
-        low: Least value; `high` is the largest.
-        source: Place of its array in `RawRows`, or another source.
-        column: Place in the source.
-    """
+    """A variable of an exported car."""
 
     name: str
-    unit: str
-    meaning: str
-    causality: str
-    start: float = 0.0
-    low: float = -math.inf
+    unit: str  # unit; empty for a pure number
+    meaning: str  # one line, with the sign convention where it matters
+    causality: str  # `INPUT`, `OUTPUT` or `PARAMETER`
+    start: float = 0.0  # start value
+    low: float = -math.inf  # least value; `high` is the largest
     high: float = math.inf
-    source: int = FROM_INPUT
-    column: int = 0
-
-
-class Laws(NamedTuple):
-    """Laws of the outputs that are computed.
-
-    Attributes:
-        forces: Axial forces of springs, stops and links.
-        limits: Limits of actuators.
-    """
-
-    forces: list[AxialForce]
-    limits: list[Actuator]
+    source: int = FROM_INPUT  # place of its array in `RawRows`, or another source
+    column: int = 0  # place in the source
 
 
 _MEANINGS: Final = {
@@ -141,8 +121,8 @@ def _fault_inputs(part: str) -> list[Variable]:
     ]
 
 
-def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], Laws]:
-    """Return the outputs: measurement, motion, and the recorded channels, with the laws of those that are computed."""
+def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], list[AxialForce], list[Actuator]]:
+    """Return the outputs: measurement, motion, and the recorded channels, with the laws of computed ones."""
     found = [
         Variable(f"measured_{number.name}", number.recorded.unit, f"{number.recorded.meaning}, measured", OUTPUT,
                  source=FROM_RESULT, column=1 + place)
@@ -155,7 +135,8 @@ def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], Laws]
                  source=FROM_MOTION, column=place)
         for place, name in enumerate(MOTION)
     ]  # fmt: skip
-    laws = Laws([], [])
+    forces: list[AxialForce] = []
+    limits: list[Actuator] = []
     names = taken | {variable.name for variable in found}
     for channel, values in loop.vehicle.channels.signals():
         if channel.name in names or (isinstance(values, Column) and values.array == "commands"):
@@ -163,15 +144,15 @@ def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], Laws]
         if isinstance(values, Column):
             source, column = RawRows._fields.index(values.array), values.column
         elif isinstance(values, AxialForce):
-            source, column = FROM_FORCE, len(laws.forces)
-            laws.forces.append(values)
+            source, column = FROM_FORCE, len(forces)
+            forces.append(values)
         elif isinstance(values, Actuator):
-            source, column = FROM_LIMIT, len(laws.limits)
-            laws.limits.append(values)
+            source, column = FROM_LIMIT, len(limits)
+            limits.append(values)
         else:
             continue
         found.append(Variable(channel.name, channel.unit, channel.meaning, OUTPUT, source=source, column=column))
-    return found, laws
+    return found, forces, limits
 
 
 _FACTORS: Final = ("tyre_friction", "tyre_cornering_stiffness", "front_cornering_stiffness", "rear_cornering_stiffness",
@@ -207,71 +188,20 @@ def parameters_of(speed_mps: float, seed: int) -> list[Variable]:
 assert {*_FACTORS} <= {*Factors.__dataclass_fields__}
 
 
-_ABOUT: Final = (
-    "Multibody car in MuJoCo; SI and radians; axes and signs of ISO 8855: x forward, y left, z up, left positive"
-)
-
-
 def model_description(
     variables: Sequence[Variable], identifier: str, token: str, version: int, timestep_s: float
 ) -> str:
-    """Return the content of modelDescription.xml."""
+    """Return the content of modelDescription.xml, from the template of that name."""
     units = dict.fromkeys(variable.unit for variable in variables if variable.unit)
-    defined = "".join(f"<Unit name={quoteattr(unit)}>{_base(unit)}</Unit>" for unit in units)
-    state = "canGetAndSetFMU{0}='true' canSerializeFMU{0}='true'".format("state" if version == 2 else "State")
-    can = f"canHandleVariableCommunicationStepSize='true' {state}"
-    step = _number(timestep_s)
-    elements = [_element(place, variable, version) for place, variable in enumerate(variables)]
-    outputs = [place for place, variable in enumerate(variables) if variable.causality == OUTPUT]
-    if version == 2:
-        head = f"fmiVersion='2.0' guid='{token}'"
-        can += " canNotUseMemoryManagementFunctions='true'"
-        unknown = "".join(f"<Unknown index='{place + 1}'/>" for place in outputs)
-        structure = f"<Outputs>{unknown}</Outputs><InitialUnknowns>{unknown}</InitialUnknowns>"
-    else:
-        head = f"fmiVersion='3.0' instantiationToken='{token}'"
-        can += f" fixedInternalStepSize='{step}'"
-        elements.append(
-            f"<Float64 name='time' valueReference='{len(variables)}' causality='independent' variability='continuous'/>"
-        )
-        structure = "".join(f"<Output valueReference='{place}'/>" for place in outputs)
-        structure += "".join(f"<InitialUnknown valueReference='{place}'/>" for place in outputs)
-    newline = "\n"
-    return (
-        f"<?xml version='1.0' encoding='UTF-8'?>\n<fmiModelDescription {head} modelName={quoteattr(identifier)} "
-        f"description={quoteattr(_ABOUT)} generationTool='activesteer {__version__}' "
-        f"variableNamingConvention='flat'>\n<CoSimulation modelIdentifier='{identifier}' {can}/>\n"
-        f"<UnitDefinitions>{defined}</UnitDefinitions>\n"
-        f"<LogCategories><Category name='error' description='Failures'/></LogCategories>\n"
-        f"<DefaultExperiment startTime='0' stopTime='10' stepSize='{step}'/>\n"
-        f"<ModelVariables>\n{newline.join(elements)}\n</ModelVariables>\n"
-        f"<ModelStructure>{structure}</ModelStructure>\n</fmiModelDescription>\n"
+    known = {name: unit.dimension if (unit := find_unit(name)) else () for name in units}
+    bases = {name: dict(zip(("kg", "m", "s", "rad"), exponents, strict=False)) for name, exponents in known.items()}
+    environment = Environment(
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )
-
-
-def _base(name: str) -> str:
-    unit = find_unit(name)
-    given = zip(("kg", "m", "s", "rad"), unit.dimension if unit else (), strict=False)
-    exponents = " ".join(f"{base}='{exponent}'" for base, exponent in given if exponent)
-    return f"<BaseUnit {exponents}/>" if exponents else ""
-
-
-def _number(value: float) -> str:
-    return repr(float(value))
-
-
-def _element(place: int, variable: Variable, version: int) -> str:
-    """Return the element of a variable."""
-    variability = {INPUT: "continuous", OUTPUT: "continuous", PARAMETER: "fixed"}[variable.causality]
-    initial = {INPUT: "", OUTPUT: " initial='calculated'", PARAMETER: " initial='exact'"}[variable.causality]
-    common = (
-        f"name={quoteattr(variable.name)} valueReference='{place}' description={quoteattr(variable.meaning)} "
-        f"causality='{variable.causality}' variability='{variability}'{initial}"
-    )
-    value = f" unit={quoteattr(variable.unit)}" if variable.unit else ""
-    value += f" min='{_number(variable.low)}'" if math.isfinite(variable.low) else ""
-    value += f" max='{_number(variable.high)}'" if math.isfinite(variable.high) else ""
-    value += "" if variable.causality == OUTPUT else f" start='{_number(variable.start)}'"
-    if version == 2:
-        return f"<ScalarVariable {common}><Real{value}/></ScalarVariable>"
-    return f"<Float64 {common}{value}/>"
+    environment.filters |= {"attribute": quoteattr, "number": lambda value: repr(float(value))}
+    template = (Path(__file__).parent / "modelDescription.xml").read_text("utf-8")
+    return environment.from_string(template).render(
+        variables=variables, identifier=identifier, token=token, version=version, timestep_s=timestep_s, units=bases,
+        release=__version__, outputs=[place for place, each in enumerate(variables) if each.causality == OUTPUT],
+        isfinite=math.isfinite,
+    )  # fmt: skip

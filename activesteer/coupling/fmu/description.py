@@ -13,7 +13,7 @@ import stat
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, NamedTuple
 
@@ -30,17 +30,9 @@ BINARIES: Final = ("binaries/linux64/", "binaries/x86_64-linux/")
 """Folders of the binaries for Linux on x86-64, of FMI 2 and of FMI 3."""
 _NEEDED: Final = (DESCRIPTION, "resources/", *BINARIES)
 
-Fail = Callable[..., Exception]
-
 
 class Archive:
-    """An FMU file, unpacked at first use and deleted at the end of the process.
-
-    Attributes:
-        path: The file.
-        key: Digest of its content.
-        names: Names of its members.
-    """
+    """An FMU file with the digest `key`, unpacked at first use and deleted at the end of the process."""
 
     def __init__(self, path: Path, kind: Kind) -> None:
         """Read and check the archive without unpacking it."""
@@ -120,62 +112,33 @@ _HERTZ: Final = re.compile(r"k?Hz|rev.*|r/.*|rpm")
 
 
 class Variable(NamedTuple):
-    """A variable of an FMU that holds numbers.
-
-    Attributes:
-        name: Its name.
-        reference: Value reference.
-        kind: Type, as in the names of FMI's functions (`Real`, `Float64`, `Boolean`).
-        form: Format of `struct` of an element.
-        size: Number of elements.
-        start: Start value; None if there is none.
-        unit: Unit; None if the FMU declares none or one that nobody knows.
-        unit_name: Name of the unit; None if the FMU declares none.
-        low: Least value; `high` is the largest.
-    """
+    """A variable of an FMU that holds numbers."""
 
     name: str
-    reference: int
-    kind: str
-    form: str
-    size: int
-    start: float | None
-    unit: Unit | None
-    unit_name: str | None
-    low: float
+    reference: int  # value reference
+    kind: str  # type, as in the names of FMI's functions (`Real`, `Float64`, `Boolean`)
+    form: str  # format of `struct` of an element
+    size: int  # number of elements
+    start: float | None  # start value; None if there is none
+    unit: Unit | None  # unit; None if the FMU declares none or one that nobody knows
+    unit_name: str | None  # name of the unit; None if the FMU declares none
+    low: float  # least value; `high` is the largest
     high: float
 
 
 class Description(NamedTuple):
-    """Description of an FMU.
+    """Description of an FMU."""
 
-    Attributes:
-        version: 2 or 3.
-        identifier: Model identifier.
-        token: GUID or instantiation token.
-        inputs: Name -> input.
-        outputs: Name -> output.
-        parameters: Name -> parameter that can be set before the initialisation.
-        library: Member of the archive with the code for this platform.
-        saves_state: Whether the FMU can save and restore its state.
-        serialises_state: Whether the FMU can turn a saved state into bytes.
-        alone: Whether a process can hold only one instance.
-        fixed_step_s: Step that the FMU must keep [s]; None if it can make every step.
-        usual_step_s: Step that the FMU suggests [s].
-    """
-
-    version: int
-    identifier: str
-    token: str
-    inputs: Mapping[str, Variable]
-    outputs: Mapping[str, Variable]
-    parameters: Mapping[str, Variable]
-    library: str
-    saves_state: bool
-    serialises_state: bool
-    alone: bool
-    fixed_step_s: float | None
-    usual_step_s: float | None
+    version: int  # 2 or 3
+    token: str  # GUID or instantiation token
+    inputs: Mapping[str, Variable]  # name -> input
+    outputs: Mapping[str, Variable]  # name -> output
+    parameters: Mapping[str, Variable]  # name -> parameter that can be set before the initialisation
+    library: str  # member of the archive with the code for this platform
+    saves_state: bool  # whether the FMU can save and restore its state
+    serialises_state: bool  # whether the FMU can turn a saved state into bytes
+    fixed_step_s: float | None  # step that the FMU must keep [s]; None if it can make every step
+    usual_step_s: float | None  # step that the FMU suggests [s]
 
 
 def describe_fmu(archive: Archive, kind: Kind) -> Description:
@@ -217,10 +180,10 @@ def describe_fmu(archive: Archive, kind: Kind) -> Description:
     if not simulation.canHandleVariableCommunicationStepSize:
         fixed_s = fixed_s or usual_s
     return Description(
-        description.fmiMajorVersion, str(simulation.modelIdentifier), str(description.guid), by_causality["input"],
+        description.fmiMajorVersion, str(description.guid), by_causality["input"],
         by_causality["output"], by_causality["parameter"], _library(archive, str(simulation.modelIdentifier), kind),
         bool(simulation.canGetAndSetFMUstate), bool(simulation.canSerializeFMUstate),
-        bool(simulation.canBeInstantiatedOnlyOncePerProcess), fixed_s, usual_s,
+        fixed_s, usual_s,
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import os
 import struct
 import weakref
 from collections.abc import Callable, Sequence
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 from activesteer.core.child_process import Child, ChildFault
 
@@ -36,81 +36,27 @@ class FmuFault(Exception):  # noqa: N818 - a fault of the FMU
 
 
 class Group(NamedTuple):
-    """Variables of one type, which one call sets or gets.
+    """Variables of one type, which one call sets or gets."""
 
-    Attributes:
-        kind: Type in the names of FMI's functions.
-        form: Format of `struct` of an element.
-        references: Value references.
-        size: Number of elements of all variables together.
-    """
-
-    kind: str
-    form: str
-    references: list[int]
-    size: int
+    kind: str  # type in the names of FMI's functions
+    form: str  # format of `struct` of an element
+    references: list[int]  # value references
+    size: int  # number of elements of all variables together
 
 
 class Spec(NamedTuple):
-    """Everything that an instance is made from.
+    """Everything that an instance is made from."""
 
-    Attributes:
-        library: Path of the shared library.
-        version: 2 or 3.
-        token: GUID or instantiation token.
-        resources: Path of the resources.
-        step_s: Time between two steps [s].
-        inputs: Inputs, group by group.
-        outputs: Outputs, group by group.
-        parameters: Parameters that differ from their start values, group by group, with their values.
-        name: Name of the instance.
-    """
-
-    library: str
-    version: int
-    token: str
-    resources: str
-    step_s: float
-    inputs: list[Group]
-    outputs: list[Group]
+    library: str  # path of the shared library
+    version: int  # 2 or 3
+    token: str  # GUID or instantiation token
+    resources: str  # path of the resources
+    step_s: float  # time between two steps [s]
+    inputs: list[Group]  # inputs, group by group
+    outputs: list[Group]  # outputs, group by group
+    # Parameters that differ from their start values, group by group, with their values
     parameters: list[tuple[Group, list[float]]]
-    name: str
-
-
-class Instance(Protocol):
-    """An instance in this process or in another one. A saved state is a number."""
-
-    def step(self, values: Sequence[float]) -> tuple[float, ...]:
-        """Set the inputs, advance by one step, and return the outputs."""
-        ...
-
-    def save(self) -> int:
-        """Save the state."""
-        ...
-
-    def restore(self, state: int) -> None:
-        """Return to a saved state."""
-        ...
-
-    def forget(self, state: int) -> None:
-        """Free a saved state."""
-        ...
-
-    def serialise(self, state: int) -> bytes:
-        """Return a saved state as bytes."""
-        ...
-
-    def deserialise(self, content: bytes) -> int:
-        """Return the saved state that bytes hold."""
-        ...
-
-    def close(self) -> None:
-        """Free the instance."""
-        ...
-
-
-class _Callbacks(ctypes.Structure):
-    _fields_ = [("logger", _P), ("allocate", _P), ("free", _P), ("finished", _P), ("environment", _P)]
+    name: str  # name of the instance
 
 
 class _Buffer:
@@ -159,7 +105,7 @@ class LocalInstance:
             self._last = (False, at, at + 1, at + 2, ctypes.addressof(self._time))
 
     def step(self, values: Sequence[float]) -> tuple[float, ...]:
-        """See `Instance`."""
+        """Set the inputs, advance by one step, and return the outputs."""
         first = 0
         for call, buffer in self._sets:
             size = buffer.size
@@ -171,7 +117,8 @@ class LocalInstance:
         if status > _WARNING:
             raise self._failed("DoStep", status)
         if self._flags is not None and any(self._flags[1:]):
-            raise self._ended()
+            what = "asks to end the simulation" if self._flags[1] else "returned early from its step"
+            raise FmuFault(f"{what}{self._words()}")
         self._steps += 1
         result: tuple[float, ...] = ()
         for call, buffer in self._gets:
@@ -181,45 +128,39 @@ class LocalInstance:
         return result
 
     def save(self) -> int:
-        """See `Instance`."""
+        """Save the state, and return its number."""
         state = ctypes.c_void_p()
-        name = f"Get{self._state}"
-        self._must(name, self._function(name, _P, _P)(self._component, ctypes.byref(state)))
+        self._must(f"Get{self._state}", (_P,), ctypes.byref(state))
         return self._kept(state, self._steps)
 
     def restore(self, state: int) -> None:
-        """See `Instance`."""
+        """Return to a saved state."""
         pointer, self._steps = self._states[state]
-        self._must(f"Set{self._state}", self._function(f"Set{self._state}", _P, _P)(self._component, pointer))
+        self._must(f"Set{self._state}", (_P,), pointer)
 
     def forget(self, state: int) -> None:
-        """See `Instance`."""
+        """Free a saved state."""
         pointer, _ = self._states.pop(state)
         if self._finalizer.alive:
             self._function(f"Free{self._state}", _P, _P)(self._component, ctypes.byref(pointer))
 
     def serialise(self, state: int) -> bytes:
-        """See `Instance`."""
+        """Return a saved state as bytes."""
         (pointer, steps), size = self._states[state], ctypes.c_size_t()
         name = "SerializedFMUstateSize" if self._spec.version == 2 else "SerializedFMUStateSize"
-        self._must(name, self._function(name, _P, _P, _P)(self._component, pointer, ctypes.byref(size)))
+        self._must(name, (_P, _P), pointer, ctypes.byref(size))
         if size.value > _MAX_STATE_BYTES:
             raise FmuFault(f"says that its state has {size.value} bytes")
-        content, name = ctypes.create_string_buffer(max(1, size.value)), f"Serialize{self._state}"
-        self._must(name, self._function(name, _P, _P, _P, _N)(self._component, pointer, content, size))
+        content = ctypes.create_string_buffer(max(1, size.value))
+        self._must(f"Serialize{self._state}", (_P, _P, _N), pointer, content, size)
         return struct.pack("=q", steps) + content.raw[: size.value]
 
     def deserialise(self, content: bytes) -> int:
-        """See `Instance`."""
+        """Return the number of the saved state that bytes hold."""
         (steps,), state = struct.unpack_from("=q", content), ctypes.c_void_p()
         name = "DeSerializeFMUstate" if self._spec.version == 2 else "DeserializeFMUState"
-        call = self._function(name, _P, _S, _N, _P)
-        self._must(name, call(self._component, content[8:], len(content) - 8, ctypes.byref(state)))
+        self._must(name, (_S, _N, _P), content[8:], len(content) - 8, ctypes.byref(state))
         return self._kept(state, steps)
-
-    def close(self) -> None:
-        """See `Instance`."""
-        self._finalizer()
 
     @property
     def _state(self) -> str:
@@ -248,15 +189,15 @@ class LocalInstance:
         """Return the address of a new instance."""
         spec, name, token = self._spec, self._spec.name.encode(), self._spec.token.encode()
         if spec.version == 2:
-            self._logger: Any = ctypes.CFUNCTYPE(None, _P, _S, _I, _S, _S)(self._said2)
+            self._logger: Any = ctypes.CFUNCTYPE(None, _P, _S, _I, _S, _S)(self._said)
             libc = ctypes.CDLL(None)
-            addresses = [ctypes.cast(part, _P) for part in (self._logger, libc.calloc, libc.free)]
-            self._callbacks = _Callbacks(*addresses, None, None)
+            addresses = [ctypes.cast(part, _P).value for part in (self._logger, libc.calloc, libc.free)]
+            self._callbacks = (_P * 5)(*addresses, None, None)  # two more: asynchronous steps, environment
             make = self._function("Instantiate", _S, _I, _S, _S, _P, _I, _I, result=_P)
             resources = f"file://{spec.resources}".encode()
             component = make(name, 1, token, resources, ctypes.byref(self._callbacks), 0, 0)
         else:
-            self._logger = ctypes.CFUNCTYPE(None, _P, _I, _S, _S)(self._said3)
+            self._logger = ctypes.CFUNCTYPE(None, _P, _I, _S, _S)(self._said)
             make = self._function("InstantiateCoSimulation", _S, _S, _S, _B, _B, _B, _B, _P, _N, _P, _P, _P, result=_P)
             logger = ctypes.cast(self._logger, _P)
             resources = os.path.join(spec.resources, "").encode()
@@ -268,25 +209,25 @@ class LocalInstance:
 
     def _initialise(self) -> None:
         """Set the parameters and initialise."""
-        spec, component = self._spec, self._component
+        spec = self._spec
         if spec.version == 2:
-            setup = self._function("SetupExperiment", _P, _I, _D, _D, _I, _D)
-            self._must("SetupExperiment", setup(component, 0, 0.0, 0.0, 0, 0.0))
+            self._must("SetupExperiment", (_I, _D, _D, _I, _D), 0, 0.0, 0.0, 0, 0.0)
         for group, values in spec.parameters:
             call, buffer = self._access("Set", group)
             buffer.put(values)
-            self._must("Set (of its parameters)", call())
+            if (status := call()) > _WARNING:
+                raise self._failed("Set (of its parameters)", status)
         if spec.version == 2:
-            status = self._function("EnterInitializationMode", _P)(component)
+            self._must("EnterInitializationMode", ())
         else:
-            enter = self._function("EnterInitializationMode", _P, _B, _D, _D, _B, _D)
-            status = enter(component, False, 0.0, 0.0, False, 0.0)
-        self._must("EnterInitializationMode", status)
-        self._must("ExitInitializationMode", self._function("ExitInitializationMode", _P)(component))
+            self._must("EnterInitializationMode", (_B, _D, _D, _B, _D), False, 0.0, 0.0, False, 0.0)
+        self._must("ExitInitializationMode", ())
 
-    def _must(self, call: str, status: int) -> None:
+    def _must(self, name: str, types: Sequence[Any], *arguments: Any) -> None:
+        """Call a function that has to succeed."""
+        status = self._function(name, _P, *types)(self._component, *arguments)
         if status > _WARNING:
-            raise self._failed(call, status)
+            raise self._failed(name, status)
 
     def _failed(self, call: str, status: int) -> FmuFault:
         if status == _FATAL:
@@ -294,18 +235,12 @@ class LocalInstance:
         word = _STATUS.get(status, f"status {status}")
         return FmuFault(f"{self._prefix}{call} returned {word}{self._words()}")
 
-    def _ended(self) -> FmuFault:
-        what = "asks to end the simulation" if self._flags[1] else "returned early from its step"
-        return FmuFault(f"{what}{self._words()}")
-
     def _words(self) -> str:
         return f": {self._log[:_MAX_LOG]}" if self._log else ""
 
-    def _said2(self, _environment: Any, _name: Any, _status: int, _category: Any, text: bytes | None) -> None:
-        self._log = (text or b"").decode(errors="replace")
-
-    def _said3(self, _environment: Any, _status: int, _category: Any, text: bytes | None) -> None:
-        self._log = (text or b"").decode(errors="replace")
+    def _said(self, *message: Any) -> None:
+        """Keep the text of a log message, which is the last argument of both versions."""
+        self._log = (message[-1] or b"").decode(errors="replace")
 
 
 def _free(terminate: Any, free: Any, component: int) -> None:
@@ -329,7 +264,7 @@ class IsolatedInstance:
         self._ask(json.dumps(spec).encode(), "its initialisation", limit_s=max(limit_s, START_LIMIT_S))
 
     def step(self, values: Sequence[float]) -> tuple[float, ...]:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         doing = f"the step at {self._steps * self._step_s:g} s"
         answer = self._ask(_STEP + struct.pack(f"={len(values)}d", *values), doing, self._step_bytes)
         if len(answer) != self._step_bytes:
@@ -338,29 +273,25 @@ class IsolatedInstance:
         return self._unpack(answer)
 
     def save(self) -> int:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         return self._number(_SAVE)
 
     def restore(self, state: int) -> None:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         self._ask(_RESTORE + str(state).encode())
 
     def forget(self, state: int) -> None:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         if self._child.alive:
             self._ask(_FORGET + str(state).encode())
 
     def serialise(self, state: int) -> bytes:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         return self._ask(_SERIALISE + str(state).encode(), most_bytes=_MAX_STATE_BYTES)
 
     def deserialise(self, content: bytes) -> int:
-        """See `Instance`."""
+        """See `LocalInstance`."""
         return self._number(_DESERIALISE + content)
-
-    def close(self) -> None:
-        """See `Instance`."""
-        self._child.close()
 
     def _number(self, request: bytes) -> int:
         answer = self._ask(request)
@@ -369,7 +300,7 @@ class IsolatedInstance:
         return int(answer)
 
     def _nonsense(self, doing: str, answer: bytes) -> FmuFault:
-        self.close()
+        self._child.close()
         return FmuFault(f"answers nonsense in {doing}: {answer[:_MAX_DIGITS]!r}")
 
     def _ask(self, request: bytes, doing: str = "a call", most_bytes: int = 0, limit_s: float | None = None) -> bytes:
@@ -382,11 +313,6 @@ class IsolatedInstance:
         if answer[:1] != _GOOD:
             raise self._nonsense(doing, answer)
         return answer[1:]
-
-
-def make_instance(spec: Spec, isolate_s: float | None) -> Instance:
-    """Return an instance of an FMU."""
-    return LocalInstance(spec) if isolate_s is None else IsolatedInstance(spec, isolate_s)
 
 
 def _spec(text: bytes) -> Spec:

@@ -20,7 +20,7 @@ from activesteer.core.files import is_file, shown_path, user_path, why_no_file
 from activesteer.core.signals import DriverCommand, Measurement, Motion, PerWheel, Setpoint, new_message
 from activesteer.core.units import UNIT_NAMES, find_unit, split_ending
 from activesteer.coupling.fmu.description import Archive, Variable, describe_fmu
-from activesteer.coupling.fmu.instance import FmuFault, Group, Instance, Spec, make_instance
+from activesteer.coupling.fmu.instance import FmuFault, Group, IsolatedInstance, LocalInstance, Spec
 from activesteer.errors import nearest_names, shown
 from activesteer.plugins import Kind, Plugin
 from activesteer.plugins.file import parse_parameters
@@ -32,49 +32,29 @@ _KEYS: Final = ("signal", "unit")
 
 
 class Place(NamedTuple):
-    """A number within the messages of a block.
+    """A number within the messages of a block."""
 
-    Attributes:
-        message: Place of the message among them.
-        field: Place of its field.
-        wheel: Place in a field of the four wheels; None for a single number.
-    """
-
-    message: int
-    field: int
-    wheel: int | None
+    message: int  # place of the message among them
+    field: int  # place of its field
+    wheel: int | None  # place in a field of the four wheels; None for a single number
 
 
 class Link(NamedTuple):
-    """A variable of an FMU and its signal: signal = factor times element + offset.
-
-    Attributes:
-        variable: The variable.
-        signal: Name of the signal.
-        places: Number of each element.
-        factor: Factor from the FMU's unit to ours.
-        offset: Offset, in our unit.
-    """
+    """A variable of an FMU and its signal: signal = factor times element + offset."""
 
     variable: Variable
-    signal: str
-    places: tuple[Place, ...]
-    factor: float
-    offset: float
+    signal: str  # name of the signal
+    places: tuple[Place, ...]  # number of each element
+    factor: float  # factor from the FMU's unit to ours
+    offset: float  # offset, in our unit
 
 
 class Signals(NamedTuple):
-    """Signals of some messages.
+    """Signals of some messages."""
 
-    Attributes:
-        places: Name -> its numbers.
-        others: Names of fields that are no numbers.
-        words: The messages, in words.
-    """
-
-    places: Mapping[str, tuple[Place, ...]]
-    others: frozenset[str]
-    words: str
+    places: Mapping[str, tuple[Place, ...]]  # name -> its numbers
+    others: frozenset[str]  # names of fields that are no numbers
+    words: str  # the messages, in words
 
     def full(self, name: str) -> str | None:
         """Return the name of a signal that is given with or without its unit, or None if there is none."""
@@ -175,28 +155,6 @@ _ANY: Final = (-_LARGEST, _LARGEST)
 """Range of a number that only has to be finite."""
 
 
-class Wiring(NamedTuple):
-    """An FMU and its connection with the messages of a block.
-
-    Attributes:
-        spec: The instance.
-        inputs: Links of the inputs, by type.
-        outputs: Links of the outputs, by type.
-        every: Steps of the block's caller between two steps of the FMU, whose outputs are held between.
-        isolate_s: Time limit of a call, in a process of its own [s]; None for an instance in this process.
-        keeps: Flag of an FMU that can save its state; `serialises` also turns it into bytes.
-        serialises: See `keeps`.
-    """
-
-    spec: Spec
-    inputs: list[Link]
-    outputs: list[Link]
-    every: int
-    isolate_s: float | None
-    keeps: bool
-    serialises: bool
-
-
 class FmuBlock:
     """A driver or controller that an FMU computes.
 
@@ -204,28 +162,31 @@ class FmuBlock:
     turns with it.
     """
 
-    def __init__(self, wiring: Wiring, kind: Kind, name: str, setup: Any, revive: Callable[[Any], FmuBlock]) -> None:
+    def __init__(self, fmu: Fmu, setup: Any, parameters: Mapping[str, Any]) -> None:
         """Instantiate and initialise the FMU."""
-        self._about = wiring, kind, name, setup, revive
+        spec, every = fmu.spec_for(setup, parameters)
+        self._about = fmu, setup, parameters, every, spec.step_s
+        limit_s = parameters.get(ISOLATE)
         try:
-            shared = _Shared(make_instance(wiring.spec, wiring.isolate_s))
+            shared = _Shared(LocalInstance(spec) if limit_s is None else IsolatedInstance(spec, limit_s))
         except FmuFault as fault:
-            raise kind.fail(name, str(fault)) from fault
+            raise fmu.fail(str(fault)) from fault
         self._bind(shared, None, 0)
 
     def _bind(self, shared: _Shared, held: Any, steps: int) -> None:
         """Join the users of an instance."""
-        wiring, kind, *_ = self._about
-        self._shared, self._block = shared, shared.add()
-        self._held, self._steps, self._every = held, steps, wiring.every
+        fmu, _, _, self._every, _ = self._about
+        kind = fmu.kind
+        self._shared, self._block = shared, shared.new_block()
+        self._held, self._steps = held, steps
         self._reads: list[Any] = [
-            (*place, 1.0 / link.factor, link.offset) for link in wiring.inputs for place in link.places
+            (*place, 1.0 / link.factor, link.offset) for link in fmu.inputs for place in link.places
         ]
         self._default: tuple[Any, ...] = tuple(kind.result())
         names = kind.result._fields
         self._writes = [
             (place.field, place.wheel, link.factor, link.offset, *kind.ranges.get(names[place.field], _ANY))
-            for link in wiring.outputs
+            for link in fmu.outputs
             for place in link.places
         ]
         fields = {field for field, *_ in self._writes}
@@ -240,7 +201,8 @@ class FmuBlock:
             return self._held
         shared = self._shared
         command: list[Any] = [*self._default]
-        _, kind, name, setup, _ = self._about
+        fmu, setup, _, _, _ = self._about
+        kind = fmu.kind
         try:
             values = []
             for message, field, wheel, factor, offset in self._reads:
@@ -251,7 +213,7 @@ class FmuBlock:
                     shared.turn_to(self._block)
                 results = shared.instance.step(values)
         except FmuFault as fault:
-            raise kind.fail(name, f"{fault}{self._when()}") from fault
+            raise fmu.fail(f"{fault}{self._when()}") from fault
         except TypeError as reason:
             raise self._unread(messages) from reason
         for (field, wheel, factor, offset, low, high), result in zip(self._writes, results, strict=True):
@@ -268,33 +230,35 @@ class FmuBlock:
             command[field] = whole(round(command[field]))
         self._held = new_message(kind.result, command)
         if self._unchecked:
-            self._held = kind.checked(self._held, name, setup)
+            self._held = kind.checked(self._held, fmu.path.name, setup)
         return self._held
 
     def _when(self) -> str:
         """The time of the present step, in words."""
-        return f", {(self._steps - 1) // self._every * self._about[0].spec.step_s:g} s after its initialisation"
+        *_, step_s = self._about
+        return f", {(self._steps - 1) // self._every * step_s:g} s after its initialisation"
 
     def _unread(self, messages: Sequence[Any]) -> Exception:
         """Return the error for an input without a value, such as the curvature of a manoeuvre that has none."""
-        wiring, kind, name, *_ = self._about
+        fmu, *_ = self._about
         empty = [
-            link.signal for link in wiring.inputs for place in link.places
+            link.signal for link in fmu.inputs for place in link.places
             if messages[place.message][place.field] is None
         ]  # fmt: skip
-        return kind.fail(name, f"this manoeuvre gives no {' or '.join(dict.fromkeys(empty))}, which the FMU needs")
+        return fmu.fail(f"this manoeuvre gives no {' or '.join(dict.fromkeys(empty))}, which the FMU needs")
 
     def _refused(self, results: Sequence[float], field: int, value: float) -> Exception:
         """Return the error for an output that is not finite or out of its range."""
-        wiring, kind, name, setup, _ = self._about
+        fmu, setup, *_ = self._about
+        kind = fmu.kind
         if math.isfinite(value):
             try:
-                kind.checked(kind.result()._replace(**{kind.result._fields[field]: value}), name, setup)
+                kind.checked(kind.result()._replace(**{kind.result._fields[field]: value}), fmu.path.name, setup)
             except kind.error as reason:
                 return reason
-        names = [link.variable.name for link in wiring.outputs for _ in link.places]
+        names = [link.variable.name for link in fmu.outputs for _ in link.places]
         bad = [f"{out} = {value!r}" for out, value in zip(names, results, strict=True) if not math.isfinite(value)]
-        return kind.fail(name, f"returned {', '.join(bad)}{self._when()}; finite numbers are needed", results)
+        return fmu.fail(f"returned {', '.join(bad)}{self._when()}; finite numbers are needed", results)
 
     def __deepcopy__(self, _memo: dict[int, Any]) -> FmuBlock:
         other = FmuBlock.__new__(FmuBlock)
@@ -304,27 +268,36 @@ class FmuBlock:
         return other
 
     def __reduce__(self) -> Any:
-        *_, revive = self._about
-        if not self._about[0].serialises:
+        fmu, setup, parameters, *_ = self._about
+        if not fmu.description.serialises_state:
             raise self._stateless("turn its state into bytes (canSerializeFMUstate), as another process needs it")
-        content = self._call(lambda shared: _serialised(shared.instance))
-        return _revived, (revive, self._about[3], content, self._held, self._steps)
+
+        def serialised(shared: _Shared) -> bytes:
+            state = shared.instance.save()
+            try:
+                return shared.instance.serialise(state)
+            finally:
+                shared.instance.forget(state)
+
+        content = self._call(serialised)
+        return _revived, (fmu, setup, parameters, content, self._held, self._steps)
 
     def _call(self, use: Callable[[_Shared], Any]) -> Any:
         """Use the instance in the state of this block."""
-        wiring, kind, name, *_ = self._about
-        if not wiring.keeps:
+        fmu, *_ = self._about
+        if not fmu.description.saves_state:
             raise self._stateless("save its state (canGetAndSetFMUstate)")
         try:
             with self._shared.lock:
                 self._shared.turn_to(self._block)
                 return use(self._shared)
         except FmuFault as fault:
-            raise kind.fail(name, f"its state cannot be copied: {fault}") from fault
+            raise fmu.fail(f"its state cannot be copied: {fault}") from fault
 
     def _stateless(self, able: str) -> Exception:
-        _, kind, name, *_ = self._about
-        return kind.fail(name, f"this FMU cannot {able}; a run with it can be neither saved nor copied: {shown(name)}")
+        fmu, *_ = self._about
+        name = shown(fmu.path.name)
+        return fmu.fail(f"this FMU cannot {able}; a run with it can be neither saved nor copied: {name}")
 
     def __del__(self) -> None:
         if (shared := getattr(self, "_shared", None)) is not None:
@@ -334,16 +307,12 @@ class FmuBlock:
 class _Shared:
     """An instance, and the states of the blocks that take turns with it."""
 
-    def __init__(self, instance: Instance) -> None:
+    def __init__(self, instance: LocalInstance | IsolatedInstance) -> None:
         self.instance, self.lock = instance, threading.Lock()
         self.user: int | None = None
         self.states: dict[int, int] = {}
         self.gone: list[int] = []
-        self._blocks = 0
-
-    def add(self) -> int:
-        self._blocks += 1
-        return self._blocks
+        self.new_block = itertools.count(1).__next__
 
     def turn_to(self, block: int) -> None:
         """Give the instance the state of a block."""
@@ -361,17 +330,9 @@ class _Shared:
             self.user = block
 
 
-def _serialised(instance: Instance) -> bytes:
-    state = instance.save()
-    try:
-        return instance.serialise(state)
-    finally:
-        instance.forget(state)
-
-
-def _revived(revive: Callable[[Any], FmuBlock], setup: Any, content: bytes, held: Any, steps: int) -> FmuBlock:
+def _revived(fmu: Fmu, setup: Any, parameters: Mapping[str, Any], content: bytes, held: Any, steps: int) -> FmuBlock:
     """Return a block in a state that another process has saved."""
-    block = revive(setup)
+    block = FmuBlock(fmu, setup, parameters)
 
     def restore(shared: _Shared) -> None:
         state = shared.instance.deserialise(content)
@@ -393,16 +354,7 @@ _MAX_KEPT_BYTES: Final = 4_000_000
 
 
 class Fmu:
-    """An FMU from which a driver or controller can be made for any car.
-
-    Attributes:
-        path: The file.
-        kind: Controllers or drivers.
-        description: Its description.
-        PARAMETERS: Name -> declaration of its parameters; see `activesteer.plugins`.
-        interval_s: Time between two steps of the FMU [s]; None for every step of the simulation.
-        files: Files to keep with a recording.
-    """
+    """An FMU from which a driver or controller can be made for any car; `PARAMETERS` as in `activesteer.plugins`."""
 
     checks_itself = True
     reads = ()
@@ -412,17 +364,18 @@ class Fmu:
         self.path, self.kind, self.__name__ = path, kind, path.stem
         self._archive = Archive(path, kind)
         about = self.description = describe_fmu(self._archive, kind)
+        # Time between two steps of the FMU; None for every step of the simulation.
         self.interval_s = about.fixed_step_s or about.usual_step_s
         map_path = path.with_suffix(".toml")
-        self.files = self._archive.kept(_MAX_KEPT_BYTES)
+        self.files = self._archive.kept(_MAX_KEPT_BYTES)  # kept with a recording
         given: Mapping[str, Any] = {}
         source = Source(path.name, error=kind.error)
         if is_file(map_path):
             given, source = read_toml(map_path, kind.error)
             self.files[map_path.name] = source.text.encode()
-        self._inputs, self._outputs = self._matched(given, source)
+        self.inputs, self.outputs = self._matched(given, source)
         if ISOLATE in about.parameters:
-            raise kind.fail(path.name, f"has a parameter {ISOLATE}, a name that every FMU has already")
+            raise self.fail(f"has a parameter {ISOLATE}, a name that every FMU has already")
         single = (variable for variable in about.parameters.values() if variable.size == 1)
         self.PARAMETERS = {variable.name: _declared(variable) for variable in single}
         self.PARAMETERS[ISOLATE] = {"unit": "s", "range": _ISOLATE_RANGE}
@@ -441,19 +394,26 @@ class Fmu:
             left = {"inputs": no_input, "outputs": no_output}
             words = [f"{word} {', '.join(names)}" for word, names in left.items() if names]
             example = (*no_input, *no_output)[0]
-            raise self.kind.fail(
-                self.path.name,
+            raise self.fail(
                 f"no signals have the names of its {' and '.join(words)}; rename them, or write "
                 f"{self.path.stem}.toml beside it: {example} = {{ signal = \"yaw_rate_radps\", unit = \"deg/s\" }}, or "
                 f"{{ signal = \"none\" }} to leave one alone",
                 (*no_input, *no_output),
             )  # fmt: skip
         if not outputs:
-            raise self.kind.fail(self.path.name, f"has no output for an activesteer.{self.kind.result.__name__}")
+            raise self.fail(f"has no output for an activesteer.{self.kind.result.__name__}")
         return sorted(inputs, key=_type_of), sorted(outputs, key=_type_of)
+
+    def fail(self, problem: str, *about: Any) -> Exception:
+        """Return the error for a problem of the FMU."""
+        return self.kind.fail(self.path.name, problem, *about)
 
     def from_vehicle(self, setup: Any, **parameters: Any) -> FmuBlock:
         """Make the block of one run."""
+        return FmuBlock(self, setup, parameters)
+
+    def spec_for(self, setup: Any, parameters: Mapping[str, Any]) -> tuple[Spec, int]:
+        """Return the instance for a run, and the steps of its caller between two steps, with held outputs between."""
         about, every, step_s = self.description, 1, setup.timestep_s
         if self.kind.word == "driver" and self.interval_s is not None:
             every = max(1, round(self.interval_s / step_s))
@@ -461,19 +421,15 @@ class Fmu:
         fixed_s = about.fixed_step_s
         if fixed_s is not None and (step_s < 0.999 * fixed_s or abs(step_s / fixed_s - round(step_s / fixed_s)) > 1e-6):
             problem = f"makes steps of {fixed_s:g} s; it cannot be called every {step_s:g} s"
-            raise self.kind.fail(self.path.name, problem, step_s, fixed_s)
-        isolate_s = parameters.pop(ISOLATE, None)
+            raise self.fail(problem, step_s, fixed_s)
+        changed = [self._changed(name, value) for name, value in parameters.items() if name != ISOLATE]
         folder = self._archive.unpacked()
         resources = folder / "resources"
         resources.mkdir(exist_ok=True)
-        spec = Spec(
-            str(folder / about.library), about.version, about.token, str(resources), step_s, _grouped(self._inputs),
-            _grouped(self._outputs), [self._changed(name, value) for name, value in parameters.items()], self.path.stem,
-        )  # fmt: skip
-        keeps = about.saves_state
-        wiring = Wiring(spec, self._inputs, self._outputs, every, isolate_s, keeps, keeps and about.serialises_state)
-        again = functools.partial(_from_vehicle, self, {**parameters, ISOLATE: isolate_s})
-        return FmuBlock(wiring, self.kind, self.path.name, setup, again)
+        return Spec(
+            str(folder / about.library), about.version, about.token, str(resources), step_s, _grouped(self.inputs),
+            _grouped(self.outputs), changed, self.path.stem,
+        ), every  # fmt: skip
 
     def _changed(self, name: str, value: Any) -> tuple[Group, list[float]]:
         variable = self.description.parameters[name]
@@ -481,10 +437,6 @@ class Fmu:
 
     def __reduce__(self) -> Any:
         return Fmu, (self.path, self.kind)
-
-
-def _from_vehicle(fmu: Fmu, parameters: Mapping[str, Any], setup: Any) -> FmuBlock:
-    return fmu.from_vehicle(setup, **parameters)
 
 
 def _declared(variable: Variable) -> dict[str, Any]:

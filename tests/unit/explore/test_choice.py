@@ -12,8 +12,7 @@ import pytest
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import MAX_WAITING, Act, Describe, End, Message, RunRequest, Start, add, read
-from activesteer.explore.runs import Runs
-from activesteer.explore.sliders import sliders
+from activesteer.explore.runs import Runs, sliders
 from activesteer.scenario import resolve
 
 OWN = """
@@ -126,7 +125,7 @@ def test_the_numbers_of_an_own_manoeuvre_have_sliders(tmp_path: Path) -> None:
 def test_an_own_controller_in_the_folder_is_found_and_its_parameter_has_a_slider(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(OWN)
     folder = Folder(tmp_path)
-    folder.check_controller("mine.py:Mine")
+    folder.check_name("controller", "mine.py:Mine")
     own = folder.located("mine.py:Mine")
     found = {slider.key: slider for slider in sliders(resolve("slalom", controllers=[own]), [own])}
     assert found["controllers.Mine.gain_s"].value == 0.1

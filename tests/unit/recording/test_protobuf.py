@@ -11,7 +11,6 @@ from activesteer.recording.schemas import (
     state_fields,
     state_layout,
     state_schema,
-    state_schema_name,
     timestamps,
     varint,
 )
@@ -63,7 +62,8 @@ def test_messages_of_another_layout_are_refused() -> None:
 
 
 def test_the_layout_follows_from_the_schema_alone(channels: list[Channel]) -> None:
-    names, layout = state_fields(state_schema("vehicle", channels), state_schema_name("vehicle"))
+    name, schema = state_schema("vehicle", channels)
+    names, layout = state_fields(schema, name)
     assert names == [channel.name for channel in channels]
     assert layout.runs == state_layout(channels).runs
     assert layout.template == state_layout(channels).template

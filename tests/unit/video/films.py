@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from activesteer.errors import PlaybackError
-from activesteer.video.encoder import ffmpeg
+from activesteer.video.film import ffmpeg
 
 
 class Decoded(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ParameterError
-from activesteer.video.cameras import view
+from activesteer.video.film import view
 from activesteer.video.track import Track
 from tests.raising import raises
 from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, circle

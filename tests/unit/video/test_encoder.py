@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from activesteer.errors import ParameterError, PlaybackError
-from activesteer.video import encoder as module
-from activesteer.video.encoder import check, encoder, frame_rate
+from activesteer.video import film as module
+from activesteer.video.film import check, encoder, frame_rate
 from tests.raising import raises
 from tests.unit.video.films import decode, need_ffmpeg
 
