@@ -79,7 +79,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
 
 def actuators_at_limit(recording: Recording) -> Iterator[str]:
     """Describe for how long the steering actuators of a car that spins were at their limits before."""
-    if "sideslip_rad" not in recording:  # measured by others
+    if len(recording) < 2 or "sideslip_rad" not in recording:  # measured by others
         return
     sideslip_rad = np.abs(recording["sideslip_rad"])
     if not np.nanmax(sideslip_rad, initial=0.0) > LOST_SIDESLIP_RAD:

@@ -107,6 +107,8 @@ def stopped(folder: Path, words: tuple[str, ...], number: signal.Signals, when: 
     if not running or (process.returncode == 0 and "stopped" not in told):  # the command had come to its end before
         assert process.returncode in {0, 1}, told
         return
+    if process.returncode == -number and not told:  # Python itself had not started yet
+        return
     deadline = time.monotonic() + END_S
     while alive(process.pid) and time.monotonic() < deadline:
         time.sleep(0.05)
