@@ -170,7 +170,8 @@ def test_packed_snow_is_found_as_soon_as_the_tyres_slide_on_it_and_is_not_taken_
 @pytest.mark.parametrize(("front", "rear"), [(1.0, 0.75), (0.75, 1.0)])
 def test_the_friction_is_that_of_the_axle_with_the_worse_tyres(front, rear):
     changes = {"factors.front_tyre_friction": front, "factors.rear_tyre_friction": rear, "road.mu": 0.9}
-    run = drive("step_steer", **changes, **{"steer.steering_wheel_deg": 75.0, "duration_s": 3.0}).recording
+    more = {"steer.steering_wheel_deg": 75.0, "duration_s": 3.0}
+    run = drive("step_steer", "compact", **changes, **more).recording
     # With the worse tyres at the rear the car spins.
     shows = (run.time_s > 1.5) & (np.abs(run["sideslip_rad"]) < math.radians(10.0))
     assert shows.any()
