@@ -32,11 +32,12 @@ class EstimatorParameters:
     friction_std: _Positive = 0.25
     """Standard deviation of this friction: wet asphalt, 0.6, is likely enough; snow, 0.3, is possible."""
     rear_ratio_std: _Positive = 0.1
-    """Standard deviation of the friction of the rear tyres relative to that of the front tyres: other tyres, wear."""
+    """Standard deviation of the friction of the rear tyres relative to that of the front tyres: other tyres, wear.
+    Chosen."""
     friction_fraction: _NotNegative = 0.05
-    """Standard deviation of the observed friction per friction, in the estimate only: the model's tyre is upright and
-    rolls straight ahead. On a ramp of the steering wheel (56 m radius) camber and turn slip take 4 to 8 % of the
-    Tesla's lateral forces. Such an error does not average out."""
+    """Standard deviation of the observed friction per friction, in the estimate only: the model's tyre is upright. At the
+    limit of a ramp of the steering wheel, the inclination of 2 to 3 deg by roll takes 2 to 3 % (compact) and 7 to 10 %
+    (Tesla) of the lateral force of an outer wheel. Such an error does not average out."""
     friction_s: _Positive = 10.0
     """Time constant with which the friction returns to the assumed value [s]."""
     slip_angle_std_rad: _Positive = math.radians(0.05)

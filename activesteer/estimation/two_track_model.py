@@ -12,12 +12,11 @@ with the steer angles d, the gravity g_y across an inclined road, the longitudin
 angles a that build up over the relaxation lengths s, the car's own tyre F_y under the wheel's load, the friction u of
 the road by similarity (u w at the rear axle, which may have other tyres), and the stiffness k_i of the tyres of an axle
 relative to new ones: u F_y(k_i a_i / u, F_z), which changes the slope of the curve and not its peak, as LKY does in the
-Magic Formula. With a longitudinal force, a
-friction circle reduces u. That lowers the largest force but hardly the force at small slip angles, as in the Magic
-Formula of combined slip (0.7 of the friction for the brake take 8 % at 2 deg). The body rolls by p as a mass on a
-spring, about an axis that lies h below the centre of gravity, so that the axles also move sideways by h p'. Springs and
-dampers of the body load the wheels. The compliance c_i is the difference between the identified cornering stiffness of
-the axle and the stiffness of its tyres:
+Magic Formula. With a longitudinal force, a friction circle reduces u. That lowers the largest force but hardly the
+force at small slip angles, as in the Magic Formula of combined slip (0.7 of the friction for the brake take 8 % at 2
+deg). The body rolls by p as a mass on a spring, about an axis that lies h below the centre of gravity, so that the
+axles also move sideways by h p'. Springs and dampers of the body load the wheels. The compliance c_i is the difference
+between the identified cornering stiffness of the axle and the stiffness of its tyres:
 
     c_i = 1 / C_i - 1 / (2 C_tyre) - q_i k / m_i
 

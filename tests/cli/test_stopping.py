@@ -107,7 +107,7 @@ def stopped(folder: Path, words: tuple[str, ...], number: signal.Signals, when: 
     if not running or (process.returncode == 0 and "stopped" not in told):  # the command had come to its end before
         assert process.returncode in {0, 1}, told
         return
-    if process.returncode == -number and not told:  # Python itself had not started yet
+    if isinstance(when, float) and when < 0.5 and process.returncode == -number and not told:  # before Python started
         return
     deadline = time.monotonic() + END_S
     while alive(process.pid) and time.monotonic() < deadline:

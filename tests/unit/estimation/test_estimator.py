@@ -133,7 +133,7 @@ def test_friction_that_does_not_show_is_not_learned(make):
 
 def test_friction_that_shows_is(slalom):
     run = slalom.recording
-    # 0.03 by the forces, and 0.05 of the friction for camber and turn slip, which the model does not know.
+    # 0.03 by the forces, and 0.05 of the friction for the inclination of the wheels, which the model does not know.
     assert run["estimated_friction_std"].min() < 0.06
     shows = run["estimated_friction_std"] < 0.08
     assert np.abs(run["estimated_friction"][shows] - 0.9).max() < 0.25
