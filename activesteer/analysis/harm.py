@@ -77,7 +77,13 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
         yield f"hits {_cones(hit)}"
 
 
-def actuators_at_limit(recording: Recording) -> Iterator[str]:
+def failures(recording: Recording) -> Iterator[str]:
+    """Describe the failures of a run, and for how long its steering actuators were at their limits before a spin."""
+    yield from losses(recording.metrics)
+    yield from _actuators_at_limit(recording)
+
+
+def _actuators_at_limit(recording: Recording) -> Iterator[str]:
     """Describe for how long the steering actuators of a car that spins were at their limits before."""
     if len(recording) < 2 or "sideslip_rad" not in recording:  # measured by others
         return
@@ -93,7 +99,7 @@ def actuators_at_limit(recording: Recording) -> Iterator[str]:
     }
     said = [f"{words} for {seconds:.1f} s" for words, seconds in waited.items() if seconds >= _WORTH_SAYING_S]
     if said:
-        yield f"before at a limit of angle, rate or torque: {' and '.join(said)}"
+        yield f"with actuators at their limits before: {' and '.join(said)}"
 
 
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
@@ -125,6 +131,7 @@ _STEERED: Final = (
     ("front superposition", "superposition_demand_rad", ("superposition_saturated",)),
 )
 _WORTH_SAYING_S: Final = 0.1
+"""Shorter times at a limit are not named [s]."""
 NEEDED_DISPLACEMENT_M: Final = 1.83
 """Displacement of a sine with dwell below which a car turns too little [m]; FMVSS 126, S5.2.3."""
 _DEGREE: Final = math.pi / 180.0

@@ -234,11 +234,10 @@ def _paint(
 
 def _print_outcomes(recordings: Mapping[str, Any]) -> None:
     """Print in words for each run a loss of control, or that the car kept its lane."""
-    from activesteer.analysis.harm import actuators_at_limit, kept, losses
+    from activesteer.analysis.harm import failures, kept
 
     for label, recording in recordings.items():
-        lost = [*losses(recording.metrics), *actuators_at_limit(recording)]
-        for words, colour in ((lost, terminal.BAD), (kept(recording.metrics), terminal.GOOD)):
+        for words, colour in ((failures(recording), terminal.BAD), (kept(recording.metrics), terminal.GOOD)):
             if text := ", ".join(words):
                 print(f"{label}: {terminal.painted(text, colour)}")
 

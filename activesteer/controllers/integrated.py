@@ -26,8 +26,11 @@ pressure difference: a limit that falls with the errors of the car, and at most 
 the tyres in their present state.
 
 If an actuator does not follow its demand (`SupervisedActuator`), it holds its position. The state feedback is then
-computed for the other actuator alone, about the turn that is still possible. The controller gets no
-message about a fault.
+computed for the other actuator alone, about the turn that is still possible. The controller gets no message about a
+fault.
+
+Both demands of the steering fade while the estimator does not explain the car (see `lqr`), M_x only while it does not
+explain the yaw rate. Behind a jump of friction it explains the yaw rate, and the brakes must act.
 
 On a car whose electric axles can split their torque (`tv`), the difference of each axle is a further unknown, as the
 force D that the right wheel gets and the left one loses, at the cost D^2 / F_0^2 and without a threshold: the motors
@@ -54,7 +57,7 @@ from activesteer.controllers.esc import stabilising
 from activesteer.controllers.lqr import Lqr, Turn
 from activesteer.controllers.parameters import ControllerSetup, IntegratedParameters
 from activesteer.controllers.torque_vectoring import SplitTorques
-from activesteer.controllers.turn_reference import BorneTurnReference
+from activesteer.controllers.turn_reference import BorneTurnReference, ConfidenceMonitor, confidence
 from activesteer.core.conventions import Array
 from activesteer.core.signals import NO_BRAKES, ActuatorCommand, DriverCommand, Estimate, Measurement
 from activesteer.errors import ControllerError, not_installed
@@ -131,9 +134,6 @@ class SupervisedActuator:
         return self.failed
 
 
-_FROZEN_S = 0.1
-"""Time without any change after which a yaw rate sensor counts as frozen [s]: in a slide, yaw rate and noise change it
-in every sample."""
 _BRAKES = 4
 """Number of brake forces; after them come the differences of electric axles."""
 _LEAST_KN = 0.01
@@ -156,6 +156,7 @@ class Integrated:
         self._parameters, self._stability, servos = (p := setup.gains.integrated), setup.gains.esc, setup.gains.servos
         self._limits_rad = servos.superposition_limit_rad, servos.rear_limit_rad
         self._car, self._slopes = setup.single_track, self._lqr.slopes
+        self._confidence = ConfidenceMonitor(setup, self._lqr.estimator)
         self._borne = BorneTurnReference(self._car, self._stability, setup.timestep_s)
         self._supervised = [SupervisedActuator(p.tolerance_rad, p.window_s, setup.timestep_s) for _ in range(2)]
         self._solve = solver()
@@ -178,7 +179,6 @@ class Integrated:
         self._effects = self._per_moment * _KILO * np.concatenate([self._arms_m, tracks_m])
         self._no_rows = np.zeros((0, forces))
         self._demand_rad, self._brakes_Nm = (0.0, 0.0), NO_BRAKES
-        self._interval_s, self._yaw_rate_radps, self._unchanged_s = setup.timestep_s, 0.0, 0.0
         per_pressure_Nm = np.array(known.brake_torque_per_pressure_NmpPa) / known.rolling_radius_m
         self._side_moment_m3 = float(per_pressure_Nm @ np.abs(self._arms_m)) / 2.0
 
@@ -202,9 +202,6 @@ class Integrated:
         added, rear, steered_Nm = self._lqr.allocate(turn, command, measurement, works)
         added = added if works[0] else self._supervised[0].held_rad
         rear = rear if works[1] else self._supervised[1].held_rad
-        changed = measurement.yaw_rate_radps != self._yaw_rate_radps
-        self._yaw_rate_radps = measurement.yaw_rate_radps
-        self._unchanged_s = 0.0 if changed else self._unchanged_s + self._interval_s
         missing_Nm = self._missing_moment(now, driver, measurement.ay_mps2, steered_Nm)
         front_angle_rad = driver + measurement.superposition_rad
         used = self._slopes.used(now, front_angle_rad, measurement.rear_steer_rad)
@@ -255,10 +252,10 @@ class Integrated:
         if now.speed_mps < self._stability.least_speed_mps:
             return 0.0
         demand = stabilising(self._stability, borne - now.yaw_rate_radps, now.sideslip_rad)
-        # As with `esc`, the measured yaw rate is enough for the brakes where the estimator's model does not explain the
-        # car, as behind a jump of friction; but not a frozen one.
-        certain = self._lqr.authority if self._unchanged_s > _FROZEN_S else 1.0
-        demand *= certain * self._car.yaw_inertia_kgm2
+        # Behind a jump of friction the estimator explains the yaw rate and not the lateral acceleration.
+        # Twice: the limits of `confidence` are for the sum over two measured values.
+        innovation = 2.0 * self._lqr.estimator.rate_innovation
+        demand *= confidence(self._confidence, innovation, now.friction_std)[1] * self._car.yaw_inertia_kgm2
         side, part = math.copysign(1.0, demand), min(abs(demand) / self._parameters.brake_threshold_Nm, 1.0)
         return part * side * max(side * (demand - steered_Nm), 0.0)
 

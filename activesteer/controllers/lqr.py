@@ -249,6 +249,11 @@ class Lqr(NativeBlock):
         return self._confidence.authority
 
     @property
+    def estimator(self) -> Estimator:
+        """Its estimator."""
+        return self._estimator
+
+    @property
     def slopes(self) -> AxleSlopes:
         """Curves of both axles."""
         return self._curves

@@ -1,4 +1,4 @@
-"""What every room may use: conventions, units, messages, files and their limits, the table of metrics.
+"""Common parts of all rooms: conventions, units, messages, files and their limits, the table of metrics.
 
 In: nothing of the other rooms.
 Out: types, functions and tables without state.

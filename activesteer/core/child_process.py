@@ -50,7 +50,7 @@ class Child:
 
     @property
     def alive(self) -> bool:
-        """Whether the child can be asked."""
+        """True while the child can be asked."""
         return self._finalizer.alive
 
     def ask(self, request: bytes, doing: str, limit_s: float, max_bytes: int) -> bytes:

@@ -75,7 +75,9 @@ def _filter(known, tyres, memory, said, line):
     predict(known, tyres, memory, duration_s)
     front_N, rear_N = forces_of(known, tyres, memory, state)
     follow_roll(known, memory, (front_N + rear_N) / known.mass_kg, duration_s)
-    memory.innovation = correct(known, tyres, memory, said[SAID_RATE], said[SAID_AY], duration_s)
+    memory.innovation, memory.rate_innovation = correct(
+        known, tyres, memory, said[SAID_RATE], said[SAID_AY], duration_s
+    )
     used = math.hypot(memory.ax_mps2, memory.loading_mps2) / GRAVITY_MPS2
     memory.friction_used += duration_s / (duration_s + _USED_S) * (used - memory.friction_used)
     forgotten = math.exp(-duration_s / known.friction_s)

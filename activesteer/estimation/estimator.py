@@ -67,6 +67,11 @@ class Estimator(NativeBlock):
         """Squared error of the last measured yaw rate and lateral acceleration, over its expected covariance."""
         return float(self._memory["innovation"][0])
 
+    @property
+    def rate_innovation(self) -> float:
+        """The same of the last measured yaw rate only."""
+        return float(self._memory["rate_innovation"][0])
+
     def step(self, measurement: Measurement) -> Estimate:
         """Process a measurement, and return the estimate."""
         _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement

@@ -292,14 +292,15 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         duration_s: Time since the last measurement [s].
 
     Returns:
-        Squared error of both values over its expected covariance: chi-square distributed with two degrees of freedom.
+        Squared error of both values over its expected covariance, chi-square distributed with two degrees of freedom,
+        and the part of the yaw rate, with one.
     """
     state, covariance, row = memory.state, memory.covariance, np.zeros(N_STATES)
     row[YAW_RATE] = row[RATE_OFFSET] = 1.0
     error = yaw_rate_radps - state[YAW_RATE] - state[RATE_OFFSET]
     variance = known.rate_variance_rad2ps2 + (known.rate_fraction * yaw_rate_radps) ** 2
     # One value after the other: the first changes the expectation of the second.
-    innovation = error * error / _take_in(state, covariance, row, error, variance)
+    of_rate = error * error / _take_in(state, covariance, row, error, variance)
     row[YAW_RATE] = row[RATE_OFFSET] = 0.0
     mass = known.mass_kg
     front_N, rear_N = forces_of(known, tyres, memory, state)
@@ -328,9 +329,9 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     repeated = 1.0 + 2.0 * known.force_s / duration_s
     variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
     variance += bend_mps2 * bend_mps2 / 18.0
-    innovation += error * error / _take_in(state, covariance, row, error, variance)
+    of_both = of_rate + error * error / _take_in(state, covariance, row, error, variance)
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     for place in (FRONT_STIFFNESS, REAR_STIFFNESS):
         state[place] = min(max(state[place], LEAST_STIFFNESS), LARGEST_STIFFNESS)
     state[REAR_RATIO] = min(max(state[REAR_RATIO], LEAST_RATIO), LARGEST_RATIO)
-    return innovation
+    return of_both, of_rate

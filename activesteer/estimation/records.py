@@ -37,7 +37,10 @@ MEMORY: Final = np.dtype(
         [
             ("estimate", np.float64, (14,)),
             ("calls", np.intp),
-            *((name, np.float64) for name in ("waited_s", "innovation", "left_out", "friction_used", "friction_borne")),
+            *(
+                (name, np.float64)
+                for name in ("waited_s", "innovation", "rate_innovation", "left_out", "friction_used", "friction_borne")
+            ),
             ("last", np.float64, (3,)),
             ("last_spin_radps", np.float64, (4,)),
             *((name, np.float64) for name in ("speed_mps", "ax_offset_mps2")),
@@ -54,11 +57,12 @@ MEMORY: Final = np.dtype(
 )
 """Memory of an estimator.
 
-The estimate and the number of calls. The last step of the filters: time since then, squared error over its expected
-covariance, wheels left out, smoothed and largest use of the friction, last samples. States and covariances of the
-filters, and the present state. Inputs of the model: steer angles, longitudinal acceleration, longitudinal force of the
-front axle, moment of all longitudinal forces, lateral acceleration that loads the wheels, lateral speed of the roll
-axis relative to v_y, roll; and for each wheel its longitudinal force, its load, and the speed of the car by this wheel.
+The estimate and the number of calls. The last step of the filters: time since then, squared error of both measurements
+and of the yaw rate over their expected covariances, wheels left out, smoothed and largest use of the friction, last
+samples. States and covariances of the filters, and the present state. Inputs of the model: steer angles, longitudinal
+acceleration, longitudinal force of the front axle, moment of all longitudinal forces, lateral acceleration that loads
+the wheels, lateral speed of the roll axis relative to v_y, roll; and for each wheel its longitudinal force, its load,
+and the speed of the car by this wheel.
 """
 
 KNOWN: Final = np.dtype(

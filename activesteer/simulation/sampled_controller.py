@@ -18,7 +18,7 @@ _SLOWER: Final = 0.95
 
 
 class ControlUnit(NamedTuple):
-    """How the loop calls a controller.
+    """Timing and inputs of a controller in the loop.
 
     Attributes:
         every: Steps of the simulation between two calls.

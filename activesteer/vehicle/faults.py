@@ -122,7 +122,7 @@ class _Acting:
 
     @property
     def state(self) -> int:
-        """What compiled code does with the fault now (see `set_fault`)."""
+        """Present action of the fault in compiled code (see `set_fault`)."""
         return int(self._own["state"])
 
     def bind(self, record: Any) -> None:

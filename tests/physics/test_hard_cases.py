@@ -120,13 +120,14 @@ def test_brakes_hold_a_car_that_leaves_snow_while_the_estimator_does_not_explain
         assert run.metrics["sideslip_peak_abs_rad"] < math.radians(15.0)
 
 
-def test_brakes_do_not_follow_a_yaw_rate_sensor_that_is_frozen():
+@pytest.mark.parametrize(("maneuver", "kind"), [("slalom", "stuck"), ("double_lane_change", "reversed")])
+def test_brakes_do_not_follow_a_yaw_rate_sensor_that_fails(maneuver: str, kind: str):
     pytest.importorskip("daqp")
-    for start_s in (2.8, 3.2):
-        fault = {"part": "yaw_rate_sensor", "kind": "stuck", "start_s": start_s}
-        run = simulate("slalom", "integrated", overrides=SENSORS | {"fault": [fault]})
-        # Without control 2.5 deg; with the brakes of a frozen sensor 39 and 75 deg.
-        assert run.metrics["sideslip_peak_abs_rad"] < math.radians(6.0)
+    for start_s in (2.2, 2.8):
+        fault = {"part": "yaw_rate_sensor", "kind": kind, "start_s": start_s}
+        run = simulate(maneuver, "integrated", overrides=SENSORS | {"fault": [fault]})
+        # With brakes that do not fade: 20 and 39 deg (frozen sensor), 84 and 49 deg (wrong sign).
+        assert run.metrics["sideslip_peak_abs_rad"] < math.radians(15.0)
 
 
 def test_slow_sound_actuators_are_not_taken_for_failed_in_a_lane_change():

@@ -17,7 +17,7 @@ from activesteer.analysis.claims.scorecard import (
     scorecard,
     setting_of,
 )
-from activesteer.analysis.harm import actuators_at_limit, kept, losses
+from activesteer.analysis.harm import failures, kept
 from activesteer.core.conventions import RunLook, run_looks
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
@@ -125,7 +125,7 @@ def outcome(recording: Recording) -> str:
     metadata, metrics = recording.metadata, recording.metrics
     if not metadata.get("complete", True):
         return f"the run did not end properly: {metadata.get('error', 'no reason is recorded')}"
-    said = [*losses(metrics), *actuators_at_limit(recording), *kept(metrics)]
+    said = [*failures(recording), *kept(metrics)]
     peaks = [name for name in SIDESLIP_PEAKS if name in metrics]
     for name in (*peaks[:1], *_ALSO):
         if name in metrics:

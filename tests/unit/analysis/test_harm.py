@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.harm import (
-    actuators_at_limit,
     changes,
+    failures,
     harms,
     has_spun,
     is_controlled,
@@ -182,7 +182,7 @@ def test_a_longer_stop_is_harm_and_no_stop_is_a_lost_car():
 @pytest.mark.parametrize(
     ("sideslip_deg", "demand_rad", "said"),
     [
-        (30.0, 0.05, ["before at a limit of angle, rate or torque: rear steering for 0.4 s"]),
+        (30.0, 0.05, ["with actuators at their limits before: rear steering for 0.4 s"]),
         (15.0, 0.05, []),  # under control
         (30.0, 0.0, []),  # not steered by the controller
     ],
@@ -197,9 +197,9 @@ def test_a_car_that_spins_says_for_how_long_its_actuators_were_at_their_limits(s
     }
     made = [Channel(name, "", "", "vehicle", single=False) for name in channels]
     run = Recording(made, time_s, np.column_stack(list(channels.values())))
-    assert list(actuators_at_limit(run)) == said
+    assert list(failures(run)) == said
 
 
 def test_a_recording_without_a_sideslip_angle_says_nothing_about_actuators():
     made = [Channel("yaw_rate_radps", "", "", "vehicle", single=False)]
-    assert list(actuators_at_limit(Recording(made, [0.0, 0.1], [[0.1], [0.2]]))) == []
+    assert list(failures(Recording(made, [0.0, 0.1], [[0.1], [0.2]]))) == []

@@ -109,6 +109,8 @@ def effects(known, driver_rad: float = 0.0, **motion: float):
     controller, now = Integrated(known), Estimate(SPEED_MPS, 0.0, 0.0, 0.0, 0.9, *[0.0] * 5)._replace(**motion)
 
     class Known:
+        rate_innovation = 0.0
+
         def step(self, _measurement):
             return now
 

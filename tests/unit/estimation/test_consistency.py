@@ -128,7 +128,7 @@ def one_run(known, tyres, rng: np.random.Generator, kind):
         rate += math.hypot(math.sqrt(known.rate_variance_rad2ps2), known.rate_fraction * rate) * rng.standard_normal()
         felt = ay_mps2 + GRAVITY_MPS2 * true.roll_rad + state[AY_OFFSET]
         felt += math.hypot(math.sqrt(known.ay_variance_m2ps4), known.ay_fraction * felt) * rng.standard_normal()
-        squared.append(correct(known, tyres, memory, rate, felt, INTERVAL_S))
+        squared.append(correct(known, tyres, memory, rate, felt, INTERVAL_S)[0])
     error = (state - memory.state)[MOTION]
     return error @ np.linalg.solve(memory.covariance[np.ix_(MOTION, MOTION)], error), np.mean(squared)
 
