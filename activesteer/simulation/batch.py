@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Final
 
@@ -15,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from activesteer.config.faults import Fault
 from activesteer.controllers import CONTROLLER, controller_spec
-from activesteer.controllers.vectorised import Vectorised
 from activesteer.core.conventions import DEFAULT_TIMESTEP_S, Array
 from activesteer.core.signals import (
     ActuatorCommand,
@@ -313,19 +311,6 @@ class Batch(Copyable):
             for car in np.flatnonzero(self._mask(cars)).tolist():
                 with _named(car):
                     self.loops[car].add_fault(fault)
-
-    def vectorised(self, controller: Any, interval_s: float | None = None) -> Vectorised:
-        """Make a controller of all cars, to call with `driver_command` and `measurement`.
-
-        Args:
-            controller: Name of a controller, or your own.
-            interval_s: Time between two calls [s]; by default a step.
-
-        Raises:
-            ControllerError: there is no such controller, or it cannot be made.
-        """
-        step_s = interval_s or self._timestep_s
-        return Vectorised(controller, [replace(loop.controller_setup, timestep_s=step_s) for loop in self.loops])
 
     def save_state(self, cars: ArrayLike | None = None) -> list[LoopState]:
         """Return the states of some cars, from which they continue bit-identically.

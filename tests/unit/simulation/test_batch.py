@@ -81,22 +81,6 @@ def test_a_car_whose_loop_stands_still_keeps_the_kind_of_its_last_command() -> N
     assert [loop.commands[1].estimate is None for loop in batch.loops] == [False, True]
 
 
-@pytest.mark.parametrize("controller", ["ars", "lqr"])
-def test_a_vectorised_controller_is_the_scalar_one(controller: str) -> None:
-    batch = Batch("sine_with_dwell", 2, overrides={"road.mu": np.array([0.5, 0.9])}, threads=1)
-    together, alone = batch.vectorised(controller, 0.01), [batch.vectorised(controller, 0.01) for _ in range(2)]
-    blocks = [each._blocks[0] for each in alone]
-    for _ in range(120):
-        batch.advance(10)
-        found = together.step(batch.driver_command, batch.measurement)
-        for car, block in enumerate(blocks):
-            loop = batch.loops[car]
-            expected = block.step(loop.commands[0], loop.measurement)
-            assert numbers_in(expected._replace(estimate=None)) == [
-                part for field in found if field is not None for part in np.ravel(field[car])
-            ]
-
-
 def test_given_commands_replace_the_blocks() -> None:
     batch = Batch("step_steer", 2, "ars", overrides={"speed_kmh": 80.0}, threads=1)
     rear: Any = np.array([-0.02, 0.03])
