@@ -156,6 +156,24 @@ def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_
 
 
 @pytest.mark.slow
+def test_a_slider_and_a_button_move_the_cursor_of_curves_over_time(shown, tmp_path):
+    page = shown(every_panel(tmp_path), **DESK)
+    values = page.locator("figure").first.locator(".values")
+    slider, button = page.locator("input.time"), page.locator("button.play")
+    slider.evaluate("(slider) => { slider.value = slider.max / 2; slider.dispatchEvent(new Event('input')); }")
+    halfway, wave = (float(text.replace("\N{MINUS SIGN}", "-")) for text in values.inner_text().split()[:2])
+    assert halfway == pytest.approx(5.05, abs=0.11)
+    assert wave == pytest.approx(np.sin(halfway), abs=0.2)
+    button.click()
+    page.wait_for_timeout(800)
+    button.click()
+    assert "Play" in button.inner_text()
+    assert halfway + 0.1 < float(values.inner_text().split()[0]) < halfway + 5.0
+    # Charts over other quantities keep their own cursor.
+    assert page.locator("figure").nth(1).locator(".values").inner_text() == ""
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PAGES)
 def test_every_page_has_one_structure_on_every_screen(shown, tmp_path, folder, kind):
     path = PAGES[kind](tmp_path)

@@ -9,6 +9,8 @@ mix();
 const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
 // Least size of a cone [px], otherwise cones and cars have their true size; distance between drawn cars [px].
 const LEAST_CONE = 2, CARS_APART = 110;
+// Instants of a picture's slider.
+const INSTANTS = 1000;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
 const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 106, PRINTED_TRACK_HEIGHT = 170;
 
@@ -251,6 +253,37 @@ class Chart {
   }
 }
 
+// A button that plays curves over time, and a slider for the instant. `show` gets its number, 0 to `last`.
+class Player {
+  constructor(last, step_s, start_s, show) {
+    Object.assign(this, { last, step_s, start_s, show, playing: false, held: false });
+    this.button = element("button", { type: "button", class: "play" }, "\u25b6 Play");
+    this.slider = element("input", { type: "range", class: "time", min: 0, max: last, value: 0, "aria-label": "Time" });
+    this.clock = element("output", { class: "quiet" });
+    this.parts = [this.button, this.slider, this.clock];
+    this.button.addEventListener("click", () => this.play(!this.playing));
+    this.slider.addEventListener("input", () => { this.play(false); this.held = true; show(+this.slider.value); });
+  }
+
+  play(on) {
+    this.playing = on;
+    this.button.textContent = on ? "\u23f8 Pause" : "\u25b6 Play";
+    if (!on) return;
+    this.held = true;
+    let exact = +this.slider.value < this.last ? +this.slider.value : 0, before = null;
+    const step = (now) => {
+      if (!this.playing) return;
+      if (before != null) exact += (now - before) / 1000 / this.step_s;
+      before = now;
+      this.show(Math.min(Math.floor(exact), this.last));
+      if (exact >= this.last) this.play(false); else requestAnimationFrame(step);
+    };
+    requestAnimationFrame(step);
+  }
+
+  tell(i) { this.slider.value = i; this.clock.textContent = `${(this.start_s + i * this.step_s).toFixed(2)} s`; }
+}
+
 const short = (value) => `${+value.toPrecision(3)}`.replace("-", "−");
 
 function between(x, first, second) {
@@ -286,9 +319,19 @@ function drawPicture(box, picture, place) {
     const [label, low, high] = picture.scale;
     bar.append(element("span", { class: "hint" }, label), `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`);
   }
-  if (bar.childNodes.length) box.before(bar);
   box.replaceChildren();
   for (const panel of picture.panels) charts.push(new Chart(box, panel, picture));
+  const timed = charts.filter(({ panel }) => panel.x.startsWith("time"));
+  if (timed.length) {
+    const start_s = Math.min(...timed.map(({ limits }) => limits.x[0])), end_s = Math.max(...timed.map(({ limits }) => limits.x[1]));
+    const step_s = (end_s - start_s) / INSTANTS;
+    const player = new Player(INSTANTS, step_s, start_s, (i) => {
+      player.tell(i);
+      for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
+    });
+    bar.append(...player.parts);
+  }
+  if (bar.childNodes.length) box.before(bar);
 }
 
 const repaintAll = () => { mix(); for (const each of drawn) each.repaint(); };

@@ -52,42 +52,15 @@
         }
         bar.append(button);
       });
+      this.player = new Player(this.data.samples - 1, this.data.step_s, this.data.start_s, (i) => this.pointAt(i));
       const reset = element("button", { type: "button", class: "reset" }, "Whole run");
       reset.addEventListener("click", () => { this.zoom(null); if (this.track) this.track.whole(); });
       const touch = matchMedia("(pointer: coarse)").matches;
-      bar.append(reset, ...this.player(), element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values, tap a run to hide it." : "Drag to zoom, double-click for the whole run; point at a run to see it alone, click to hide it."));
-    }
-
-    // A button that plays the run, and a slider for its time.
-    player() {
-      this.button = element("button", { type: "button", class: "play" }, "\u25b6 Play");
-      this.slider = element("input", { type: "range", class: "time", min: 0, max: this.data.samples - 1, value: 0, "aria-label": "Time" });
-      this.clock = element("output", { class: "quiet" });
-      this.button.addEventListener("click", () => this.play(!this.playing));
-      this.slider.addEventListener("input", () => { this.play(false); this.held = true; this.pointAt(+this.slider.value); });
-      return [this.button, this.slider, this.clock];
-    }
-
-    play(on) {
-      this.playing = on;
-      this.button.textContent = on ? "\u23f8 Pause" : "\u25b6 Play";
-      if (!on) return;
-      this.held = true;
-      const last = this.data.samples - 1;
-      let exact = +this.slider.value < last ? +this.slider.value : 0, before = null;
-      const step = (now) => {
-        if (!this.playing) return;
-        if (before != null) exact += (now - before) / 1000 / this.data.step_s;
-        before = now;
-        this.pointAt(Math.min(Math.floor(exact), last));
-        if (exact >= last) this.play(false); else requestAnimationFrame(step);
-      };
-      requestAnimationFrame(step);
+      bar.append(reset, ...this.player.parts, element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values, tap a run to hide it." : "Drag to zoom, double-click for the whole run; point at a run to see it alone, click to hide it."));
     }
 
     show(i) {
-      this.slider.value = i;
-      this.clock.textContent = `${this.time[i].toFixed(2)} s`;
+      this.player.tell(i);
       if (this.track) this.track.at(i);
     }
 
@@ -118,7 +91,7 @@
     read(u, panel, values) {
       const i = u.cursor.idx;
       values.replaceChildren();
-      if (i == null || u.cursor.left < 0) { if (this.track && !this.held) this.track.at(null); return; }
+      if (i == null || u.cursor.left < 0) { if (this.track && !this.player.held) this.track.at(null); return; }
       values.append(`${this.time[i].toFixed(2)} s`);
       panel.series.forEach((series, k) => {
         // The value of the first curve of each run; desired values are not shown.
@@ -126,7 +99,7 @@
         values.append(" ", element("span", { style: `--run: var(--run-${this.data.runs[series.run].place})` }, shown(series.values[i])));
       });
       // While it plays, the places of the cars come from the clock.
-      if (!this.playing) this.show(i);
+      if (!this.player.playing) this.show(i);
     }
 
     marks(u) {
@@ -161,7 +134,7 @@
     }
 
     fit(width = null) {
-      if (width != null) this.play(false);
+      if (width != null) this.player.play(false);
       for (const plot of this.plots) {
         const room = width == null ? plot.root.parentElement.clientWidth : (width - PRINTED_GAP) / 2;
         if (room > 0 && room !== plot.width) plot.setSize({ width: room, height: width == null ? PLOT_HEIGHT : PRINTED_PLOT_HEIGHT });
