@@ -15,7 +15,7 @@ import numpy as np
 from activesteer.core.conventions import CORNERS
 from activesteer.native.compilation import compiled
 from activesteer.scenario import Scenario, resolve
-from activesteer.sensors.block import AX, WHEEL_SPEEDS, measured
+from activesteer.sensors.block import AX, WHEEL_SPEEDS, measure
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.recorder import Recorder
@@ -103,11 +103,9 @@ def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
         step_brakes(setup, state, speeds, memory[AX], row[_PEDAL], 0.0, asked_Nm, 0.0)
         held += state.allowed_Pa[0] < state.demand_Pa[0]
         wheels, p = row[_WHEELS:_PEDAL], state.pressure_Pa
-        truth = (
-            row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7],
-            (wheels[0], wheels[1], wheels[2], wheels[3]), (p[0], p[1], p[2], p[3]),
-        )  # fmt: skip
-        measured(chains, memory, radii_m, timestep_s, truth)
+        memory[:7] = row[1:8]
+        memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4], memory[WHEEL_SPEEDS + 4 : WHEEL_SPEEDS + 8] = wheels, p
+        measure(chains, memory, radii_m, timestep_s)
     return held
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -85,6 +84,13 @@ def records_at(kind: np.dtype[Any]) -> Any:
     return records
 
 
+def message_pointer(message: type[Any]) -> Any:
+    """Return an intrinsic: address (intp) -> pointer to the numbers of a message, by the names of its fields."""
+    return pointer_to(from_dtype(np.dtype((np.record, record_fields(message)))))
+
+
+_command_pointer, measurement_pointer = message_pointer(DriverCommand), message_pointer(Measurement)
+
 _IGNORED: Final = types.none
 """Type of a field that holds no number: native code ignores its value."""
 _TYPES: Final = {0: _IGNORED, 1: types.float64}
@@ -100,11 +106,6 @@ def native_type(message: type[Any]) -> types.Tuple:
     return types.Tuple([_TYPES.get(width) or types.UniTuple(types.float64, width) for width in widths])
 
 
-def zeros_of(message: type[Any]) -> tuple[Any, ...]:
-    """Return a message of zeros of the type by which compiled code takes it, None for fields that hold no number."""
-    return tuple(None if width == 0 else 0.0 if width == 1 else (0.0,) * width for width in widths_of(message))
-
-
 def _places(kind: Any) -> list[tuple[int, ...]]:
     """Indices of the numbers of a tuple and of the tuples within it, one after the other."""
     places: list[tuple[int, ...]] = []
@@ -116,36 +117,19 @@ def _places(kind: Any) -> list[tuple[int, ...]]:
     return places
 
 
-def _numbers_at(builder: ir.IRBuilder, address: Any) -> Callable[[int], Any]:
-    """Pointer to a float64 by its place behind an address."""
-    start = builder.inttoptr(address, ir.DoubleType().as_pointer())
-    return lambda place: builder.gep(start, [ir.Constant(ir.IntType(64), place)])
-
-
 def _store(_typing_context, address, message):
     def generate(context, builder, _signature, arguments):
-        pointer = _numbers_at(builder, arguments[0])
+        start = builder.inttoptr(arguments[0], ir.DoubleType().as_pointer())
         for place, path in enumerate(_places(message)):
-            builder.store(builder.extract_value(arguments[1], path), pointer(place))
+            pointer = builder.gep(start, [ir.Constant(ir.IntType(64), place)])
+            builder.store(builder.extract_value(arguments[1], path), pointer)
         return context.get_dummy_value()
 
     return types.void(address, message), generate
 
 
-def _load(_typing_context, address, like):
-    def generate(_context, builder, _signature, arguments):
-        pointer, message = _numbers_at(builder, arguments[0]), arguments[1]
-        for place, path in enumerate(_places(like)):
-            message = builder.insert_value(message, builder.load(pointer(place)), path)
-        return message
-
-    return like(address, like), generate
-
-
 store_numbers: Final[Any] = intrinsic(_store)
 """`store_numbers(address, message)` in compiled code: write the numbers of a tuple as consecutive float64."""
-load_numbers: Final[Any] = intrinsic(_load)
-"""`load_numbers(address, like)` in compiled code: read a tuple of the type of another one from consecutive float64."""
 
 
 N_STEERING: Final = 6
@@ -165,8 +149,6 @@ assert [number.name for number in numbers_of(ActuatorCommand)[:N_STEERING]] == [
 
 call_law: Final = call_at(types.void, *CALL)
 """`call_law(address, (block, command, measurement, held))` in compiled code."""
-_command_pointer: Final = pointer_to(from_dtype(np.dtype((np.record, record_fields(DriverCommand)))))
-_measured_pointer: Final = pointer_to(from_dtype(np.dtype((np.record, record_fields(Measurement)))))
 
 
 def law_address(controller: Any) -> int:
@@ -190,7 +172,7 @@ def _compiled(kind: type[Any]) -> int:
         answer: Any = law(
             carray(block_pointer(block), (1,))[0],
             carray(_command_pointer(command), (1,))[0],
-            carray(_measured_pointer(measurement), (1,))[0],
+            carray(measurement_pointer(measurement), (1,))[0],
         )
         numbers = f64_pointer(held)
         numbers[0], numbers[1], numbers[2], numbers[3], numbers[4] = answer[:5]

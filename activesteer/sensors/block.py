@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from activesteer.core.conventions import CORNERS
 from activesteer.core.signals import Measurement, numbers_of, widths_of
 from activesteer.native.compilation import inlined
-from activesteer.native.memory import load_numbers, store_numbers
 from activesteer.sensors.parameters import RANDOM, Sensor, Sensors
 
 CHAIN: Final = np.dtype(
@@ -216,10 +215,8 @@ def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float)
 
 
 @inlined
-def measured(chains, memory, wheel_radii_m, timestep_s, truth):
-    """Return the readings of the sensors after one more step."""
-    outputs = truth[1:]
-    store_numbers(memory.ctypes.data, outputs)
+def measure(chains, memory, wheel_radii_m, timestep_s):
+    """Replace the truth in the first numbers of the memory by the readings of the sensors after one more step."""
     for index in range(1, _N_OUTPUTS):
         memory[index] = passed_on(chains[index - 1], memory, memory[index], timestep_s)
     from_wheels, counted = 0.0, 0.0
@@ -228,4 +225,3 @@ def measured(chains, memory, wheel_radii_m, timestep_s, truth):
         counted += wheel_radii_m[wheel]
     if counted > 0.0:
         memory[0] = from_wheels
-    return truth[:1] + load_numbers(memory.ctypes.data, outputs)

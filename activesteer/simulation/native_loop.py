@@ -20,11 +20,7 @@ from activesteer.native.memory import (
     array_of,
     call_law,
     f64_pointer,
-    load_numbers,
-    native_type,
     pointer_to,
-    store_numbers,
-    zeros_of,
 )
 from activesteer.native.records import ARRAY, record_type
 from activesteer.vehicle import native_step
@@ -78,12 +74,9 @@ takes to arrive; `calls`: steps that it has counted. `estimate`: address of the 
 `steering_ratio`: not 0 if the controller knows the driver's demand by the angle sensor only; `seen`: the driver's
 command as it knows it. `held`, `bus`: its last decision, and those on the way (`N_HELD`)."""
 
-_ARGUMENTS: Final = (types.intp, native_type(DriverCommand), native_type(ActuatorCommand), types.boolean)
-_step: Final = call_at(types.Tuple([types.boolean, native_type(Measurement), native_type(Motion)]), *_ARGUMENTS)
+_step: Final = call_at(types.boolean, *native_step.STEP)
 _setpoint_pointer: Final = pointer_to(from_dtype(SETPOINT))
 
-
-_DRIVER_COMMAND, _ACTUATOR_COMMAND = zeros_of(DriverCommand), zeros_of(ActuatorCommand)
 _DRIVER_NUMBERS: Final = [number.name for number in numbers_of(DriverCommand)]
 _WHEEL, _FRONT = map(_DRIVER_NUMBERS.index, ("steering_wheel_demand_rad", "front_steer_demand_rad"))
 _MEASURED: Final = [number.name for number in numbers_of(Measurement)]
@@ -175,17 +168,17 @@ def _advance(car, bindings, step_address):
         for wheel in range(4):
             ctrl[bindings.drives[wheel]] = car.torques_Nm[wheel]
             ctrl[bindings.brakes[wheel]] = car.torques_Nm[4 + wheel]
-    sane, measurement, motion = _step(
+    # In the record, the numbers of the controller's command follow those of the driver's.
+    sane = _step(
         step_address,
         (
             car.bindings,
-            load_numbers(car.driver_command.ctypes.data, _DRIVER_COMMAND),
-            load_numbers(car.actuator_command.ctypes.data, _ACTUATOR_COMMAND),
+            car.driver_command.ctypes.data,
             torques_set,
+            car.measurement.ctypes.data,
+            car.motion.ctypes.data,
         ),
     )
-    store_numbers(car.measurement.ctypes.data, measurement)
-    store_numbers(car.motion.ctypes.data, motion)
     car.step += 1
     car.left -= 1
     return DONE if sane else INSANE

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from activesteer.core.conventions import CORNERS, DEFAULT_TIMESTEP_S, Array
 from activesteer.core.signals import (
-    NO_TORQUES,
     ActuatorCommand,
     DriverCommand,
     Estimate,
     Measurement,
     Motion,
+    nested_fields,
     new_message,
 )
-from activesteer.errors import ActiveSteerError, ModelError, ParameterError, SimulationDiverged, shown
+from activesteer.errors import ModelError, ParameterError, SimulationDiverged, shown
 from activesteer.native.records import Uncopyable
 from activesteer.road.road import Road
 from activesteer.sensors import SensorBlock
@@ -50,11 +50,11 @@ from activesteer.vehicle.step_bindings import (
     engine_arrays,
     read_through,
     record_from,
+    write_commands,
     write_estimate,
 )
 
 _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-_N_DRIVER, _N_ACTUATOR = len(DriverCommand._fields), len(ActuatorCommand._fields)
 _GEARS: Final = (-1, CLUTCH_OPEN, 1)
 
 
@@ -144,6 +144,9 @@ class Vehicle(Uncopyable):
             self.electric,
         )  # fmt: skip
         self._address = self._bindings.ctypes.data
+        kinds = {"measurement": nested_fields(Measurement), "motion": nested_fields(Motion)}
+        self._sensed = np.zeros(1, list(kinds.items()))
+        self._sensed_at = [self._sensed[name].ctypes.data for name in kinds]
         self._tape: Tape | None = None
         self._tape_address = self._bindings["tape"]
         self._forces = fb.header_of(model)
@@ -228,31 +231,17 @@ class Vehicle(Uncopyable):
             ParameterError: a command is not exactly such a message, or holds something that is not a number.
             SimulationDiverged: the engine warns, or a recorded value is not finite or beyond all reason.
         """
-        # Native code reads a fixed number of fields; an incomplete message would end the process.
-        if (
-            type(driver_command) is not DriverCommand
-            or type(actuator_command) is not ActuatorCommand
-            or len(driver_command) != _N_DRIVER
-            or len(actuator_command) != _N_ACTUATOR
-        ):
-            raise _refused(driver_command, actuator_command)
-        try:
-            if actuator_command.estimate is not None:
-                self.note_estimate(actuator_command.estimate)
-            if (added := actuator_command.wheel_torque_demand_Nm) is not NO_TORQUES:
-                self.wheels.check_driven(added)
-            if (torques := driver_command.wheel_torques) is not None:
-                self.wheels.apply(torques)
-            else:
-                check_gear(driver_command.gear)
-            sane, measurement, motion = native_step.step(
-                self._address, driver_command, actuator_command, torques is not None
-            )
-        except Exception as reason:
-            raise _refused(driver_command, actuator_command, reason) from reason
-        if not sane:
+        write_commands(self.rows.commands, driver_command, actuator_command)
+        if actuator_command.estimate is not None:
+            self.note_estimate(actuator_command.estimate)
+        self.wheels.check_driven(actuator_command.wheel_torque_demand_Nm)
+        if (torques := driver_command.wheel_torques) is not None:
+            self.wheels.apply(torques)
+        else:
+            check_gear(driver_command.gear)
+        if not native_step.step(self._address, self.rows.commands.ctypes.data, torques is not None, *self._sensed_at):
             self.check()
-        return new_message(Measurement, measurement), new_message(Motion, motion)
+        return self._said()
 
     def record_on(self, tape: Tape | None) -> None:
         """Record the following steps on a tape. None stops recording.
@@ -340,9 +329,12 @@ class Vehicle(Uncopyable):
 
     def truth(self) -> tuple[Measurement, Motion]:
         """Return the signals of ideal sensors, and `motion`."""
-        sane, measurement, motion = native_step.sense(self._address)
-        if not sane:
+        if not native_step.sense(self._address, *self._sensed_at):
             self.check()
+        return self._said()
+
+    def _said(self) -> tuple[Measurement, Motion]:
+        measurement, motion = self._sensed.item()
         return new_message(Measurement, measurement), new_message(Motion, motion)
 
     def check(self) -> None:
@@ -372,20 +364,15 @@ class Vehicle(Uncopyable):
             ParameterError: `estimate` is not an `Estimate` of numbers.
         """
         numbers = np.zeros(len(Estimate._fields))
-        try:
-            write_estimate(numbers.data, 0, *Estimate(*estimate))
-        except Exception as reason:
-            problem = f"is {shown(estimate)}; an Estimate is needed"
-            raise ParameterError(problem, key="estimate", value=estimate) from reason
-        self.rows.estimate = numbers
-        self._estimate_memory = self.rows.estimate.data
+        _write_estimate(numbers.data, estimate)
+        self.rows.estimate, self._estimate_memory = numbers, numbers.data
         record_from(self._bindings, self.rows.live())
         self.channels.add_estimate()
 
     def note_estimate(self, estimate: Estimate) -> None:
         """Record an estimate from the next step on, if estimates are recorded (see `record_estimate`)."""
         if self._estimate_memory is not None:
-            write_estimate(self._estimate_memory, 0, *estimate)
+            _write_estimate(self._estimate_memory, estimate)
 
     def save_state(self) -> NDArray[np.float64]:
         """Return the state of engine, brakes, motors, sensors and gear, from which a run continues bit-identically."""
@@ -507,6 +494,13 @@ class Vehicle(Uncopyable):
         return tuple(self.model.body(index).name for index in range(1, self.model.nbody))
 
 
+def _write_estimate(memory: memoryview, estimate: Estimate) -> None:
+    try:
+        write_estimate(memory, 0, *Estimate(*estimate))
+    except Exception as reason:
+        raise ParameterError(f"is {shown(estimate)}; an Estimate is needed", key="estimate", value=estimate) from reason
+
+
 def _raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Array, speed_mps: float) -> None:
     """Look for warnings of the engine and for values that are not finite, commands first."""
     for name in CARRIED_OUT:
@@ -540,16 +534,3 @@ def check_gear(gear: Any) -> None:
     """Raise a `ParameterError` for a gear that the car does not have."""
     if gear not in _GEARS:
         raise ParameterError(f"is {shown(gear)}; -1, 0 or 1 is needed", key="gear", value=gear, allowed=_GEARS)
-
-
-def _refused(driver_command: object, actuator_command: object, reason: Exception | None = None) -> ActiveSteerError:
-    """The error for commands that the vehicle cannot carry out."""
-    if isinstance(reason, ActiveSteerError):
-        return reason
-    for key, given, kind in (
-        ("driver_command", driver_command, DriverCommand),
-        ("actuator_command", actuator_command, ActuatorCommand),
-    ):
-        if type(given) is not kind or len(given) != len(kind._fields):
-            return ParameterError(f"is {shown(given)}; a complete {kind.__name__} is needed", key=key, value=given)
-    return ParameterError(f"cannot carry out {shown(driver_command)} and {shown(actuator_command)}: {reason}")

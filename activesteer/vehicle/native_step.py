@@ -12,10 +12,10 @@ from typing import Final
 from numba import carray, from_dtype, types
 
 from activesteer.core.conventions import CORNERS
-from activesteer.core.signals import Measurement, Motion
+from activesteer.core.signals import Motion
 from activesteer.native.compilation import compiled_call, inlined
-from activesteer.native.memory import f64_pointer, load_numbers, native_type, pointer_to
-from activesteer.sensors.block import AX, CHAIN, WHEEL_SPEEDS, measured
+from activesteer.native.memory import f64_pointer, measurement_pointer, message_pointer, pointer_to
+from activesteer.sensors.block import AX, CHAIN, MEASURED, WHEEL_SPEEDS, measure
 from activesteer.vehicle.brakes.brake_control_unit import step_brakes
 from activesteer.vehicle.brakes.records import BRAKE_SETUP, BRAKE_STATE
 from activesteer.vehicle.channels.native_channels import ENGINE_ARRAYS
@@ -25,10 +25,8 @@ from activesteer.vehicle.native_implicit import advance, implicit_plan_pointer
 from activesteer.vehicle.parameters import CLUTCH_OPEN
 from activesteer.vehicle.statics import YAW_DOF
 from activesteer.vehicle.step_bindings import (
-    ACTUATOR_COMMAND,
     BRAKES,
     COMMAND_ROW,
-    DRIVER_COMMAND,
     ENGINE,
     MOTOR,
     N_SOURCES,
@@ -36,13 +34,13 @@ from activesteer.vehicle.step_bindings import (
     STEP_BINDINGS,
     TAPE,
     TORQUES,
-    write_commands,
 )
 
 FASTEST_MPS: Final = 200.0
 """No car of this package drives faster. A run with a higher speed, or a speed that is NaN, has diverged [m/s]."""
 
 _N_WHEELS: Final = len(CORNERS)
+_N_MEASURED: Final = len(MEASURED)
 _ENGINE_ARRAYS: Final = len(ENGINE_ARRAYS)
 """Number of the engine's arrays, which come first in a row."""
 _EXPONENT: Final = 0x7FF0000000000000
@@ -56,6 +54,7 @@ _setup_pointer: Final = pointer_to(from_dtype(BRAKE_SETUP))
 _state_pointer: Final = pointer_to(from_dtype(BRAKE_STATE))
 _bits_pointer: Final = pointer_to(types.int64)
 _counter_pointer: Final = pointer_to(types.int32)
+_motion_pointer: Final = message_pointer(Motion)
 
 
 @inlined
@@ -68,8 +67,8 @@ def _all_finite(address, size):
 
 
 @inlined
-def _sense(bindings):
-    """Return whether the state is sane, and the fields of `Measurement` and of `Motion`."""
+def _sense(bindings, measurement_address, motion_address):
+    """Write the numbers of the true `Measurement` and of `Motion`, and return whether the state is sane."""
     s = carray(f64_pointer(bindings.sensordata), (bindings.sizes[0],))
     yaw_rate = carray(f64_pointer(bindings.qvel), (bindings.n_dofs,))[YAW_DOF]
     speed = s[bindings.velocimeter]
@@ -89,34 +88,21 @@ def _sense(bindings):
     cos, sin = math.cos(yaw), math.sin(yaw)
     east, north = s[bindings.velocity], s[bindings.velocity + 1]
     pressure_Pa = carray(_state_pointer(bindings.brake_state), (1,))[0].pressure_Pa
-    return (
-        sane,
-        (
-            carray(f64_pointer(bindings.time), (1,))[0],
-            speed,
-            yaw_rate,
-            s[bindings.accelerometer + 1],
-            s[bindings.accelerometer],
-            s[bindings.steering_wheel_angle],
-            0.5 * (s[bindings.rear_left_angle] + s[bindings.rear_right_angle]),
-            s[bindings.superposition_angle] / bindings.ratio,
-            (
-                s[bindings.wheel_speed],
-                s[bindings.wheel_speed + 1],
-                s[bindings.wheel_speed + 2],
-                s[bindings.wheel_speed + 3],
-            ),
-            (pressure_Pa[0], pressure_Pa[1], pressure_Pa[2], pressure_Pa[3]),
-        ),
-        (
-            s[bindings.position],
-            s[bindings.position + 1],
-            yaw,
-            cos * east + sin * north,
-            cos * north - sin * east,
-            yaw_rate,
-        ),
-    )
+    truth = carray(measurement_pointer(measurement_address), (1,))[0]
+    truth.time_s = carray(f64_pointer(bindings.time), (1,))[0]
+    truth.speed_mps, truth.yaw_rate_radps = speed, yaw_rate
+    truth.ax_mps2, truth.ay_mps2 = s[bindings.accelerometer], s[bindings.accelerometer + 1]
+    truth.steering_wheel_rad = s[bindings.steering_wheel_angle]
+    truth.rear_steer_rad = 0.5 * (s[bindings.rear_left_angle] + s[bindings.rear_right_angle])
+    truth.superposition_rad = s[bindings.superposition_angle] / bindings.ratio
+    for wheel in range(_N_WHEELS):
+        truth.wheel_speed_radps[wheel] = s[bindings.wheel_speed + wheel]
+        truth.brake_pressure_Pa[wheel] = pressure_Pa[wheel]
+    motion = carray(_motion_pointer(motion_address), (1,))[0]
+    motion.x_m, motion.y_m = s[bindings.position], s[bindings.position + 1]
+    motion.yaw_rad, motion.yaw_rate_radps = yaw, yaw_rate
+    motion.speed_mps, motion.lateral_speed_mps = cos * east + sin * north, cos * north - sin * east
+    return sane
 
 
 @inlined
@@ -164,13 +150,10 @@ def _with_grip(setup, state, wheel, torque_Nm):
     return torque_Nm * min(max(2.0 - excess_mps / setup.spin_mps, 0.0), 1.0)
 
 
-_SENSED: Final = types.Tuple([types.boolean, native_type(Measurement), native_type(Motion)])
-
-
-@compiled_call(_SENSED, types.intp)
-def sense(bindings_address):
-    """Read the ideal sensors."""
-    return _sense(carray(_bindings_pointer(bindings_address), (1,))[0])
+@compiled_call(types.boolean, types.intp, types.intp, types.intp)
+def sense(bindings_address, measurement_address, motion_address):
+    """Read the ideal sensors, called from Python (see `_sense`)."""
+    return _sense(carray(_bindings_pointer(bindings_address), (1,))[0], measurement_address, motion_address)
 
 
 @compiled_call(types.void, types.intp, types.float64)
@@ -231,36 +214,42 @@ def _set_inputs(bindings, commands_address, torques_set):
 
 
 @inlined
-def carry_out(bindings_address, driver_command, actuator_command, torques_set):
+def carry_out(bindings_address, commands_address, torques_set, measurement_address, motion_address):
     """Carry out the commands, advance the engine by one step, record it and read the sensors.
 
-    The commands stay in the first recorded array after the engine's. The step is recorded on the tape of the bindings,
-    unless the state is not sane.
+    The numbers of the commands (`COMMAND_ROW`) are copied into the first recorded array after the engine's; those of
+    measurement and motion are written. The step is recorded on the tape of the bindings, unless the state is not sane.
+    Returns whether it is.
     """
     bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
-    commands_address = bindings.sources[_ENGINE_ARRAYS]
-    write_commands(commands_address, driver_command, actuator_command)
-    _set_inputs(bindings, commands_address, torques_set)
+    row_address = bindings.sources[_ENGINE_ARRAYS]
+    _copy(commands_address, row_address, bindings.sizes[_ENGINE_ARRAYS])
+    _set_inputs(bindings, row_address, torques_set)
     advance(carray(implicit_plan_pointer(bindings.implicit), (1,))[0])
     keep_demands(bindings.faults, bindings.n_faults)
-    sane, truth, motion = _sense(bindings)
+    sane = _sense(bindings, measurement_address, motion_address)
     if bindings.tape != 0 and sane:
         _record(bindings, carray(_tape_pointer(bindings.tape), (1,))[0])
     if bindings.n_sensors == 0:
-        return sane, truth, motion
+        return sane
     chains = carray(_chain_pointer(bindings.sensors), (bindings.n_sensors,))
     memory = carray(f64_pointer(bindings.sensor_memory), (bindings.sensor_memory_size,))
-    read = measured(chains, memory, bindings.wheel_radii_m, bindings.timestep_s, truth)
-    if bindings.n_faults != 0:
-        misread(bindings.faults, bindings.n_faults, memory)
-        read = read[:1] + load_numbers(memory.ctypes.data, read[1:])
-    return sane, read, motion
+    # The first number of a measurement is its time.
+    _copy(measurement_address + 8, bindings.sensor_memory, _N_MEASURED)
+    measure(chains, memory, bindings.wheel_radii_m, bindings.timestep_s)
+    misread(bindings.faults, bindings.n_faults, memory)
+    _copy(bindings.sensor_memory, measurement_address + 8, _N_MEASURED)
+    return sane
 
 
-@compiled_call(_SENSED, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND, types.boolean)
-def step(bindings_address, driver_command, actuator_command, torques_set):
-    """Make one step, called from Python (see `carry_out`)."""
-    return carry_out(bindings_address, driver_command, actuator_command, torques_set)
+STEP: Final = (types.intp, types.intp, types.boolean, types.intp, types.intp)
+"""Types of the arguments of `step`."""
+
+
+@compiled_call(types.boolean, *STEP)
+def step(bindings_address, commands_address, torques_set, measurement_address, motion_address):
+    """Make one step (see `carry_out`)."""
+    return carry_out(bindings_address, commands_address, torques_set, measurement_address, motion_address)
 
 
 @compiled_call(types.void, types.intp, types.Array(types.float64, 2, "C"))

@@ -17,7 +17,7 @@ from activesteer.core.conventions import CORNERS, Array
 from activesteer.core.signals import ActuatorCommand, Channel, DriverCommand, Estimate, Number, WheelTorques, numbers_of
 from activesteer.core.units import ESTIMATED
 from activesteer.errors import ParameterError, shown
-from activesteer.native.compilation import compiled_call, inlined
+from activesteer.native.compilation import compiled_call
 from activesteer.native.memory import native_type, store_numbers
 from activesteer.native.records import numbers_type
 from activesteer.sensors.block import SensorBlock
@@ -179,8 +179,6 @@ BRAKES: Final = COMMANDS.index("fl_brake_torque_demand_Nm")
 """Place of the brake torque of the first wheel in a row."""
 TORQUES: Final = COMMANDS.index("fl_wheel_torque_demand_Nm")
 """Place of the additional drive torque of the first wheel in a row."""
-DRIVER_COMMAND, ACTUATOR_COMMAND = native_type(DriverCommand), native_type(ActuatorCommand)
-"""The commands as compiled code takes them from Python."""
 ESTIMATE_CHANNELS: Final = tuple(
     Channel(f"{ESTIMATED}_{number.name}", about.unit, f"{about.meaning}, estimated by the controller", "control")
     for number in numbers_of(Estimate)
@@ -193,19 +191,12 @@ _SIZE_DRIVER: Final = 8 * len(numbers_of(DriverCommand))
 """Bytes of a row that hold the driver's command."""
 
 
-@inlined
-def write_commands(address, driver_command, actuator_command):
-    """Write a row."""
-    store_numbers(address, driver_command)
-    store_numbers(address + _SIZE_DRIVER, actuator_command)
-
-
-@compiled_call(types.void, types.intp, DRIVER_COMMAND, others_run=False)
+@compiled_call(types.void, types.intp, native_type(DriverCommand), others_run=False)
 def _write_driver_command(address, command):
     store_numbers(address, command)
 
 
-@compiled_call(types.void, types.intp, ACTUATOR_COMMAND, others_run=False)
+@compiled_call(types.void, types.intp, native_type(ActuatorCommand), others_run=False)
 def _write_actuator_command(address, command):
     store_numbers(address, command)
 
@@ -228,10 +219,10 @@ def write_command(kind: type[Any], address: int, command: Any) -> None:
         raise ParameterError(f"cannot carry out {shown(command)}: {reason}", key=key, value=command) from reason
 
 
-@compiled_call(types.void, types.intp, DRIVER_COMMAND, ACTUATOR_COMMAND)
-def write_commands_at(address, driver_command, actuator_command):
-    """Write a row, called from Python (see `write_commands`)."""
-    write_commands(address, driver_command, actuator_command)
+def write_commands(row: Array, driver_command: Any, actuator_command: Any) -> None:
+    """Write the numbers of both commands into a row (see `write_command`)."""
+    write_command(DriverCommand, row.ctypes.data, driver_command)
+    write_command(ActuatorCommand, row.ctypes.data + _SIZE_DRIVER, actuator_command)
 
 
 def engine_arrays(data: mujoco.MjData) -> dict[str, Array]:
@@ -267,7 +258,7 @@ class RecordedArrays:
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)
-        write_commands_at(commands.ctypes.data, driver_command, actuator_command)
+        write_commands(commands, driver_command, actuator_command)
         return RawRows(*(array[np.newaxis] for array in self._of(now, commands)))
 
     def _of(self, data: mujoco.MjData, commands: Array) -> RawRows:

@@ -10,10 +10,10 @@ from typing import Final
 
 from numba import carray, from_dtype, types
 
-from activesteer.core.signals import ActuatorCommand, DriverCommand, numbers_of
+from activesteer.core.signals import Measurement, numbers_of
 from activesteer.coupling.car.variables import PLACE_GROUPS, PLACES
 from activesteer.native.compilation import compiled_callback
-from activesteer.native.memory import f64_pointer, load_numbers, pointer_to, store_numbers, word_pointer, zeros_of
+from activesteer.native.memory import f64_pointer, pointer_to, word_pointer
 from activesteer.vehicle.channels.corners import angle_sides, in_the_road_plane, sideslip_share
 from activesteer.vehicle.channels.native_channels import (
     Actuator,
@@ -28,18 +28,15 @@ from activesteer.vehicle.native_step import carry_out
 
 _BYTES: Final = 8
 
-
-_DRIVER, _ACTUATOR = zeros_of(DriverCommand), zeros_of(ActuatorCommand)
-_DRIVER_BYTES: Final = _BYTES * len(numbers_of(DriverCommand))
+_MEASUREMENT_BYTES: Final = _BYTES * len(numbers_of(Measurement))
 
 
 @compiled_callback(types.void, types.intp, types.intp, types.intp, types.intp)
 def car_step(bindings, commands, torques_set, out):
-    """Make one step of the car."""
-    driver = load_numbers(commands, _DRIVER)
-    actuator = load_numbers(commands + _DRIVER_BYTES, _ACTUATOR)
-    sane, measurement, motion = carry_out(bindings, driver, actuator, torques_set != 0)
-    store_numbers(out, (1.0 if sane else 0.0, measurement, motion))
+    """Make one step of the car, and write whether it is sane, the measurement and the motion."""
+    measurement = out + _BYTES
+    sane = carry_out(bindings, commands, torques_set != 0, measurement, measurement + _MEASUREMENT_BYTES)
+    f64_pointer(out)[0] = 1.0 if sane else 0.0
 
 
 _ORIENTATION, _VELOCITY, _ACCELERATION, _RATES, _AXES, _HEIGHTS, _REAR, _SUPERPOSITION = (

@@ -11,7 +11,7 @@ from activesteer.config import Source, build
 from activesteer.core.signals import Measurement
 from activesteer.native.compilation import compiled
 from activesteer.sensors import SensorBlock, Sensors
-from activesteer.sensors.block import measured
+from activesteer.sensors.block import measure
 
 Values = NDArray[np.float64]
 STANDING: Final = Measurement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
@@ -31,10 +31,8 @@ PLACES: Final = {
 @compiled
 def _shown(chains, memory, wheel_radii_m, timestep_s, truth, said):
     for row in range(len(truth)):
-        t = truth[row]
-        scalars = (0.0, t[0], t[1], t[2], t[3], t[4], t[5], t[6])
-        members = (*scalars, (t[7], t[8], t[9], t[10]), (t[11], t[12], t[13], t[14]))
-        measured(chains, memory, wheel_radii_m, timestep_s, members)
+        memory[: said.shape[1]] = truth[row]
+        measure(chains, memory, wheel_radii_m, timestep_s)
         said[row] = memory[: said.shape[1]]
 
 
