@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import mujoco
-from numba import carray, types
+from numba import carray, config, types
 
 from activesteer.errors import ModelError
 from activesteer.native.compilation import compiled_callback, inlined
@@ -383,6 +383,11 @@ _SLOTS: Final = (
 
 
 def _install() -> None:
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+        raise ModelError(
+            "NUMBA_DISABLE_JIT is set, and a car needs compiled code; without it only kernels such as those of "
+            "activesteer.tyre.kernels can be called"
+        )
     present = [get() for _, get, _ in _SLOTS]
     for (name, *_), other in zip(_SLOTS, present, strict=True):
         if other is not None and not any(other is ours for ours in _installed):

@@ -179,6 +179,16 @@ def test_compiling_needs_no_linear_algebra_and_leaves_it_to_those_who_do() -> No
     assert _run(code, _PACKAGE.parent) == ("True", "")
 
 
+def test_a_run_without_compiled_code_ends_with_one_error() -> None:
+    result = subprocess.run(
+        [sys.executable, "-m", "activesteer.commands.cli", "run", "straight_line"],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert result.returncode == 1
+    assert "Traceback" not in result.stderr
+    assert "NUMBA_DISABLE_JIT is set" in result.stderr.splitlines()[-1]
+
+
 def test_all_native_code_of_the_package_is_made_in_one_place() -> None:
     words = re.compile(r"\b(njit|jit|cfunc|guvectorize|vectorize)\b")
     found = [file for file in _PACKAGE.rglob("*.py") if words.search(file.read_text())]
