@@ -181,7 +181,7 @@ def test_compiling_needs_no_linear_algebra_and_leaves_it_to_those_who_do() -> No
 
 def test_a_run_without_compiled_code_ends_with_one_error() -> None:
     result = subprocess.run(
-        [sys.executable, "-m", "activesteer.commands.cli", "run", "straight_line"],
+        [sys.executable, "-c", "from activesteer.commands.cli import main; exit(main(['run', 'straight_line']))"],
         env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert result.returncode == 1
