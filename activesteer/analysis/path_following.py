@@ -81,7 +81,7 @@ def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
     values |= _places(recording, course)
     if maneuver_kind(recording) == "slalom":
         values |= _slalom(recording, course)
-    use = np.array([recording[f"{corner}_friction_utilisation"] for corner in CORNERS], dtype=np.float64)
+    use = np.array([recording[f"{corner}_friction_utilisation"] for corner in CORNERS])
     values["friction_utilisation_max"], values["friction_utilisation_mean"] = float(use.max()), float(use.mean())
     speed = recording["speed_mps"]
     values["speed_loss_mps"] = float(speed[0] - speed.min())

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any, Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.core.conventions import Array
 from activesteer.errors import RecordingError
 from activesteer.road.course import Course, Footprint, course_of, footprint_of
 
@@ -16,7 +16,7 @@ class RecordingLike(Protocol):
     """A recorded run. `activesteer.recording.Recording` is one."""
 
     @property
-    def time_s(self) -> NDArray[np.float64]:
+    def time_s(self) -> Array:
         """Time of the samples [s], ascending, shape (n,)."""
         ...
 
@@ -25,7 +25,7 @@ class RecordingLike(Protocol):
         """Description of the run, with `maneuver.kind`."""
         ...
 
-    def __getitem__(self, name: str, /) -> NDArray[Any]:
+    def __getitem__(self, name: str, /) -> Array:
         """Return a channel over `time_s`, shape (n,)."""
         ...
 
@@ -40,7 +40,7 @@ class Evaluable:
         self._recording = recording
         self.time_s, self.metadata = recording.time_s, recording.metadata
 
-    def __getitem__(self, name: str, /) -> NDArray[Any]:
+    def __getitem__(self, name: str, /) -> Array:
         """Return a channel over time, shape (n,)."""
         values = self._recording[name]
         usable = np.abs(values) <= _MAX_VALUE

@@ -60,7 +60,7 @@ def _pairs(measured: Recording, simulated: Recording, names: tuple[str, ...]) ->
     for name in names:
         if name not in measured or name not in simulated:
             continue
-        one, other = (np.asarray(run[name], np.float64) for run in (measured, simulated))
+        one, other = measured[name], simulated[name]
         size, mean = float(other.std()), float(other.mean())
         if size > 1e-9 and float(one.std()) > 1e-9:
             pairs.append(((one - mean) / size, (other - mean) / size))
@@ -130,7 +130,7 @@ def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[A
     # What a low-pass filter at a quarter of the sampling rate or lower removes is taken for noise: its median absolute
     # deviation, which the short edges of a manoeuvre do not move. The noise is assumed white: below the cut-off
     # frequency it is as dense as above. A signal that the logger has filtered already shows no noise.
-    values = np.asarray(recording[channel], np.float64)
+    values = recording[channel]
     step_s = float(np.median(np.diff(recording.time_s)))
     nyquist_Hz = 0.5 / step_s
     split_Hz = min(chosen.of(channel) if chosen else math.inf, 0.5 * nyquist_Hz)

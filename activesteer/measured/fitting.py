@@ -106,13 +106,13 @@ def measured_of(
             )
     if not len(recording):
         raise RecordingError("has no rows", file=f"{name}.mcap")
-    begin_s = float(recording.time_s[0])
-    time_s = np.asarray(recording.time_s, np.float64)
+    time_s = recording.time_s
+    begin_s = float(time_s[0])
     # The last row of a run is one step before its end.
     from_s, until_s = table.windows.get(name, (table.from_s, table.until_s))
     begin, end = -math.inf if from_s is None else from_s, math.inf if until_s is None else until_s
     inside = (time_s >= begin) & (time_s <= min(end, time_s[-1] - study.timestep_s))
-    values = {channel: np.asarray(recording[channel], np.float64)[inside] for channel in channels}
+    values = {channel: recording[channel][inside] for channel in channels}
     for channel, each in values.items():
         if np.count_nonzero(np.isfinite(each)) < _FEWEST:
             raise RecordingError(

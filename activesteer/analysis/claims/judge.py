@@ -253,7 +253,7 @@ def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics,
             values[delay] = math.nan
             if whole:
                 steady, begin_s = metrics["none"][f"{name}_steady_state_{unit}"], own["step_time_s"]
-                time_s = np.asarray(recordings[system].time_s, dtype=np.float64)
+                time_s = recordings[system].time_s
                 moving = math.copysign(1.0, steady) * smooth(recordings[system][f"{name}_{unit}"], timestep(time_s))
                 after = time_s >= begin_s
                 values[delay] = crossing_time(time_s[after], moving[after], LEVEL * abs(steady)) - begin_s
@@ -268,9 +268,9 @@ def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole:
     ars, afs = recordings["ars"], recordings["afs"]
     times = sine_with_dwell.steering(ars)
     later_s = sine_with_dwell.steering(afs).begin_s - times.begin_s
-    time_s = np.asarray(ars.time_s, dtype=np.float64)
+    time_s = ars.time_s
     wanted = (time_s >= times.reversal_s) & (time_s <= times.completion_s + sine_with_dwell.INSTANTS_S[-1])
-    rear = np.asarray(ars["rear_steer_demand_rad"], dtype=np.float64)[wanted]
+    rear = ars["rear_steer_demand_rad"][wanted]
     front = np.interp(time_s[wanted] + later_s, afs.time_s, afs["superposition_demand_rad"])
     both = (np.abs(rear) > MIN_ANGLE_RAD) & (np.abs(front) > MIN_ANGLE_RAD)
     scale = float(np.sqrt(np.sum(rear**2) * np.sum(front**2)))
