@@ -1,4 +1,4 @@
-"""Result of a fit, and its page."""
+"""Result of a fit: intervals of its parameters, and warnings."""
 
 from __future__ import annotations
 
@@ -27,9 +27,6 @@ _TOO_LITTLE: Final = 0.5
 standard deviation would be twice the range."""
 
 
-Intervals = tuple[Array, Array, tuple[float, ...], float]
-
-
 def autocorrelation_time(values: Array) -> float:
     """Return the number of neighbouring samples that are worth one independent sample, or 1 for white noise.
 
@@ -49,7 +46,9 @@ def autocorrelation_time(values: Array) -> float:
     return min(max(time, 1.0), float(count))
 
 
-def intervals(series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool) -> Intervals:
+def intervals(
+    series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool
+) -> tuple[Array, Array, tuple[float, ...], float]:
     """Return the uncertainty of the parameters, relative to their ranges, in the linear neighbourhood of the solution.
 
     That is half of each interval, shape (p,), and correlations of the errors, shape (p, p), both nan for a parameter at

@@ -155,60 +155,49 @@ def search(
     """Minimise the sum of squares of all differences (trust region reflective, SciPy)."""
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
-    rounds: dict[bytes, tuple[list[Array], list[Array]] | None] = {}
+    rounds: dict[bytes, tuple[list[Array], list[Array]] | str] = {}
 
-    def tried(place: Array) -> tuple[list[Array], list[Array]] | None:
-        """Return differences and derivatives, or None if the parameters cannot be driven."""
+    def tried(place: Array) -> tuple[list[Array], list[Array]] | str:
+        """Return differences and derivatives, or the reason why the parameters cannot be driven."""
         name = place.tobytes()
         if name not in rounds:
-            rounds[name] = _tried(answers, place, first=not rounds)
-            if len(rounds) == 1:
-                check(rounds[name][1])  # type: ignore[index] - the first one is there, or an error was raised
+            rounds[name] = _tried(answers, place)
         return rounds[name]
 
     def differences(place: Array) -> Array:
         found = tried(place)
         # The search shortens its step if a value is not finite.
-        return np.full(size, np.nan) if found is None else np.concatenate(found[0])
-
-    def slopes(place: Array) -> Array:
-        found = tried(place)
-        assert found is not None
-        return np.concatenate(found[1])
+        return np.full(size, np.nan) if isinstance(found, str) else np.concatenate(found[0])
 
     # Away from the ends of a range, so that the search can step to both sides.
     start = np.clip(start, STEP, 1.0 - STEP)
     begun = tried(start)
-    assert begun is not None
+    if isinstance(begun, str):
+        raise StudyError(f"the car cannot be driven at the start of the search: {begun}", value=begun)
+    check(begun[1])
     size = sum(map(len, begun[0]))
-    derivatives, unused = cast(Any, slopes), cast(Any, None)  # SciPy declares no types for them
+    # SciPy asks for derivatives at drivable parameters only. It declares no types for them.
+    derivatives, unused = cast(Any, lambda place: np.concatenate(tried(place)[1])), cast(Any, None)
     found = least_squares(
         differences, start, derivatives, (0.0, 1.0), xtol=_SETTLED, ftol=_LESS, gtol=unused, max_nfev=_MOST_ROUNDS
     )
     last = tried(found.x)
-    assert last is not None
+    assert not isinstance(last, str)
     return Found(found.x, begun[0], *last, len(rounds), found.status > 0)
 
 
-def _tried(
-    answers: Callable[[list[Array]], Sequence[Answer]], place: Array, *, first: bool
-) -> tuple[list[Array], list[Array]] | None:
+def _tried(answers: Callable[[list[Array]], Sequence[Answer]], place: Array) -> tuple[list[Array], list[Array]] | str:
     steps = np.where(place + STEP > 1.0, -STEP, STEP)
     here, *there = answers([place, *(place + step for step in np.diag(steps))])
     if isinstance(here, str):
-        if first:
-            raise StudyError(f"the car cannot be driven at the start of the search: {here}", value=here)
-        return None
-    sides: list[list[Array]] = []
-    for beside in there:
+        return here
+    slopes: list[list[Array]] = [[] for _ in here]
+    for beside, step in zip(there, steps, strict=True):
         if isinstance(beside, str):
             raise StudyError(f"the car cannot be driven beside drivable parameters: {beside}")
-        sides.append(beside)
-    slopes = [
-        np.column_stack([(side[number] - series) / step for side, step in zip(sides, steps, strict=True)])
-        for number, series in enumerate(here)
-    ]
-    return here, slopes
+        for columns, side, series in zip(slopes, beside, here, strict=True):
+            columns.append((side - series) / step)
+    return here, [np.column_stack(columns) for columns in slopes]
 
 
 SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
@@ -262,7 +251,6 @@ class _Problem:
         self._plan = Plan(self._study)
         self._values = FactorValues(self._study)
         self._table = table
-        self._factors = study.factors
         self._low, self._high = (np.array([getattr(each, end) for each in study.factors]) for end in ("low", "high"))
         self.settings: Settings = self._plan.settings
         self.start = self._unit([_start(factor, table, first, study) for factor in study.factors])
@@ -339,7 +327,7 @@ class _Problem:
         values, start = self._factor_values(found.place), self._factor_values(self.start)
         parameters = tuple(
             Parameter(factor.key, values[factor.key], float(half), start[factor.key], factor.low, factor.high)
-            for factor, half in zip(self._factors, (self._high - self._low) * half_widths, strict=True)
+            for factor, half in zip(self._study.factors, (self._high - self._low) * half_widths, strict=True)
         )
         places = [(measured, name) for measured in self._measured for name in self._noise]
         compared = []
@@ -353,7 +341,7 @@ class _Problem:
                     measured.channels[name][kept], before, after, independent,
                 )
             )  # fmt: skip
-        everywhere = {factor.key for factor in self._factors if not factor.maneuvers}
+        everywhere = {factor.key for factor in self._study.factors if not factor.maneuvers}
         overrides = [self._values.overrides(number, 0, values) for number in range(len(self._measured))]
         made = Fit(
             parameters, correlations, tuple(compared), self._table.intervals, freedom, _misfit(found.after),
