@@ -28,9 +28,10 @@ from numpy.typing import NDArray
 
 from activesteer.analysis import braking, frequency_response, handling, path_following, sine_with_dwell, step_response
 from activesteer.analysis.series import Array, peak, sizes
-from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
+from activesteer.analysis.source import Evaluable, RecordingLike
 from activesteer.config import read_toml
 from activesteer.core.conventions import CORNERS
+from activesteer.core.limits import table_of, text
 from activesteer.core.metric_table import metric
 from activesteer.errors import RecordingError, nearest_names
 from activesteer.road.road import road_of
@@ -208,7 +209,7 @@ KEY_FIGURES: Final = {title: tuple(metrics) for title, metrics in _TABLE["key_fi
 
 def evaluated_kind(recording: RecordingLike) -> str:
     """Return the kind of a run's manoeuvre, which must have an evaluation."""
-    kind = maneuver_kind(recording)
+    kind = text(table_of(recording.metadata.get("maneuver"), "maneuver").get("kind"), "maneuver.kind")
     if kind not in EVALUATIONS:
         raise RecordingError(
             f"there is no evaluation for the kind {kind!r}; {nearest_names(kind, EVALUATIONS)}",

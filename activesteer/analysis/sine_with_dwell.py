@@ -16,7 +16,6 @@ Source: 49 CFR 571.126 (FMVSS 126), S5.2 and S7.11; UN Regulation 140.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -31,7 +30,7 @@ from activesteer.analysis.series import (
     timestep,
     zeroing_range,
 )
-from activesteer.analysis.source import RecordingLike
+from activesteer.analysis.source import RecordingLike, entry
 from activesteer.errors import RecordingError
 from activesteer.recording.contents import events_of
 
@@ -98,8 +97,7 @@ def steering(recording: RecordingLike) -> Steering:
 
 def marks(recording: RecordingLike) -> list[tuple[float, str]]:
     """Return the times that plots over time mark, with their words: instants of the criterion, or phases that begin."""
-    maneuver = recording.metadata.get("maneuver")
-    if not isinstance(maneuver, Mapping) or maneuver.get("kind") != "sine_with_dwell":
+    if entry(recording, "maneuver", "kind") != "sine_with_dwell":
         return [(event.time_s, event.what) for event in events_of(recording.metadata) if event.kind == "phase"]
     try:
         completion_s = steering(recording).completion_s
