@@ -170,15 +170,13 @@ def _unit_words(ratio: float) -> list[str]:
             guesses.append((sum(map(abs, powers)), abs(math.log(ratio / would)), powers))
     if not guesses:
         return [f"ay_mps2 is {ratio:.2g} times speed x yaw rate, nearly 1 in a car: a unit of the three is wrong"]
-    return [_unit_word(name, power) for power, name in zip(min(guesses)[2], _MISTAKES, strict=True) if power]
-
-
-def _unit_word(name: str, power: int) -> str:
-    size, wrong, right = _MISTAKES[name]
-    if power < 0:
-        size, wrong, right = 1.0 / size, right, wrong
-    times = f"{size:.2g} times too large" if size > 1.0 else f"{1.0 / size:.2g} times too small"
-    return f"{name} is {times}: it looks like {wrong} that were taken as {right}"
+    found = []
+    for power, (name, (size, wrong, right)) in zip(min(guesses)[2], _MISTAKES.items(), strict=True):
+        factor = size**power
+        times = f"{factor:.2g} times too large" if factor > 1.0 else f"{1.0 / factor:.2g} times too small"
+        taken = f"{wrong} that were taken as {right}" if power > 0 else f"{right} that were taken as {wrong}"
+        found += [f"{name} is {times}: it looks like {taken}"] if power else []
+    return found
 
 
 def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:

@@ -12,7 +12,7 @@ import functools
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
@@ -127,8 +127,11 @@ class Scenario:
                 allowed=SYSTEMS,
             )
         cut = [system for system in SYSTEMS if _is_cut_short(recordings[system])]
-        metrics = {system: self._evaluated(recordings[system], system in cut) for system in SYSTEMS}
-        metrics[TOGETHER] = defaultdict(lambda: math.nan)
+        # Metrics that an incomplete run does not have are nan.
+        metrics: RunMetrics = {name: defaultdict(lambda: math.nan) for name in (*cut, TOGETHER)}
+        for system in SYSTEMS:
+            with suppress(RecordingError) if system in cut else nullcontext():
+                metrics.setdefault(system, {}).update(self.metrics(Evaluable(recordings[system])))
         obstacle, hindrance = obstacle_of(recordings, cut)
         try:
             for system, more in self.compared(recordings, metrics, not cut).items():
@@ -136,15 +139,6 @@ class Scenario:
             return [_judged(statement, metrics, obstacle, hindrance) for statement in self.statements]
         except KeyError as name:
             raise RecordingError(f"a run has no metric {name.args[0]}: its manoeuvre is of another kind") from None
-
-    def _evaluated(self, recording: RecordingLike, cut: bool) -> dict[str, float]:
-        """Return the metrics of a run. Those that an incomplete run does not have are nan."""
-        if not cut:
-            return dict(self.metrics(Evaluable(recording)))
-        found: dict[str, float] = defaultdict(lambda: math.nan)
-        with suppress(RecordingError):
-            found.update(self.metrics(Evaluable(recording)))
-        return found
 
 
 def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance: float) -> Claim:
