@@ -5,10 +5,8 @@ leakage. The response at a frequency is the cross spectrum over the spectrum of 
 neighbouring lines. The coherence is the share of the output that follows from the input by a linear system.
 
 Source: ISO 7401, Road vehicles - Lateral transient response test methods; J. S. Bendat and A. G. Piersol, Random Data
-(2010), chapter 6 (the estimate H1 and the coherence).
-
-Source: P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967) 70-73 (averaged spectra of overlapping
-segments); J. S. Bendat and A. G. Piersol, Random Data (2010), chapters 6 and 9 (the estimate H1, its random error).
+(2010), chapters 6 and 9 (the estimate H1, the coherence, the random error); P. D. Welch, IEEE Transactions on Audio and
+Electroacoustics 15 (1967) 70-73 (averaged spectra of overlapping segments).
 """
 
 from __future__ import annotations

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -17,6 +19,7 @@ from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import Group, ReportedRun, groups_of, judge
 from activesteer.analysis.source import entry
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
+from activesteer.config import leaf_keys
 from activesteer.core.files import write_text
 from activesteer.core.metric_table import Better, recorded_metric
 from activesteer.core.units import display_unit, parameter_label, typeset
@@ -151,20 +154,13 @@ def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
     for run in recordings:
         chosen = {key: run.metadata[key] for key in tables if key in run.metadata}
         one = chosen.get(tables[0])
-        flat.append(dict(_flat(one if len(tables) == 1 and isinstance(one, Mapping) else chosen)))
+        table = one if len(tables) == 1 and isinstance(one, Mapping) else chosen
+        flat.append({".".join(path): _text(path[-1], reduce(getitem, path, table)) for path in leaf_keys(table)})
     found = []
     for key in dict.fromkeys(key for entries in flat for key in entries):
         values = tuple(entries.get(key, "") for entries in flat)
         found.append(Row(key, values if len(set(values)) > 1 else values[:1]))
     return found
-
-
-def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{before}{key}.")
-        else:
-            yield f"{before}{key}", _text(key, value)
 
 
 def _text(key: str, value: Any) -> str:
