@@ -150,17 +150,17 @@ class _Case:
         notes = []
         for number, run in enumerate(file.table.runs):
             try:
-                found = import_file(
+                recording = import_file(
                     [file.folder / name for name in run.files], file.folder / run.map if run.map else None
                 )
             except RecordingError as reason:
                 raise RecordingError(
                     f"run {run.name}: {reason.problem}", file=reason.file, line=reason.line, key=reason.key
                 ) from reason
-            found.recording.save(scratch / f"{run.name}.mcap")
-            self._recordings[run.name] = found.recording
+            recording.save(scratch / f"{run.name}.mcap")
+            self._recordings[run.name] = recording
             self._keep_windows(run, number)
-            notes += [f"{run.name}: {note}" for note in found.notes]
+            notes += [f"{run.name}: {note}" for note in recording.metadata["measured"]["notes"]]
         self.notes = tuple(notes)
         self.assumptions: tuple[str, ...] = ()
 

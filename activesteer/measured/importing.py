@@ -76,14 +76,6 @@ _MOST_REPEATED: Final = 5
 """Number of repeated column names that are listed."""
 
 
-class Import(NamedTuple):
-    """Result of an import."""
-
-    recording: Recording  # the recording
-    taken: dict[str, str]  # channel -> column and unit that it comes from
-    notes: tuple[str, ...]  # assumptions that the file does not state, and suspicious values
-
-
 class _Source(NamedTuple):
     """Source of a channel."""
 
@@ -98,8 +90,12 @@ _Files = Mapping[Path, list[Column]]
 """File -> its columns."""
 
 
-def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehicle: str = "compact") -> Import:
-    """Read one or several files of measured data of one run."""
+def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehicle: str = "compact") -> Recording:
+    """Read one or several files of measured data of one run.
+
+    The table `measured` of the metadata has `columns`, channel -> column and unit that it comes from, and `notes`,
+    assumptions that the file does not state, and suspicious values.
+    """
     chosen = MeasurementMap() if map_path is None else build(MeasurementMap, *read_toml(map_path, RecordingError))
     paths = [path] if isinstance(path, Path) else list(path)
     path = paths[0]
@@ -173,7 +169,7 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
     except RecordingError as error:
         recording.metadata["metrics_error"] = str(error)
         notes.append(f"no metrics of the kind {chosen.kind}: {error}")
-    return Import(recording, taken, tuple(notes))
+    return recording
 
 
 def _found(name: str, files: _Files) -> tuple[Column, Path]:
