@@ -18,7 +18,7 @@ from activesteer.config import Range, build, field_in_unit
 from activesteer.core.conventions import Array
 from activesteer.driver import is_driver_file
 from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
-from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, notes_of, told_apart, without_effect
+from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, told_apart, without_effect
 from activesteer.measured.signals import at_sensor, by_channel
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
@@ -337,14 +337,13 @@ class _Problem:
         factors = FactorValues(self._study)
         everywhere = {factor.key for factor in self._study.factors if not factor.maneuvers}
         overrides = [factors.overrides(number, 0, values) for number in range(len(self._measured))]
-        made = Fit(
+        return Fit(
             parameters, correlations, compared, self._table.intervals, freedom, _misfit(found.after),
             found.rounds, self.runs, found.settled,
             {key: value for key, value in overrides[0].items() if key in everywhere},
             {measured.name: own for measured, each in zip(self._measured, overrides, strict=True)
              if (own := {key: value for key, value in each.items() if key not in everywhere})},
         )  # fmt: skip
-        return made._replace(notes=notes_of(made))
 
 
 def drive(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -51,10 +51,11 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Draw tracks of the front axle centre along the course. The axis names the factor that stretches y."""
-    course = read_course(drawn_runs(recordings)[0].recording)
+    drawn = drawn_runs(recordings)
+    course = read_course(drawn[0].recording)
     figure = new_figure(width_in=PAGE_IN, height_in=0.95 + _axis_height_in(course, TRACK_ASPECT))
     axis: Axes = figure.subplots()
-    _draw_tracks(axis, recordings)
+    _draw_tracks(axis, drawn, course)
     over_time.name_curves(figure, axis)
     return figure
 
@@ -66,7 +67,7 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     figure = new_figure(width_in=PAGE_IN, height_in=3.2 + 1.15 * len(panels))
     grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[2.6, *(1.0 for _ in panels)])
     above = figure.add_subplot(grid[0])
-    _draw_tracks(above, recordings)
+    _draw_tracks(above, drawn, read_course(drawn[0].recording))
     axes: list[Axes] = [figure.add_subplot(grid[1])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(2, 1 + len(panels))]
     over_time.fill_panels(axes, drawn, panels)
@@ -78,16 +79,14 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     return figure
 
 
-def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
+def _draw_tracks(axis: Axes, drawn: Sequence[DrawnRun], course: Course) -> None:
     """Draw the course, and the track of the front axle centre of every run."""
-    drawn = drawn_runs(recordings)
     for curve in drawn:
         x, y = (over_time.thinned(values) for values in lanes.front_axle(curve.recording))
         axis.plot(
             x, y, color=curve.look.colour, linewidth=over_time.LINE_PT, linestyle=curve.linestyle,
             label=curve.look.label,
         )  # fmt: skip
-    course = read_course(drawn[0].recording)
     struck = lanes.struck_cones([curve.recording for curve in drawn], course)
     _draw_course(axis, course, TRACK_ASPECT, struck)
     _draw_friction(axis, drawn[0])
