@@ -126,13 +126,13 @@ def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]
         found.append(f"yaw_rate_radps reaches {np.abs(rate).max():.0f} rad/s: it looks like deg/s")
     roll = channels.get("roll_rad")
     signed = any("sign" in line for line in found)
-    if roll is not None and ay is not None and _alike(roll, ay) < -_ALIKE and not signed:
+    if not signed and roll is not None and ay is not None and _alike(roll, ay) < -_ALIKE:
+        signed = True
         found.append(
             "roll_rad and ay_mps2 are of opposite sign: a car rolls to the outside of the turn, so roll_rad is "
             'positive to the left, or all are in axes of SAE J670 (axes = "sae_j670" in a map)'
         )
-    opposite = rate is not None and wheel is not None and _alike(wheel, rate) < -_ALIKE
-    if opposite and not any("sign" in line for line in found):
+    if not signed and rate is not None and wheel is not None and _alike(wheel, rate) < -_ALIKE:
         found.append(
             "steering_wheel_rad and yaw_rate_radps are of opposite sign: one of them is positive to the right, the "
             "steering wheel where ay_mps2 agrees with the yaw rate"
