@@ -45,13 +45,13 @@ def straight_braking_metrics(recording: RecordingLike) -> dict[str, float]:
     Raises:
         RecordingError: a channel is missing, or the brake is not pressed.
     """
-    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    time_s = recording.time_s
     pressed = recording["brake_pedal"] > 0.0
     if not pressed.any():
         raise RecordingError("the recording holds no braking: the brake is not pressed")
     begin = int(pressed.argmax())
-    speed = np.asarray(recording["speed_mps"], dtype=np.float64)
-    x, y = (np.asarray(recording[name], dtype=np.float64) for name in ("x_m", "y_m"))
+    speed = recording["speed_mps"]
+    x, y = recording["x_m"], recording["y_m"]
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
     stop = _below(speed, begin, STOPPED_MPS)
     start_mps = float(speed[begin])
@@ -91,7 +91,7 @@ def _allowed(recording: RecordingLike, way: Array, first: int, last: int) -> flo
     peaks, loads = np.zeros(last + 1 - first), np.zeros(last + 1 - first)
     for corner in CORNERS:
         fx, fy, fz, use = (
-            np.asarray(recording[f"{corner}_{name}"][part], dtype=np.float64)
+            recording[f"{corner}_{name}"][part]
             for name in ("tyre_fx_N", "tyre_fy_N", "tyre_fz_N", "friction_utilisation")
         )
         used = use > 0.0
@@ -108,7 +108,7 @@ def _largest_slip(recording: RecordingLike, speed: Array, braked: slice) -> floa
         return math.nan
     rolls, largest = max(braked.start - 1, 0), 0.0
     for corner in CORNERS:
-        spin = np.asarray(recording[f"{corner}_wheel_speed_radps"], dtype=np.float64)
+        spin = recording[f"{corner}_wheel_speed_radps"]
         radius_m = speed[rolls] / spin[rolls]
         largest = max(largest, float((1.0 - radius_m * spin[braked][fast] / speed[braked][fast]).max()))
     return largest
@@ -143,7 +143,7 @@ def brake_in_turn_metrics(recording: RecordingLike) -> dict[str, float]:
     Raises:
         RecordingError: a channel is missing, the brake is not pressed, or the car does not turn before.
     """
-    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    time_s = recording.time_s
     pressed = recording["brake_pedal"] > 0.0
     if not pressed.any() or time_s[int(pressed.argmax())] - time_s[0] < BEFORE_S:
         raise RecordingError(

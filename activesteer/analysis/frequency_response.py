@@ -5,10 +5,8 @@ leakage. The response at a frequency is the cross spectrum over the spectrum of 
 neighbouring lines. The coherence is the share of the output that follows from the input by a linear system.
 
 Source: ISO 7401, Road vehicles - Lateral transient response test methods; J. S. Bendat and A. G. Piersol, Random Data
-(2010), chapter 6 (the estimate H1 and the coherence).
-
-Source: P. D. Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967) 70-73 (averaged spectra of overlapping
-segments); J. S. Bendat and A. G. Piersol, Random Data (2010), chapters 6 and 9 (the estimate H1, its random error).
+(2010), chapters 6 and 9 (the estimate H1, the coherence, the random error); P. D. Welch, IEEE Transactions on Audio and
+Electroacoustics 15 (1967) 70-73 (averaged spectra of overlapping segments).
 """
 
 from __future__ import annotations
@@ -39,7 +37,7 @@ HIGHEST_Hz: Final = 4.0
 class FrequencyResponse(NamedTuple):
     """Response of one output to the input."""
 
-    frequency_Hz: Array  # frequencies [Hz], shape (n,)
+    frequency_Hz: NDArray[np.floating]  # frequencies [Hz], shape (n,)
     response: NDArray[np.complex128]  # output over input, complex, shape (n,)
     coherence: Array  # coherence, 0 to 1, shape (n,)
     # relative standard error of the gain by coherence and number of averages, shape (n,), or empty for one run; it is
@@ -50,18 +48,16 @@ class FrequencyResponse(NamedTuple):
 
 def frequency_response(recording: RecordingLike, output: str, frequency_Hz: Array) -> FrequencyResponse:
     """Return the response of a channel to the steering, at the lines of the spectrum nearest to frequencies [Hz]."""
-    time_s = np.asarray(recording.time_s, dtype=np.float64)
-    step_s = timestep(time_s)
-    u = np.fft.rfft(np.asarray(recording[INPUT], dtype=np.float64))
-    y = np.fft.rfft(np.asarray(recording[output], dtype=np.float64))
-    lines_Hz = np.asarray(np.fft.rfftfreq(len(time_s), step_s), dtype=np.float64)
-    asked = np.atleast_1d(np.asarray(frequency_Hz, dtype=np.float64))
-    places = np.rint(asked / lines_Hz[1]).astype(int)
+    count, step_s = len(recording.time_s), timestep(recording.time_s)
+    u, y = np.fft.rfft(recording[INPUT]), np.fft.rfft(recording[output])
+    lines_Hz = np.fft.rfftfreq(count, step_s)
+    places = np.rint(frequency_Hz / lines_Hz[1]).astype(int)
     if places.min() <= HALF_BAND_LINES or places.max() + HALF_BAND_LINES >= len(lines_Hz):
+        low, high = float(frequency_Hz.min()), float(frequency_Hz.max())
         raise RecordingError(
-            f"a run of {len(time_s) * step_s:.3g} s holds no response from {asked.min():.3g} to {asked.max():.3g} Hz; "
+            f"a run of {count * step_s:.3g} s holds no response from {low:.3g} to {high:.3g} Hz; "
             f"its spectrum ends at {lines_Hz[-1]:.3g} Hz, and {HALF_BAND_LINES + 1} lines at each end fall away",
-            value=(float(asked.min()), float(asked.max())),
+            value=(low, high),
         )
     band = places[:, None] + np.arange(-HALF_BAND_LINES, HALF_BAND_LINES + 1)
     power_u = (np.abs(u[band]) ** 2).sum(axis=1)
@@ -71,7 +67,7 @@ def frequency_response(recording: RecordingLike, output: str, frequency_Hz: Arra
 
 
 def _response_of(
-    frequency_Hz: Array, power_u: Array, power_y: Array, cross: NDArray[np.complex128], largest: float
+    frequency_Hz: NDArray[np.floating], power_u: Array, power_y: Array, cross: NDArray[np.complex128], largest: float
 ) -> FrequencyResponse:
     """Return the estimate H1 and the coherence from powers of input and output and their cross spectrum."""
     missing = ~(power_u > MIN_SPECTRUM**2 * largest)
@@ -122,7 +118,7 @@ def frequency_response_metrics(recording: RecordingLike) -> dict[str, float]:
     return values
 
 
-def _falls_to(x: Array, y: Array, level: float) -> float:
+def _falls_to(x: NDArray[np.floating], y: Array, level: float) -> float:
     """Return the first abscissa at which y falls to a level, interpolated, or nan if it never does."""
     below = np.flatnonzero((y[1:] <= level) & (y[:-1] > level))
     if below.size == 0:
@@ -147,11 +143,11 @@ def random_response(
         raise RecordingError("there is no run with random steering")
     from scipy import signal  # noqa: PLC0415 - slow to import, and lists of standards do not need it
 
-    step_s = timestep(np.asarray(recordings[0].time_s, dtype=np.float64))
+    step_s = timestep(recordings[0].time_s)
     length = round(SEGMENT_S / step_s)
     spectra, counts = [], []
     for recording in recordings:
-        u, y = (np.asarray(recording[name], dtype=np.float64) for name in (INPUT, output))
+        u, y = recording[INPUT], recording[output]
         if len(u) < length:
             raise RecordingError(
                 f"a run of {len(u) * step_s:.3g} s is too short for an average; {SEGMENT_S:g} s are needed",
@@ -162,7 +158,7 @@ def random_response(
         counts.append(1 + (len(u) - length) // (length - length // 2))
     power_u, power_y, cross = np.average(spectra, axis=0, weights=counts)
     power_u, power_y, averages = power_u.real, power_y.real, sum(counts) / _HANN_OVERLAP
-    lines_Hz = np.asarray(np.fft.rfftfreq(length, step_s), dtype=np.float64)
+    lines_Hz = np.fft.rfftfreq(length, step_s)
     inside = (lines_Hz >= lowest_Hz - 1e-9) & (lines_Hz <= highest_Hz + 1e-9)
     largest = float(power_u.max())
     found = _response_of(lines_Hz[inside], power_u[inside], power_y[inside], cross[inside], largest)

@@ -69,15 +69,11 @@ def car_of(recording: RecordingLike) -> CarGeometry:
 def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[str, float]:
     """Return the steady-state handling from a slow ramp; by default with the car in the recording's metadata."""
     car = car or car_of(recording)
-
-    def channel(name: str) -> Array:
-        return np.asarray(recording[name], dtype=np.float64)
-
-    ay = channel("ay_mps2")
+    ay = recording["ay_mps2"]
     side = math.copysign(1.0, float(ay[int(np.abs(ay).argmax())]))
     ay = side * ay
-    speed = channel("vx_mps")
-    step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
+    speed = recording["vx_mps"]
+    step_s = timestep(recording.time_s)
     smoothed = _moving_average(ay, step_s)
     # Only samples before the limit: beyond it the same acceleration occurs again.
     top = int(smoothed.argmax())
@@ -92,11 +88,11 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[s
             value=float(smoothed[top]),
             allowed=FIT_MPS2,
         )
-    wheel = side * channel("steering_wheel_rad")
+    wheel = side * recording["steering_wheel_rad"]
     steer = wheel / car.steering_ratio
-    yaw_rate = side * channel("yaw_rate_radps")
+    yaw_rate = side * recording["yaw_rate_radps"]
     curvature = yaw_rate / np.maximum(speed, MIN_SPEED_MPS)
-    sideslip = side * channel("sideslip_rad")
+    sideslip = side * recording["sideslip_rad"]
 
     def gradient(values: Array) -> float:
         return _line(ay[fit], values[fit])[0]
@@ -112,7 +108,7 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[s
         "ackermann_gradient_radpmps2": gradient(car.wheelbase_m * curvature),
         "linear_range_mps2": float(smoothed[int(departed.argmax())]) if departed.any() else math.nan,
         "characteristic_speed_mps": characteristic_speed(car.wheelbase_m, understeer),
-        "roll_gradient_radpmps2": gradient(side * channel("roll_rad")),
+        "roll_gradient_radpmps2": gradient(side * recording["roll_rad"]),
         "sideslip_gradient_radpmps2": gradient(sideslip),
         "front_slip_gradient_radpmps2": gradient(steer - sideslip - car.cg_to_front_m * curvature),
         "rear_slip_gradient_radpmps2": gradient(car.cg_to_rear_m * curvature - sideslip),

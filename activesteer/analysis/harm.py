@@ -80,11 +80,6 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
 def failures(recording: Recording) -> Iterator[str]:
     """Describe the failures of a run, and for how long its steering actuators were at their limits before a spin."""
     yield from losses(recording.metrics)
-    yield from _actuators_at_limit(recording)
-
-
-def _actuators_at_limit(recording: Recording) -> Iterator[str]:
-    """Describe for how long the steering actuators of a car that spins were at their limits before."""
     if len(recording) < 2 or "sideslip_rad" not in recording:  # measured by others
         return
     sideslip_rad = np.abs(recording["sideslip_rad"])

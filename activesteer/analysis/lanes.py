@@ -92,10 +92,8 @@ def corners(recording: RecordingLike, car: Footprint) -> list[tuple[Array, Array
 
 def _pose(recording: RecordingLike) -> tuple[Array, Array, Array, Array]:
     """Return world x and y of the front axle centre [m], cosine and sine of the yaw angle, over time."""
-    x, y, yaw = (
-        np.asarray(recording[name], dtype=np.float64) for name in ("front_axle_x_m", "front_axle_y_m", "yaw_rad")
-    )
-    return x, y, np.cos(yaw), np.sin(yaw)
+    yaw = recording["yaw_rad"]
+    return *front_axle(recording), np.cos(yaw), np.sin(yaw)
 
 
 _NEAR: Final = 10
@@ -104,8 +102,7 @@ _NEAR: Final = 10
 
 def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
     """Return world x and y of the front axle centre over time [m], shape (n,) each."""
-    x, y = (np.asarray(recording[f"front_axle_{axis}_m"], dtype=np.float64) for axis in "xy")
-    return x, y
+    return recording["front_axle_x_m"], recording["front_axle_y_m"]
 
 
 def first_at(recording: RecordingLike, x_m: float) -> int | None:

@@ -27,10 +27,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis import braking, frequency_response, handling, path_following, sine_with_dwell, step_response
-from activesteer.analysis.series import peak, sizes
-from activesteer.analysis.source import Evaluable, RecordingLike, maneuver_kind
+from activesteer.analysis.series import Array, peak, sizes
+from activesteer.analysis.source import Evaluable, RecordingLike
 from activesteer.config import read_toml
-from activesteer.core.conventions import CORNERS, Array
+from activesteer.core.conventions import CORNERS
+from activesteer.core.limits import table_of, text
 from activesteer.core.metric_table import metric
 from activesteer.errors import RecordingError, nearest_names
 from activesteer.road.road import road_of
@@ -119,11 +120,10 @@ def ride_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of the ride."""
     road = road_of(recording.metadata)
     extended = [
-        road.extended_share(*(np.asarray(recording[f"{corner}_contact_{axis}_m"])[::_EVERY] for axis in "xy"))
-        for corner in CORNERS
+        road.extended_share(*(recording[f"{corner}_contact_{axis}_m"][::_EVERY] for axis in "xy")) for corner in CORNERS
     ]
-    loads = np.stack([np.asarray(recording[f"{corner}_tyre_fz_N"], np.float64) for corner in CORNERS])
-    travels = np.stack([np.asarray(recording[f"{corner}_travel_m"], np.float64) for corner in CORNERS])
+    loads = np.stack([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS])
+    travels = np.stack([recording[f"{corner}_travel_m"] for corner in CORNERS])
     return {
         "seat_acceleration_rms_mps2": seat_acceleration_mps2(recording),
         "wheel_load_coefficient_max": float((loads.std(axis=1) / loads.mean(axis=1)).max()),
@@ -135,31 +135,27 @@ def ride_metrics(recording: RecordingLike) -> dict[str, float]:
 
 def seat_acceleration_mps2(recording: RecordingLike) -> float:
     """Return the weighted RMS of the vertical acceleration at the worse seat point [m/s2]."""
-    time_s = np.asarray(recording.time_s, np.float64)
-    step_s = float(time_s[1] - time_s[0])
-    up, pitch, roll = (
-        np.asarray(recording[name], np.float64) for name in ("az_mps2", "pitch_rate_radps", "roll_rate_radps")
-    )
+    step_s = float(recording.time_s[1] - recording.time_s[0])
     axle_m = math.hypot(
         recording["front_axle_x_m"][0] - recording["x_m"][0], recording["front_axle_y_m"][0] - recording["y_m"][0]
     )
     wheelbase_m = float(recording.metadata.get("car", {}).get("wheelbase_m", 2.0 * axle_m))
     ahead_m = axle_m - 0.5 * wheelbase_m
-    base = up - ahead_m * np.gradient(pitch, step_s)
-    aside = SEAT_ASIDE_M * np.gradient(roll, step_s)
+    base = recording["az_mps2"] - ahead_m * np.gradient(recording["pitch_rate_radps"], step_s)
+    aside = SEAT_ASIDE_M * np.gradient(recording["roll_rate_radps"], step_s)
     return max(float(np.sqrt(np.mean(weighted(base + sign * aside, step_s) ** 2))) for sign in (1.0, -1.0))
 
 
 def weighted(acceleration_mps2: Array, step_s: float) -> Array:
     """Return a vertical acceleration filtered by W_k. Its mean is removed first."""
     spectrum = np.fft.rfft(acceleration_mps2 - np.mean(acceleration_mps2))
-    gain = weighting(np.asarray(np.fft.rfftfreq(len(acceleration_mps2), step_s), np.float64))
+    gain = weighting(np.fft.rfftfreq(len(acceleration_mps2), step_s))
     return np.fft.irfft(spectrum * gain, len(acceleration_mps2))
 
 
 def weighting(frequency_Hz: Array) -> NDArray[np.complex128]:
     """Return the complex gain of the weighting W_k."""
-    s = 2j * math.pi * np.asarray(frequency_Hz, np.float64)
+    s = 2j * math.pi * frequency_Hz
 
     def quadratic(at_Hz: float, quality: float) -> NDArray[np.complex128]:
         part = s / (2.0 * math.pi * at_Hz)
@@ -177,7 +173,7 @@ LIFTED_N: Final = 1.0
 
 def rollover_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the general metrics, and those of the wheel loads."""
-    loads_N = np.array([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS], dtype=np.float64)
+    loads_N = np.array([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS])
     lifted = loads_N < LIFTED_N
     both = (lifted[0] & lifted[2]) | (lifted[1] & lifted[3])
     step_s = float(recording.time_s[1] - recording.time_s[0])
@@ -213,7 +209,7 @@ KEY_FIGURES: Final = {title: tuple(metrics) for title, metrics in _TABLE["key_fi
 
 def evaluated_kind(recording: RecordingLike) -> str:
     """Return the kind of a run's manoeuvre, which must have an evaluation."""
-    kind = maneuver_kind(recording)
+    kind = text(table_of(recording.metadata.get("maneuver"), "maneuver").get("kind"), "maneuver.kind")
     if kind not in EVALUATIONS:
         raise RecordingError(
             f"there is no evaluation for the kind {kind!r}; {nearest_names(kind, EVALUATIONS)}",

@@ -15,7 +15,7 @@ import numpy as np
 
 from activesteer.analysis import lanes
 from activesteer.analysis.series import counted, lag, largest_rate, rate_rms, rms, sizes, timestep
-from activesteer.analysis.source import RecordingLike, maneuver_kind, read_course, read_footprint
+from activesteer.analysis.source import RecordingLike, entry, read_course, read_footprint
 from activesteer.core.conventions import CORNERS
 from activesteer.road.course import Course
 
@@ -79,9 +79,9 @@ def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
     values["steering_wheel_rate_peak_radps"] = largest_rate(wheel, step_s)
     values["steering_wheel_rate_rms_radps"] = rate_rms(wheel, step_s)
     values |= _places(recording, course)
-    if maneuver_kind(recording) == "slalom":
+    if entry(recording, "maneuver", "kind") == "slalom":
         values |= _slalom(recording, course)
-    use = np.array([recording[f"{corner}_friction_utilisation"] for corner in CORNERS], dtype=np.float64)
+    use = np.array([recording[f"{corner}_friction_utilisation"] for corner in CORNERS])
     values["friction_utilisation_max"], values["friction_utilisation_mean"] = float(use.max()), float(use.mean())
     speed = recording["speed_mps"]
     values["speed_loss_mps"] = float(speed[0] - speed.min())

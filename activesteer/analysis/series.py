@@ -15,6 +15,7 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.errors import RecordingError
 
 Array = NDArray[np.floating]
+"""Array of floating-point numbers, of any shape."""
 
 SMOOTHING_S: Final = 0.04
 """Width of the smoothing window [s]. A cubic fit over it leaves a 3 Hz oscillation unchanged to 1e-4 of its amplitude
@@ -36,7 +37,7 @@ PEAK_MARGIN: Final = 0.005
 def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
     """Return the sideslip angles [rad] in a part of a run, while the car is faster than `ANGLES_COUNT_ABOVE_MPS`."""
     # Without a speed, as in measured data, all samples count. If none counts, there is one sample of 0.
-    sideslip_rad = np.asarray(recording["sideslip_rad"], dtype=np.float64)[part]
+    sideslip_rad = recording["sideslip_rad"][part]
     try:
         slow = recording["speed_mps"][part] <= ANGLES_COUNT_ABOVE_MPS
     except RecordingError:
@@ -102,20 +103,19 @@ def rate_rms(values: Array, timestep_s: float) -> float:
 
 def rms(values: Array) -> float:
     """Return the root mean square, in the unit of the values, or nan for no values."""
-    return float(np.sqrt(np.mean(np.square(values, dtype=np.float64)))) if len(values) else math.nan
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
 
 
 def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> float:
     """Return the lag of a signal behind another signal: the shift at which the two are most alike."""
-    lead, follow = (np.asarray(values, dtype=np.float64) for values in (leader, follower))
-    count, maximum = len(lead), round(longest_s / timestep_s)
+    count, maximum = len(leader), round(longest_s / timestep_s)
     if count < 2 * maximum:
         return math.nan
-    energies = np.cumsum(lead**2), np.cumsum(follow[::-1] ** 2)
+    energies = np.cumsum(leader**2), np.cumsum(follower[::-1] ** 2)
     scale = np.sqrt([energies[0][count - k - 1] * energies[1][count - k - 1] for k in range(maximum + 1)])
     if not scale.all():
         return math.nan
-    alike = np.array([lead[: count - k] @ follow[k:] for k in range(maximum + 1)]) / scale
+    alike = np.array([leader[: count - k] @ follower[k:] for k in range(maximum + 1)]) / scale
     top = int(alike.argmax())
     if top in (0, maximum):
         return math.nan
@@ -170,9 +170,7 @@ _ENDS_PERIODS: Final = 6.0
 """Time in which the filter dies away, in periods of the cut-off frequency."""
 
 
-def low_pass(
-    values: NDArray[np.floating], timestep_s: float, cut_off_Hz: float, poles: int = 12
-) -> NDArray[np.float64]:
+def low_pass(values: Array, timestep_s: float, cut_off_Hz: float, poles: int = 12) -> NDArray[np.float64]:
     """Apply a Butterworth filter without phase: half of its even number of poles forwards, the same backwards.
 
     Both passes have the given cut-off frequency; together they halve a sine of this frequency.
@@ -197,8 +195,7 @@ def low_pass(
             value=len(values),
         )
     sections = butter(poles // 2, cut_off_Hz, fs=1.0 / timestep_s, output="sos")
-    filtered = sosfiltfilt(sections, np.asarray(values, dtype=np.float64), padlen=ends)
-    return np.asarray(filtered, dtype=np.float64)
+    return sosfiltfilt(sections, values, padlen=ends)
 
 
 FAST_RADPS: Final = math.radians(75.0)
@@ -231,4 +228,4 @@ def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
 def offset(values: Array, samples: slice) -> float:
     """Return the mean of a signal over some samples, or 0 for no samples."""
     # The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
-    return float(np.mean(values[samples], dtype=np.float64)) if samples.stop > samples.start else 0.0
+    return float(np.mean(values[samples])) if samples.stop > samples.start else 0.0

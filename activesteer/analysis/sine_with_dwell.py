@@ -16,15 +16,21 @@ Source: 49 CFR 571.126 (FMVSS 126), S5.2 and S7.11; UN Regulation 140.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from activesteer.analysis.series import THRESHOLD_RAD, crossing_time, low_pass, offset, peak, timestep, zeroing_range
-from activesteer.analysis.source import RecordingLike
-from activesteer.core.conventions import Array
+from activesteer.analysis.series import (
+    THRESHOLD_RAD,
+    Array,
+    crossing_time,
+    low_pass,
+    offset,
+    peak,
+    timestep,
+    zeroing_range,
+)
+from activesteer.analysis.source import RecordingLike, entry
 from activesteer.errors import RecordingError
 from activesteer.recording.contents import events_of
 
@@ -61,8 +67,8 @@ class Steering(NamedTuple):
 
 def steering(recording: RecordingLike) -> Steering:
     """Return beginning, reversal and completion of a sine with dwell, interpolated between samples."""
-    time_s = np.asarray(recording.time_s, dtype=np.float64)
-    angle = low_pass(np.asarray(recording["steering_wheel_rad"]), timestep(time_s), STEERING_CUT_OFF_Hz)
+    time_s = recording.time_s
+    angle = low_pass(recording["steering_wheel_rad"], timestep(time_s), STEERING_CUT_OFF_Hz)
     if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
         problem = "the sine with dwell has no beginning: the steering wheel is turned in the first sample"
         raise RecordingError(problem, value=float(angle[0]))
@@ -91,8 +97,7 @@ def steering(recording: RecordingLike) -> Steering:
 
 def marks(recording: RecordingLike) -> list[tuple[float, str]]:
     """Return the times that plots over time mark, with their words: instants of the criterion, or phases that begin."""
-    maneuver = recording.metadata.get("maneuver")
-    if not isinstance(maneuver, Mapping) or maneuver.get("kind") != "sine_with_dwell":
+    if entry(recording, "maneuver", "kind") != "sine_with_dwell":
         return [(event.time_s, event.what) for event in events_of(recording.metadata) if event.kind == "phase"]
     try:
         completion_s = steering(recording).completion_s
@@ -122,10 +127,9 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
         RecordingError: a channel is missing, or the run holds no sine with dwell.
     """
     times = steering(recording)
-    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    time_s = recording.time_s
     yaw_rate, ay = (
-        low_pass(np.asarray(recording[name]), timestep(time_s), MOTION_CUT_OFF_Hz)
-        - offset(recording[name], times.straight)
+        low_pass(recording[name], timestep(time_s), MOTION_CUT_OFF_Hz) - offset(recording[name], times.straight)
         for name in ("yaw_rate_radps", "ay_mps2")
     )
     top_s, top = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
@@ -195,13 +199,13 @@ def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, fl
 
 
 def _displacement(recording: RecordingLike, times: Steering) -> float:
-    time_s = np.asarray(recording.time_s, dtype=np.float64)
+    time_s = recording.time_s
     x0, y0, yaw = (_at(time_s, recording[name], times.begin_s) for name in ("x_m", "y_m", "yaw_rad"))
     x1, y1 = (_at(time_s, recording[name], times.begin_s + DISPLACEMENT_TIME_S) for name in ("x_m", "y_m"))
     return times.side * ((y1 - y0) * math.cos(yaw) - (x1 - x0) * math.sin(yaw))
 
 
-def integrated_displacement(time_s: NDArray[np.floating], ay_mps2: NDArray[np.floating], begin_s: float) -> float:
+def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> float:
     """Return the displacement 1.07 s after the beginning of steer, integrated twice [m]; FMVSS 126, S7.11.9."""
     end_s = begin_s + DISPLACEMENT_TIME_S
     if end_s > time_s[-1]:
@@ -211,6 +215,6 @@ def integrated_displacement(time_s: NDArray[np.floating], ay_mps2: NDArray[np.fl
     return float(np.trapezoid((end_s - instants_s) * np.interp(instants_s, time_s, ay_mps2), instants_s))
 
 
-def _at(time_s: Array, values: NDArray[np.floating], instant_s: float) -> float:
+def _at(time_s: Array, values: Array, instant_s: float) -> float:
     """Return the value at a time, interpolated, or nan after the end of the run."""
     return float(np.interp(instant_s, time_s, values)) if instant_s <= time_s[-1] else math.nan

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any, Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from activesteer.core.conventions import Array
+from activesteer.core.limits import fail
 from activesteer.errors import RecordingError
 from activesteer.road.course import Course, Footprint, course_of, footprint_of
 
@@ -16,7 +17,7 @@ class RecordingLike(Protocol):
     """A recorded run. `activesteer.recording.Recording` is one."""
 
     @property
-    def time_s(self) -> NDArray[np.float64]:
+    def time_s(self) -> Array:
         """Time of the samples [s], ascending, shape (n,)."""
         ...
 
@@ -25,7 +26,7 @@ class RecordingLike(Protocol):
         """Description of the run, with `maneuver.kind`."""
         ...
 
-    def __getitem__(self, name: str, /) -> NDArray[Any]:
+    def __getitem__(self, name: str, /) -> Array:
         """Return a channel over `time_s`, shape (n,)."""
         ...
 
@@ -40,7 +41,7 @@ class Evaluable:
         self._recording = recording
         self.time_s, self.metadata = recording.time_s, recording.metadata
 
-    def __getitem__(self, name: str, /) -> NDArray[Any]:
+    def __getitem__(self, name: str, /) -> Array:
         """Return a channel over time, shape (n,)."""
         values = self._recording[name]
         usable = np.abs(values) <= _MAX_VALUE
@@ -57,25 +58,17 @@ _MAX_VALUE: Final = 1e30
 """Bound that no channel of a car comes near, and whose square is still finite."""
 
 
-def maneuver_kind(recording: RecordingLike) -> str:
-    """Return the kind of the manoeuvre (`step_steer` ...)."""
-    maneuver = recording.metadata.get("maneuver")
-    kind = maneuver.get("kind") if isinstance(maneuver, Mapping) else None
-    if not isinstance(kind, str):
-        raise RecordingError(
-            f"is {maneuver!r}; a table with the key 'kind' is needed",
-            file="the metadata",
-            key="maneuver",
-            value=maneuver,
-        )
-    return kind
+def entry(recording: RecordingLike, table: str, key: str) -> str:
+    """Return an entry of a table of the metadata as text, or empty if it does not exist."""
+    values = recording.metadata.get(table)
+    return str(values.get(key, "")) if isinstance(values, Mapping) else ""
 
 
 def read_course(recording: RecordingLike) -> Course:
     """Return the course of a run."""
     course = course_of(recording.metadata)
     if course is None:
-        raise RecordingError("is missing: the manoeuvre has no path", file="the metadata", key="course")
+        raise fail("course", "is missing: the manoeuvre has no path")
     return course
 
 
@@ -83,5 +76,5 @@ def read_footprint(recording: RecordingLike) -> Footprint:
     """Return the sizes of the car of a run."""
     footprint = footprint_of(recording.metadata)
     if footprint is None:
-        raise RecordingError("is missing: the sizes of the car are needed", file="the metadata", key="car")
+        raise fail("car", "is missing: the sizes of the car are needed")
     return footprint

@@ -53,15 +53,14 @@ def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
     Raises:
         RecordingError: there is no step, it has no beginning, the run ends too early after it, or a channel is missing.
     """
-    time_s = np.asarray(recording.time_s, dtype=np.float64)
-    steering_rad = np.asarray(recording["steering_wheel_rad"], dtype=np.float64)
+    time_s = recording.time_s
+    steering_rad = recording["steering_wheel_rad"]
     step_time_s = _step_time(time_s, steering_rad)
 
     values: dict[str, float] = {"step_time_s": step_time_s}
     for channel, minimum in SIGNALS.items():
-        signal = np.asarray(recording[channel], dtype=np.float64)
         name, _, unit = channel.rpartition("_")
-        for key, value in step_response(time_s, signal, step_time_s, STEADY_WINDOW_S, minimum).items():
+        for key, value in step_response(time_s, recording[channel], step_time_s, STEADY_WINDOW_S, minimum).items():
             values[f"{name}_{key}" + (f"_{unit}" if key in ("steady_state", "peak") else "")] = value
     values["tb_srad"] = values["yaw_rate_peak_time_s"] * abs(values["sideslip_steady_state_rad"])
 
@@ -73,7 +72,7 @@ def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
     return values
 
 
-def _step_time(time_s: np.ndarray, steering_rad: np.ndarray) -> float:
+def _step_time(time_s: Array, steering_rad: Array) -> float:
     final_rad = float(np.mean(steering_rad[time_s >= time_s[-1] - STEADY_WINDOW_S]))
     if not abs(final_rad) >= MIN_STEP_RAD:
         raise RecordingError(
@@ -108,7 +107,7 @@ FIT: Final = (1.0 / 3.0, 1.25)
 def slow_ramp_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of a slow ramp."""
     values = handling.handling_metrics(recording)
-    step_s = timestep(np.asarray(recording.time_s, dtype=np.float64))
+    step_s = timestep(recording.time_s)
     ay = low_pass(recording["ay_mps2"], step_s, MOTION_CUT_OFF_Hz)
     steering = low_pass(recording["steering_wheel_rad"], step_s, STEERING_CUT_OFF_Hz)
     side = math.copysign(1.0, float(ay[int(np.abs(ay).argmax())]))

@@ -294,18 +294,18 @@ def _import(options: argparse.Namespace) -> None:
 
     if options.output is not None and options.output.suffix != ".mcap":
         raise ParameterError(f"-o {options.output}: the name of a recording ends in .mcap")
-    found = import_file(options.files, options.map, options.vehicle)
+    recording = import_file(options.files, options.map, options.vehicle)
     output = options.output or options.files[0].with_suffix(".mcap")
-    recording = found.recording
+    measured = recording.metadata["measured"]
     check_target(output)
     with atomic_write(output, RecordingError) as part:
         try:
             recording.save(part)
         except RecordingError as error:
             raise RecordingError(error.problem.replace(str(part), str(output))) from error
-    terminal.print_notes(found.notes)
+    terminal.print_notes(measured["notes"])
     step_s = float(recording.time_s[1] - recording.time_s[0])
-    about = {"rows": len(recording), "step_s": step_s, "channels": found.taken, "notes": list(found.notes)}
+    about = {"rows": len(recording), "step_s": step_s, "channels": measured["columns"], "notes": measured["notes"]}
     head = f"{output}: {len(recording)} rows, {recording.time_s[0]:.3f} to {recording.time_s[-1]:.3f} s"
-    columns = (f"  {name:24} {terminal.printable(column)}" for name, column in found.taken.items())
+    columns = (f"  {name:24} {terminal.printable(column)}" for name, column in measured["columns"].items())
     terminal.tell(options, {"file": str(output), **about}, [head, *columns])

@@ -99,22 +99,19 @@ def csv_columns(path: Path) -> list[Column]:
             ),
         )
 
-    def values(place: str) -> Any:
+    def read(place: str, name: str) -> tuple[Array, None]:
         column = table.column(place)
         if pa.types.is_time(column.type):
             column = column.cast(pa.string())
         if not pa.types.is_string(column.type):
-            return column.to_numpy(zero_copy_only=False)
-        if (times_s := _clock_s(column.to_pylist())) is not None:
-            return times_s
-        text = next(str(item) for item in column if not _NUMBER.fullmatch(str(item).strip()) and item.is_valid)
-        raise ValueError(f"{shown(text)} is no number")
-
-    def read(place: str, name: str) -> tuple[Array, None]:
-        try:
-            return numbers(values(place), name, path), None
-        except (ValueError, StopIteration) as reason:
-            raise RecordingError(f"column {shown(name)} holds no numbers: {reason}", file=path.name) from None
+            return numbers(column.to_numpy(zero_copy_only=False), name, path), None
+        texts = column.to_pylist()
+        times_s = _clock_s(texts)
+        if times_s is None:
+            text = next((text for text in texts if text and not _NUMBER.fullmatch(text.strip())), "")
+            problem = f"{shown(text)} is no number" if text else "decimal points and commas are mixed"
+            raise RecordingError(f"column {shown(name)} holds no numbers: {problem}", file=path.name)
+        return times_s, None
 
     columns = zip(places, names, units, strict=True)
     return [Column(name, unit, partial(read, place, name)) for place, name, unit in columns if name]
@@ -305,16 +302,13 @@ def _parquet(path: Path) -> list[Column]:
 def _mat(path: Path) -> list[Column]:
     from scipy.io import loadmat, whosmat  # noqa: PLC0415 - slow to import
 
-    try:
-        with understood(path, "MATLAB file"):
+    with understood(path, "MATLAB file"):
+        try:
             check_rows(max((max(shape, default=0) for _, shape, _ in whosmat(path)), default=0), path)
             variables = loadmat(path, simplify_cells=True)
-    except RecordingError as error:
-        if isinstance(error.__cause__, NotImplementedError):
-            raise RecordingError(
-                f"{shown_path(path)} is a MATLAB file of version 7.3; save it with `save(..., '-v7')`", value=path
-            ) from None
-        raise
+        except NotImplementedError:
+            problem = f"{shown_path(path)} is a MATLAB file of version 7.3; save it with `save(..., '-v7')`"
+            raise RecordingError(problem, value=path) from None
 
     def read(name: str, values: Any) -> tuple[Array, None]:
         return numbers(values, name, path), None

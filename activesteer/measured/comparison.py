@@ -60,7 +60,7 @@ def _pairs(measured: Recording, simulated: Recording, names: tuple[str, ...]) ->
     for name in names:
         if name not in measured or name not in simulated:
             continue
-        one, other = (np.asarray(run[name], np.float64) for run in (measured, simulated))
+        one, other = measured[name], simulated[name]
         size, mean = float(other.std()), float(other.mean())
         if size > 1e-9 and float(one.std()) > 1e-9:
             pairs.append(((one - mean) / size, (other - mean) / size))
@@ -125,26 +125,28 @@ FILTERS: Final[dict[str, Filter | None]] = {
 0.5 % of error up to 5 Hz: this one has -3 dB at 9.05 Hz and 0.36 % at 5 Hz."""
 
 
-def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[Array, float, str]:
-    """Return a filtered channel, the standard deviation of the remaining noise, and why it is not filtered, if so."""
+def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[Array, float]:
+    """Return a filtered channel, and the standard deviation of the remaining noise, 0 if it cannot be estimated."""
     # What a low-pass filter at a quarter of the sampling rate or lower removes is taken for noise: its median absolute
     # deviation, which the short edges of a manoeuvre do not move. The noise is assumed white: below the cut-off
     # frequency it is as dense as above. A signal that the logger has filtered already shows no noise.
-    values = np.asarray(recording[channel], np.float64)
+    values = recording[channel]
     step_s = float(np.median(np.diff(recording.time_s)))
     nyquist_Hz = 0.5 / step_s
     split_Hz = min(chosen.of(channel) if chosen else math.inf, 0.5 * nyquist_Hz)
+    poles = chosen.poles if chosen else 8
     try:
-        poles = chosen.poles if chosen else 8
         rest = values - low_pass(values, step_s, split_Hz, poles)
-        std = _MEDIAN_TO_STD * float(np.median(np.abs(rest - np.median(rest))))
-        density = std / math.sqrt(nyquist_Hz - split_Hz)
-        if chosen is None:
-            return values, density * math.sqrt(nyquist_Hz), ""
-        cut_Hz = chosen.of(channel)
-        return low_pass(values, step_s, cut_Hz, poles), density * math.sqrt(min(cut_Hz, nyquist_Hz)), ""
-    except RecordingError as reason:
-        return values, 0.0, reason.problem if chosen else ""
+    except RecordingError:
+        if chosen:
+            raise
+        return values, 0.0
+    std = _MEDIAN_TO_STD * float(np.median(np.abs(rest - np.median(rest))))
+    density = std / math.sqrt(nyquist_Hz - split_Hz)
+    if chosen is None:
+        return values, density * math.sqrt(nyquist_Hz)
+    cut_Hz = chosen.of(channel)
+    return low_pass(values, step_s, cut_Hz, poles), density * math.sqrt(min(cut_Hz, nyquist_Hz))
 
 
 STANDARDS: Final = {
@@ -285,16 +287,17 @@ def compare(
     if len(time_s) < 10:
         raise RecordingError(f"the runs have {len(time_s)} samples in common; at least 10 are needed")
 
-    chosen, problems = FILTERS[filtered], list[str]()
-    smoothed = {name: [smooth(run, name, chosen) for run in (*measured, simulated)] for name in names}
-    for name, sides in smoothed.items():
-        if reason := next((problem for _, _, problem in sides if problem), ""):
-            problems.append(f"{quantity_of(name).label}: {reason}")
+    smoothed, problems = dict[str, list[tuple[Array, float]]](), list[str]()
+    for name in names:
+        try:
+            smoothed[name] = [smooth(run, name, FILTERS[filtered]) for run in (*measured, simulated)]
+        except RecordingError as reason:
+            problems.append(f"{quantity_of(name).label}: {reason.problem}")
             smoothed[name] = [smooth(run, name, None) for run in (*measured, simulated)]
     allowed = dict.fromkeys(names, 0.0)
     for name, (*sides, _) in smoothed.items() if noise else ():
         # Half of the 95 % interval of the noise in the mean of several runs.
-        allowed[name] = _TWO_SIDED_95 * math.sqrt(sum(remaining**2 for _, remaining, _ in sides)) / len(sides)
+        allowed[name] = _TWO_SIDED_95 * math.sqrt(sum(remaining**2 for _, remaining in sides)) / len(sides)
 
     def mean_of(name: str) -> tuple[Array, Array]:
         values = np.stack([

@@ -1,4 +1,4 @@
-"""Result of a fit, and its page."""
+"""Result of a fit: intervals of its parameters, and warnings."""
 
 from __future__ import annotations
 
@@ -27,9 +27,6 @@ _TOO_LITTLE: Final = 0.5
 standard deviation would be twice the range."""
 
 
-Intervals = tuple[Array, Array, tuple[float, ...], float]
-
-
 def autocorrelation_time(values: Array) -> float:
     """Return the number of neighbouring samples that are worth one independent sample, or 1 for white noise.
 
@@ -49,7 +46,9 @@ def autocorrelation_time(values: Array) -> float:
     return min(max(time, 1.0), float(count))
 
 
-def intervals(series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool) -> Intervals:
+def intervals(
+    series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool
+) -> tuple[Array, Array, tuple[float, ...], float]:
     """Return the uncertainty of the parameters, relative to their ranges, in the linear neighbourhood of the solution.
 
     That is half of each interval, shape (p,), and correlations of the errors, shape (p, p), both nan for a parameter at
@@ -179,7 +178,42 @@ class Fit(NamedTuple):
     settled: bool  # whether the search converged
     overrides: dict[str, Any]  # key -> value that drives the fitted car in every recording
     own: dict[str, dict[str, Any]]  # recording -> additional values for that recording
-    notes: tuple[str, ...] = ()  # warnings, one sentence each
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Warnings, one sentence each."""
+        found = []
+        if not self.settled:
+            found.append(f"the search did not converge in {self.rounds} rounds; restart it from its end (fit.start)")
+        for one in self.parameters:
+            if one.at_end:
+                found.append(
+                    f"{one.key} is at an end of its range, {one.value:.5g}: it has no interval, and the other "
+                    "intervals hold for this value"
+                )
+            elif 2.0 * one.half_width > one.high - one.low:
+                found.append(f"{one.key} is almost unknown: its interval is wider than its range")
+        lower = np.tril(np.nan_to_num(self.correlations), -1)
+        for place in sorted(np.argwhere(np.abs(lower) >= _ALIKE).tolist(), key=lambda place: -abs(lower[*place])):
+            one, other = (self.parameters[each].key for each in place)
+            correlation = f"the correlation of their errors is {lower[*place]:.3f}"
+            found.append(f"{one} and {other} can hardly be separated: {correlation}")
+        for each in self.compared:
+            left = rms(each.after)
+            where = f"{quantity_of(each.channel).label} in {each.recording}"
+            if left > _MUCH:
+                found.append(
+                    f"the residual of the {where} is {left:.1f} times its noise: car or inputs differ, and errors may "
+                    "exceed the intervals"
+                )
+            elif left < 1.0 / _MUCH:
+                found.append(f"the residual of the {where} is {left:.2g} of the stated noise, which is too large")
+            elif len(each.after) > _HANGS * each.independent:
+                found.append(
+                    f"the residual of the {where} is not white: {len(each.after)} samples count as "
+                    f"{each.independent:.0f}; car or inputs differ, or the noise is filtered"
+                )
+        return tuple(found)
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values."""
@@ -213,39 +247,3 @@ def rests_on(found: Fit) -> list[str]:
         "The inputs are used as recorded: the intervals contain neither noise and offsets of steering and speed, nor "
         "errors of the model of the car.",
     ]
-
-
-def notes_of(found: Fit) -> tuple[str, ...]:
-    """Return warnings, one sentence each."""
-    notes = []
-    if not found.settled:
-        notes.append(f"the search did not converge in {found.rounds} rounds; restart it from its end (fit.start)")
-    for one in found.parameters:
-        if one.at_end:
-            notes.append(
-                f"{one.key} is at an end of its range, {one.value:.5g}: it has no interval, and the other intervals "
-                "hold for this value"
-            )
-        elif 2.0 * one.half_width > one.high - one.low:
-            notes.append(f"{one.key} is almost unknown: its interval is wider than its range")
-    lower = np.tril(np.nan_to_num(found.correlations), -1)
-    for place in sorted(np.argwhere(np.abs(lower) >= _ALIKE).tolist(), key=lambda place: -abs(lower[*place])):
-        one, other = (found.parameters[each].key for each in place)
-        correlation = f"the correlation of their errors is {lower[*place]:.3f}"
-        notes.append(f"{one} and {other} can hardly be separated: {correlation}")
-    for each in found.compared:
-        left = rms(each.after)
-        where = f"{quantity_of(each.channel).label} in {each.recording}"
-        if left > _MUCH:
-            notes.append(
-                f"the residual of the {where} is {left:.1f} times its noise: car or inputs differ, and errors may "
-                "exceed the intervals"
-            )
-        elif left < 1.0 / _MUCH:
-            notes.append(f"the residual of the {where} is {left:.2g} of the stated noise, which is too large")
-        elif len(each.after) > _HANGS * each.independent:
-            notes.append(
-                f"the residual of the {where} is not white: {len(each.after)} samples count as {each.independent:.0f}; "
-                "car or inputs differ, or the noise is filtered"
-            )
-    return tuple(notes)

@@ -18,7 +18,7 @@ from activesteer.config import Range, build, field_in_unit
 from activesteer.core.conventions import Array
 from activesteer.driver import is_driver_file
 from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
-from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, notes_of, told_apart, without_effect
+from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, told_apart, without_effect
 from activesteer.measured.signals import at_sensor, by_channel
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
@@ -89,14 +89,22 @@ class Measured(NamedTuple):
 
     name: str  # name of its file
     begin_s: float  # time of the recording at which the manoeuvre starts [s]
-    time_s: Array  # times at which channels are compared [s], shape (n,)
-    channels: dict[str, Array]  # measured values there, SI; not finite where missing
+    channels: dict[str, tuple[Array, Array]]  # times at which a channel is compared [s], and measured values there, SI
 
 
 def measured_of(
     recording: Recording, name: str, study: StudyFile, table: FitTable, channels: Collection[str]
 ) -> Measured:
     """Return the data of a recording that are compared."""
+    if not len(recording):
+        raise RecordingError("has no rows", file=f"{name}.mcap")
+    time_s = recording.time_s
+    begin_s = float(time_s[0])
+    # The last row of a run is one step before its end.
+    from_s, until_s = table.windows.get(name, (table.from_s, table.until_s))
+    begin, end = -math.inf if from_s is None else from_s, math.inf if until_s is None else until_s
+    inside = (time_s >= begin) & (time_s <= min(end, time_s[-1] - study.timestep_s))
+    found = {}
     for channel in channels:
         if channel not in recording:
             have = [each.name for each in recording.channels]
@@ -104,23 +112,16 @@ def measured_of(
             raise study.source.fail(
                 ("fit", "noise", key), f"{name} has no such channel; {nearest_names(channel, have)}", channel, have
             )
-    if not len(recording):
-        raise RecordingError("has no rows", file=f"{name}.mcap")
-    begin_s = float(recording.time_s[0])
-    time_s = np.asarray(recording.time_s, np.float64)
-    # The last row of a run is one step before its end.
-    from_s, until_s = table.windows.get(name, (table.from_s, table.until_s))
-    begin, end = -math.inf if from_s is None else from_s, math.inf if until_s is None else until_s
-    inside = (time_s >= begin) & (time_s <= min(end, time_s[-1] - study.timestep_s))
-    values = {channel: np.asarray(recording[channel], np.float64)[inside] for channel in channels}
-    for channel, each in values.items():
-        if np.count_nonzero(np.isfinite(each)) < _FEWEST:
+        values = recording[channel]
+        kept = inside & np.isfinite(values)
+        if (count := np.count_nonzero(kept)) < _FEWEST:
             raise RecordingError(
-                f"has {np.count_nonzero(np.isfinite(each))} samples to compare, and {_FEWEST} are needed; it is "
-                f"recorded from {time_s[0]:g} to {time_s[-1]:g} s, and compared from fit.from_s to fit.until_s",
+                f"has {count} samples to compare, and {_FEWEST} are needed; it is recorded from {time_s[0]:g} to "
+                f"{time_s[-1]:g} s, and compared from fit.from_s to fit.until_s",
                 file=f"{name}.mcap", key=channel,
             )  # fmt: skip
-    return Measured(name, begin_s, time_s[inside] - begin_s, values)
+        found[channel] = time_s[kept] - begin_s, values[kept]
+    return Measured(name, begin_s, found)
 
 
 STEP: Final = 1e-3
@@ -155,60 +156,49 @@ def search(
     """Minimise the sum of squares of all differences (trust region reflective, SciPy)."""
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
-    rounds: dict[bytes, tuple[list[Array], list[Array]] | None] = {}
+    rounds: dict[bytes, tuple[list[Array], list[Array]] | str] = {}
 
-    def tried(place: Array) -> tuple[list[Array], list[Array]] | None:
-        """Return differences and derivatives, or None if the parameters cannot be driven."""
+    def tried(place: Array) -> tuple[list[Array], list[Array]] | str:
+        """Return differences and derivatives, or the reason why the parameters cannot be driven."""
         name = place.tobytes()
         if name not in rounds:
-            rounds[name] = _tried(answers, place, first=not rounds)
-            if len(rounds) == 1:
-                check(rounds[name][1])  # type: ignore[index] - the first one is there, or an error was raised
+            rounds[name] = _tried(answers, place)
         return rounds[name]
 
     def differences(place: Array) -> Array:
         found = tried(place)
         # The search shortens its step if a value is not finite.
-        return np.full(size, np.nan) if found is None else np.concatenate(found[0])
-
-    def slopes(place: Array) -> Array:
-        found = tried(place)
-        assert found is not None
-        return np.concatenate(found[1])
+        return np.full(size, np.nan) if isinstance(found, str) else np.concatenate(found[0])
 
     # Away from the ends of a range, so that the search can step to both sides.
     start = np.clip(start, STEP, 1.0 - STEP)
     begun = tried(start)
-    assert begun is not None
+    if isinstance(begun, str):
+        raise StudyError(f"the car cannot be driven at the start of the search: {begun}", value=begun)
+    check(begun[1])
     size = sum(map(len, begun[0]))
-    derivatives, unused = cast(Any, slopes), cast(Any, None)  # SciPy declares no types for them
+    # SciPy asks for derivatives at drivable parameters only. It declares no types for them.
+    derivatives, unused = cast(Any, lambda place: np.concatenate(tried(place)[1])), cast(Any, None)
     found = least_squares(
         differences, start, derivatives, (0.0, 1.0), xtol=_SETTLED, ftol=_LESS, gtol=unused, max_nfev=_MOST_ROUNDS
     )
     last = tried(found.x)
-    assert last is not None
+    assert not isinstance(last, str)
     return Found(found.x, begun[0], *last, len(rounds), found.status > 0)
 
 
-def _tried(
-    answers: Callable[[list[Array]], Sequence[Answer]], place: Array, *, first: bool
-) -> tuple[list[Array], list[Array]] | None:
+def _tried(answers: Callable[[list[Array]], Sequence[Answer]], place: Array) -> tuple[list[Array], list[Array]] | str:
     steps = np.where(place + STEP > 1.0, -STEP, STEP)
     here, *there = answers([place, *(place + step for step in np.diag(steps))])
     if isinstance(here, str):
-        if first:
-            raise StudyError(f"the car cannot be driven at the start of the search: {here}", value=here)
-        return None
-    sides: list[list[Array]] = []
-    for beside in there:
+        return here
+    slopes: list[list[Array]] = [[] for _ in here]
+    for beside, step in zip(there, steps, strict=True):
         if isinstance(beside, str):
             raise StudyError(f"the car cannot be driven beside drivable parameters: {beside}")
-        sides.append(beside)
-    slopes = [
-        np.column_stack([(side[number] - series) / step for side, step in zip(sides, steps, strict=True)])
-        for number, series in enumerate(here)
-    ]
-    return here, slopes
+        for columns, side, series in zip(slopes, beside, here, strict=True):
+            columns.append((side - series) / step)
+    return here, [np.column_stack(columns) for columns in slopes]
 
 
 SPEED_HOLD: Final = {"driver.speed_gain_1ps": 8.0, "driver.speed_integral_gain_1ps2": 8.0}
@@ -260,16 +250,12 @@ class _Problem:
         ]
         self._study = replace(study, maneuvers=tuple(maneuvers), overrides=known)
         self._plan = Plan(self._study)
-        self._values = FactorValues(self._study)
         self._table = table
-        self._factors = study.factors
         self._low, self._high = (np.array([getattr(each, end) for each in study.factors]) for end in ("low", "high"))
         self.settings: Settings = self._plan.settings
-        self.start = self._unit([_start(factor, table, first, study) for factor in study.factors])
+        start = np.array([_start(factor, table, first, study) for factor in study.factors])
+        self.start = (start - self._low) / (self._high - self._low)
         self.runs = 0
-
-    def _unit(self, values: Sequence[float]) -> Array:
-        return (np.array(values) - self._low) / (self._high - self._low)
 
     def _factor_values(self, place: Array) -> dict[str, Any]:
         values = self._low + (self._high - self._low) * place
@@ -286,8 +272,8 @@ class _Problem:
             for number, place in enumerate(places):
                 for recording, measured in enumerate(self._measured):
                     overrides = self._plan.request_with(0, 0, (recording, 0, 0), self._factor_values(place)).overrides
-                    queue.add((number, recording), drive, self.settings, recording, overrides, measured.time_s,
-                              tuple(self._noise))  # fmt: skip
+                    times = {name: time_s for name, (time_s, _) in measured.channels.items()}
+                    queue.add((number, recording), drive, self.settings, recording, overrides, times)
             driven: dict[tuple[int, int], dict[str, Array] | str] = {}
             total = len(places) * len(self._measured)
             for outcome in queue.outcomes():
@@ -307,9 +293,7 @@ class _Problem:
         for run, measured in zip(driven, self._measured, strict=True):
             if isinstance(run, str):
                 return f"{measured.name}: {run}"
-            for name, noise in self._noise.items():
-                kept = np.isfinite(measured.channels[name])
-                series.append((run[name][kept] - measured.channels[name][kept]) / noise)
+            series += [(run[name] - values) / self._noise[name] for name, (_, values) in measured.channels.items()]
         return series
 
     def check(self, slopes: list[Array]) -> None:
@@ -339,43 +323,40 @@ class _Problem:
         values, start = self._factor_values(found.place), self._factor_values(self.start)
         parameters = tuple(
             Parameter(factor.key, values[factor.key], float(half), start[factor.key], factor.low, factor.high)
-            for factor, half in zip(self._factors, (self._high - self._low) * half_widths, strict=True)
+            for factor, half in zip(self._study.factors, (self._high - self._low) * half_widths, strict=True)
         )
-        places = [(measured, name) for measured in self._measured for name in self._noise]
-        compared = []
-        for (measured, name), before, after, independent in zip(
-            places, found.before, found.after, samples, strict=True
-        ):
-            kept = np.isfinite(measured.channels[name])
-            compared.append(
-                Compared(
-                    measured.name, name, self._noise[name], measured.begin_s + measured.time_s[kept],
-                    measured.channels[name][kept], before, after, independent,
-                )
-            )  # fmt: skip
-        everywhere = {factor.key for factor in self._factors if not factor.maneuvers}
-        overrides = [self._values.overrides(number, 0, values) for number in range(len(self._measured))]
-        made = Fit(
-            parameters, correlations, tuple(compared), self._table.intervals, freedom, _misfit(found.after),
+        places = [(measured, *each) for measured in self._measured for each in measured.channels.items()]
+        compared = tuple(
+            Compared(
+                measured.name, name, self._noise[name], measured.begin_s + time_s, values, before, after, independent
+            )
+            for (measured, name, (time_s, values)), before, after, independent in zip(
+                places, found.before, found.after, samples, strict=True
+            )
+        )
+        factors = FactorValues(self._study)
+        everywhere = {factor.key for factor in self._study.factors if not factor.maneuvers}
+        overrides = [factors.overrides(number, 0, values) for number in range(len(self._measured))]
+        return Fit(
+            parameters, correlations, compared, self._table.intervals, freedom, _misfit(found.after),
             found.rounds, self.runs, found.settled,
             {key: value for key, value in overrides[0].items() if key in everywhere},
             {measured.name: own for measured, each in zip(self._measured, overrides, strict=True)
              if (own := {key: value for key, value in each.items() if key not in everywhere})},
         )  # fmt: skip
-        return made._replace(notes=notes_of(made))
 
 
 def drive(
-    settings: Settings, recording: int, overrides: dict[str, Any], time_s: Array, channels: tuple[str, ...]
+    settings: Settings, recording: int, overrides: dict[str, Any], times: dict[str, Array]
 ) -> dict[str, Array] | str:
-    """Drive once. Return channels at the times of a recording, or the reason of a failure."""
+    """Drive once. Return channels at their times in a recording, or the reason of a failure."""
     try:
         scenario = scenario_of(settings, recording, 0, overrides)
         run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)
     except ActiveSteerError as error:
         return str(error)
     run = at_sensor(run)
-    return {name: np.interp(time_s, run.time_s, run[name]) for name in channels}
+    return {name: np.interp(time_s, run.time_s, run[name]) for name, time_s in times.items()}
 
 
 def _start(factor: Factor, table: FitTable, scenario: Any, study: StudyFile) -> float:

@@ -116,7 +116,7 @@ def validate_measured(
         progress(0.0, "import")
         case = _Case(file, Path(scratch))
         progress(0.1, "prediction")
-        predicted = case.fit(free, case.predict_channels, {}, jobs, scheduler)
+        predicted = case.fit(free, file.predict_channels, {}, jobs, scheduler)
         known = {} if predicted is None else predicted.overrides
         stages = {"predicted": case.runs(known)}
         parts = case.parts("predicted", stages["predicted"])
@@ -127,7 +127,7 @@ def validate_measured(
             assert found is not None
             stages["fitted"] = case.runs(found.overrides)
             parts += case.parts("fitted", stages["fitted"])
-        calls = [(case, free, known, key, end) for key, each in file.table.intervals.items() for end in each.ends]
+        calls = [(case, free, known, {key: end}) for key, each in file.table.intervals.items() for end in each.ends]
         beside = in_parallel(
             _at_end, calls, jobs, lambda _, done: progress(0.5 + 0.5 * done / len(calls), "band"), scheduler=scheduler
         )
@@ -144,41 +144,42 @@ class _Case:
     """Imported runs, and the car that repeats them."""
 
     def __init__(self, file: MeasuredFile, scratch: Path) -> None:
-        self._file, self._scratch = file, scratch
+        self.file, self._scratch = file, scratch
         self._recordings: dict[str, Recording] = {}
-        self._offsets: dict[str, float] = {}
+        self._windows: dict[tuple[str, str], list[float]] = {}  # (run, part) -> start and end in the recording [s]
         notes = []
         for number, run in enumerate(file.table.runs):
             try:
-                found = import_file(
+                recording = import_file(
                     [file.folder / name for name in run.files], file.folder / run.map if run.map else None
                 )
             except RecordingError as reason:
                 raise RecordingError(
                     f"run {run.name}: {reason.problem}", file=reason.file, line=reason.line, key=reason.key
                 ) from reason
-            found.recording.save(scratch / f"{run.name}.mcap")
-            self._recordings[run.name] = found.recording
-            self._offsets[run.name] = float(found.recording.metadata["measured"]["time_offset_s"])
-            self._check_windows(run, number)
-            notes += [f"{run.name}: {note}" for note in found.notes]
+            recording.save(scratch / f"{run.name}.mcap")
+            self._recordings[run.name] = recording
+            self._keep_windows(run, number)
+            notes += [f"{run.name}: {note}" for note in recording.metadata["measured"]["notes"]]
         self.notes = tuple(notes)
         self.assumptions: tuple[str, ...] = ()
-        self.predict_channels = file.predict_channels
 
-    def _check_windows(self, run: RunTable, number: int) -> None:
-        recording, offset = self._recordings[run.name], self._offsets[run.name]
+    def _keep_windows(self, run: RunTable, number: int) -> None:
+        recording = self._recordings[run.name]
+        offset = float(recording.metadata["measured"]["time_offset_s"])
         first, last = offset + recording.time_s[0], offset + recording.time_s[-1]
-        for key, window in (("fit_s", run.fit_s), ("check_s", run.check_s)):
+        for part, window in zip(PARTS, (run.fit_s, run.check_s), strict=True):
             if window and (window[0] < first - 0.01 or window[1] > last + 0.01):
-                raise self._file.source.fail(
-                    ("runs", str(number), key),
+                raise self.file.source.fail(
+                    ("runs", str(number), f"{part}_s"),
                     f"{list(window)} s is not inside the imported part, {first:.2f} to {last:.2f} s", window,
                 )  # fmt: skip
-        for channel in self._file.tolerances:
+            if window:
+                self._windows[run.name, part] = [second - offset for second in window]
+        for channel in self.file.tolerances:
             if channel not in recording:
-                key = next(key for key in self._file.table.quantities if field_in_unit(key, (channel,))[0])
-                raise self._file.source.fail(("quantities", key), f"run {run.name} has no such channel", channel)
+                key = next(key for key in self.file.table.quantities if field_in_unit(key, (channel,))[0])
+                raise self.file.source.fail(("quantities", key), f"run {run.name} has no such channel", channel)
 
     def fit(
         self,
@@ -192,15 +193,14 @@ class _Case:
         """Find factors in the fit windows, or None without factors."""
         if not keys:
             return None
-        used = [run for run in self._file.table.runs if run.fit_s]
-        windows = {run.name: [second - self._offsets[run.name] for second in run.fit_s] for run in used}
+        windows = {run: window for (run, part), window in self._windows.items() if part == "fit"}
         study = {
-            "maneuvers": [str(self._scratch / f"{run.name}.mcap") for run in used],
-            "vehicles": [self._file.vehicle],
-            "overrides": {**self._file.table.overrides, **(overrides or {})},
-            "factors": {key: self._file.table.factors[key] for key in keys},
+            "maneuvers": [str(self._scratch / f"{run}.mcap") for run in windows],
+            "vehicles": [self.file.vehicle],
+            "overrides": {**self.file.table.overrides, **(overrides or {})},
+            "factors": {key: self.file.table.factors[key] for key in keys},
             "fit": {
-                "noise": {channel: self._file.noise[channel] for channel in channels},
+                "noise": {channel: self.file.noise[channel] for channel in channels},
                 "start": {key: value for key, value in start.items() if key in keys},
                 "windows": windows,
             },
@@ -209,29 +209,28 @@ class _Case:
             return fit(study, jobs=jobs, scheduler=scheduler)
         except StudyError as reason:  # its keys are those of a study, of which the file has the factors
             where = reason.key.split(".", 1) if reason.key else []
-            raise self._file.source.fail(where, reason.problem, reason.value, reason.allowed) from reason
+            raise self.file.source.fail(where, reason.problem, reason.value, reason.allowed) from reason
 
     def runs(self, overrides: Mapping[str, Any]) -> dict[str, Recording]:
         """Drive all runs."""
-        values = {**SPEED_HOLD, **self._file.table.overrides, **overrides}
+        values = {**SPEED_HOLD, **self.file.table.overrides, **overrides}
         return {
-            name: simulate(str(self._scratch / f"{name}.mcap"), "none", self._file.vehicle, values)
+            name: simulate(str(self._scratch / f"{name}.mcap"), "none", self.file.vehicle, values)
             for name in self._recordings
         }
 
     def parts(self, stage: str, runs: Mapping[str, Recording]) -> list[Part]:
         """Compare runs in all windows."""
-        table, found = self._file.table, []
+        table, found = self.file.table, []
         for run in table.runs:
             result = compare(
                 [self._recordings[run.name]], runs[run.name], filtered=table.filter, noise=table.noise_allowance,
-                tolerances=self._file.tolerances, aligned=False,
+                tolerances=self.file.tolerances, aligned=False,
             )  # fmt: skip
             self.assumptions = tuple(assumptions(result))
-            for part, window in zip(PARTS, (run.fit_s, run.check_s), strict=True):
-                if window:
-                    begin, end = (second - self._offsets[run.name] for second in window)
-                    found += [Part(run.name, part, stage, _cut(one, begin, end)) for one in result.quantities]
+            for part in PARTS:
+                if window := self._windows.get((run.name, part)):
+                    found += [Part(run.name, part, stage, _cut(one, *window)) for one in result.quantities]
         return found
 
 
@@ -245,11 +244,11 @@ def _cut(one: Compared, begin: float, end: float) -> Compared:
 
 
 def _at_end(
-    case: _Case, free: list[str], start: Mapping[str, Any], key: str, value: float
+    case: _Case, free: list[str], start: Mapping[str, Any], end: dict[str, float]
 ) -> tuple[dict[str, float], list[Array]]:
     """Return the free factors and the predictions in the check windows with one value at an end of its interval."""
-    found = case.fit(free, case.predict_channels, start, 1, None, {key: value})
-    known = {key: value} | ({} if found is None else found.overrides)
+    found = case.fit(free, case.file.predict_channels, start, 1, None, end)
+    known = end | ({} if found is None else found.overrides)
     parts = case.parts("predicted", case.runs(known))
     values = {} if found is None else {one.key: one.value for one in found.parameters}
     return values, [one.compared.simulated for one in parts if one.part == "check"]

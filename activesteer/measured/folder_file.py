@@ -175,9 +175,6 @@ class MeasuredFile:
 def read_measured(folder: Path) -> MeasuredFile:
     """Read and check the file of a folder."""
     given, source = read_toml(folder / NAME)
-    for key in ("effects", "steps", "decisions"):
-        if key in given:
-            raise source.fail((key,), "is gone; give values of the car in [circle.prediction] and [intervals]")
     table = build(MeasuredTable, given, source)
     for key in _OF_RUNS if table.circle is not None else ():
         if key in given:
@@ -288,17 +285,16 @@ def _quantities(
     if not quantities:
         raise source.fail(("quantities",), "at least one channel is needed")
     for name, (key, factor, given) in by_channel(quantities, names, source, ("quantities",)).items():
-        usual = TOLERANCES.get(name)
-        if usual is None and (given.offset is None or given.gain is None):
+        if name not in TOLERANCES and (given.offset is None or given.gain is None):
             raise source.fail(
                 ("quantities", key), "has no usual tolerance; give offset, gain and source", key, list(TOLERANCES)
             )
-        if given.offset is not None or given.gain is not None:
-            usual = usual or Tolerance(0.0, 0.0, "")
-            offset = usual.offset if given.offset is None else given.offset * factor
-            usual = Tolerance(offset, usual.gain if given.gain is None else given.gain, given.source or "user's file")
-        assert usual is not None
-        tolerances[name] = usual
+        tolerance = TOLERANCES.get(name, Tolerance(0.0, 0.0, ""))
+        if given.offset is not None:
+            tolerance = tolerance._replace(offset=given.offset * factor, source=given.source or "user's file")
+        if given.gain is not None:
+            tolerance = tolerance._replace(gain=given.gain, source=given.source or "user's file")
+        tolerances[name] = tolerance
         if given.noise is not None:
             noise[name] = given.noise * factor
     return tolerances, noise
@@ -317,30 +313,25 @@ def _value(vehicle: str, key: str, source: Source, where: tuple[str, ...], overr
 
 def measured_folder(name: str) -> Path:
     """Return the folder of measured runs: the one of a car of the package, or a path."""
-    own = models_dir() / "reference" / name
-    of_package = [path.name for path in own.parent.iterdir() if is_file(path / NAME)]
-    if name in of_package:
-        return own
-    folder = user_path(name, ParameterError)
+    folder = _folder(name)
     if not is_folder(folder):
-        raise ParameterError(
-            f"there is no folder {shown_path(folder)}; {nearest_names(name, of_package)}",
-            value=name,
-            allowed=of_package,
-        )
+        known = [file.parent.name for file in (models_dir() / "reference").glob(f"*/{NAME}")]
+        problem = f"there is no folder {shown_path(folder)}; {nearest_names(name, known)}"
+        raise ParameterError(problem, value=name, allowed=known)
     if not is_file(folder / NAME):
-        raise ParameterError(
-            f"the folder {shown_path(folder)} has no {NAME}; activesteer compare --new FOLDER makes an example",
-            value=name,
-        )
+        problem = f"the folder {shown_path(folder)} has no {NAME}; activesteer compare --new FOLDER makes an example"
+        raise ParameterError(problem, value=name)
     return folder
 
 
 def is_measured(name: str) -> bool:
     """Return whether a name is that of a folder of measured runs."""
-    return any(
-        is_file(folder / NAME) for folder in (models_dir() / "reference" / name, user_path(name, ParameterError))
-    )
+    return is_file(_folder(name) / NAME)
+
+
+def _folder(name: str) -> Path:
+    own = models_dir() / "reference" / name
+    return own if is_file(own / NAME) else user_path(name, ParameterError)
 
 
 def write_template(folder: Path) -> list[Path]:

@@ -76,14 +76,6 @@ _MOST_REPEATED: Final = 5
 """Number of repeated column names that are listed."""
 
 
-class Import(NamedTuple):
-    """Result of an import."""
-
-    recording: Recording  # the recording
-    taken: dict[str, str]  # channel -> column and unit that it comes from
-    notes: tuple[str, ...]  # assumptions that the file does not state, and suspicious values
-
-
 class _Source(NamedTuple):
     """Source of a channel."""
 
@@ -98,8 +90,12 @@ _Files = Mapping[Path, list[Column]]
 """File -> its columns."""
 
 
-def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehicle: str = "compact") -> Import:
-    """Read one or several files of measured data of one run."""
+def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehicle: str = "compact") -> Recording:
+    """Read one or several files of measured data of one run.
+
+    The table `measured` of the metadata has `columns`, channel -> column and unit that it comes from, and `notes`,
+    assumptions that the file does not state, and suspicious values.
+    """
     chosen = MeasurementMap() if map_path is None else build(MeasurementMap, *read_toml(map_path, RecordingError))
     paths = [path] if isinstance(path, Path) else list(path)
     path = paths[0]
@@ -118,8 +114,13 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
     if len(repeated) > _MOST_REPEATED:
         notes.append(f"{len(repeated) - _MOST_REPEATED} more names stand over several columns each")
     sources = _mapped(chosen, files, table) if chosen.channels else _by_name(files, table, notes)
-    shared = _shared_times(files, chosen, sources)
-    sampled = {name: _signal(name, source, shared[source.file], chosen) for name, source in sources.items()}
+    read = {name: source.column.read() for name, source in sources.items()}
+    lacking = {sources[name].file for name, (_, own) in read.items() if own is None}
+    shared = _shared_times(files, chosen, [file for file in paths if file in lacking])
+    sampled = {}
+    for name, (column, own) in read.items():
+        time_s = shared[sources[name].file] if own is None else own
+        sampled[name] = _signal(name, sources[name], time_s, column, chosen)
     grid_s, step_s = _grid(sampled, chosen, path)
     start_s = float(grid_s[0])
     if start_s != 0.0:
@@ -168,7 +169,7 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
     except RecordingError as error:
         recording.metadata["metrics_error"] = str(error)
         notes.append(f"no metrics of the kind {chosen.kind}: {error}")
-    return Import(recording, taken, tuple(notes))
+    return recording
 
 
 def _found(name: str, files: _Files) -> tuple[Column, Path]:
@@ -224,16 +225,12 @@ def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[st
     return sources
 
 
-def _shared_times(files: _Files, chosen: MeasurementMap, sources: Mapping[str, _Source]) -> dict[Path, Array | None]:
-    """Return the times that the columns of each file without own times share [s]."""
-    needing = {source.file for source in sources.values() if source.column.read()[1] is None}
-    if chosen.time and not needing:
+def _shared_times(files: _Files, chosen: MeasurementMap, lacking: list[Path]) -> dict[Path, Array]:
+    """Return the times that the columns of each file share [s], for files whose columns lack their own times."""
+    if chosen.time and not lacking:
         raise RecordingError("every column has its own time; leave this key out", key="time", value=chosen.time)
-    named = [path for path in needing if any(column.name == chosen.time for column in files[path])]
-    return {
-        path: _shared_time(columns, chosen, path, named=path in named or not named) if path in needing else None
-        for path, columns in files.items()
-    }
+    named = [path for path in lacking if any(column.name == chosen.time for column in files[path])]
+    return {path: _shared_time(files[path], chosen, path, named=path in named or not named) for path in lacking}
 
 
 def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, named: bool) -> Array:
@@ -260,7 +257,7 @@ def known_time_unit(name: str) -> str:
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 
 
-def _signal(name: str, source: _Source, shared: Array | None, chosen: MeasurementMap) -> signals.Samples:
+def _signal(name: str, source: _Source, time_s: Array, values: Array, chosen: MeasurementMap) -> signals.Samples:
     """Return the samples of a channel, in SI units and with the signs of ISO 8855."""
     column, unit, factor, path, given = source
     found, wanted = signals.written_unit(unit), unit_of(name)
@@ -270,11 +267,8 @@ def _signal(name: str, source: _Source, shared: Array | None, chosen: Measuremen
             f"known units are {', '.join(UNIT_NAMES)}",
             file=path.name, value=unit, allowed=UNIT_NAMES,
         )  # fmt: skip
-    values, own = column.read()
-    time_s = own if own is not None else shared
-    assert time_s is not None
     shift_s = chosen.shift_s.get(path.name, 0.0)
-    time_s, values = signals.samples(column.name, np.asarray(time_s, np.float64) + shift_s, values, path.name)
+    time_s, values = signals.samples(column.name, time_s + shift_s, values, path.name)
     start_s = -math.inf if chosen.start_s is None else chosen.start_s
     end_s = math.inf if chosen.end_s is None else chosen.end_s
     inside = (time_s >= start_s) & (time_s <= end_s)

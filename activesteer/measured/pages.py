@@ -177,17 +177,16 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
         ),
         f"Area metric {found['area_metric_deg']:.1f} deg, overlap of the distributions {100 * found['overlap']:.0f} %.",
     ]  # fmt: skip
+    spread = [f"{one['mean']:.1f} +- {one['std']:.1f}" for one in (measured, ours)]
     rows = [
-        (words, f"{one['mean']:.1f} +- {one['std']:.1f}", more)
-        for words, one, more in (
-            ("measured", measured, f"{measured['n']} values"),
-            ("predicted", ours, f"{ours['n']} samples, nominal {ours['nominal']:.1f}"),
-        )
+        ("measured", spread[0], f"{measured['n']} values"),
+        ("predicted", spread[1], f"{ours['n']} samples, nominal {ours['nominal']:.1f}"),
     ]
     if two := found["with_assumptions_deg"] != ours["nominal"]:
         second = f"{found['with_assumptions_deg']:.1f}"
         rows.append(("second prediction, without [circle.prediction]", second, "nominal"))
-    sections = [Section("", (), [_distributions(result)], [_table(["steering wheel", "deg", ""], rows)])]
+    table = Table("", ["steering wheel", "deg", ""], rows, kind="comparisons")
+    sections = [Section("", (), [_distributions(result)], [table])]
     if box := found["box"]:
         text = (
             f"From {box['low_deg']:.1f} to {box['high_deg']:.1f} deg, {box['width_deg']:.1f} deg wide: "
@@ -200,12 +199,8 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
             for each in box["intervals"]
         ]
         head = ["interval", "low end, deg", "high end, deg", "source"]
-        sections.append(Section("Probability box", [text], tables=[_table(head, ends)]))
+        sections.append(Section("Probability box", [text], tables=[Table("", head, ends, kind="comparisons")]))
     return lead, sections
-
-
-def _table(columns: Sequence[str], rows: Sequence[Sequence[Text]]) -> Table:
-    return Table("", columns, rows, kind="comparisons")
 
 
 def _distributions(result: CircleValidation) -> Picture:

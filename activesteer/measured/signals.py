@@ -126,13 +126,13 @@ def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]
         found.append(f"yaw_rate_radps reaches {np.abs(rate).max():.0f} rad/s: it looks like deg/s")
     roll = channels.get("roll_rad")
     signed = any("sign" in line for line in found)
-    if roll is not None and ay is not None and _alike(roll, ay) < -_ALIKE and not signed:
+    if not signed and roll is not None and ay is not None and _alike(roll, ay) < -_ALIKE:
+        signed = True
         found.append(
             "roll_rad and ay_mps2 are of opposite sign: a car rolls to the outside of the turn, so roll_rad is "
             'positive to the left, or all are in axes of SAE J670 (axes = "sae_j670" in a map)'
         )
-    opposite = rate is not None and wheel is not None and _alike(wheel, rate) < -_ALIKE
-    if opposite and not any("sign" in line for line in found):
+    if not signed and rate is not None and wheel is not None and _alike(wheel, rate) < -_ALIKE:
         found.append(
             "steering_wheel_rad and yaw_rate_radps are of opposite sign: one of them is positive to the right, the "
             "steering wheel where ay_mps2 agrees with the yaw rate"
@@ -170,15 +170,13 @@ def _unit_words(ratio: float) -> list[str]:
             guesses.append((sum(map(abs, powers)), abs(math.log(ratio / would)), powers))
     if not guesses:
         return [f"ay_mps2 is {ratio:.2g} times speed x yaw rate, nearly 1 in a car: a unit of the three is wrong"]
-    return [_unit_word(name, power) for power, name in zip(min(guesses)[2], _MISTAKES, strict=True) if power]
-
-
-def _unit_word(name: str, power: int) -> str:
-    size, wrong, right = _MISTAKES[name]
-    if power < 0:
-        size, wrong, right = 1.0 / size, right, wrong
-    times = f"{size:.2g} times too large" if size > 1.0 else f"{1.0 / size:.2g} times too small"
-    return f"{name} is {times}: it looks like {wrong} that were taken as {right}"
+    found = []
+    for power, (name, (size, wrong, right)) in zip(min(guesses)[2], _MISTAKES.items(), strict=True):
+        factor = size**power
+        times = f"{factor:.2g} times too large" if factor > 1.0 else f"{1.0 / factor:.2g} times too small"
+        taken = f"{wrong} that were taken as {right}" if power > 0 else f"{right} that were taken as {wrong}"
+        found += [f"{name} is {times}: it looks like {taken}"] if power else []
+    return found
 
 
 def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:

@@ -27,11 +27,11 @@ FILES = [FOLDER / f"double_lane_change_{who}.csv" for who in ("car", "driver")]
 
 @pytest.fixture(scope="module")
 def measured() -> Recording:
-    return import_file(FILES, FOLDER / "map.toml").recording
+    return import_file(FILES, FOLDER / "map.toml")
 
 
 def test_the_files_are_imported_with_the_scale_of_the_steering_as_the_only_doubt(measured: Recording) -> None:
-    notes = import_file(FILES, FOLDER / "map.toml").notes
+    notes = import_file(FILES, FOLDER / "map.toml").metadata["measured"]["notes"]
     assert [note for note in notes if "time begins" not in note] == [
         note for note in notes if "has a scale of its own" in note
     ]
@@ -137,7 +137,8 @@ def test_the_example_is_complete_and_is_never_written_over(tmp_path: Path) -> No
     assert {path.name for path in files} == {"run.csv", "map.toml", "validation.toml"}
     file = read_measured(folder)
     assert set(file.tolerances) == {"yaw_rate_radps", "ay_mps2"}
-    assert import_file(folder / "run.csv", folder / "map.toml").notes == ()
+    run = import_file(folder / "run.csv", folder / "map.toml")
+    assert run.metadata["measured"]["notes"] == []
     with raises(ActiveSteerError, value=str(folder)):
         write_template(folder)
 

@@ -12,7 +12,7 @@ import functools
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
@@ -127,8 +127,11 @@ class Scenario:
                 allowed=SYSTEMS,
             )
         cut = [system for system in SYSTEMS if _is_cut_short(recordings[system])]
-        metrics = {system: self._evaluated(recordings[system], system in cut) for system in SYSTEMS}
-        metrics[TOGETHER] = defaultdict(lambda: math.nan)
+        # Metrics that an incomplete run does not have are nan.
+        metrics: RunMetrics = {name: defaultdict(lambda: math.nan) for name in (*cut, TOGETHER)}
+        for system in SYSTEMS:
+            with suppress(RecordingError) if system in cut else nullcontext():
+                metrics.setdefault(system, {}).update(self.metrics(Evaluable(recordings[system])))
         obstacle, hindrance = obstacle_of(recordings, cut)
         try:
             for system, more in self.compared(recordings, metrics, not cut).items():
@@ -136,15 +139,6 @@ class Scenario:
             return [_judged(statement, metrics, obstacle, hindrance) for statement in self.statements]
         except KeyError as name:
             raise RecordingError(f"a run has no metric {name.args[0]}: its manoeuvre is of another kind") from None
-
-    def _evaluated(self, recording: RecordingLike, cut: bool) -> dict[str, float]:
-        """Return the metrics of a run. Those that an incomplete run does not have are nan."""
-        if not cut:
-            return dict(self.metrics(Evaluable(recording)))
-        found: dict[str, float] = defaultdict(lambda: math.nan)
-        with suppress(RecordingError):
-            found.update(self.metrics(Evaluable(recording)))
-        return found
 
 
 def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance: float) -> Claim:
@@ -253,7 +247,7 @@ def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics,
             values[delay] = math.nan
             if whole:
                 steady, begin_s = metrics["none"][f"{name}_steady_state_{unit}"], own["step_time_s"]
-                time_s = np.asarray(recordings[system].time_s, dtype=np.float64)
+                time_s = recordings[system].time_s
                 moving = math.copysign(1.0, steady) * smooth(recordings[system][f"{name}_{unit}"], timestep(time_s))
                 after = time_s >= begin_s
                 values[delay] = crossing_time(time_s[after], moving[after], LEVEL * abs(steady)) - begin_s
@@ -268,9 +262,9 @@ def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole:
     ars, afs = recordings["ars"], recordings["afs"]
     times = sine_with_dwell.steering(ars)
     later_s = sine_with_dwell.steering(afs).begin_s - times.begin_s
-    time_s = np.asarray(ars.time_s, dtype=np.float64)
+    time_s = ars.time_s
     wanted = (time_s >= times.reversal_s) & (time_s <= times.completion_s + sine_with_dwell.INSTANTS_S[-1])
-    rear = np.asarray(ars["rear_steer_demand_rad"], dtype=np.float64)[wanted]
+    rear = ars["rear_steer_demand_rad"][wanted]
     front = np.interp(time_s[wanted] + later_s, afs.time_s, afs["superposition_demand_rad"])
     both = (np.abs(rear) > MIN_ANGLE_RAD) & (np.abs(front) > MIN_ANGLE_RAD)
     scale = float(np.sqrt(np.sum(rear**2) * np.sum(front**2)))

@@ -18,9 +18,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS, SYSTEMS, Claim, Scenario
-from activesteer.analysis.source import RecordingLike
-from activesteer.config import Source, build, read_toml
+from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, SYSTEMS, Claim, Scenario
+from activesteer.analysis.source import RecordingLike, entry
+from activesteer.config import build, read_toml
 from activesteer.core.files import finite
 from activesteer.core.metric_table import recorded_metric
 from activesteer.errors import ParameterError, nearest_names
@@ -82,20 +82,17 @@ def read_setting(name: str) -> Setting:
     if name == LITERATURE:
         return Setting()
     table, source = read_toml(Path(__file__).parent / f"{name}_setting.toml", ParameterError)
-    found = build(Setting, table, source)
-    _check_reasons(found.fails, source, "fails")
-    return found
+    return build(Setting, table, source)
 
 
 def setting_of(recording: RecordingLike) -> str:
     """Return the name of the setting in which a run was made, or empty if it has other overrides or is of the user."""
-    maneuver, overrides = recording.metadata.get("maneuver"), recording.metadata.get("overrides") or {}
-    name = maneuver.get("name") if isinstance(maneuver, Mapping) else None
+    name, overrides = entry(recording, "maneuver", "name"), recording.metadata.get("overrides") or {}
     if name not in SCENARIOS or not isinstance(overrides, Mapping):
         return ""
     if not overrides:
         return LITERATURE
-    return PAPER if dict(overrides) == read_setting(PAPER).overrides(str(name)) else ""
+    return PAPER if dict(overrides) == read_setting(PAPER).overrides(name) else ""
 
 
 def claims_for(recording: RecordingLike) -> Scenario | None:
@@ -103,34 +100,19 @@ def claims_for(recording: RecordingLike) -> Scenario | None:
     # The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a user's step steer is a
     # step steer. The paper has no claims about a manoeuvre with other settings, except those of `setting_of`; any car
     # and any duration are judged.
-    maneuver, vehicle = recording.metadata.get("maneuver"), recording.metadata.get("vehicle")
-    if not isinstance(maneuver, Mapping):
-        return None
+    vehicle = recording.metadata.get("vehicle")
     harmless = {*_NO_SETTING, *(vehicle if isinstance(vehicle, Mapping) else ())}
     keys = recording.metadata.get("overrides") or ()
     changed = any(key.removeprefix("maneuver.").partition(".")[0] not in harmless for key in keys)
     if changed and setting_of(recording) != PAPER:
         return None
-    name, kind = maneuver.get("name"), maneuver.get("kind")
-    return SCENARIOS.get(str(name if name in SCENARIOS or kind not in {"step_steer", "sine_with_dwell"} else kind))
+    name, kind = (entry(recording, "maneuver", key) for key in ("name", "kind"))
+    return SCENARIOS.get(name if name in SCENARIOS or kind not in {"step_steer", "sine_with_dwell"} else kind)
 
 
-def not_reproduced(vehicle: str, path: Path = NOT_REPRODUCED) -> dict[str, str]:
-    """Return the claims that are not reproduced with a vehicle."""
-    table, source = read_toml(path, ParameterError)
-    for name, reasons in table.items():
-        _check_reasons(reasons, source, name)
-    return dict(table.get(vehicle, {}))
-
-
-def _check_reasons(reasons: object, source: Source, name: str) -> None:
-    if not isinstance(reasons, dict):
-        raise source.fail((name,), f"is {reasons!r}; claims and reasons are needed", reasons)
-    for number, reason in reasons.items():
-        if number not in STATEMENTS:
-            raise source.fail((name, number), f"no such claim; {nearest_names(number, STATEMENTS)}", number)
-        if not isinstance(reason, str) or not reason.strip():
-            raise source.fail((name, number), f"is {reason!r}; the reason in words is needed", reason)
+def not_reproduced(vehicle: str) -> dict[str, str]:
+    """Return the claims that are not reproduced with a vehicle, each with its reason."""
+    return read_toml(NOT_REPRODUCED, ParameterError)[0].get(vehicle, {})
 
 
 class Verdict(StrEnum):

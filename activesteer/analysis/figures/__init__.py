@@ -25,6 +25,7 @@ from activesteer.analysis.source import RecordingLike
 from activesteer.config import Source, build
 from activesteer.core.conventions import RUN_COLOURS, SYSTEM_LABELS
 from activesteer.core.files import make_folder
+from activesteer.core.limits import fail, table_of
 from activesteer.drawing.panels import PANELS
 from activesteer.errors import ParameterError, RecordingError, shown
 from activesteer.plotting import new_figure, save
@@ -132,13 +133,10 @@ def figure_9(recording: RecordingLike) -> Figure:
 
 
 def _parameters(recording: RecordingLike, *keys: str) -> Mapping[str, Any]:
-    table: Any = recording.metadata.get("vehicle")
+    value, path = recording.metadata.get("vehicle"), "vehicle"
     for key in keys:
-        table = table.get(key) if isinstance(table, Mapping) else None
-    if not isinstance(table, Mapping):
-        path = f"vehicle.{'.'.join(keys)}"
-        raise RecordingError(f"the metadata of the recording have no table {path!r}", value=path)
-    return table
+        value, path = table_of(value, path).get(key), f"{path}.{key}"
+    return table_of(value, path)
 
 
 def _single_track(recording: RecordingLike) -> SingleTrack:
@@ -154,7 +152,7 @@ def _single_track(recording: RecordingLike) -> SingleTrack:
 def _number(table: Mapping[str, Any], key: str, default: float | None = None) -> float:
     value = table.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise RecordingError(f"the controllers in the metadata of the recording: {key} is {shown(value)}, not a number")
+        raise fail(key, f"is {shown(value)}, expected a number of the vehicle's controllers")
     return float(value)
 
 

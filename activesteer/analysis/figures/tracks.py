@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -40,7 +40,7 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     course = read_course(drawn_runs(recordings)[0].recording)
     figure = new_figure(width_in=PAGE_IN, height_in=0.65 + _axis_height_in(course, COURSE_ASPECT))
     axis: Axes = figure.subplots()
-    _draw_course(axis, course, COURSE_ASPECT)
+    _draw_course(axis, course, COURSE_ASPECT, np.zeros(len(course.cones_m), bool))
     for lane in course.lanes:
         text = f"{lane.name}\n" if lane.name else ""
         size = f"{lane.end_x_m - lane.start_x_m:.1f} m x {lane.left_y_m - lane.right_y_m:.2f} m"
@@ -51,10 +51,11 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
     """Draw tracks of the front axle centre along the course. The axis names the factor that stretches y."""
-    course = read_course(drawn_runs(recordings)[0].recording)
+    drawn = drawn_runs(recordings)
+    course = read_course(drawn[0].recording)
     figure = new_figure(width_in=PAGE_IN, height_in=0.95 + _axis_height_in(course, TRACK_ASPECT))
     axis: Axes = figure.subplots()
-    _draw_tracks(axis, recordings)
+    _draw_tracks(axis, drawn, course)
     over_time.name_curves(figure, axis)
     return figure
 
@@ -66,7 +67,7 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     figure = new_figure(width_in=PAGE_IN, height_in=3.2 + 1.15 * len(panels))
     grid = figure.add_gridspec(1 + len(panels), 1, height_ratios=[2.6, *(1.0 for _ in panels)])
     above = figure.add_subplot(grid[0])
-    _draw_tracks(above, recordings)
+    _draw_tracks(above, drawn, read_course(drawn[0].recording))
     axes: list[Axes] = [figure.add_subplot(grid[1])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(2, 1 + len(panels))]
     over_time.fill_panels(axes, drawn, panels)
@@ -78,20 +79,14 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
     return figure
 
 
-def _draw_tracks(axis: Axes, recordings: Mapping[str, RecordingLike]) -> None:
+def _draw_tracks(axis: Axes, drawn: Sequence[DrawnRun], course: Course) -> None:
     """Draw the course, and the track of the front axle centre of every run."""
-    drawn = drawn_runs(recordings)
     for curve in drawn:
         x, y = (over_time.thinned(values) for values in lanes.front_axle(curve.recording))
         axis.plot(
-            x,
-            y,
-            color=curve.look.colour,
-            linewidth=over_time.LINE_PT,
-            linestyle=curve.linestyle,
+            x, y, color=curve.look.colour, linewidth=over_time.LINE_PT, linestyle=curve.linestyle,
             label=curve.look.label,
-        )
-    course = read_course(drawn[0].recording)
+        )  # fmt: skip
     struck = lanes.struck_cones([curve.recording for curve in drawn], course)
     _draw_course(axis, course, TRACK_ASPECT, struck)
     _draw_friction(axis, drawn[0])
@@ -132,7 +127,7 @@ def _draw_friction(axis: Axes, curve: DrawnRun) -> None:
         )  # fmt: skip
 
 
-def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.bool_] | None = None) -> None:
+def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.bool_]) -> None:
     """Draw lanes, path and cones with their own legend, and set the limits of the axis."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Ellipse, Rectangle  # noqa: PLC0415
@@ -145,9 +140,7 @@ def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.b
         shown = [patch]
     view = view_of(course)
     shown += axis.plot(view.path_x_m, view.path_y_m, ":", color="#888888", linewidth=1.2, zorder=1)
-    for (x, y), hit in zip(
-        course.cone_centres_m(), struck if struck is not None else [False] * len(course.cones_m), strict=True
-    ):
+    for (x, y), hit in zip(course.cone_centres_m(), struck, strict=True):
         colour = STRUCK_COLOUR if hit else CONE_COLOUR
         # The cone has its size; its edge keeps it visible.
         size = 2.0 * CONE_RADIUS_M
@@ -156,7 +149,7 @@ def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.b
     if len(course.cones_m):
         shown.append(Line2D([], [], linestyle="", marker="o", markersize=3.0, color=CONE_COLOUR))
         names.append("cone")
-    if struck is not None and struck.any():
+    if struck.any():
         axis.plot(
             *course.cone_centres_m()[struck].T, "x", color=STRUCK_COLOUR, markersize=5.0, zorder=4, label="_struck"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.claims.scorecard import (
@@ -18,6 +18,7 @@ from activesteer.analysis.claims.scorecard import (
     setting_of,
 )
 from activesteer.analysis.harm import failures, kept
+from activesteer.analysis.source import entry
 from activesteer.core.conventions import RunLook, run_looks
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
@@ -101,12 +102,6 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
     ordered = [(name, paper) for name in SCENARIOS for paper in (True, False) if (name, paper) in by_maneuver]
     ordered += [key for key in by_maneuver if key not in ordered]
     return [_group(name, by_maneuver[name, paper], paper=paper) for name, paper in ordered]
-
-
-def entry(recording: Recording, table: str, key: str) -> str:
-    """Return an entry of a table of the metadata as text, or empty if it does not exist."""
-    values: Any = recording.metadata.get(table)
-    return str(values.get(key, "")) if isinstance(values, Mapping) else ""
 
 
 def _group(name: str, recordings: Mapping[str, Recording], *, paper: bool) -> Group:

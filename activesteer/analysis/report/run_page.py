@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -14,8 +16,10 @@ from activesteer.analysis.claims.scorecard import Scorecard, Verdict, number_lin
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
 from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
-from activesteer.analysis.report.groups import Group, ReportedRun, entry, groups_of, judge
+from activesteer.analysis.report.groups import Group, ReportedRun, groups_of, judge
+from activesteer.analysis.source import entry
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
+from activesteer.config import leaf_keys
 from activesteer.core.files import write_text
 from activesteer.core.metric_table import Better, recorded_metric
 from activesteer.core.units import display_unit, parameter_label, typeset
@@ -150,7 +154,8 @@ def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
     for run in recordings:
         chosen = {key: run.metadata[key] for key in tables if key in run.metadata}
         one = chosen.get(tables[0])
-        flat.append(dict(_flat(one if len(tables) == 1 and isinstance(one, Mapping) else chosen)))
+        table = one if len(tables) == 1 and isinstance(one, Mapping) else chosen
+        flat.append({".".join(path): _text(path[-1], reduce(getitem, path, table)) for path in leaf_keys(table)})
     found = []
     for key in dict.fromkeys(key for entries in flat for key in entries):
         values = tuple(entries.get(key, "") for entries in flat)
@@ -158,17 +163,9 @@ def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
     return found
 
 
-def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{before}{key}.")
-        else:
-            yield f"{before}{key}", _text(key, value)
-
-
 def _text(key: str, value: Any) -> str:
     if isinstance(value, bool) or value is None:
-        return str(value).lower() if value is not None else "none"
+        return str(value).lower()
     if isinstance(value, int | float):
         unit, factor = display_unit(key)
         return typeset(f"{value:.6g}" if factor == 1.0 else f"{value:.6g} ({value * factor:.4g} {unit})")
@@ -179,40 +176,23 @@ MAX_FIGURES: Final = 6
 """Most key figures that can be read at a glance."""
 
 
-class Figure(NamedTuple):
-    """A key figure of a run, as text."""
-
-    text: str  # its value
-    difference: str = ""  # difference from the first run; empty for the first run and without a difference
-    change: Change = Change.OTHER  # significance of the difference
-
-
-class Result(NamedTuple):
-    """Result of a run."""
-
-    run: ReportedRun  # the run
-    losses: tuple[str, ...]  # its failures, in words
-    kept: tuple[str, ...]  # the requirements that it met, in words
-    figures: tuple[Figure, ...]  # its key figures
-
-
 HEADLINE: Final = "Peak sideslip [deg]"
 """Title of the key figure that is shown where there is room for only one."""
 
 
-def results(group: Group) -> list[Result]:
-    """Return the result of each run of a group, compared with the first run."""
+def results(group: Group) -> list[dict[str, Any]]:
+    """Return failures, met requirements and key figures of each run of a group, compared with the first run."""
     chosen = key_figures(group).values()
     first = group.runs[0].recording.metrics
-    lost = [(*(["incomplete"] if run.problem else []), *losses(run.recording.metrics)) for run in group.runs]
+    lost = [[*(["incomplete"] if run.problem else []), *losses(run.recording.metrics)] for run in group.runs]
     found = []
     for place, run in enumerate(group.runs):
         metrics = run.recording.metrics
-        well = tuple(kept(metrics)) or (("stays under control",) if any(lost) and not lost[place] else ())
+        well = [*kept(metrics)] or (["stays under control"] if any(lost) and not lost[place] else [])
         figures = [_figure(name, metrics, first if place else None) for name in chosen]
         if not (_is_judged(group.runs[0]) and _is_judged(run)):
-            figures = [figure._replace(change=Change.OTHER) for figure in figures]
-        found.append(Result(run, lost[place], well, tuple(figures)))
+            figures = [figure | {"change": Change.OTHER} for figure in figures]
+        found.append({"run": run, "losses": lost[place], "kept": well, "figures": figures})
     return found
 
 
@@ -232,19 +212,19 @@ def key_figures(group: Group) -> dict[str, str]:
     return dict(list(found.items())[:MAX_FIGURES])
 
 
-def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> Figure:
+def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> dict[str, Any]:
+    """Return the text of a key figure, and its difference from the first run with the significance, if it has one."""
     sizes = abs if recorded_metric(name).better is Better.SMALLER else float
     value = sizes(metrics.get(name, math.nan))
     text = shown(name, metrics, number(name, value))
-    if LOST in (text, shown(name, first or {}, "")):
-        return Figure(text)
     before = math.nan if first is None else sizes(first.get(name, math.nan))
-    if not math.isfinite(value - before):
-        return Figure(text)
+    if LOST in (text, shown(name, first or {}, "")) or not math.isfinite(value - before):
+        return {"text": text, "difference": "", "change": Change.OTHER}
     difference = difference_text(name, value, before)
     if is_near(name, value, before):
-        return Figure(text, difference.text, Change.SAME)
-    return Figure(text, difference.percent or difference.text, significance(name, value, before))
+        return {"text": text, "difference": difference.text, "change": Change.SAME}
+    change = significance(name, value, before)
+    return {"text": text, "difference": difference.percent or difference.text, "change": change}
 
 
 def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:

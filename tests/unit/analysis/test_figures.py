@@ -260,13 +260,11 @@ def test_damaged_parameters_are_refused(draw, keys, value):
         draw(run)
 
 
-@pytest.mark.parametrize(
-    ("draw", "key"), [(figures.figure_7, "single_track"), (figures.figure_9, "controllers.ars.corrector")]
-)
+@pytest.mark.parametrize(("draw", "key"), [(figures.figure_7, "single_track"), (figures.figure_9, "controllers")])
 def test_missing_parameters_are_named(draw, key):
     run = step_steer()
-    run.metadata["vehicle"] = {name: table for name, table in VEHICLE.items() if name != key.partition(".")[0]}
-    with raises(RecordingError, value=f"vehicle.{key}"):
+    run.metadata["vehicle"] = {name: table for name, table in VEHICLE.items() if name != key}
+    with raises(RecordingError, file="the metadata", key=f"vehicle.{key}"):
         draw(run)
 
 

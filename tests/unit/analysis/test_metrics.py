@@ -88,7 +88,7 @@ def test_wheels_of_a_side_that_are_lifted_together_count_as_two_wheel_lift():
 def test_a_recording_without_kind_is_refused():
     run = wave()
     run.metadata["maneuver"] = "step_steer"
-    with raises(RecordingError, file="the metadata", key="maneuver", value="step_steer"):
+    with raises(RecordingError, file="the metadata", key="maneuver"):
         metrics(run)
 
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import math
 
-import pytest
-
-from activesteer.analysis.claims.judge import Claim, Statement
-from activesteer.analysis.claims.scorecard import Verdict, not_reproduced, scorecard
-from activesteer.errors import ParameterError
-from tests.raising import raises
+from activesteer.analysis.claims.judge import STATEMENTS, Claim, Statement
+from activesteer.analysis.claims.scorecard import (
+    NOT_REPRODUCED,
+    PAPER,
+    Verdict,
+    not_reproduced,
+    read_setting,
+    scorecard,
+)
+from activesteer.config import read_toml
 
 
 def claim(number: str, passed: bool, **values: float) -> Claim:
@@ -71,30 +75,13 @@ def test_text_shows_the_numbers_of_the_systems_beside_each_other_in_display_unit
     assert lines[-1] == "1 claims: 1 passed"
 
 
-def test_the_list_in_the_package_can_be_read():
-    assert all(reason for reason in not_reproduced("compact").values())
+def test_the_lists_in_the_package_name_claims_and_reasons():
+    lists = [*read_toml(NOT_REPRODUCED)[0].values(), read_setting(PAPER).fails]
+    for reasons in lists:
+        assert set(reasons) <= set(STATEMENTS)
+        assert all(isinstance(reason, str) and reason.strip() for reason in reasons.values())
+
+
+def test_the_list_of_the_vehicle_is_looked_up_by_its_name():
+    assert not_reproduced("compact")["S1"] != not_reproduced("tesla_model_s")["S1"]
     assert not_reproduced("a car that nobody knows") == {}
-
-
-def test_the_list_of_the_vehicle_is_looked_up_by_its_name(tmp_path):
-    path = tmp_path / "list.toml"
-    path.write_text('[compact]\nD5 = "why"\n[other]\nS1 = "for another reason"')
-    assert not_reproduced("compact", path) == {"D5": "why"}
-    assert not_reproduced("other", path) == {"S1": "for another reason"}
-
-
-@pytest.mark.parametrize(
-    ("text", "key"),
-    [
-        ('[compact]\nD6 = "why"', "compact.D6"),
-        ('[compact]\nD5 = ""', "compact.D5"),
-        ("[compact]\nD5 = true", "compact.D5"),
-        ('D5 = "why"', "D5"),
-        ("[compact\n", None),
-    ],
-)
-def test_a_wrong_list_is_refused(text, key, tmp_path):
-    path = tmp_path / "list.toml"
-    path.write_text(text)
-    with raises(ParameterError, file="list.toml", key=key):
-        not_reproduced("compact", path)

@@ -47,10 +47,10 @@ def test_a_csv_has_any_separator_and_decimal_comma(tmp_path, separator, comma):
     names = separator.join(["time[s]", "LWI[deg]", "Gierrate[deg/s]", "Querbeschleunigung[g]", "v[km/h]"])
     columns = [TIME_S, np.degrees(WHEEL_RAD), np.degrees(RATE_RADPS), AY_MPS2 / 9.81, 3.6 * SPEED_MPS]
     found = import_file(write(tmp_path / "a.csv", names, columns, separator, comma=comma))
-    check(found.recording)
-    assert found.notes == ()
-    assert found.recording["speed_mps"][0] == pytest.approx(20.0)
-    assert found.recording.metrics["yaw_rate_peak_abs_radps"] == pytest.approx(0.1, rel=1e-3)
+    check(found)
+    assert found.metadata["measured"]["notes"] == []
+    assert found["speed_mps"][0] == pytest.approx(20.0)
+    assert found.metrics["yaw_rate_peak_abs_radps"] == pytest.approx(0.1, rel=1e-3)
 
 
 def test_a_line_of_units_and_a_preamble_are_understood_and_bytes_of_windows(tmp_path):
@@ -58,7 +58,7 @@ def test_a_line_of_units_and_a_preamble_are_understood_and_bytes_of_windows(tmp_
     lines += [f"{t:.3f};{math.degrees(r):.6f};72.0" for t, r in zip(TIME_S, RATE_RADPS, strict=True)]
     path = tmp_path / "a.csv"
     path.write_bytes("\r\n".join(lines).encode("latin-1"))
-    recording = import_file(path).recording
+    recording = import_file(path)
     np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS, atol=1e-7)
 
 
@@ -77,7 +77,7 @@ def test_quotes_words_clocks_and_unicode_text_are_understood(tmp_path, names, ce
     if comma and "2024" not in cells:
         lines = [line.replace(".", ",") for line in lines]
     (tmp_path / "a.csv").write_text("\n".join([names, *lines]), encoding=coding)
-    recording = import_file(tmp_path / "a.csv").recording
+    recording = import_file(tmp_path / "a.csv")
     np.testing.assert_allclose(np.diff(recording.time_s), 0.01, atol=1e-6)
     np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS, atol=1e-7)
     assert recording["speed_mps"][0] == pytest.approx(20.0)
@@ -86,17 +86,19 @@ def test_quotes_words_clocks_and_unicode_text_are_understood(tmp_path, names, ce
 def test_first_of_several_columns_with_one_name_is_used_with_a_note_and_a_map_names_another(tmp_path):
     path = write(tmp_path / "a.csv", "t,yawrate,yawrate,v", [TIME_S, RATE_RADPS, 2.0 * RATE_RADPS, SPEED_MPS])
     found = import_file(path)
-    check_rate(found.recording, 1.0)
-    assert any("several columns are named 'yawrate': the first is used" in note for note in found.notes)
+    check_rate(found, 1.0)
+    assert any(
+        "several columns are named 'yawrate': the first is used" in note for note in found.metadata["measured"]["notes"]
+    )
     (tmp_path / "map.toml").write_text('[channels]\nyaw_rate_radps = { column = "yawrate (2)" }\n')
-    check_rate(import_file(path, tmp_path / "map.toml").recording, 2.0)
+    check_rate(import_file(path, tmp_path / "map.toml"), 2.0)
 
 
 def test_a_column_with_an_unknown_unit_is_left_out_with_a_note(tmp_path):
     path = write(tmp_path / "a.csv", "t,yaw_rate[furlong],v[m/s],foo[bar]", [TIME_S, RATE_RADPS, SPEED_MPS, SPEED_MPS])
     found = import_file(path)
-    assert "yaw_rate_radps" not in found.taken
-    (note,) = found.notes
+    assert "yaw_rate_radps" not in found.metadata["measured"]["columns"]
+    (note,) = found.metadata["measured"]["notes"]
     assert note.startswith("'yaw_rate[furlong]' is left out: its unit is unknown; known are rad, deg")
 
 
@@ -179,12 +181,12 @@ def test_mat_parquet_and_our_own_exports_come_back(tmp_path):
         'time = "run.t"\n[channels]\nyaw_rate_radps = { column = "run.YawRate", unit = "rad/s" }\n'
         'ay_mps2 = { column = "lateral_acceleration", unit = "m/s2" }\n'
     )
-    recording = import_file(tmp_path / "a.mat", tmp_path / "map.toml").recording
+    recording = import_file(tmp_path / "a.mat", tmp_path / "map.toml")
     check(recording)
     assert list(recording.attachments) == ["map.toml"]
     for export, ending in (("to_csv", "csv"), ("to_parquet", "parquet"), ("to_mat", "mat")):
         path = getattr(recording, export)(tmp_path / f"again.{ending}")
-        check(import_file(path).recording)
+        check(import_file(path))
 
 
 def test_mdf_channels_have_times_of_their_own(tmp_path):
@@ -195,7 +197,7 @@ def test_mdf_channels_have_times_of_their_own(tmp_path):
     file.append([asammdf.Signal(np.full_like(slow, 72.0), slow, name="VehicleSpeed", unit="km/h")])
     file.save(tmp_path / "a.mf4", overwrite=True)
     file.close()
-    recording = import_file(tmp_path / "a.mf4").recording
+    recording = import_file(tmp_path / "a.mf4")
     assert recording.time_s[1] - recording.time_s[0] == pytest.approx(0.01)
     np.testing.assert_allclose(recording["speed_mps"], 20.0)
     np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS[: len(recording)], atol=1e-9)
@@ -214,11 +216,11 @@ def test_the_clock_of_the_logger_is_set_to_zero_and_kept_in_the_metadata(tmp_pat
     path = write(tmp_path / "a.csv", "t,steering_wheel_rad,yaw_rate_radps,speed_mps",
                  [clock_s + TIME_S, 0.1 * RATE_RADPS, RATE_RADPS, SPEED_MPS])  # fmt: skip
     found = import_file(path)
-    np.testing.assert_allclose(found.recording.time_s, TIME_S, atol=1e-12)
-    np.testing.assert_allclose(found.recording["yaw_rate_radps"], RATE_RADPS, atol=1e-5)
-    assert found.recording.metadata["measured"]["time_offset_s"] == clock_s
-    assert any("begins at" in note for note in found.notes)
-    assert open_loop_of(found.recording, "a")["duration_s"] == pytest.approx(TIME_S[-1])
+    np.testing.assert_allclose(found.time_s, TIME_S, atol=1e-12)
+    np.testing.assert_allclose(found["yaw_rate_radps"], RATE_RADPS, atol=1e-5)
+    assert found.metadata["measured"]["time_offset_s"] == clock_s
+    assert any("begins at" in note for note in found.metadata["measured"]["notes"])
+    assert open_loop_of(found, "a")["duration_s"] == pytest.approx(TIME_S[-1])
 
 
 def test_a_recording_that_does_not_start_at_zero_is_driven_from_its_first_row():
@@ -238,7 +240,7 @@ def test_a_map_gives_units_signs_offsets_and_the_axes_of_sae(tmp_path):
         'ay_mps2 = { column = "q", unit = "m/s2", offset = -0.3 }\n'
         'roll_rad = { column = "b", unit = "rad", zero_until_s = 2.0 }\n'
     )
-    recording = import_file(path, tmp_path / "map.toml").recording
+    recording = import_file(path, tmp_path / "map.toml")
     assert (recording.time_s[0], recording.time_s[-1], len(recording)) == (0.0, 2.0, 101)
     # Averaged over a step of 20 ms, a sine of 0.5 Hz loses 0.02 %.
     np.testing.assert_allclose(recording["yaw_rate_radps"], RATE_RADPS[100:301:2], atol=3e-4)
@@ -248,7 +250,7 @@ def test_a_map_gives_units_signs_offsets_and_the_axes_of_sae(tmp_path):
 
 def test_the_path_of_a_circle_follows_from_speed_and_yaw_rate_and_a_car_drives_it(tmp_path):
     path = write(tmp_path / "a.csv", "time_s,yaw_rate_radps,speed_mps", [TIME_S, 0.0 * TIME_S + 0.5, SPEED_MPS])
-    recording = import_file(path).recording
+    recording = import_file(path)
     np.testing.assert_allclose(recording["x_m"], 40.0 * np.sin(0.5 * TIME_S), atol=1e-3)
     np.testing.assert_allclose(recording["y_m"], 40.0 * (1.0 - np.cos(0.5 * TIME_S)), atol=1e-3)
     recording.save(tmp_path / "a.mcap")
@@ -263,7 +265,7 @@ def test_gaps_are_bridged_as_long_as_the_map_allows(tmp_path):
     holed = RATE_RADPS.copy()
     holed[100:105] = np.nan
     path = write(tmp_path / "short.csv", "time_s,yaw_rate_radps,speed_mps", [TIME_S, holed, SPEED_MPS])
-    np.testing.assert_allclose(import_file(path).recording["yaw_rate_radps"], RATE_RADPS, atol=1e-3)
+    np.testing.assert_allclose(import_file(path)["yaw_rate_radps"], RATE_RADPS, atol=1e-3)
     holed[100:150] = np.nan
     path = write(tmp_path / "long.csv", "time_s,yaw_rate_radps,speed_mps", [TIME_S, holed, SPEED_MPS])
     with raises(RecordingError, file="long.csv", key="yaw_rate_radps", value=pytest.approx((0.99, 1.5))):
@@ -348,9 +350,8 @@ yaw_rate_radps = { column = "r" }
 speed_mps = { column = "vel" }
 """
     (tmp_path / "map.toml").write_text(text)
-    found = import_file([car, driver], tmp_path / "map.toml")
-    run = found.recording
-    assert [note for note in found.notes if "time begins" not in note] == []
+    run = import_file([car, driver], tmp_path / "map.toml")
+    assert [note for note in run.metadata["measured"]["notes"] if "time begins" not in note] == []
     offset = run.metadata["measured"]["time_offset_s"]
     np.testing.assert_allclose(run["steering_wheel_rad"], np.interp(run.time_s + offset, TIME_S, WHEEL_RAD), atol=1e-4)
     inside = run.time_s + offset <= TIME_S[-1] - 0.02
