@@ -38,7 +38,7 @@ class BrakeInput:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BrakeInTurn(Maneuver):
+class BrakeInTurn(Maneuver, kind="brake_in_turn"):
     """A turn at constant speed and steering wheel angle, then braking."""
 
     turn: TurnInput
@@ -98,7 +98,7 @@ _MIN_SPEED_MPS: Final = 10.0 / 3.6
 
 
 @dataclass(frozen=True, kw_only=True)
-class StraightBraking(Maneuver):
+class StraightBraking(Maneuver, kind="straight_braking"):
     """Driving straight ahead, then braking with an open clutch until the car stands."""
 
     brake: BrakeInput
@@ -124,14 +124,10 @@ class StraightBraking(Maneuver):
                 value=self.brake.start_s,
             )
 
-    @property
+    @cached_property
     def course(self) -> Course | None:
         """The straight line that the driver keeps, or None if the steering wheel is held."""
-        return self._course if self.hold_line else None
-
-    @cached_property
-    def _course(self) -> Course:
-        return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0]))
+        return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0])) if self.hold_line else None
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Speed, then the ramp of the brake (see the base class)."""

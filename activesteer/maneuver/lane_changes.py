@@ -81,18 +81,10 @@ class AlongCourse(Maneuver):
                 allowed=Range(gate_s + _AFTER_S),
             )
 
-    @property
+    @cached_property
+    @abstractmethod
     def course(self) -> Course:
         """Path, lanes and cones."""
-        return self._course
-
-    @cached_property
-    def _course(self) -> Course:
-        return self._make_course()
-
-    @abstractmethod
-    def _make_course(self) -> Course:
-        """Lay out the course; called once."""
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Path and speed."""
@@ -317,7 +309,7 @@ class LaneLayout:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LaneChange(AlongCourse):
+class LaneChange(AlongCourse, kind="lane_change"):
     """A double lane change."""
 
     lane: LaneLayout = LaneLayout()
@@ -338,7 +330,9 @@ class LaneChange(AlongCourse):
     def _coasting(self) -> Setpoint:
         return self._setpoint._replace(hold_speed=False)
 
-    def _make_course(self) -> Course:
+    @cached_property
+    def course(self) -> Course:
+        """Path, lanes and cones of the standard."""
         layout, width = self.lane, known_width(self.vehicle_width_m)
         # Laid out to the left and then mirrored, so that left and right agree to the last digit.
         left = self._lanes(width, 1.0)
@@ -430,7 +424,7 @@ class ConeRow:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slalom(AlongCourse):
+class Slalom(AlongCourse, kind="slalom"):
     """A slalom along a sine.
 
     Between the cones the path is a cosine with its crests at the cones. It leaves the line of the cones one spacing
@@ -444,7 +438,9 @@ class Slalom(AlongCourse):
     vehicle_width_m: Width | None = None
     """Width of the vehicle, which must fit past the cones [m]. Default: the width in the vehicle file."""
 
-    def _make_course(self) -> Course:
+    @cached_property
+    def course(self) -> Course:
+        """Path and cones."""
         row, width = self.cones, known_width(self.vehicle_width_m)
         if row.offset_m <= 0.5 * width:
             raise ManeuverError(

@@ -149,7 +149,7 @@ class Phase:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Phases(Maneuver):
+class Phases(Maneuver, kind="phases"):
     """Phases in a row. The last one lasts to the end of the run."""
 
     phases: tuple[Phase, ...]

@@ -46,7 +46,7 @@ class StepInput:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StepSteer(Maneuver):
+class StepSteer(Maneuver, kind="step_steer"):
     """A step of the steering wheel angle, ramped at a limited rate."""
 
     steer: StepInput
@@ -121,7 +121,7 @@ class Sweep:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SineSweep(Maneuver):
+class SineSweep(Maneuver, kind="sine_sweep"):
     """A sine of constant amplitude and rising frequency at constant speed."""
 
     sweep: Sweep = Sweep()
@@ -175,7 +175,7 @@ class SlowRamp:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlowlyIncreasingSteer(Maneuver):
+class SlowlyIncreasingSteer(Maneuver, kind="slowly_increasing_steer"):
     """A slow ramp of the steering wheel angle at constant speed, up to the limit of the car."""
 
     steer: SlowRamp = SlowRamp()
@@ -232,7 +232,7 @@ class RandomSignal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RandomSteer(Maneuver):
+class RandomSteer(Maneuver, kind="random_steer"):
     """Random steering at constant speed."""
 
     random: RandomSignal = RandomSignal()
@@ -325,7 +325,7 @@ class DwellInput:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SineWithDwell(Maneuver):
+class SineWithDwell(Maneuver, kind="sine_with_dwell"):
     """A sine with dwell. The drive holds the speed until the sine begins."""
 
     steer: DwellInput

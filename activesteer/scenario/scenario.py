@@ -32,7 +32,7 @@ from activesteer.core.files import user_path
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, nearest_names
 from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
-from activesteer.maneuver.base import with_road_files
+from activesteer.maneuver.base import with_files
 from activesteer.plugins import Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
@@ -166,11 +166,10 @@ def resolve(
     car = car_with(vehicle, sorted_out["vehicle"])
     if any(field.name == "vehicle_width_m" for field in fields(kind)):
         table = {"vehicle_width_m": car.config.width_m, **table}
-    table, csv_files = kind.filled_from_csv(table, folder, source)
-    table, road_files = with_road_files(table, folder, source)
+    table, csv_files = with_files(kind, table, folder, source)
     who = driver_with(driver, sorted_out["driver"])
     own = own_values({one.given: one.value for one in sorted_out["controllers"]}, owned)
-    made_from = {**files, **csv_files, **road_files, **car.files, **who.files}
+    made_from = {**files, **csv_files, **car.files, **who.files}
     built = build_maneuver(table, source)
     if is_recording(maneuver):
         built = build_maneuver(led(table, car.on(built.ground).steering_lag_s), source)
@@ -379,8 +378,8 @@ def _maneuver(before: Maneuver, key: str, path: list[str], value: Any, time_s: f
 def _same_course(before: Maneuver, of: Maneuver | None = None, **values: Any) -> Maneuver:
     """Return a manoeuvre with the very course of another one, so that a driver stays on his path."""
     after = replace(before, **values) if of is None else of
-    if "_course" in before.__dict__:
-        vars(after)["_course"] = before.__dict__["_course"]
+    if before.course is not None:
+        vars(after)["course"] = before.course
     return after
 
 
