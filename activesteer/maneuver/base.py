@@ -134,7 +134,7 @@ class Search:
     """Search for a steering wheel angle by driving the car without control."""
 
     probe: Maneuver
-    """The manoeuvre that is driven."""
+    """The manoeuvre that is driven: step steers, whose steady state counts, or one slow ramp to the left."""
     lateral_acceleration_mps2: float
     """Lateral acceleration to reach [m/s2], left positive."""
     accept: Callable[[float], Maneuver]
@@ -144,6 +144,13 @@ class Search:
 def within(value: float, most: float) -> float:
     """Return a value limited to 0 and `most`. In a setpoint `min` and `max` would take most of the time."""
     return 0.0 if value < 0.0 else most if value > most else value
+
+
+def check_begin(key: str, start_s: float, duration_s: float) -> None:
+    """Check that an input begins before the end of the run."""
+    if start_s >= duration_s:
+        problem = f"is {start_s:g} s, but the run ends at {duration_s:g} s (duration_s)"
+        raise ManeuverError(problem, key=key, value=start_s)
 
 
 def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:

@@ -17,8 +17,8 @@ from typing import Annotated, Any, Final, NamedTuple
 from activesteer.config import Range
 from activesteer.core.signals import Setpoint, new_message
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Side, Speed, check_search_speed, within
-from activesteer.maneuver.steering_tests import RampAngle, reference_angle_search
+from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Search, Side, Speed, check_search_speed, within
+from activesteer.maneuver.steering_tests import reference_angle_search
 
 _Pedal = Annotated[float, Range(0.0, 1.0)]
 _Ramp = Annotated[float, Range(0.0, 60.0)]
@@ -175,7 +175,7 @@ class Phases(Maneuver, kind="phases"):
         return self.reference_angle_rad is None and any(phase.steering_factor is not None for phase in self.phases)
 
     @property
-    def search(self) -> RampAngle | None:
+    def search(self) -> Search | None:
         """Search for A, if a phase needs it."""
         if not self._needs_reference:
             return None
