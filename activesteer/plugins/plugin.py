@@ -109,11 +109,6 @@ def read_values(
     return found
 
 
-def has_argument(maker: Any, name: str) -> bool:
-    """Return whether a class or function has an argument."""
-    return name in _arguments(maker)
-
-
 def _arguments(maker: Any) -> Mapping[str, inspect.Parameter]:
     try:
         return inspect.signature(maker, eval_str=True).parameters
@@ -286,7 +281,7 @@ class Plugin:
         parameters = {**self.parameters, **getattr(setup, "user_parameters", {}).get(self.key, {})}
         if hasattr(self.origin, "from_vehicle"):
             return self.origin.from_vehicle(setup, **parameters)
-        given = {SETUP: setup} if has_argument(self.origin, SETUP) else {}
+        given = {SETUP: setup} if SETUP in _arguments(self.origin) else {}
         return self.origin(**parameters, **given)
 
 

@@ -107,7 +107,8 @@ def model_files(mjcf: Path) -> dict[str, bytes]:
                 waiting.append(_included(element, path, mjcf, name))
             else:
                 _check(element, copies, name)
-                assets |= dict.fromkeys(_asset_names(element), name)
+                # Of a mesh, texture, height field or skin.
+                assets |= {file: name for key, file in element.items() if key.startswith("file") and file}
             if element.tag == "compiler":
                 folders |= {mjcf.parent / element.get(key, "") for key in ("meshdir", "texturedir", "assetdir")}
     for file, name in assets.items():
@@ -184,11 +185,6 @@ def _check(element: ElementTree.Element, copies: float, name: str) -> None:
                     raise _too_much(f"<{tag} memory={shown(text)}>", _MAX_MEMORY, name)
             elif maximum > _MAX_NUMBER:
                 raise _too_much(f"<{tag} {attribute}={shown(text)}>", _MAX_NUMBER, name)
-
-
-def _asset_names(element: ElementTree.Element) -> list[str]:
-    """Return the files of a mesh, texture, height field or skin."""
-    return [file for attribute, file in element.items() if attribute.startswith("file") and file]
 
 
 def _check_asset(path: Path, name: str) -> bytes:
@@ -293,13 +289,11 @@ def car_with(vehicle: FileOrTable, overrides: list[Override]) -> CarSpec:
     files |= {f"tyres/{path.name}": read_bytes(path, TyreFileError) for path in (front, rear)}
     model = mjcf.parent.name.encode("utf-8", "backslashreplace").decode()
     files |= {f"mjcf/{model}/{name}": text for name, text in model_files(mjcf).items()}
-    front_tyre = _tyre(front, config)
-    new = front_tyre, front_tyre if rear == front else _tyre(rear, config)
+    read = {
+        path: replace(load_tir(path), conventions=config.tyres.conventions) for path in dict.fromkeys((front, rear))
+    }
+    new = read[front], read[rear]
     return CarSpec(config, mjcf, config.factors.on_tyres(*new), new, files=files)
-
-
-def _tyre(path: Path, config: VehicleConfig) -> TyreParameters:
-    return replace(load_tir(path), conventions=config.tyres.conventions)
 
 
 def read_table(
