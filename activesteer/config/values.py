@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
 from activesteer.core import limits
-from activesteer.core.files import read_text
+from activesteer.core.files import is_file, read_text, user_path
 from activesteer.core.limits import MAX_NUMBER, MAX_TOML_LETTERS
 from activesteer.core.units import EDGE_UNITS
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
@@ -98,6 +98,20 @@ def _numbered(name: str, elements: Mapping[str, int]) -> str:
         if key in elements:
             key += f".{elements[key]}"
     return key
+
+
+def find_file(name: str, folders: Sequence[Path], pattern: str, source: Source, key: Sequence[str]) -> Path:
+    """Find a file that a key names, in one of the folders or by its own path.
+
+    The error lists the files of the last folder, or of the working directory, that match a pattern.
+    """
+    for candidate in (*(folder / name for folder in folders), user_path(name, source.error)):
+        if name.isprintable() and is_file(candidate):
+            return candidate
+    folder = folders[-1] if folders else Path.cwd()
+    present = [path.relative_to(folder).as_posix() for path in folder.glob(pattern)]
+    problem = f"there is no file {shown(name)} in {shown(folder)}; {nearest_names(name, present)}"
+    raise source.fail(key, problem, name, present)
 
 
 _DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{limits.MAX_TOML_DEPTH}}}""")

@@ -9,10 +9,10 @@ from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
-from activesteer.config import Range, Source, build, field_in_unit
+from activesteer.config import Range, Source, build, field_in_unit, find_file
 from activesteer.config.faults import Fault, check_faults
 from activesteer.core import limits
-from activesteer.core.files import csv_number, is_file, read_bytes, read_csv, user_path
+from activesteer.core.files import csv_number, is_file, read_bytes, read_csv
 from activesteer.core.signals import Setpoint, new_message
 from activesteer.errors import ManeuverError, nearest_names, shown
 from activesteer.road.course import Course
@@ -165,19 +165,6 @@ def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
         )
 
 
-def find_csv(name: str, folder: Path | None, source: Source, key: Sequence[str]) -> Path:
-    """Find the CSV that a key of a manoeuvre names, in the folder of its file, or None for a table that has no file."""
-    beside = () if folder is None else (folder / name,)
-    for candidate in (*beside, user_path(name, source.error)):
-        if name.isprintable() and is_file(candidate):
-            return candidate
-    folder = folder or Path.cwd()
-    present = [path.name for path in folder.iterdir() if path.suffix == ".csv"]
-    raise source.fail(
-        key, f"there is no file {shown(name)} in {shown(folder)}; {nearest_names(name, present)}", name, present
-    )
-
-
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
 ) -> tuple[dict[str, list[float]], list[int]]:
@@ -296,7 +283,7 @@ def with_files(
             if folder is None:
                 continue
             raise source.fail(key, f"{last} and {given} both give the values; leave one out")
-        file = find_csv(name, folder, source, key)
+        file = find_file(name, () if folder is None else (folder,), "*.csv", source, key)
         try:
             values = read(file)
         except ManeuverError as reason:

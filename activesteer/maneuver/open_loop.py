@@ -104,13 +104,16 @@ class WheelTorqueTable:
     rr_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
     """Rear right."""
 
-    def columns(self, what: str) -> tuple[tuple[float, ...], ...] | None:
-        """Return the torques of the four wheels, `drive` or `brake`, or None if no wheel has any."""
-        given = [getattr(self, f"{corner}_{what}_Nm") for corner in CORNERS]
-        if all(column is None for column in given):
-            return None
-        none = (0.0,) * len(self.time_s)
-        return tuple(none if column is None else column for column in given)
+    def at(self, time_s: float) -> WheelTorques:
+        """Return the torques at a time [s]."""
+        drive, brake = (
+            tuple(
+                0.0 if column is None else _interpolate(time_s, self.time_s, column)
+                for column in (getattr(self, f"{corner}_{what}_Nm") for corner in CORNERS)
+            )
+            for what in ("drive", "brake")
+        )
+        return new_message(WheelTorques, (drive, brake))
 
 
 def _read(fills: str, columns: Sequence[str], file: Path) -> dict[str, Any]:
@@ -197,7 +200,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
         value = steering.factor * _interpolate(time_s - steering.delay_s, steering.time_s, steering.values)
         angle, rack = (value, None) if self.steering.rack_m is None else (0.0, value)
         if self.wheel_torques is not None:
-            return Setpoint(angle, self.speed_mps, 0.0, False, None, rack, self._torques(self.wheel_torques, time_s))
+            return Setpoint(angle, self.speed_mps, 0.0, False, None, rack, self.wheel_torques.at(time_s))
         speed = self.speed_mps if self.speed is None else _interpolate(time_s, self.speed.time_s, self.speed.speed_mps)
         pedal = 0.0 if self.brake is None else _interpolate(time_s, self.brake.time_s, self.brake.pedal)
         parking = self.parking_brake
@@ -211,16 +214,6 @@ class OpenLoop(Maneuver, kind="open_loop"):
         if self.wheel_torques is None:
             return setpoint
         return setpoint._replace(wheel_torques=None, hold_speed=self.drive == "hold_speed")
-
-    @staticmethod
-    def _torques(table: WheelTorqueTable, time_s: float) -> WheelTorques:
-        def at(columns: tuple[tuple[float, ...], ...] | None) -> tuple[float, float, float, float]:
-            if columns is None:
-                return (0.0, 0.0, 0.0, 0.0)
-            fl, fr, rl, rr = (_interpolate(time_s, table.time_s, column) for column in columns)
-            return fl, fr, rl, rr
-
-        return WheelTorques(at(table.columns("drive")), at(table.columns("brake")))
 
 
 def _interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:

@@ -21,11 +21,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from activesteer.config import Range, Source, build, checked_number, read_toml, to_table
+from activesteer.config import Range, Source, build, checked_number, find_file, read_toml, to_table
 from activesteer.controllers import ControllerParameters, SingleTrackParameters
 from activesteer.controllers.parameters import SplitAxle
 from activesteer.core.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
-from activesteer.core.files import is_file, read_bytes, user_path, why_no_file
+from activesteer.core.files import is_file, read_bytes, why_no_file
 from activesteer.driver import DriverParameters, driver_spec, is_driver_file
 from activesteer.errors import (
     ActiveSteerError,
@@ -33,7 +33,6 @@ from activesteer.errors import (
     ModelError,
     ParameterError,
     TyreFileError,
-    nearest_names,
     shown,
 )
 from activesteer.estimation import EstimatorSetup, KnownTyre
@@ -281,9 +280,11 @@ def car_with(vehicle: FileOrTable, overrides: list[Override]) -> CarSpec:
         # The word alone stands for the key `source` of the table.
         table["single_track"] = {**known, "source": IDENTIFY}
     config = build(VehicleConfig, table, source)
-    mjcf = _find_file(config.mjcf, folder, models_dir() / "mjcf", source, ("mjcf",), ModelError)
+    beside = () if folder is None else (folder,)
+    of_model, of_tyres = (replace(source, error=error) for error in (ModelError, TyreFileError))
+    mjcf = find_file(config.mjcf, (*beside, models_dir() / "mjcf"), "**/*.xml", of_model, ("mjcf",))
     front, rear = (
-        _find_file(name, folder, models_dir() / "tyres", source, ("tyres", axle), TyreFileError)
+        find_file(name, (*beside, models_dir() / "tyres"), "*.tir", of_tyres, ("tyres", axle))
         for axle, name in (("front", config.tyres.front), ("rear", config.tyres.rear))
     )
     files |= {f"tyres/{path.name}": read_bytes(path, TyreFileError) for path in (front, rear)}
@@ -308,29 +309,6 @@ def read_table(
     table, source = read_toml(path, error)
     table.setdefault("name", path.stem)
     return table, source, path.parent, {f"{part}.toml": source.text.encode()}
-
-
-def _find_file(
-    name: str,
-    own: Path | None,
-    folder: Path,
-    source: Source,
-    key: tuple[str, ...],
-    error: type[ModelError] | type[TyreFileError],
-) -> Path:
-    """Find a file of a vehicle file: beside the vehicle file, among the package's models, or by its own path."""
-    beside = () if own is None else (own / name,)
-    for candidate in (*beside, folder / name, user_path(name, error)):
-        if is_file(candidate):
-            return candidate
-    suffix = Path(name).suffix
-    present = [str(path.relative_to(folder)) for path in folder.rglob("*") if not suffix or path.suffix == suffix]
-    raise replace(source, error=error).fail(
-        key,
-        f"there is no file {shown(name)} in {folder.parent.name}/{folder.name}; {nearest_names(name, present)}",
-        name,
-        present,
-    )
 
 
 @dataclass(frozen=True)
