@@ -27,7 +27,7 @@ import numpy as np
 
 from activesteer.analysis.harm import changes, severity
 from activesteer.config import Source, field_in_unit
-from activesteer.core.metric_table import METRICS, RENAMED
+from activesteer.core.metric_table import METRICS
 from activesteer.errors import nearest_names, shown
 
 HARM: Final = "harm"
@@ -139,8 +139,6 @@ class Expression:
     def _metric(self, name: str, controller: str, maneuver: str = "") -> _Number:
         names = self._names
         known = [HARM, CLAIMS_FAILED, *METRICS]
-        if name in RENAMED:
-            raise self._fail(f"{name} is now {RENAMED[name]};")
         metric, factor = field_in_unit(name, known)
         if metric is None:
             raise self._fail(f"{name}: {nearest_names(name, known)};")

@@ -78,9 +78,3 @@ def test_a_recorded_metric_of_another_version_is_shown_unconverted():
 
 def test_every_key_metric_is_declared():
     assert METRICS.keys() >= {name for names in KEY_METRICS.values() for name in names}
-
-
-def test_a_former_name_is_rejected_with_the_new_one():
-    with raises(ParameterError, value="tyre_use_max") as caught:
-        metric("tyre_use_max")
-    assert "friction_utilisation_max" in str(caught.value)
