@@ -166,8 +166,8 @@ class Plugin:
     is_builtin: bool = False
 
     def __post_init__(self) -> None:
-        """Mark a block that uses the truth in its label."""
-        if self.uses_truth:
+        """Mark a block that uses the truth in its label, once also if the block is a copy."""
+        if self.uses_truth and not self.label.endswith("+truth"):
             object.__setattr__(self, "label", f"{self.label}+truth")
 
     @property

@@ -229,7 +229,6 @@ class CarSpec:
         mjcf: The model file.
         tyres: Tyres of the front and of the rear axle.
         new_tyres: The tyres without the factors of the vehicle file.
-        overrides: Changes of the vehicle file.
         files: Name -> content of all its files, to be kept with a recording.
     """
 
@@ -237,7 +236,6 @@ class CarSpec:
     mjcf: Path
     tyres: tuple[TyreParameters, TyreParameters]
     new_tyres: tuple[TyreParameters, TyreParameters]
-    overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
 
     @property
@@ -266,9 +264,10 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
         >>> round(float(car.model.body_mass.sum()))
         1630
     """
-    changes = plain(overrides)
-    listed = [Override(key, tuple(key.removeprefix("vehicle.").split(".")), value) for key, value in changes.items()]
-    return replace(car_with(vehicle, listed), overrides=changes)
+    listed = [
+        Override(key, tuple(key.removeprefix("vehicle.").split(".")), value) for key, value in plain(overrides).items()
+    ]
+    return car_with(vehicle, listed)
 
 
 def car_with(vehicle: FileOrTable, overrides: list[Override]) -> CarSpec:
