@@ -10,7 +10,7 @@ import os
 import re
 import types
 import typing
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -194,6 +194,10 @@ class Plugin:
             return declared_by(self.origin)
         except (TypeError, ValueError) as reason:
             raise self.kind.fail(self.name, str(reason)) from reason
+
+    def own_parameter(self, path: Sequence[str]) -> str:
+        """Return the parameter of a user's block that a key below the table of its kind names, or an empty text."""
+        return "" if self.is_builtin or path[0] != self.key else ".".join(path[1:])
 
     def own_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Check overrides of the parameters and return them by the names of the arguments.

@@ -347,13 +347,11 @@ def driver_with(given: Any, overrides: list[Override]) -> ChosenDriver:
     """Read a driver, or a user's code, with overrides of the driver file only."""
     plugin, is_file = driver_spec(given), is_driver_file(given)
     table, source, _, files = read_table(given if is_file else DEFAULT_DRIVER, "driver", find_driver_file, DriverError)
-    of_code = {} if is_file else {one.path[1:]: one for one in overrides if one.path[0] == plugin.key and one.path[1:]}
-    table, source = applied(DriverParameters, table, source, [one for one in overrides if one not in of_code.values()])
-    parameters = build(DriverParameters, table, source)
-    if is_file:
-        return ChosenDriver(plugin, parameters, files)
-    values = plugin.own_values({".".join(path): one.value for path, one in of_code.items()}) if of_code else {}
-    return ChosenDriver(plugin, parameters, {**files, **plugin.files}, {plugin.key: values} if values else {})
+    of_code = {name: one.value for one in overrides if (name := plugin.own_parameter(one.path))}
+    of_file = [one for one in overrides if not plugin.own_parameter(one.path)]
+    parameters = build(DriverParameters, *applied(DriverParameters, table, source, of_file))
+    values = {plugin.key: plugin.own_values(of_code)} if of_code else {}
+    return ChosenDriver(plugin, parameters, {**files, **plugin.files}, values)
 
 
 def split_axles(motors: Motors) -> tuple[SplitAxle, ...]:

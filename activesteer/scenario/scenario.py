@@ -254,8 +254,8 @@ def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> A
             raise ParameterError("no controller here has such a parameter", key=key)
         return owned[path[0]][0].value_of(path[1], scenario.user_parameters)
     who = scenario.driver
-    if part == "driver" and not who.plugin.is_builtin and path[0] == who.plugin.key and path[1:]:
-        return who.plugin.value_of(".".join(path[1:]), who.user_parameters)
+    if part == "driver" and (name := who.plugin.own_parameter(path)):
+        return who.plugin.value_of(name, who.user_parameters)
     value: Any = {"maneuver": scenario.maneuver, "vehicle": scenario.car.config, "driver": who.parameters}[part]
     factor = 1.0
     for name in path:
@@ -341,8 +341,8 @@ def _with(cls: type[Any], table: Mapping[str, Any], path: list[str], value: Any,
 
 def _driver(scenario: Scenario, path: list[str], value: Any) -> Any:
     who = scenario.driver
-    if not who.plugin.is_builtin and path[0] == who.plugin.key and path[1:]:
-        values = {**who.user_parameters.get(path[0], {}), **who.plugin.own_values({".".join(path[1:]): value})}
+    if name := who.plugin.own_parameter(path):
+        values = {**who.user_parameters.get(path[0], {}), **who.plugin.own_values({name: value})}
         return replace(who, user_parameters={**who.user_parameters, path[0]: values})
     if not who.plugin.is_builtin:
         raise ParameterError(f"has no effect: {who.plugin.name} drives", key=".".join(("driver", *path)), value=value)
