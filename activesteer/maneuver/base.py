@@ -153,16 +153,13 @@ def check_begin(key: str, start_s: float, duration_s: float) -> None:
         raise ManeuverError(problem, key=key, value=start_s)
 
 
-def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
-    """Check that the car drives forwards and fast enough for a search."""
-    if speed_mps < MIN_SEARCH_SPEED_MPS:
-        minimum = 3.6 * MIN_SEARCH_SPEED_MPS
-        raise ManeuverError(
-            f"is {3.6 * speed_mps:g} km/h; {aim} needs at least {minimum:g} km/h, or give {amplitude}",
-            key="speed_kmh",
-            value=3.6 * speed_mps,
-            allowed=Range(minimum),
-        )
+def check_speed(speed_mps: float, needing: str, instead: str = "", least_mps: float = MIN_SEARCH_SPEED_MPS) -> None:
+    """Check that the car drives forwards and fast enough. `instead` is the key with which a search is not needed."""
+    if speed_mps < least_mps:
+        given, least = 3.6 * speed_mps, 3.6 * least_mps
+        problem = f"is {given:g} km/h; {needing} needs at least {least:g} km/h, forwards"
+        problem += f", or give {instead}" if instead else ""
+        raise ManeuverError(problem, key="speed_kmh", value=given, allowed=Range(least))
 
 
 def read_columns(

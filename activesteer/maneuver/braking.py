@@ -12,7 +12,7 @@ from activesteer.config import Range
 from activesteer.core.path import Path
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver, Search, check_search_speed, within
+from activesteer.maneuver.base import Maneuver, Search, check_speed, within
 from activesteer.maneuver.steering_tests import StepInput, steady_turn_search
 from activesteer.road.course import Course
 
@@ -64,7 +64,7 @@ class BrakeInTurn(Maneuver, kind="brake_in_turn"):
             )
         brake.check_end(self.duration_s)
         if turn.steering_wheel_rad is None:
-            check_search_speed(self.speed_mps, "turn.lateral_acceleration_mps2", "turn.steering_wheel_deg")
+            check_speed(self.speed_mps, "turn.lateral_acceleration_mps2", "turn.steering_wheel_deg")
 
     @property
     def search(self) -> Search | None:
@@ -107,14 +107,7 @@ class StraightBraking(Maneuver, kind="straight_braking"):
 
     def __post_init__(self) -> None:
         """Check that the car drives forwards and brakes within the run."""
-        if self.speed_mps < _MIN_SPEED_MPS:
-            min_kmh = 3.6 * _MIN_SPEED_MPS
-            raise ManeuverError(
-                f"is {3.6 * self.speed_mps:g} km/h; braking begins at {min_kmh:g} km/h or more, forwards",
-                key="speed_kmh",
-                value=3.6 * self.speed_mps,
-                allowed=Range(min_kmh),
-            )
+        check_speed(self.speed_mps, "braking", least_mps=_MIN_SPEED_MPS)
         self.brake.check_end(self.duration_s)
 
     @cached_property

@@ -42,7 +42,7 @@ from activesteer.core.conventions import Array
 from activesteer.core.path import Path
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import SIGNS, Maneuver, Side
+from activesteer.maneuver.base import SIGNS, Maneuver, Side, check_speed
 from activesteer.road.course import Course, Lane
 
 if TYPE_CHECKING:
@@ -63,13 +63,7 @@ class AlongCourse(Maneuver):
 
     def __post_init__(self) -> None:
         """Check that the car drives forwards and passes the last gate within the run."""
-        if self.speed_mps < _MIN_SPEED_MPS:
-            raise ManeuverError(
-                f"is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, at no less than "
-                f"{3.6 * _MIN_SPEED_MPS:g} km/h",
-                key="speed_kmh",
-                value=3.6 * self.speed_mps,
-            )
+        check_speed(self.speed_mps, "a course", least_mps=_MIN_SPEED_MPS)
         last = self.course.last_gate_x_m
         if last is not None and self.duration_s * self.speed_mps < last:
             gate_s = last / self.speed_mps

@@ -15,7 +15,7 @@ from activesteer.config import Range
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Search, Side, check_begin, check_search_speed, within
+from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Search, Side, check_begin, check_speed, within
 
 _SEARCH_S: Final = 4.5
 """Length of a run of the amplitude search after the beginning of the step [s]."""
@@ -327,7 +327,7 @@ class SineWithDwell(Maneuver, kind="sine_with_dwell"):
                 allowed=Range(steer.completion_s + 1.75),
             )
         if steer.steering_wheel_rad is None:
-            check_search_speed(self.speed_mps, "steer.amplitude_factor", "steer.steering_wheel_deg")
+            check_speed(self.speed_mps, "steer.amplitude_factor", "steer.steering_wheel_deg")
 
     @property
     def search(self) -> Search | None:
