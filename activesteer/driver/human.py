@@ -154,12 +154,11 @@ class SharedTables:
 
         first = step // _WINDOW * _WINDOW
         key = id(maneuver), first, rack_m
-        known, table = self._kept.get(key, (None, None))
-        if table is None or known is not maneuver:
+        if key not in self._kept:
             while len(self._kept) >= _MAX_TABLES:
                 del self._kept[next(iter(self._kept))]
-            table = from_step(first)
-            self._kept[key] = maneuver, table
+            self._kept[key] = maneuver, from_step(first)  # with the manoeuvre, whose id then stays its own
+        table = self._kept[key][1]
         if step >= first + table.steps:  # the path changes on the way
             return from_step(step), step
         return table, first
