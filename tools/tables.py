@@ -22,8 +22,8 @@ from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.scorecard import PAPER, not_reproduced, read_setting
 from activesteer.config import Range, dataclass_in, element_of, spellings
 from activesteer.controllers import load_controller
+from activesteer.maneuver import KINDS
 from activesteer.maneuver.base import Maneuver
-from activesteer.maneuver.kinds import KINDS
 from tools.make_setting import AROUND
 from tools.population_results import Population, read_population
 from tools.proportions import percent

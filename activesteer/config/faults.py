@@ -38,30 +38,6 @@ ANGLE_SENSOR: Final = "steering_wheel_sensor"
 """Sensor that tells controllers the driver's demand if the sensor is not ideal."""
 
 
-class Sensor(NamedTuple):
-    """A signal of `Measurement` as faults name it.
-
-    Attributes:
-        field: Its name in `Measurement`.
-        wheel: Its place if the field is a tuple of the four wheels.
-        unit: Its unit, as the suffix of a key.
-    """
-
-    field: str
-    wheel: int | None
-    unit: str
-
-
-def _sensors() -> dict[str, Sensor]:
-    """Return the signals that a controller gets, except the time."""
-    found: dict[str, Sensor] = {}
-    for number in numbers_of(Measurement)[1:]:
-        name, _, unit = number.name.rpartition("_")
-        wheel = None if number.name == number.field else CORNERS.index(name[:2])
-        found[f"{name}_sensor"] = Sensor(number.field, wheel, unit)
-    return found
-
-
 MOTOR: Final = "motor_"
 """Beginning of the parts that are electric motors. Their places follow."""
 ACTUATORS: Final = {
@@ -73,8 +49,10 @@ ACTUATORS: Final = {
     **{f"{MOTOR}{place}": Actuator((f"{MOTOR}{place}",), "Nm") for place in ("front", "rear", *CORNERS)},
 }
 """Part -> its actuators."""
-SENSORS: Final = _sensors()
-"""Part -> its signal."""
+SENSORS: Final = {
+    f"{name}_sensor": unit for name, _, unit in (number.name.rpartition("_") for number in numbers_of(Measurement)[1:])
+}
+"""Part -> unit of its signal, as the suffix of a key. They are the signals that a controller gets, except the time."""
 
 KINDS: Final = {
     "stuck": "an actuator stays where it is, a brake or motor at its torque, a sensor at its last reading",
@@ -170,7 +148,7 @@ class Fault:
         if self.kind == "runaway" and self.part in ACTUATORS:
             return None if self._has_torque else "side"
         if self.kind in ("offset", "runaway"):
-            return f"size_{(ACTUATORS.get(self.part) or SENSORS[self.part]).unit}"
+            return f"size_{SENSORS[self.part] if self.part in SENSORS else ACTUATORS[self.part].unit}"
         return None
 
     @property

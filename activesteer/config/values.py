@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
 from activesteer.core import limits
-from activesteer.core.files import read_text
+from activesteer.core.files import is_file, read_text, user_path
 from activesteer.core.limits import MAX_NUMBER, MAX_TOML_LETTERS
 from activesteer.core.units import EDGE_UNITS
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
@@ -98,6 +98,20 @@ def _numbered(name: str, elements: Mapping[str, int]) -> str:
         if key in elements:
             key += f".{elements[key]}"
     return key
+
+
+def find_file(name: str, folders: Sequence[Path], pattern: str, source: Source, key: Sequence[str]) -> Path:
+    """Find a file that a key names, in one of the folders or by its own path.
+
+    The error lists the files of the last folder, or of the working directory, that match a pattern.
+    """
+    for candidate in (*(folder / name for folder in folders), user_path(name, source.error)):
+        if name.isprintable() and is_file(candidate):
+            return candidate
+    folder = folders[-1] if folders else Path.cwd()
+    present = [path.relative_to(folder).as_posix() for path in folder.glob(pattern)]
+    problem = f"there is no file {shown(name)} in {shown(folder)}; {nearest_names(name, present)}"
+    raise source.fail(key, problem, name, present)
 
 
 _DEEP_KEY: Final = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){{{limits.MAX_TOML_DEPTH}}}""")
@@ -282,16 +296,6 @@ def merged(
         result[key] = merged(inner, result.get(key, {}), rest, value, source, where)
     elif (element := element_of(hint)) is not None:
         result[key] = _merged_list(element, result.get(key, ()), rest, value, source, where)
-    elif typing.get_origin(hint) is dict:
-        item, branch = typing.get_args(hint)[1], result.get(key, {})
-        if not isinstance(branch, Mapping):
-            raise source.fail(where, f"is {shown(branch)}, which is no table", branch)
-        if rest[0] not in branch or len(rest) == 1:
-            raise source.fail(
-                (*where, *rest), f"there is no such key; {nearest_names(rest[0], branch)}", rest[0], sorted(branch)
-            )
-        below = merged(item, branch[rest[0]], rest[1:], value, source, (*where, rest[0]))
-        result[key] = {**branch, rest[0]: below}
     else:
         raise source.fail((*where, *rest), f"{key} is a value, not a table")
     return result
@@ -340,7 +344,6 @@ def _holds(value: object, wanted: object) -> bool:
 
 
 T = TypeVar("T")
-"""Longest text [characters]."""
 
 
 def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence[str] = (), base: Any = None) -> T:
@@ -420,18 +423,15 @@ def _elements(
     return tuple(convert(item, value, factor, source, path) for value in raw)
 
 
-def _word(words: Sequence[str], raw: Any, source: Source, path: Sequence[str]) -> str:
-    if raw not in list(words):
-        known = ", ".join(repr(word) for word in words[:-1])
-        raise source.fail(path, f"is {shown(raw)}; allowed are {known} and {words[-1]!r}", raw, words)
-    return raw
-
-
 def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, path: Sequence[str]) -> Any:
     if hint is Any:
         return raw
     if typing.get_origin(hint) is typing.Literal:
-        return _word(typing.get_args(hint), raw, source, path)
+        words = typing.get_args(hint)
+        if raw not in list(words):
+            known = ", ".join(repr(word) for word in words[:-1])
+            raise source.fail(path, f"is {shown(raw)}; allowed are {known} and {words[-1]!r}", raw, words)
+        return raw
     wanted = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}[hint]
     good = isinstance(raw, hint) or (hint is float and isinstance(raw, int))
     if not good or (isinstance(raw, bool) and hint is not bool):

@@ -54,7 +54,7 @@ class FrontSuperposition(NativeBlock):
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the angle to add at the front wheels."""
-        return steering(*front_superposition(self, command, measurement))
+        return steering(front_superposition(self, command, measurement))
 
 
 @law_of(FrontSuperposition)

@@ -187,7 +187,7 @@ class Lqr(NativeBlock):
         """Return both angles."""
         now = self._estimator.step(measurement)
         return steering(
-            *regulated(
+            regulated(
                 self, now, self._confidence.innovation, command.front_steer_demand_rad, command.brake_pedal,
                 measurement.superposition_rad, measurement.rear_steer_rad, measurement.brake_pressure_Pa,
             ),

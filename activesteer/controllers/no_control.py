@@ -33,7 +33,7 @@ class NoControl(NativeBlock):
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return no angles; the desired yaw rate is recorded."""
-        return steering(*no_control(self, command, measurement))
+        return steering(no_control(self, command, measurement))
 
 
 @law_of(NoControl)

@@ -125,7 +125,7 @@ class RearSteer(NativeBlock):
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the demanded rear angle and its parts."""
-        return steering(*rear_steer(self, command, measurement))
+        return steering(rear_steer(self, command, measurement))
 
 
 @law_of(RearSteer)

@@ -112,7 +112,6 @@ class Metric(NamedTuple):
 
 _WORDS: Final = {"ay": "lateral acceleration", "tb": "TB"}
 _PERCENT: Final = DisplayUnit("%", 100.0)
-_PURE: Final = DisplayUnit("-", 1.0)
 
 
 def _declare(
@@ -131,10 +130,6 @@ def _declare(
         name = f"{stem}_{si}" if si else stem
         found.append(Metric(name, label, unit or display_unit(f"_{si}"), significance, better, form))
     return found
-
-
-def _pure(*stems: str, better: Better | None = None, unit: DisplayUnit = _PURE) -> list[Metric]:
-    return _declare("", *stems, better=better, unit=unit)
 
 
 _SMALLER, _LOWER, _HIGHER = Better.SMALLER, Better.LOWER, Better.HIGHER
@@ -213,20 +208,22 @@ METRICS: Final = {
         *_declare("J", "battery_energy", better=_LOWER),
         *_declare("J", "brake_energy"),
         *_declare("J", "steering_energy", unit=DisplayUnit("J", 1.0)),
-        *_pure("yaw_rate_overshoot", better=_LOWER, unit=_PERCENT),
-        *_pure("wheel_load_coefficient_max", "wheel_lift_share", "extended_road_share", better=_SMALLER, unit=_PERCENT),
+        *_declare("", "yaw_rate_overshoot", better=_LOWER, unit=_PERCENT),
+        *_declare(
+            "", "wheel_load_coefficient_max", "wheel_lift_share", "extended_road_share", better=_SMALLER, unit=_PERCENT
+        ),
         *_declare("m", "suspension_travel_max", better=_SMALLER),
-        *_pure("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
-        *_pure(
-            "ay_overshoot", "roll_overshoot", "sideslip_overshoot", "braking_efficiency", "wheel_slip_max",
+        *_declare("", "yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
+        *_declare(
+            "", "ay_overshoot", "roll_overshoot", "sideslip_overshoot", "braking_efficiency", "wheel_slip_max",
             "added_angles_opposite_share", unit=_PERCENT,
         ),
-        *_pure(
-            "friction_utilisation_max", "friction_utilisation_mean", "yaw_rate_peak_gain_ratio", "coherence_min",
+        *_declare(
+            "", "friction_utilisation_max", "friction_utilisation_mean", "yaw_rate_peak_gain_ratio", "coherence_min",
             "added_angles_correlation",
         ),
-        *_declare("", CONES_HIT, CONES_MISSED, better=_SMALLER, unit=_PURE, form=Form.COUNT),
-        *_declare("", STAYS_IN_LANES, unit=_PURE, form=Form.YES_OR_NO),
+        *_declare("", CONES_HIT, CONES_MISSED, better=_SMALLER, form=Form.COUNT),
+        *_declare("", STAYS_IN_LANES, form=Form.YES_OR_NO),
     )
 }  # fmt: skip
 """Name -> metric."""
@@ -247,4 +244,4 @@ def recorded_metric(name: str) -> Metric:
     A file of another version may hold a metric that this version does not declare. Such a metric is shown by its full
     name, which says its SI unit, and its value is not converted.
     """
-    return METRICS.get(name) or Metric(name, name, _PURE)
+    return METRICS.get(name) or Metric(name, name, display_unit(""))

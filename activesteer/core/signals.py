@@ -377,28 +377,7 @@ class ActuatorCommand(NamedTuple):
 
 
 def steering(
-    rear_rad: float,
-    front_rad: float,
-    desired_radps: float,
-    prediction_rad: float,
-    correction_rad: float,
-    limited: bool,
-    estimate: Estimate | None = None,
+    first: tuple[float, float, float, float, float, bool], estimate: Estimate | None = None
 ) -> ActuatorCommand:
-    """Return the `ActuatorCommand` of a controller that only steers, from the first six fields and its estimate."""
-    return new_message(
-        ActuatorCommand,
-        (
-            rear_rad,
-            front_rad,
-            desired_radps,
-            prediction_rad,
-            correction_rad,
-            limited,
-            NO_BRAKES,
-            0.0,
-            estimate,
-            0.0,
-            NO_TORQUES,
-        ),
-    )
+    """Return the `ActuatorCommand` of a controller that only steers, from its first six fields and its estimate."""
+    return new_message(ActuatorCommand, (*first, NO_BRAKES, 0.0, estimate, 0.0, NO_TORQUES))

@@ -44,23 +44,17 @@ class HumanDriver(NativeBlock):
     _constant_radius: ConstantRadiusDriver
     _path: PathPreviewDriver
 
-    def __init__(
-        self, open_loop: OpenLoopDriver, constant_radius: ConstantRadiusDriver, path: PathPreviewDriver
-    ) -> None:
-        """Combine three drivers: for a steering wheel angle, a curvature, and a path."""
-        self._open_loop = open_loop
-        self._constant_radius = constant_radius
-        self._path = path
+    def __init__(self, setup: DriverSetup) -> None:
+        """Combine three drivers for a car: for a steering wheel angle, a curvature, and a path."""
+        robot, single_track = OpenLoopDriver.from_vehicle(setup), SingleTrack(setup.single_track)
+        self._open_loop = robot
+        self._constant_radius = ConstantRadiusDriver(robot, single_track.wheelbase_m, setup.timestep_s)
+        self._path = PathPreviewDriver(robot, single_track.matrices, setup.parameters, setup.timestep_s)
 
     @classmethod
     def from_vehicle(cls, setup: DriverSetup) -> HumanDriver:
         """Make the driver for a car."""
-        robot, single_track = OpenLoopDriver.from_vehicle(setup), SingleTrack(setup.single_track)
-        return cls(
-            robot,
-            ConstantRadiusDriver(robot, single_track.wheelbase_m, setup.timestep_s),
-            PathPreviewDriver(robot, single_track.matrices, setup.parameters, setup.timestep_s),
-        )
+        return cls(setup)
 
     def prepare(self, speed_mps: float) -> int:
         """Compute the gains on a path at a speed for compiled code, and return how many there are.
@@ -160,12 +154,11 @@ class SharedTables:
 
         first = step // _WINDOW * _WINDOW
         key = id(maneuver), first, rack_m
-        known, table = self._kept.get(key, (None, None))
-        if table is None or known is not maneuver:
+        if key not in self._kept:
             while len(self._kept) >= _MAX_TABLES:
                 del self._kept[next(iter(self._kept))]
-            table = from_step(first)
-            self._kept[key] = maneuver, table
+            self._kept[key] = maneuver, from_step(first)  # with the manoeuvre, whose id then stays its own
+        table = self._kept[key][1]
         if step >= first + table.steps:  # the path changes on the way
             return from_step(step), step
         return table, first

@@ -224,7 +224,6 @@ class ConstantRadiusDriver(NativeBlock):
     def __init__(self, robot: OpenLoopDriver, wheelbase_m: float, timestep_s: float) -> None:
         """Make the driver of one run."""
         self.robot = robot
-        self.speed_hold = robot.speed_hold
         self._wheelbase_m = wheelbase_m
         self._fraction = timestep_s / _TIME_CONSTANT_S
         self._correction_1pm = 0.0

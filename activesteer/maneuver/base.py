@@ -1,17 +1,18 @@
-"""Base of all manoeuvres: speed, road, duration, a setpoint at any time, and files that a manoeuvre names."""
+"""Base of all manoeuvres: their kinds, speed, road, duration, a setpoint at any time, and the files that they name."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
-from activesteer.config import Range, Source, field_in_unit
-from activesteer.config.faults import Fault
+from activesteer.config import Range, Source, build, field_in_unit, find_file
+from activesteer.config.faults import Fault, check_faults
 from activesteer.core import limits
-from activesteer.core.files import csv_number, is_file, read_bytes, read_csv, user_path
+from activesteer.core.files import csv_number, is_file, read_bytes, read_csv
 from activesteer.core.signals import Setpoint, new_message
 from activesteer.errors import ManeuverError, nearest_names, shown
 from activesteer.road.course import Course
@@ -26,6 +27,25 @@ DriveMode = Literal["hold_speed", "coast"]
 
 MIN_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
 """Below this speed the lateral acceleration hardly depends on the steering wheel angle [m/s]."""
+
+KINDS: Final[dict[str, type[Maneuver]]] = {}
+"""Value of `kind` in a file -> class. A class enters itself: `class StepSteer(Maneuver, kind="step_steer")`."""
+
+
+class NamedFile(NamedTuple):
+    """A key of a manoeuvre that names a file, and the keys beside it that the file fills.
+
+    Attributes:
+        key: The key, as the path of names to it.
+        fills: Keys that it fills, in the same table.
+        read: Function from the file to the values of these keys.
+        folder: Folder of the file among those that are kept with a recording; empty if the values are the whole file.
+    """
+
+    key: tuple[str, ...]
+    fills: tuple[str, ...]
+    read: Callable[[Path], dict[str, Any]]
+    folder: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,27 +80,13 @@ class Maneuver(ABC):
     fault: tuple[Fault, ...] = ()
     """Faults of actuators and sensors, and their times."""
 
-    @classmethod
-    def filled_from_csv(
-        cls, table: Mapping[str, Any], folder: Path | None, source: Source
-    ) -> tuple[dict[str, Any], dict[str, bytes]]:
-        """Fill the values of the CSV files that a manoeuvre names into its table.
+    FILES: ClassVar[tuple[NamedFile, ...]] = ()
+    """Keys of this kind that name files."""
 
-        A table without a file may have both the name of a CSV and values. It comes from a recording, and the values are
-        those that were read then, unless an override names another CSV.
-
-        Args:
-            table: The table.
-            folder: Folder of the manoeuvre file; None for a table that has no file.
-            source: For error messages.
-
-        Returns:
-            The table, and the CSV files by their names, to be kept with the recording.
-
-        Raises:
-            ManeuverError: a CSV is not found or wrong, or a manoeuvre file gives the values too.
-        """
-        return dict(table), {}
+    def __init_subclass__(cls, kind: str = "") -> None:
+        """Enter a kind into the table of kinds."""
+        if kind:
+            KINDS[kind] = cls
 
     @abstractmethod
     def setpoint(self, time_s: float) -> Setpoint:
@@ -90,7 +96,7 @@ class Maneuver(ABC):
             time_s: Time since the start of the recording [s].
         """
 
-    @property
+    @cached_property
     def course(self) -> Course | None:
         """Path, lanes and cones, or None if the manoeuvre sets the steering wheel angle instead."""
         return None
@@ -128,7 +134,7 @@ class Search:
     """Search for a steering wheel angle by driving the car without control."""
 
     probe: Maneuver
-    """The manoeuvre that is driven."""
+    """The manoeuvre that is driven: step steers, whose steady state counts, or one slow ramp to the left."""
     lateral_acceleration_mps2: float
     """Lateral acceleration to reach [m/s2], left positive."""
     accept: Callable[[float], Maneuver]
@@ -140,29 +146,20 @@ def within(value: float, most: float) -> float:
     return 0.0 if value < 0.0 else most if value > most else value
 
 
-def check_search_speed(speed_mps: float, aim: str, amplitude: str) -> None:
-    """Check that the car drives forwards and fast enough for a search."""
-    if speed_mps < MIN_SEARCH_SPEED_MPS:
-        minimum = 3.6 * MIN_SEARCH_SPEED_MPS
-        raise ManeuverError(
-            f"is {3.6 * speed_mps:g} km/h; {aim} needs at least {minimum:g} km/h, or give {amplitude}",
-            key="speed_kmh",
-            value=3.6 * speed_mps,
-            allowed=Range(minimum),
-        )
+def check_begin(key: str, start_s: float, duration_s: float) -> None:
+    """Check that an input begins before the end of the run."""
+    if start_s >= duration_s:
+        problem = f"is {start_s:g} s, but the run ends at {duration_s:g} s (duration_s)"
+        raise ManeuverError(problem, key=key, value=start_s)
 
 
-def find_csv(name: str, folder: Path | None, source: Source, key: Sequence[str]) -> Path:
-    """Find the CSV that a key of a manoeuvre names, in the folder of its file, or None for a table that has no file."""
-    beside = () if folder is None else (folder / name,)
-    for candidate in (*beside, user_path(name, source.error)):
-        if name.isprintable() and is_file(candidate):
-            return candidate
-    folder = folder or Path.cwd()
-    present = [path.name for path in folder.iterdir() if path.suffix == ".csv"]
-    raise source.fail(
-        key, f"there is no file {shown(name)} in {shown(folder)}; {nearest_names(name, present)}", name, present
-    )
+def check_speed(speed_mps: float, needing: str, instead: str = "", least_mps: float = MIN_SEARCH_SPEED_MPS) -> None:
+    """Check that the car drives forwards and fast enough. `instead` is the key with which a search is not needed."""
+    if speed_mps < least_mps:
+        given, least = 3.6 * speed_mps, 3.6 * least_mps
+        problem = f"is {given:g} km/h; {needing} needs at least {least:g} km/h, forwards"
+        problem += f", or give {instead}" if instead else ""
+        raise ManeuverError(problem, key="speed_kmh", value=given, allowed=Range(least))
 
 
 def read_columns(
@@ -216,59 +213,101 @@ def read_columns(
     return columns, [row.line for row in rows]
 
 
-def with_road_files(
-    table: Mapping[str, Any], folder: Path | None, source: Source
-) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Fill the contents of the road's files into the table of a manoeuvre (see `Maneuver.filled_from_csv`).
-
-    The files to be kept with the recording are the CSV files; the table itself holds the OpenCRG file.
-    """
-    road = table.get("road")
-    files: dict[str, bytes] = {}
-    if not isinstance(road, Mapping):
-        return dict(table), files
-    filled = dict(road)
-    for key, values, read in (("profile", "heights", _profile), ("crg", "crg_data", _crg)):
-        name, path = road.get(key), ("road", key)
-        if not isinstance(name, str):
-            continue
-        if values in road and ".".join(path) not in source.overridden:
-            if folder is None:
-                continue
-            raise source.fail(path, f"{key} and {values} both give the surface; leave one out")
-        file = find_csv(name, folder, source, path)
-        try:
-            filled[values] = read(file)
-        except ManeuverError as reason:
-            raise source.fail(path, f"{file.name}: {reason}", reason.value, reason.allowed) from reason
-        if key == "profile":
-            files[f"road/{file.name}"] = read_bytes(file, ManeuverError, limits.MAX_CSV_BYTES)
-    return {**table, "road": filled}, files
-
-
-def _profile(file: Path) -> dict[str, list[float]]:
+def _profile(file: Path) -> dict[str, Any]:
     columns, _ = read_columns(file, ("s_m",), ("z_m", "left_z_m", "right_z_m"))
     given = set(columns) - {"s_m"}
     if given == {"z_m"}:
-        return {"s_m": columns["s_m"], "left_z_m": columns["z_m"]}
+        return {"heights": {"s_m": columns["s_m"], "left_z_m": columns["z_m"]}}
     if given != {"left_z_m", "right_z_m"}:
-        raise ManeuverError(f"has the heights {sorted(given)}; z_m, or left_z_m and right_z_m are needed")
-    return columns
+        problem = f"has the heights {sorted(given)}; z_m, or left_z_m and right_z_m are needed"
+        raise ManeuverError(problem, file=file.name)
+    return {"heights": columns}
 
 
-def _crg(file: Path) -> list[str]:
+def _crg(file: Path) -> dict[str, Any]:
     """Return an OpenCRG file with the files that it refers to, packed."""
     files = {file.name: read_bytes(file, ManeuverError, limits.MAX_CRG_BYTES)}
     name, place = file.name, file
     for _ in range(limits.MAX_CRG_FILES):
         other = referenced(files[name])
         if other is None:
-            return list(packed(files))
+            return {"crg_data": list(packed(files))}
         found = next(
             (path for path in (place.parent / other, place.parent / PurePosixPath(other).name) if is_file(path)), None
         )
         if found is None:
-            raise ManeuverError(f"refers to {shown(other)}, which is not found beside it")
+            raise ManeuverError(f"refers to {shown(other)}, which is not found beside it", file=name)
         name, place = other, found
         files[name] = read_bytes(found, ManeuverError, limits.MAX_CRG_BYTES)
-    raise ManeuverError(f"refers to more than {limits.MAX_CRG_FILES} files in a chain")
+    raise ManeuverError(f"refers to more than {limits.MAX_CRG_FILES} files in a chain", file=file.name)
+
+
+_ROAD_FILES: Final = (
+    NamedFile(("road", "profile"), ("heights",), _profile, "road"),
+    NamedFile(("road", "crg"), ("crg_data",), _crg, ""),
+)
+
+
+def with_files(
+    kind: type[Maneuver], table: Mapping[str, Any], folder: Path | None, source: Source
+) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Fill the values of the files that a manoeuvre names into its table.
+
+    A table without a file may have both the name of a file and values. It comes from a recording, and the values are
+    those that were read then, unless an override names another file.
+
+    Args:
+        kind: Class of the manoeuvre.
+        table: The table.
+        folder: Folder of the manoeuvre file; None for a table that has no file.
+        source: For error messages.
+
+    Returns:
+        The table, and the CSV files by their names, to be kept with the recording.
+
+    Raises:
+        ManeuverError: a file is not found or wrong, or a manoeuvre file gives the values too.
+    """
+    filled, files = dict(table), {}
+    for key, fills, read, kept in (*kind.FILES, *_ROAD_FILES):
+        *above, last = key
+        holder = filled.get(above[0]) if above else filled
+        name = holder.get(last) if isinstance(holder, Mapping) else None
+        if holder is None or not isinstance(name, str):
+            continue
+        given = next((each for each in fills if each in holder), None)
+        if given is not None and ".".join(key) not in source.overridden:
+            if folder is None:
+                continue
+            raise source.fail(key, f"{last} and {given} both give the values; leave one out")
+        file = find_file(name, () if folder is None else (folder,), "*.csv", source, key)
+        try:
+            values = read(file)
+        except ManeuverError as reason:
+            raise source.fail(key, str(reason), reason.value, reason.allowed) from reason
+        filled |= {above[0]: {**holder, **values}} if above else values
+        if kept:
+            files[f"{kept}/{file.name}"] = read_bytes(file, ManeuverError, limits.MAX_CSV_BYTES)
+    return filled, files
+
+
+def maneuver_class(table: Mapping[str, Any], source: Source) -> type[Maneuver]:
+    """Return the class of a manoeuvre table."""
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        problem = "is missing" if kind is None else f"there is no kind {shown(kind)}"
+        help_ = nearest_names(kind if isinstance(kind, str) else "", KINDS)
+        raise source.fail(("kind",), f"{problem}; {help_}", kind, sorted(KINDS))
+    return KINDS[kind]
+
+
+def build_maneuver(table: Mapping[str, Any], source: Source) -> Maneuver:
+    """Build a manoeuvre from its table."""
+    maneuver = build(maneuver_class(table, source), table, source)
+    if maneuver.fault:
+        check_faults(maneuver.fault, maneuver.duration_s, source.fail)
+    try:
+        _ = maneuver.ground
+    except ManeuverError as reason:
+        raise source.placed((), reason) from reason
+    return maneuver

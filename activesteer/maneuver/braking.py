@@ -12,8 +12,8 @@ from activesteer.config import Range
 from activesteer.core.path import Path
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver, check_search_speed, within
-from activesteer.maneuver.steering_tests import SteadyTurn, StepInput, StepSteer
+from activesteer.maneuver.base import Maneuver, Search, check_speed, within
+from activesteer.maneuver.steering_tests import StepInput, steady_turn_search
 from activesteer.road.course import Course
 
 
@@ -36,9 +36,16 @@ class BrakeInput:
     rise_s: Annotated[float, Range(0.01, 5.0)] = 0.2
     """Time until the pedal is in position [s]."""
 
+    def check_end(self, duration_s: float) -> None:
+        """Check that the pedal is in position before the end of the run."""
+        pressed_s = self.start_s + self.rise_s
+        if pressed_s >= duration_s:
+            problem = f"the brake is pressed down at {pressed_s:g} s, but the run ends at {duration_s:g} s"
+            raise ManeuverError(problem, key="brake.start_s", value=self.start_s)
+
 
 @dataclass(frozen=True, kw_only=True)
-class BrakeInTurn(Maneuver):
+class BrakeInTurn(Maneuver, kind="brake_in_turn"):
     """A turn at constant speed and steering wheel angle, then braking."""
 
     turn: TurnInput
@@ -55,31 +62,23 @@ class BrakeInTurn(Maneuver):
                 key="brake.start_s",
                 value=brake.start_s,
             )
-        if brake.start_s + brake.rise_s >= self.duration_s:
-            end = brake.start_s + brake.rise_s
-            raise ManeuverError(
-                f"the brake is pressed down at {end:g} s, but the run ends at {self.duration_s:g} s",
-                key="brake.start_s",
-            )
+        brake.check_end(self.duration_s)
         if turn.steering_wheel_rad is None:
-            check_search_speed(self.speed_mps, "turn.lateral_acceleration_mps2", "turn.steering_wheel_deg")
+            check_speed(self.speed_mps, "turn.lateral_acceleration_mps2", "turn.steering_wheel_deg")
 
     @property
-    def search(self) -> SteadyTurn | None:
-        """Search for the angle by a step steer, if only the lateral acceleration is given."""
-        wanted = self.turn.lateral_acceleration_mps2
-        if self.turn.steering_wheel_rad is not None or wanted is None:
-            return None
-        step = StepSteer(
-            kind="step_steer", name=self.name, speed_mps=self.speed_mps, duration_s=self.duration_s,
-            settle_s=self.settle_s, road=self.road, steer=StepInput(lateral_acceleration_mps2=wanted),
-        )  # fmt: skip
-        search = step.search
-        return None if search is None else dataclasses.replace(search, accept=self.with_amplitude)
+    def search(self) -> Search | None:
+        """Search for the angle by a step steer, if only the lateral acceleration is given, which stays on record."""
+        turn = self.turn
 
-    def with_amplitude(self, steering_wheel_rad: float) -> BrakeInTurn:
-        """Return the manoeuvre with a steering wheel angle [rad]. The lateral acceleration stays on record."""
-        return dataclasses.replace(self, turn=dataclasses.replace(self.turn, steering_wheel_rad=steering_wheel_rad))
+        def accept(angle: float) -> BrakeInTurn:
+            return dataclasses.replace(self, turn=dataclasses.replace(turn, steering_wheel_rad=angle))
+
+        # A turn is entered slowly, but the search drives a quick step.
+        step = StepInput(
+            steering_wheel_rad=turn.steering_wheel_rad, lateral_acceleration_mps2=turn.lateral_acceleration_mps2
+        )
+        return steady_turn_search(self, step, accept)
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Ramp of the steering wheel, then ramp of the brake (see the base class)."""
@@ -98,7 +97,7 @@ _MIN_SPEED_MPS: Final = 10.0 / 3.6
 
 
 @dataclass(frozen=True, kw_only=True)
-class StraightBraking(Maneuver):
+class StraightBraking(Maneuver, kind="straight_braking"):
     """Driving straight ahead, then braking with an open clutch until the car stands."""
 
     brake: BrakeInput
@@ -108,30 +107,13 @@ class StraightBraking(Maneuver):
 
     def __post_init__(self) -> None:
         """Check that the car drives forwards and brakes within the run."""
-        if self.speed_mps < _MIN_SPEED_MPS:
-            min_kmh = 3.6 * _MIN_SPEED_MPS
-            raise ManeuverError(
-                f"is {3.6 * self.speed_mps:g} km/h; braking begins at {min_kmh:g} km/h or more, forwards",
-                key="speed_kmh",
-                value=3.6 * self.speed_mps,
-                allowed=Range(min_kmh),
-            )
-        pressed_s = self.brake.start_s + self.brake.rise_s
-        if pressed_s >= self.duration_s:
-            raise ManeuverError(
-                f"the brake is pressed down at {pressed_s:g} s, but the run ends at {self.duration_s:g} s",
-                key="brake.start_s",
-                value=self.brake.start_s,
-            )
-
-    @property
-    def course(self) -> Course | None:
-        """The straight line that the driver keeps, or None if the steering wheel is held."""
-        return self._course if self.hold_line else None
+        check_speed(self.speed_mps, "braking", least_mps=_MIN_SPEED_MPS)
+        self.brake.check_end(self.duration_s)
 
     @cached_property
-    def _course(self) -> Course:
-        return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0]))
+    def course(self) -> Course | None:
+        """The straight line that the driver keeps, or None if the steering wheel is held."""
+        return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0])) if self.hold_line else None
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Speed, then the ramp of the brake (see the base class)."""

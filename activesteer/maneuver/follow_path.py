@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path as FilePath
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final, NoReturn
 
 import numpy as np
 
-from activesteer.config import Range, Source
-from activesteer.core import limits
+from activesteer.config import Range
 from activesteer.core.conventions import Array
-from activesteer.core.files import read_bytes
 from activesteer.core.path import Path
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import Maneuver, find_csv, within
+from activesteer.maneuver.base import Maneuver, NamedFile, read_columns, within
 from activesteer.maneuver.lane_changes import AlongCourse
-from activesteer.maneuver.path_points import COLUMNS, OPTIONAL, check_points, read_csv
 from activesteer.road.course import Course
 from activesteer.road.native_path import PathSearch
 
@@ -34,6 +32,77 @@ _PEDAL_PER_MPS: Final = 0.08
 """Pedal over the speed that is too high [s/m]."""
 _FREE_MPS: Final = 0.3
 """Speed above the demand that calls for no brake [m/s]."""
+
+
+COLUMNS: Final = ("x_m", "y_m")
+"""Columns that a CSV must have."""
+OPTIONAL: Final = ("speed_mps", "width_m")
+"""Columns that a CSV may have. Others are ignored."""
+
+MIN_POINTS: Final = 4
+_MAX_GAP_M: Final = 20.0
+"""Largest distance of two points. A larger one counts as a jump [m]."""
+_MIN_GAP_M: Final = 1e-3
+_MAX_TURN_RAD: Final = math.radians(90.0)
+"""Largest turn at a point. A larger one counts as going back [rad]."""
+_MIN_RADIUS_M: Final = 6.0
+"""Smallest radius. A tighter bend counts as a kink. A car of the compact class turns on 5.2 m [m]."""
+_MAX_START_M: Final = 1.0
+"""Largest distance of the first point from the car [m]."""
+_MAX_START_RAD: Final = math.radians(15.0)
+"""Largest angle of the first section to the car's heading [rad]."""
+
+
+def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[int], str]) -> None:
+    """Check that a car can start on the path and follow it."""
+    count = len(x_m)
+    if count != len(y_m) or count < MIN_POINTS:
+        raise ManeuverError(
+            f"the path has {count} x_m and {len(y_m)} y_m; as many of each are needed, at least {MIN_POINTS}",
+            value=(count, len(y_m)),
+        )
+
+    def fail(index: int, problem: str) -> NoReturn:
+        point = x_m[index], y_m[index]
+        raise ManeuverError(f"{place(index)}: the point ({point[0]:g}, {point[1]:g}) m {problem}", value=point)
+
+    gaps = [math.hypot(x_m[i + 1] - x_m[i], y_m[i + 1] - y_m[i]) for i in range(count - 1)]
+    for i, gap in enumerate(gaps, 1):
+        if gap < _MIN_GAP_M:
+            fail(i, "is the same as the point before; leave one of them out")
+        if gap > _MAX_GAP_M:
+            fail(i, f"is {gap:.3g} m from the point before; at most {_MAX_GAP_M:g} m are allowed, add points")
+    for i in range(1, count - 1):
+        ahead = math.atan2(y_m[i + 1] - y_m[i], x_m[i + 1] - x_m[i])
+        behind = math.atan2(y_m[i] - y_m[i - 1], x_m[i] - x_m[i - 1])
+        turn = abs(math.remainder(ahead - behind, math.tau))
+        if turn > _MAX_TURN_RAD:
+            fail(i, f"turns the path back, by {math.degrees(turn):.0f} deg; are the points in the order of travel?")
+        # Radius of the circle through this point and its neighbours: chord over twice the sine of the angle between.
+        chord = math.hypot(x_m[i + 1] - x_m[i - 1], y_m[i + 1] - y_m[i - 1])
+        if 2.0 * math.sin(turn) * _MIN_RADIUS_M > chord:
+            radius = chord / (2.0 * math.sin(turn))
+            fail(i, f"is a kink of {radius:.2g} m radius; at least {_MIN_RADIUS_M:g} m are needed, round it off")
+    if math.hypot(x_m[0], y_m[0]) > _MAX_START_M:
+        fail(
+            0,
+            f"is {math.hypot(x_m[0], y_m[0]):.3g} m from the car: the path must begin at the car, at (0, 0), at most "
+            f"{_MAX_START_M:g} m off; shift it by ({-x_m[0]:g}, {-y_m[0]:g}) m",
+        )
+    heading = math.atan2(y_m[1] - y_m[0], x_m[1] - x_m[0])
+    if abs(heading) > _MAX_START_RAD:
+        fail(
+            0,
+            f"begins with a heading of {math.degrees(heading):.0f} deg: the car starts along x, the path may be at "
+            f"most {math.degrees(_MAX_START_RAD):g} deg off; turn it by {-math.degrees(heading):.0f} deg about (0, 0)",
+        )
+
+
+def _read_points(file: FilePath) -> dict[str, Any]:
+    """Read the points from a CSV with the header x_m,y_m, and speed and width there if it has such columns."""
+    columns, lines = read_columns(file, COLUMNS, OPTIONAL)
+    check_points(columns["x_m"], columns["y_m"], lambda index: f"{file.name}, line {lines[index]}")
+    return columns
 
 
 class PathSpeed:
@@ -98,36 +167,17 @@ class PathTable:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FollowPath(AlongCourse):
+class FollowPath(AlongCourse, kind="follow_path"):
     """A path through given points."""
 
     path: PathTable
     """The points."""
 
-    @classmethod
-    def filled_from_csv(
-        cls, table: Mapping[str, Any], folder: FilePath | None, source: Source
-    ) -> tuple[dict[str, Any], dict[str, bytes]]:
-        """Fill in the points of the CSV (see the base class)."""
-        points = table.get("path")
-        if not isinstance(points, Mapping) or not isinstance(points.get("csv"), str):
-            return dict(table), {}
-        given = [name for name in (*COLUMNS, *OPTIONAL) if name in points]
-        if given and "path.csv" not in source.overridden:
-            if folder is None:
-                return dict(table), {}
-            key = "csv" if given[0] in COLUMNS else given[0]
-            raise source.fail(("path", key), f"csv and the list {given[0]} both give the points; leave one out")
-        file = find_csv(points["csv"], folder, source, ("path", "csv"))
-        try:
-            columns, lines = read_csv(file)
-            check_points(columns["x_m"], columns["y_m"], lambda index: f"{file.name}, line {lines[index]}")
-        except ManeuverError as reason:
-            raise source.fail(("path", "csv"), str(reason), reason.value, reason.allowed) from reason
-        filled = {**table, "path": {**points, **columns}}
-        return filled, {f"path/{file.name}": read_bytes(file, ManeuverError, limits.MAX_CSV_BYTES)}
+    FILES: ClassVar = (NamedFile(("path", "csv"), (*COLUMNS, *OPTIONAL), _read_points, "path"),)
 
-    def _make_course(self) -> Course:
+    @cached_property
+    def course(self) -> Course:
+        """The path, and the road along it."""
         path = Path.through(self.path.x_m or (), self.path.y_m or ())
         return Course(path, width_m=self._along(path, self.path.width_m))
 
@@ -161,7 +211,7 @@ class Circle:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConstantRadius(Maneuver):
+class ConstantRadius(Maneuver, kind="constant_radius"):
     """A circle at a slowly rising speed."""
 
     circle: Circle = Circle()

@@ -42,7 +42,7 @@ from activesteer.core.conventions import Array
 from activesteer.core.path import Path
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import SIGNS, Maneuver, Side
+from activesteer.maneuver.base import SIGNS, Maneuver, Side, check_speed
 from activesteer.road.course import Course, Lane
 
 if TYPE_CHECKING:
@@ -63,13 +63,7 @@ class AlongCourse(Maneuver):
 
     def __post_init__(self) -> None:
         """Check that the car drives forwards and passes the last gate within the run."""
-        if self.speed_mps < _MIN_SPEED_MPS:
-            raise ManeuverError(
-                f"is {3.6 * self.speed_mps:g} km/h; a course is driven forwards, at no less than "
-                f"{3.6 * _MIN_SPEED_MPS:g} km/h",
-                key="speed_kmh",
-                value=3.6 * self.speed_mps,
-            )
+        check_speed(self.speed_mps, "a course", least_mps=_MIN_SPEED_MPS)
         last = self.course.last_gate_x_m
         if last is not None and self.duration_s * self.speed_mps < last:
             gate_s = last / self.speed_mps
@@ -81,18 +75,10 @@ class AlongCourse(Maneuver):
                 allowed=Range(gate_s + _AFTER_S),
             )
 
-    @property
+    @cached_property
+    @abstractmethod
     def course(self) -> Course:
         """Path, lanes and cones."""
-        return self._course
-
-    @cached_property
-    def _course(self) -> Course:
-        return self._make_course()
-
-    @abstractmethod
-    def _make_course(self) -> Course:
-        """Lay out the course; called once."""
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Path and speed."""
@@ -117,14 +103,6 @@ _CONE_SPACING_M: Final = 5.0
 """Largest distance between cones along a lane [m]."""
 
 
-class _Section(NamedTuple):
-    name: str
-    start_m: float
-    length_m: float
-    width_m: float
-    centre_m: float
-
-
 def lanes(
     standard: LaneStandard,
     vehicle_width_m: float,
@@ -139,27 +117,27 @@ def lanes(
     of side lane and exit lane has a factor of its own.
     """
     b = vehicle_width_m
-    entry, exit_first = 1.1 * b + 0.25, 1.3 * b + 0.25
+    entry = 1.1 * b + 0.25
+    # Name, start, length, width, and offset of the centre line [m].
     if standard == "iso_3888_1":
         sections = (
-            _Section("entry lane", 0.0, 15.0, entry, 0.0),
-            _Section("side lane", 45.0, 25.0, 1.2 * b + 0.25, 3.5),
-            _Section("exit lane", 95.0, 30.0, exit_first, 0.0),
+            ("entry lane", 0.0, 15.0, entry, 0.0),
+            ("side lane", 45.0, 25.0, 1.2 * b + 0.25, 3.5),
+            ("exit lane", 95.0, 30.0, 1.3 * b + 0.25, 0.0),
         )
     else:
         aside, back = b + 1.0, 3.0
         sections = (
-            _Section("entry lane", 0.0, 12.0, entry, 0.0),
-            _Section("side lane", 25.5, 11.0, aside, 0.5 * entry + 1.0 + 0.5 * aside),
-            _Section("exit lane", 49.0, 12.0, back, 0.5 * (back - entry)),
+            ("entry lane", 0.0, 12.0, entry, 0.0),
+            ("side lane", 25.5, 11.0, aside, 0.5 * entry + 1.0 + 0.5 * aside),
+            ("exit lane", 49.0, 12.0, back, 0.5 * (back - entry)),
         )
-    return tuple(_lane(section, start_x_m, length_factor, side * offset_factor) for section in sections)
-
-
-def _lane(section: _Section, start_x_m: float, along: float, aside: float) -> Lane:
-    start = start_x_m + along * section.start_m
-    centre, half = aside * section.centre_m, 0.5 * section.width_m
-    return Lane(section.name, start, start + along * section.length_m, centre - half, centre + half)
+    found = []
+    for name, start_m, length_m, width_m, offset_m in sections:
+        start = start_x_m + length_factor * start_m
+        centre, half = side * offset_factor * offset_m, 0.5 * width_m
+        found.append(Lane(name, start, start + length_factor * length_m, centre - half, centre + half))
+    return tuple(found)
 
 
 def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
@@ -214,45 +192,26 @@ def least_jerk(start_x_m: float, end_x_m: float, end_y_m: float, bounds: Sequenc
 
     Validity: small headings; a point ahead is at y + ahead y', its x at x + ahead.
     """
-    spline = _Spline(start_x_m, end_x_m)
+    from scipy.interpolate import BSpline  # noqa: PLC0415 - slow to import, and few manoeuvres need it
+
+    count = max(_DEGREE + 2, round((end_x_m - start_x_m) / _KNOT_SPACING_M))
+    knots = np.linspace(start_x_m, end_x_m, count + 1)
+    on_knots = partial(BSpline, np.concatenate([[start_x_m] * _DEGREE, knots, [end_x_m] * _DEGREE]), k=_DEGREE)
+    basis = on_knots(np.eye(count + _DEGREE))
+    # y''' is a parabola between knots: three points of Gauss integrate its square exactly.
+    points, weights = np.polynomial.legendre.leggauss(3)
+    half = 0.5 * np.diff(knots)[:, None]
+    middle = 0.5 * (knots[:-1] + knots[1:])[:, None]
+    jerk = np.sqrt(half * weights).reshape(-1, 1) * basis((middle + half * points).ravel(), 3)
     inside = np.array([bound for bound in bounds if start_x_m <= bound.x_m <= end_x_m]).reshape(-1, 4)
     x, ahead, low, high = inside.T
-    at = spline.basis(x) + ahead[:, None] * spline.basis(x, 1)
+    at = basis(x) + ahead[:, None] * basis(x, 1)
     # The last three coefficients are y at the end without slope and curvature, the first three are 0.
-    fixed = np.zeros(at.shape[1])
-    fixed[-3:] = end_y_m
-    rest = at @ fixed
-    free = at[:, 3:-3]
-    return spline.of(_bounded(spline.jerk[:, 3:-3], -spline.jerk @ fixed, free, low - rest, high - rest), fixed)
-
-
-class _Spline:
-    """Basis functions on clamped, equally spaced knots.
-
-    Attributes:
-        basis: Function from x to the values of all basis functions, shape (k, n); a second argument selects a
-            derivative.
-        jerk: Square root of the weight times third derivative at the points of a quadrature, shape (q, n).
-    """
-
-    def __init__(self, start: float, end: float) -> None:
-        from scipy.interpolate import BSpline  # noqa: PLC0415 - slow to import, and few manoeuvres need it
-
-        count = max(_DEGREE + 2, round((end - start) / _KNOT_SPACING_M))
-        knots = np.linspace(start, end, count + 1)
-        self._knots = np.concatenate([[start] * _DEGREE, knots, [end] * _DEGREE])
-        self._on_knots = partial(BSpline, self._knots, k=_DEGREE)
-        self.basis = self._on_knots(np.eye(count + _DEGREE))
-        # y''' is a parabola between knots: three points of Gauss integrate its square exactly.
-        points, weights = np.polynomial.legendre.leggauss(3)
-        half = 0.5 * np.diff(knots)[:, None]
-        middle = 0.5 * (knots[:-1] + knots[1:])[:, None]
-        self.jerk = np.sqrt(half * weights).reshape(-1, 1) * self.basis((middle + half * points).ravel(), 3)
-
-    def of(self, free: Array, fixed: Array) -> BSpline:
-        coefficients = fixed.copy()
-        coefficients[3:-3] = free
-        return self._on_knots(coefficients)
+    coefficients = np.zeros(count + _DEGREE)
+    coefficients[-3:] = end_y_m
+    rest = at @ coefficients
+    coefficients[3:-3] = _bounded(jerk[:, 3:-3], -jerk @ coefficients, at[:, 3:-3], low - rest, high - rest)
+    return on_knots(coefficients)
 
 
 def _bounded(a: Array, b: Array, g: Array, low: Array, high: Array) -> Array:
@@ -317,7 +276,7 @@ class LaneLayout:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LaneChange(AlongCourse):
+class LaneChange(AlongCourse, kind="lane_change"):
     """A double lane change."""
 
     lane: LaneLayout = LaneLayout()
@@ -338,7 +297,9 @@ class LaneChange(AlongCourse):
     def _coasting(self) -> Setpoint:
         return self._setpoint._replace(hold_speed=False)
 
-    def _make_course(self) -> Course:
+    @cached_property
+    def course(self) -> Course:
+        """Path, lanes and cones of the standard."""
         layout, width = self.lane, known_width(self.vehicle_width_m)
         # Laid out to the left and then mirrored, so that left and right agree to the last digit.
         left = self._lanes(width, 1.0)
@@ -399,9 +360,6 @@ def _bounds(course: Sequence[Lane], half_width_m: float) -> Iterator[Bound]:
                 yield Bound(x - ahead, ahead, lane.right_y_m + half_width_m, lane.left_y_m - half_width_m)
 
 
-_SLALOM_SAMPLE_M: Final = 0.5
-
-
 @dataclass(frozen=True)
 class ConeRow:
     """The row of cones along x and the path past it."""
@@ -430,7 +388,7 @@ class ConeRow:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slalom(AlongCourse):
+class Slalom(AlongCourse, kind="slalom"):
     """A slalom along a sine.
 
     Between the cones the path is a cosine with its crests at the cones. It leaves the line of the cones one spacing
@@ -444,7 +402,9 @@ class Slalom(AlongCourse):
     vehicle_width_m: Width | None = None
     """Width of the vehicle, which must fit past the cones [m]. Default: the width in the vehicle file."""
 
-    def _make_course(self) -> Course:
+    @cached_property
+    def course(self) -> Course:
+        """Path and cones."""
         row, width = self.cones, known_width(self.vehicle_width_m)
         if row.offset_m <= 0.5 * width:
             raise ManeuverError(
@@ -471,7 +431,7 @@ def _slalom_path(places: np.ndarray, spacing: float, offset: float) -> tuple[np.
     last_side = 1.0 if len(places) % 2 else -1.0
     entry = BPoly.from_derivatives([first - spacing, first], [0.0 * straight, crest])
     leaving = BPoly.from_derivatives([last - spacing, last], [-last_side * crest, last_side * offset * straight])
-    x = np.linspace(0.0, last, math.ceil(last / _SLALOM_SAMPLE_M) + 1)
+    x = np.linspace(0.0, last, math.ceil(last / _SAMPLE_M) + 1)
     y = np.select(
         [x < first - spacing, x < first, x < last - spacing],
         [0.0, entry(x), offset * np.cos(wave_number * (x - first))],

@@ -3,30 +3,18 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar
 
-from activesteer.config import Range, Source
-from activesteer.core import limits
+from activesteer.config import Range, check_points
 from activesteer.core.conventions import CORNERS
-from activesteer.core.files import read_bytes
 from activesteer.core.signals import Setpoint, WheelTorques, new_message
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import DriveMode, Maneuver, find_csv, read_columns
-
-
-def check_table(times_s: Sequence[float], values: Sequence[float]) -> None:
-    """Check that a table has as many values as times, and that its times increase."""
-    if not times_s or len(times_s) != len(values):
-        raise ManeuverError(
-            f"has {len(times_s)} times and {len(values)} values; as many of each are needed, at least one"
-        )
-    for earlier, later in pairwise(times_s):
-        if later <= earlier:
-            raise ManeuverError(f"does not increase from {earlier:g} to {later:g} s", key="time_s")
+from activesteer.maneuver.base import DriveMode, Maneuver, NamedFile, read_columns
 
 
 @dataclass(frozen=True)
@@ -116,44 +104,20 @@ class WheelTorqueTable:
     rr_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
     """Rear right."""
 
-    def columns(self, what: str) -> tuple[tuple[float, ...], ...] | None:
-        """Return the torques of the four wheels, `drive` or `brake`, or None if no wheel has any."""
-        given = [getattr(self, f"{corner}_{what}_Nm") for corner in CORNERS]
-        if all(column is None for column in given):
-            return None
-        none = (0.0,) * len(self.time_s)
-        return tuple(none if column is None else column for column in given)
+    def at(self, time_s: float) -> WheelTorques:
+        """Return the torques at a time [s]."""
+        drive, brake = (
+            tuple(
+                0.0 if column is None else _interpolate(time_s, self.time_s, column)
+                for column in (getattr(self, f"{corner}_{what}_Nm") for corner in CORNERS)
+            )
+            for what in ("drive", "brake")
+        )
+        return new_message(WheelTorques, (drive, brake))
 
 
-_CSVS: Final = (
-    ("steering_csv", "steering", ("steering_wheel_rad", "rack_m")),
-    ("drive_csv", "wheel_torques", tuple(field.name for field in fields(WheelTorqueTable))[1:]),
-)
-"""Key that names a CSV, the table it fills, and the columns of which it must have at least one."""
-
-
-def with_tables(
-    table: Mapping[str, Any], folder: Path | None, source: Source
-) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Fill the values of its CSV files into an open-loop table (see `Maneuver.filled_from_csv`)."""
-    filled, files = dict(table), {}
-    for key, name, columns in _CSVS:
-        if not isinstance(filled.get(key), str):
-            continue
-        if name in filled and key not in source.overridden:
-            if folder is None:
-                continue
-            raise source.fail((key,), f"{key} and the table [{name}] both give the values; leave one out")
-        file = find_csv(filled[key], folder, source, (key,))
-        try:
-            filled[name] = _read(file, columns)
-        except ManeuverError as reason:
-            raise source.fail((key,), str(reason)) from reason
-        files[f"tables/{file.name}"] = read_bytes(file, ManeuverError, limits.MAX_CSV_BYTES)
-    return filled, files
-
-
-def _read(file: Path, columns: Sequence[str]) -> dict[str, list[float]]:
+def _read(fills: str, columns: Sequence[str], file: Path) -> dict[str, Any]:
+    """Read a table from a CSV, which must have at least one of the columns."""
     values, lines = read_columns(file, ("time_s",), columns)
     if len(values) == 1:
         raise ManeuverError(
@@ -168,11 +132,11 @@ def _read(file: Path, columns: Sequence[str]) -> dict[str, list[float]]:
                 key="time_s",
                 value=later,
             )
-    return values
+    return {fills: values}
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenLoop(Maneuver):
+class OpenLoop(Maneuver, kind="open_loop"):
     """Tables over time. The drive holds the speed, or the car coasts, or the wheel torques are given."""
 
     steering: SteeringTable = SteeringTable()
@@ -199,36 +163,27 @@ class OpenLoop(Maneuver):
     """Whether steering or wheel torques that end before `duration_s` keep their last value. A single value always
     does."""
 
-    @classmethod
-    def filled_from_csv(
-        cls, table: Mapping[str, Any], folder: Path | None, source: Source
-    ) -> tuple[dict[str, Any], dict[str, bytes]]:
-        """Fill in the tables of the CSV files (see the base class)."""
-        return with_tables(table, folder, source)
+    FILES: ClassVar = tuple(
+        NamedFile((key,), (fills,), partial(_read, fills, columns), "tables")
+        for key, fills, columns in (
+            ("steering_csv", "steering", ("steering_wheel_rad", "rack_m")),
+            ("drive_csv", "wheel_torques", tuple(field.name for field in fields(WheelTorqueTable))[1:]),
+        )
+    )
 
     def __post_init__(self) -> None:
         """Check the tables."""
-        torques = self.wheel_torques
-        tables = [("steering", self.steering.time_s, self.steering.values)]
-        if self.speed is not None:
-            tables.append(("speed", self.speed.time_s, self.speed.speed_mps))
-        if self.brake is not None:
-            tables.append(("brake", self.brake.time_s, self.brake.pedal))
-        if self.parking_brake is not None:
-            tables.append(("parking_brake", self.parking_brake.time_s, self.parking_brake.applied))
-        if torques is not None:
-            columns = [*(torques.columns("drive") or ()), *(torques.columns("brake") or ())]
-            tables += [("wheel_torques", torques.time_s, column) for column in columns]
-            if self.speed is not None or self.brake is not None or self.parking_brake is not None:
-                raise ManeuverError("cannot be given together with a speed or a brake", key="wheel_torques")
-        for key, times_s, values in tables:
-            try:
-                check_table(times_s, values)
-            except ManeuverError as reason:
-                raise ManeuverError(reason.problem, key=f"{key}.{reason.key}" if reason.key else key) from reason
+        others = {"speed": self.speed, "brake": self.brake, "parking_brake": self.parking_brake}
+        if self.wheel_torques is not None and any(others.values()):
+            raise ManeuverError("cannot be given together with a speed or a brake", key="wheel_torques")
+        for name, table in {"steering": self.steering, **others, "wheel_torques": self.wheel_torques}.items():
+            if table is not None:
+                columns = {f"{name}.{field.name}": getattr(table, field.name) for field in fields(table)}
+                lists = {key: column for key, column in columns.items() if isinstance(column, tuple)}
+                check_points(f"{name}.time_s", table.time_s, lists, Range(1), ManeuverError)
         self._check_end("steering", self.steering.time_s)
-        if torques is not None:
-            self._check_end("wheel_torques", torques.time_s)
+        if self.wheel_torques is not None:
+            self._check_end("wheel_torques", self.wheel_torques.time_s)
 
     def _check_end(self, key: str, times_s: tuple[float, ...]) -> None:
         """Refuse a table that is shorter than the manoeuvre, unless `hold_last` is set."""
@@ -245,7 +200,7 @@ class OpenLoop(Maneuver):
         value = steering.factor * _interpolate(time_s - steering.delay_s, steering.time_s, steering.values)
         angle, rack = (value, None) if self.steering.rack_m is None else (0.0, value)
         if self.wheel_torques is not None:
-            return Setpoint(angle, self.speed_mps, 0.0, False, None, rack, self._torques(self.wheel_torques, time_s))
+            return Setpoint(angle, self.speed_mps, 0.0, False, None, rack, self.wheel_torques.at(time_s))
         speed = self.speed_mps if self.speed is None else _interpolate(time_s, self.speed.time_s, self.speed.speed_mps)
         pedal = 0.0 if self.brake is None else _interpolate(time_s, self.brake.time_s, self.brake.pedal)
         parking = self.parking_brake
@@ -259,16 +214,6 @@ class OpenLoop(Maneuver):
         if self.wheel_torques is None:
             return setpoint
         return setpoint._replace(wheel_torques=None, hold_speed=self.drive == "hold_speed")
-
-    @staticmethod
-    def _torques(table: WheelTorqueTable, time_s: float) -> WheelTorques:
-        def at(columns: tuple[tuple[float, ...], ...] | None) -> tuple[float, float, float, float]:
-            if columns is None:
-                return (0.0, 0.0, 0.0, 0.0)
-            fl, fr, rl, rr = (_interpolate(time_s, table.time_s, column) for column in columns)
-            return fl, fr, rl, rr
-
-        return WheelTorques(at(table.columns("drive")), at(table.columns("brake")))
 
 
 def _interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:

@@ -17,8 +17,8 @@ from typing import Annotated, Any, Final, NamedTuple
 from activesteer.config import Range
 from activesteer.core.signals import Setpoint, new_message
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Side, Speed, check_search_speed, within
-from activesteer.maneuver.steering_tests import RampAngle, reference_angle_search
+from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Search, Side, Speed, check_speed, within
+from activesteer.maneuver.steering_tests import reference_angle_search
 
 _Pedal = Annotated[float, Range(0.0, 1.0)]
 _Ramp = Annotated[float, Range(0.0, 60.0)]
@@ -149,7 +149,7 @@ class Phase:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Phases(Maneuver):
+class Phases(Maneuver, kind="phases"):
     """Phases in a row. The last one lasts to the end of the run."""
 
     phases: tuple[Phase, ...]
@@ -166,7 +166,7 @@ class Phases(Maneuver):
         if not self.phases:
             raise ManeuverError("at least one phase [[phases]] is needed", key="phases")
         if self._needs_reference:
-            check_search_speed(self.speed_mps, "steering_factor", "reference_angle_deg")
+            check_speed(self.speed_mps, "steering_factor", "reference_angle_deg")
         elif self.reference_angle_rad is not None and all(phase.steering_factor is None for phase in self.phases):
             raise ManeuverError("has no effect without steering_factor in a phase", key="reference_angle_rad")
 
@@ -175,7 +175,7 @@ class Phases(Maneuver):
         return self.reference_angle_rad is None and any(phase.steering_factor is not None for phase in self.phases)
 
     @property
-    def search(self) -> RampAngle | None:
+    def search(self) -> Search | None:
         """Search for A, if a phase needs it."""
         if not self._needs_reference:
             return None

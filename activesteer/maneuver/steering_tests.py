@@ -15,7 +15,7 @@ from activesteer.config import Range
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Search, Side, check_search_speed, within
+from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Search, Side, check_begin, check_speed, within
 
 _SEARCH_S: Final = 4.5
 """Length of a run of the amplitude search after the beginning of the step [s]."""
@@ -46,7 +46,7 @@ class StepInput:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StepSteer(Maneuver):
+class StepSteer(Maneuver, kind="step_steer"):
     """A step of the steering wheel angle, ramped at a limited rate."""
 
     steer: StepInput
@@ -54,13 +54,7 @@ class StepSteer(Maneuver):
 
     def __post_init__(self) -> None:
         """Check that the step starts before the end of the run."""
-        step = self.steer
-        if step.start_s >= self.duration_s:
-            raise ManeuverError(
-                f"is {step.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)",
-                key="steer.start_s",
-                value=step.start_s,
-            )
+        check_begin("steer.start_s", self.steer.start_s, self.duration_s)
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Steering wheel angle of the ramp (see the base class)."""
@@ -78,25 +72,26 @@ class StepSteer(Maneuver):
         return self.at_speed(math.copysign(0.0, amplitude)), self.at_speed(amplitude)
 
     @property
-    def search(self) -> SteadyTurn | None:
+    def search(self) -> Search | None:
         """Search for the amplitude, if only the lateral acceleration is given."""
-        wanted = self.steer.lateral_acceleration_mps2
-        if self.steer.steering_wheel_rad is not None or wanted is None:
-            return None
-        # Of fixed length, so that the amplitude does not depend on the length of the manoeuvre.
-        probe = dataclasses.replace(self, duration_s=self.steer.start_s + _SEARCH_S)
-        return SteadyTurn(probe, wanted, self.with_amplitude)
+        return steady_turn_search(self, self.steer, self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> StepSteer:
         """Return the step with an amplitude [rad]. The lateral acceleration stays on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
 
-@dataclass(frozen=True)
-class SteadyTurn(Search):
-    """Search for the amplitude of a step steer that gives a steady-state lateral acceleration."""
-
-    probe: StepSteer
+def steady_turn_search(maneuver: Maneuver, step: StepInput, accept: Callable[[float], Maneuver]) -> Search | None:
+    """Return the search for the amplitude of a step that gives its lateral acceleration, if the step has none."""
+    wanted = step.lateral_acceleration_mps2
+    if step.steering_wheel_rad is not None or wanted is None:
+        return None
+    # Of fixed length, so that the amplitude does not depend on the length of the manoeuvre.
+    probe = StepSteer(
+        kind="step_steer", name=maneuver.name, speed_mps=maneuver.speed_mps, duration_s=step.start_s + _SEARCH_S,
+        settle_s=maneuver.settle_s, road=maneuver.road, steer=step,
+    )  # fmt: skip
+    return Search(probe, wanted, accept)
 
 
 Frequency = Annotated[float, Range(0.01, 50.0)]
@@ -121,7 +116,7 @@ class Sweep:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SineSweep(Maneuver):
+class SineSweep(Maneuver, kind="sine_sweep"):
     """A sine of constant amplitude and rising frequency at constant speed."""
 
     sweep: Sweep = Sweep()
@@ -175,7 +170,7 @@ class SlowRamp:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlowlyIncreasingSteer(Maneuver):
+class SlowlyIncreasingSteer(Maneuver, kind="slowly_increasing_steer"):
     """A slow ramp of the steering wheel angle at constant speed, up to the limit of the car."""
 
     steer: SlowRamp = SlowRamp()
@@ -183,14 +178,8 @@ class SlowlyIncreasingSteer(Maneuver):
 
     def __post_init__(self) -> None:
         """Check that the ramp begins within the run and turns the steering wheel."""
-        ramp = self.steer
-        if ramp.start_s >= self.duration_s:
-            raise ManeuverError(
-                f"is {ramp.start_s:g} s, but the run ends at {self.duration_s:g} s (duration_s)",
-                key="steer.start_s",
-                value=ramp.start_s,
-            )
-        if ramp.rate_radps == 0.0 or ramp.end_rad == 0.0:
+        check_begin("steer.start_s", self.steer.start_s, self.duration_s)
+        if self.steer.rate_radps == 0.0 or self.steer.end_rad == 0.0:
             raise ManeuverError("rate_degps and end_deg must not be 0: the steering wheel would not turn", key="steer")
 
     def setpoint(self, time_s: float) -> Setpoint:
@@ -198,13 +187,6 @@ class SlowlyIncreasingSteer(Maneuver):
         ramp = self.steer
         turned = within((time_s - ramp.start_s) * abs(ramp.rate_radps), ramp.end_rad)
         return self.at_speed(math.copysign(turned, ramp.rate_radps))
-
-
-@dataclass(frozen=True)
-class RampAngle(Search):
-    """Search for the angle at which a slow ramp to the left reaches a lateral acceleration."""
-
-    probe: SlowlyIncreasingSteer
 
 
 _STEP_S: Final = 0.005
@@ -232,7 +214,7 @@ class RandomSignal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RandomSteer(Maneuver):
+class RandomSteer(Maneuver, kind="random_steer"):
     """Random steering at constant speed."""
 
     random: RandomSignal = RandomSignal()
@@ -282,13 +264,13 @@ _RAMP: Final = SlowRamp(start_s=0.5, rate_radps=math.radians(13.5), end_rad=math
 _RAMP_S: Final = 20.5
 
 
-def reference_angle_search(maneuver: Maneuver, accept: Callable[[float], Maneuver]) -> RampAngle:
+def reference_angle_search(maneuver: Maneuver, accept: Callable[[float], Maneuver]) -> Search:
     """Return the search for A, the steering wheel angle at 0.3 g, at the speed and on the road of a manoeuvre."""
     probe = SlowlyIncreasingSteer(
         kind="slowly_increasing_steer", name=f"{maneuver.name} (slow ramp to 0.3 g)", speed_mps=maneuver.speed_mps,
         duration_s=_RAMP_S, settle_s=maneuver.settle_s, road=maneuver.road, steer=_RAMP,
     )  # fmt: skip
-    return RampAngle(probe, _REFERENCE_MPS2, accept)
+    return Search(probe, _REFERENCE_MPS2, accept)
 
 
 @dataclass(frozen=True)
@@ -325,7 +307,7 @@ class DwellInput:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SineWithDwell(Maneuver):
+class SineWithDwell(Maneuver, kind="sine_with_dwell"):
     """A sine with dwell. The drive holds the speed until the sine begins."""
 
     steer: DwellInput
@@ -345,10 +327,10 @@ class SineWithDwell(Maneuver):
                 allowed=Range(steer.completion_s + 1.75),
             )
         if steer.steering_wheel_rad is None:
-            check_search_speed(self.speed_mps, "steer.amplitude_factor", "steer.steering_wheel_deg")
+            check_speed(self.speed_mps, "steer.amplitude_factor", "steer.steering_wheel_deg")
 
     @property
-    def search(self) -> RampAngle | None:
+    def search(self) -> Search | None:
         """Search for A, if the amplitude is given as a multiple of A."""
         factor = self.steer.amplitude_factor
         if self.steer.steering_wheel_rad is not None or factor is None:

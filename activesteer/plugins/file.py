@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, ClassVar, Final, NamedTuple, NoReturn
+from typing import Any, ClassVar, Final, NoReturn
 
 from activesteer.config import parse_value
 from activesteer.core.files import is_file, read_bytes, shown_path, user_path, why_no_file
@@ -30,24 +30,14 @@ _USER_MODULE: Final = "activesteer_user_"
 _PARAMETER: Final = re.compile(r"([A-Za-z_]\w*)=(.*)", re.DOTALL)
 
 
-class FromFile(NamedTuple):
-    """A class or function from a file.
-
-    Attributes:
-        origin: The class or function.
-        parameters: Name -> value, typed as in TOML.
-        files: Path in the file's folder -> content, of the file and the modules beside it that it imports.
-    """
-
-    origin: Any
-    parameters: dict[str, Any]
-    files: dict[str, bytes]
-
-
-def from_file(text: str, kind: Kind) -> FromFile:
+def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, bytes]]:
     """Load the file and look up the class or function.
 
     The file can import modules beside it. Every call loads the file and these modules again.
+
+    Returns:
+        The class or function; the parameters, typed as in TOML; and the contents of the file and of the modules beside
+        it that it imports, by their paths in its folder.
     """
 
     def fail(problem: str, value: Any = text, allowed: Any = None) -> Exception:
@@ -90,7 +80,7 @@ def from_file(text: str, kind: Kind) -> FromFile:
             form["name"],
             own,
         )
-    return FromFile(origin, parse_parameters(form["parameters"] or "", fail), files)
+    return origin, parse_parameters(form["parameters"] or "", fail), files
 
 
 def is_user_module(name: str) -> bool:

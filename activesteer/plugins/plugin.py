@@ -10,7 +10,7 @@ import os
 import re
 import types
 import typing
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -109,11 +109,6 @@ def read_values(
     return found
 
 
-def has_argument(maker: Any, name: str) -> bool:
-    """Return whether a class or function has an argument."""
-    return name in _arguments(maker)
-
-
 def _arguments(maker: Any) -> Mapping[str, inspect.Parameter]:
     try:
         return inspect.signature(maker, eval_str=True).parameters
@@ -171,8 +166,8 @@ class Plugin:
     is_builtin: bool = False
 
     def __post_init__(self) -> None:
-        """Mark a block that uses the truth in its label."""
-        if self.uses_truth:
+        """Mark a block that uses the truth in its label, once also if the block is a copy."""
+        if self.uses_truth and not self.label.endswith("+truth"):
             object.__setattr__(self, "label", f"{self.label}+truth")
 
     @property
@@ -199,6 +194,10 @@ class Plugin:
             return declared_by(self.origin)
         except (TypeError, ValueError) as reason:
             raise self.kind.fail(self.name, str(reason)) from reason
+
+    def own_parameter(self, path: Sequence[str]) -> str:
+        """Return the parameter of a user's block that a key below the table of its kind names, or an empty text."""
+        return "" if self.is_builtin or path[0] != self.key else ".".join(path[1:])
 
     def own_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Check overrides of the parameters and return them by the names of the arguments.
@@ -286,7 +285,7 @@ class Plugin:
         parameters = {**self.parameters, **getattr(setup, "user_parameters", {}).get(self.key, {})}
         if hasattr(self.origin, "from_vehicle"):
             return self.origin.from_vehicle(setup, **parameters)
-        given = {SETUP: setup} if has_argument(self.origin, SETUP) else {}
+        given = {SETUP: setup} if SETUP in _arguments(self.origin) else {}
         return self.origin(**parameters, **given)
 
 

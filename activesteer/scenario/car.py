@@ -21,11 +21,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from activesteer.config import Range, Source, build, checked_number, read_toml, to_table
+from activesteer.config import Range, Source, build, checked_number, find_file, read_toml, to_table
 from activesteer.controllers import ControllerParameters, SingleTrackParameters
 from activesteer.controllers.parameters import SplitAxle
 from activesteer.core.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
-from activesteer.core.files import is_file, read_bytes, user_path, why_no_file
+from activesteer.core.files import is_file, read_bytes, why_no_file
 from activesteer.driver import DriverParameters, driver_spec, is_driver_file
 from activesteer.errors import (
     ActiveSteerError,
@@ -33,7 +33,6 @@ from activesteer.errors import (
     ModelError,
     ParameterError,
     TyreFileError,
-    nearest_names,
     shown,
 )
 from activesteer.estimation import EstimatorSetup, KnownTyre
@@ -107,7 +106,8 @@ def model_files(mjcf: Path) -> dict[str, bytes]:
                 waiting.append(_included(element, path, mjcf, name))
             else:
                 _check(element, copies, name)
-                assets |= dict.fromkeys(_asset_names(element), name)
+                # Of a mesh, texture, height field or skin.
+                assets |= {file: name for key, file in element.items() if key.startswith("file") and file}
             if element.tag == "compiler":
                 folders |= {mjcf.parent / element.get(key, "") for key in ("meshdir", "texturedir", "assetdir")}
     for file, name in assets.items():
@@ -186,11 +186,6 @@ def _check(element: ElementTree.Element, copies: float, name: str) -> None:
                 raise _too_much(f"<{tag} {attribute}={shown(text)}>", _MAX_NUMBER, name)
 
 
-def _asset_names(element: ElementTree.Element) -> list[str]:
-    """Return the files of a mesh, texture, height field or skin."""
-    return [file for attribute, file in element.items() if attribute.startswith("file") and file]
-
-
 def _check_asset(path: Path, name: str) -> bytes:
     data = read_bytes(path, ModelError, _MAX_ASSET_BYTES)
     if data.startswith(b"\x89PNG") and len(data) > 24:
@@ -234,7 +229,6 @@ class CarSpec:
         mjcf: The model file.
         tyres: Tyres of the front and of the rear axle.
         new_tyres: The tyres without the factors of the vehicle file.
-        overrides: Changes of the vehicle file.
         files: Name -> content of all its files, to be kept with a recording.
     """
 
@@ -242,7 +236,6 @@ class CarSpec:
     mjcf: Path
     tyres: tuple[TyreParameters, TyreParameters]
     new_tyres: tuple[TyreParameters, TyreParameters]
-    overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
 
     @property
@@ -271,9 +264,10 @@ def load_car(vehicle: FileOrTable = "compact", overrides: Mapping[str, Any] | No
         >>> round(float(car.model.body_mass.sum()))
         1630
     """
-    changes = plain(overrides)
-    listed = [Override(key, tuple(key.removeprefix("vehicle.").split(".")), value) for key, value in changes.items()]
-    return replace(car_with(vehicle, listed), overrides=changes)
+    listed = [
+        Override(key, tuple(key.removeprefix("vehicle.").split(".")), value) for key, value in plain(overrides).items()
+    ]
+    return car_with(vehicle, listed)
 
 
 def car_with(vehicle: FileOrTable, overrides: list[Override]) -> CarSpec:
@@ -285,21 +279,21 @@ def car_with(vehicle: FileOrTable, overrides: list[Override]) -> CarSpec:
         # The word alone stands for the key `source` of the table.
         table["single_track"] = {**known, "source": IDENTIFY}
     config = build(VehicleConfig, table, source)
-    mjcf = _find_file(config.mjcf, folder, models_dir() / "mjcf", source, ("mjcf",), ModelError)
+    beside = () if folder is None else (folder,)
+    of_model, of_tyres = (replace(source, error=error) for error in (ModelError, TyreFileError))
+    mjcf = find_file(config.mjcf, (*beside, models_dir() / "mjcf"), "**/*.xml", of_model, ("mjcf",))
     front, rear = (
-        _find_file(name, folder, models_dir() / "tyres", source, ("tyres", axle), TyreFileError)
+        find_file(name, (*beside, models_dir() / "tyres"), "*.tir", of_tyres, ("tyres", axle))
         for axle, name in (("front", config.tyres.front), ("rear", config.tyres.rear))
     )
     files |= {f"tyres/{path.name}": read_bytes(path, TyreFileError) for path in (front, rear)}
     model = mjcf.parent.name.encode("utf-8", "backslashreplace").decode()
     files |= {f"mjcf/{model}/{name}": text for name, text in model_files(mjcf).items()}
-    front_tyre = _tyre(front, config)
-    new = front_tyre, front_tyre if rear == front else _tyre(rear, config)
+    read = {
+        path: replace(load_tir(path), conventions=config.tyres.conventions) for path in dict.fromkeys((front, rear))
+    }
+    new = read[front], read[rear]
     return CarSpec(config, mjcf, config.factors.on_tyres(*new), new, files=files)
-
-
-def _tyre(path: Path, config: VehicleConfig) -> TyreParameters:
-    return replace(load_tir(path), conventions=config.tyres.conventions)
 
 
 def read_table(
@@ -314,29 +308,6 @@ def read_table(
     table, source = read_toml(path, error)
     table.setdefault("name", path.stem)
     return table, source, path.parent, {f"{part}.toml": source.text.encode()}
-
-
-def _find_file(
-    name: str,
-    own: Path | None,
-    folder: Path,
-    source: Source,
-    key: tuple[str, ...],
-    error: type[ModelError] | type[TyreFileError],
-) -> Path:
-    """Find a file of a vehicle file: beside the vehicle file, among the package's models, or by its own path."""
-    beside = () if own is None else (own / name,)
-    for candidate in (*beside, folder / name, user_path(name, error)):
-        if is_file(candidate):
-            return candidate
-    suffix = Path(name).suffix
-    present = [str(path.relative_to(folder)) for path in folder.rglob("*") if not suffix or path.suffix == suffix]
-    raise replace(source, error=error).fail(
-        key,
-        f"there is no file {shown(name)} in {folder.parent.name}/{folder.name}; {nearest_names(name, present)}",
-        name,
-        present,
-    )
 
 
 @dataclass(frozen=True)
@@ -376,13 +347,11 @@ def driver_with(given: Any, overrides: list[Override]) -> ChosenDriver:
     """Read a driver, or a user's code, with overrides of the driver file only."""
     plugin, is_file = driver_spec(given), is_driver_file(given)
     table, source, _, files = read_table(given if is_file else DEFAULT_DRIVER, "driver", find_driver_file, DriverError)
-    of_code = {} if is_file else {one.path[1:]: one for one in overrides if one.path[0] == plugin.key and one.path[1:]}
-    table, source = applied(DriverParameters, table, source, [one for one in overrides if one not in of_code.values()])
-    parameters = build(DriverParameters, table, source)
-    if is_file:
-        return ChosenDriver(plugin, parameters, files)
-    values = plugin.own_values({".".join(path): one.value for path, one in of_code.items()}) if of_code else {}
-    return ChosenDriver(plugin, parameters, {**files, **plugin.files}, {plugin.key: values} if values else {})
+    of_code = {name: one.value for one in overrides if (name := plugin.own_parameter(one.path))}
+    of_file = [one for one in overrides if not plugin.own_parameter(one.path)]
+    parameters = build(DriverParameters, *applied(DriverParameters, table, source, of_file))
+    values = {plugin.key: plugin.own_values(of_code)} if of_code else {}
+    return ChosenDriver(plugin, parameters, {**files, **plugin.files}, values)
 
 
 def split_axles(motors: Motors) -> tuple[SplitAxle, ...]:

@@ -50,9 +50,9 @@ def applied(
             )
     changed = frozenset(".".join(override.path) for override in overrides)
     for override in overrides:
-        given = Source("", error=ParameterError, overridden=frozenset({".".join(override.path)}))
+        given = Source("", overridden=frozenset({".".join(override.path)}))
         table = merged(cls, table, override.path, override.value, given)
-    check_overruled(cls, table, Source("", error=ParameterError, overridden=changed), [one.path for one in overrides])
+    check_overruled(cls, table, Source("", overridden=changed), [one.path for one in overrides])
     return dict(table), replace(source, overridden=changed)
 
 
@@ -78,16 +78,12 @@ def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
     return found
 
 
-def own_values(overrides: Mapping[str, Any], controllers: Mapping[str, Sequence[Plugin]]) -> dict[str, dict[str, Any]]:
+def own_values(overrides: Sequence[Override], controllers: Mapping[str, Sequence[Plugin]]) -> dict[str, dict[str, Any]]:
     """Return the checked overrides of users' controllers: class -> name -> value."""
     given: dict[str, dict[str, Any]] = {}
-    for key, value in overrides.items():
-        name, parameter = own_path(key) or ("", "")
+    for _, (name, parameter), value in overrides:
         given.setdefault(name, {})[parameter] = value
     return {name: plugin.own_values(values) for name, values in given.items() for plugin in controllers[name]}
-
-
-_KEYS: Final = frozenset(field.name for field in fields(ControllerParameters))
 
 
 def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
@@ -102,7 +98,7 @@ def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> di
     """Return the overrides that none of these controllers reads: key -> keys of the table [controllers] it replaces."""
     read = frozenset[str]().union(*map(keys_read, controllers))
     replaced = {
-        key: _KEYS.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))
+        key: _BUILT_IN.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))
         for key, path in gain_paths(overrides).items()
     }
     if own := {key: path[0] for key in overrides if (path := own_path(key))}:

@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Any, Final, Literal, NamedTuple, TypeGuard
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from activesteer.core.files import user_path
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, nearest_names
 from activesteer.maneuver import Maneuver, build_maneuver, maneuver_class
-from activesteer.maneuver.base import with_road_files
+from activesteer.maneuver.base import with_files
 from activesteer.plugins import Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER, find_maneuver
@@ -166,11 +166,10 @@ def resolve(
     car = car_with(vehicle, sorted_out["vehicle"])
     if any(field.name == "vehicle_width_m" for field in fields(kind)):
         table = {"vehicle_width_m": car.config.width_m, **table}
-    table, csv_files = kind.filled_from_csv(table, folder, source)
-    table, road_files = with_road_files(table, folder, source)
+    table, csv_files = with_files(kind, table, folder, source)
     who = driver_with(driver, sorted_out["driver"])
-    own = own_values({one.given: one.value for one in sorted_out["controllers"]}, owned)
-    made_from = {**files, **csv_files, **road_files, **car.files, **who.files}
+    own = own_values(sorted_out["controllers"], owned)
+    made_from = {**files, **csv_files, **car.files, **who.files}
     built = build_maneuver(table, source)
     if is_recording(maneuver):
         built = build_maneuver(led(table, car.on(built.ground).steering_lag_s), source)
@@ -255,8 +254,8 @@ def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> A
             raise ParameterError("no controller here has such a parameter", key=key)
         return owned[path[0]][0].value_of(path[1], scenario.user_parameters)
     who = scenario.driver
-    if part == "driver" and not who.plugin.is_builtin and path[0] == who.plugin.key and path[1:]:
-        return who.plugin.value_of(".".join(path[1:]), who.user_parameters)
+    if part == "driver" and (name := who.plugin.own_parameter(path)):
+        return who.plugin.value_of(name, who.user_parameters)
     value: Any = {"maneuver": scenario.maneuver, "vehicle": scenario.car.config, "driver": who.parameters}[part]
     factor = 1.0
     for name in path:
@@ -282,7 +281,6 @@ def describe(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-Part = Literal["road", "maneuver", "controller", "driver"]
 _CAN: Final = (
     "these keys can: road.mu and the other frictions of the road, the speed and the inputs of the manoeuvre, "
     "controllers.*, driver.*; a fault is set with Simulation.fail"
@@ -294,36 +292,29 @@ _SAMPLES: Final = 200
 """Instants at which the effect of a change on the rest of the manoeuvre is looked for."""
 
 
-class Change(NamedTuple):
-    """A changed scenario."""
+def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s: float) -> tuple[str, Scenario]:
+    """Change one key of a scenario that runs with a controller, at a time of the run [s].
 
-    part: Part
-    scenario: Scenario
-
-
-def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s: float) -> Change:
-    """Change one key of a scenario that runs with a controller, at a time of the run [s]."""
+    Returns:
+        The block that must be made anew, `controller` or `driver`, or an empty text, and the changed scenario.
+    """
     value = plain({key: value})[key]
-    part, path = part_of(key, type(scenario.maneuver), own_controllers([controller]))
-    overrides = {**scenario.overrides, key: value}
+    owned = own_controllers([controller])
+    part, path = part_of(key, type(scenario.maneuver), owned)
+    scenario = replace(scenario, overrides={**scenario.overrides, key: value})
     if part == "controllers":
-        known = (
-            scenario.user_parameters.get(path[0], {}) | own_values({key: value}, own_controllers([controller]))[path[0]]
-        )
-        return Change(
-            "controller",
-            replace(scenario, user_parameters={**scenario.user_parameters, path[0]: known}, overrides=overrides),
-        )
+        known = scenario.user_parameters
+        own = own_values([Override(key, tuple(path), value)], owned)[path[0]]
+        return "controller", replace(scenario, user_parameters={**known, path[0]: known.get(path[0], {}) | own})
     if part == "driver":
-        return Change("driver", replace(scenario, driver=_driver(scenario, path, value), overrides=overrides))
+        return "driver", replace(scenario, driver=_driver(scenario, path, value))
     if part == "vehicle":
         if path[0] != "controllers" or len(path) < 2 or path[1] in _CONTROL_UNIT:
             raise _cannot(key, "it is built into the car")
         check_gains({key: value}, [controller])
         car = scenario.car
         gains = _with(ControllerParameters, to_table(car.config.controllers), path[1:], value, path[:1])
-        car = replace(car, config=replace(car.config, controllers=gains))
-        return Change("controller", replace(scenario, car=car, overrides=overrides))
+        return "controller", replace(scenario, car=replace(car, config=replace(car.config, controllers=gains)))
     before = scenario.maneuver
     if path[0] == "road":
         road = _with(Road, to_table(before.road), path[1:], value, path[:1]) if path[1:] else before.road
@@ -332,12 +323,10 @@ def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s
             raise _cannot(key, "only the friction of a road can" if road != before.road else "the value is the same")
         if len(road.areas()) != len(before.road.areas()):
             raise _cannot(key, "the road has no such area; give it at the start, with the friction of the road")
-        return Change("road", replace(scenario, maneuver=_same_course(before, road=road), overrides=overrides))
+        return "", replace(scenario, maneuver=_same_course(before, replace(before, road=road)))
     if path[0] in _FIXED:
         raise _cannot(key, "it belongs to the start of the run")
-    return Change(
-        "maneuver", replace(scenario, maneuver=_maneuver(before, key, path, value, time_s), overrides=overrides)
-    )
+    return "", replace(scenario, maneuver=_maneuver(before, key, path, value, time_s))
 
 
 def _cannot(key: str, reason: str) -> ParameterError:
@@ -352,8 +341,8 @@ def _with(cls: type[Any], table: Mapping[str, Any], path: list[str], value: Any,
 
 def _driver(scenario: Scenario, path: list[str], value: Any) -> Any:
     who = scenario.driver
-    if not who.plugin.is_builtin and path[0] == who.plugin.key and path[1:]:
-        values = {**who.user_parameters.get(path[0], {}), **who.plugin.own_values({".".join(path[1:]): value})}
+    if name := who.plugin.own_parameter(path):
+        values = {**who.user_parameters.get(path[0], {}), **who.plugin.own_values({name: value})}
         return replace(who, user_parameters={**who.user_parameters, path[0]: values})
     if not who.plugin.is_builtin:
         raise ParameterError(f"has no effect: {who.plugin.name} drives", key=".".join(("driver", *path)), value=value)
@@ -369,18 +358,17 @@ def _maneuver(before: Maneuver, key: str, path: list[str], value: Any, time_s: f
     one, other = before.course, after.course
     if one is not None and (other is None or one.to_table() != other.to_table()):
         raise _cannot(key, "it moves the course")
-    after = _same_course(before, of=after)
+    after = _same_course(before, after)
     rest = (time_s + (before.duration_s - time_s) * index / _SAMPLES for index in range(_SAMPLES))
     if all(after.setpoint(instant) == before.setpoint(instant) for instant in rest):
         raise ManeuverError("has no effect on the rest of the run", key=key, value=value)
     return after
 
 
-def _same_course(before: Maneuver, of: Maneuver | None = None, **values: Any) -> Maneuver:
-    """Return a manoeuvre with the very course of another one, so that a driver stays on his path."""
-    after = replace(before, **values) if of is None else of
-    if "_course" in before.__dict__:
-        vars(after)["_course"] = before.__dict__["_course"]
+def _same_course(before: Maneuver, after: Maneuver) -> Maneuver:
+    """Give a manoeuvre the very course of another one, so that a driver stays on his path, and return it."""
+    if before.course is not None:
+        vars(after)["course"] = before.course
     return after
 
 

@@ -327,7 +327,7 @@ class ClosedLoop(Uncopyable):
         """
         time_s = self.step_count * self.vehicle.timestep_s
         part, after = changed(self.scenario, key, value, self._plugin, time_s)
-        if part in ("driver", "controller"):
+        if part:
             old, new = (self._new_block(part, scenario) for scenario in (self.scenario, after))
             setattr(self, part, retuned(getattr(self, part), old, new))
         self._adopt(after)
@@ -431,7 +431,7 @@ class ClosedLoop(Uncopyable):
         if state.changes != self.changes:
             scenario = self._start
             for key, value, time_s in state.changes:
-                scenario = changed(scenario, key, value, self._plugin, time_s).scenario
+                _, scenario = changed(scenario, key, value, self._plugin, time_s)
             for part in ("driver", "controller"):
                 self._new_block(part, scenario)
             self._adopt(scenario)

@@ -35,7 +35,7 @@ from activesteer.core.files import read_bytes
 from activesteer.core.version import __version__
 from activesteer.errors import ActiveSteerError, ManeuverError, ModelError, ParameterError
 from activesteer.maneuver.base import Search
-from activesteer.maneuver.steering_tests import RampAngle, SteadyTurn, StepSteer
+from activesteer.maneuver.steering_tests import StepSteer
 from activesteer.native.compilation import content_key, processor
 from activesteer.plugins import Plugin
 from activesteer.recording import Recording
@@ -135,11 +135,11 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
     key = _key(probed, search, timestep_s)
     angle = recall(key)
     if angle is None:
-        if isinstance(search, RampAngle):
-            angle = _ramp_angle(probed, search, timestep_s)
+        wanted = search.lateral_acceleration_mps2
+        if isinstance(search.probe, StepSteer):
+            angle = _steady_turn(probed, search.probe, wanted, timestep_s)
         else:
-            assert isinstance(search, SteadyTurn)
-            angle = _steady_turn(probed, search, timestep_s)
+            angle = _ramp_angle(probed, wanted, timestep_s)
         keep(key, angle)
     return angle
 
@@ -157,18 +157,16 @@ def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
         "model": hashlib.sha256(compiled_model.tobytes()).hexdigest(),
         "car": to_table(scenario.car.config) | {"controllers": None},
         "driver": to_table(scenario.driver.parameters) | {"name": "", "title": ""},
-        "search": [type(search).__name__, to_table(search.probe), search.lateral_acceleration_mps2, timestep_s],
+        "search": [to_table(search.probe), search.lateral_acceleration_mps2, timestep_s],
         "code": [__version__, content_key(Path(__file__)), platform.platform(), processor()],
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def _steady_turn(scenario: Scenario, search: SteadyTurn, timestep_s: float) -> float:
+def _steady_turn(scenario: Scenario, probe: StepSteer, wanted: float, timestep_s: float) -> float:
     """Secant search over whole step steers."""
-    wanted = search.lateral_acceleration_mps2
     if wanted == 0.0:
         return 0.0
-    probe = search.probe
     car, speed = scenario.car.config.single_track, max(probe.speed_mps, 1.0)
     # First guess: Ackermann angle with the understeer of a typical car, about 2.5 deg/g.
     angle = scenario.car.config.steering.ratio * wanted * (car.wheelbase_m / speed**2 + 0.0044)
@@ -208,13 +206,12 @@ def _steady_acceleration(simulation: ClosedLoop, maneuver: StepSteer, start: Any
     return float(_rows(recorder, "ay_mps2").mean())
 
 
-def _ramp_angle(scenario: Scenario, search: RampAngle, timestep_s: float) -> float:
+def _ramp_angle(scenario: Scenario, wanted: float, timestep_s: float) -> float:
     """Evaluate the regression line of the lateral acceleration over the angle at the required acceleration.
 
     The model is symmetric, so one side represents both.
     """
-    wanted, probe = search.lateral_acceleration_mps2, search.probe
-    high = FIT[1] * wanted
+    probe, high = scenario.maneuver, FIT[1] * wanted
     simulation = ClosedLoop(scenario, "none", timestep_s)
     recorder = Recorder(simulation.vehicle, simulation.steps)
     chunk, left = round(_CHUNK_S / timestep_s), simulation.steps

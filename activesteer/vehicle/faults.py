@@ -24,14 +24,6 @@ from activesteer.vehicle.force_block import find
 
 _NEVER: Final = 2**62
 _SAVE: Final = -1
-_ACTUATOR_KINDS: Final = {
-    "stuck": native.STICKS, "runaway": native.RUNS_LEFT, "float": native.FLOATS, "offset": native.WORKS,
-    "reversed": native.REVERSES, "dropout": native.DROPS_OUT, "delayed": native.DROPS_OUT,
-}  # fmt: skip
-_SENSOR_KINDS: Final = {
-    "stuck": native.STUCK, "delayed": native.DELAYED, "offset": native.OFFSET, "runaway": native.RUNAWAY,
-    "reversed": native.REVERSED, "dropout": native.DROPOUT,
-}  # fmt: skip
 
 
 class Faults:
@@ -191,7 +183,7 @@ class _ActuatorFault(_DemandFault):
         self._record = vehicle.actuators.of(index)
         self._demand = vehicle.data.ctrl[index : index + 1]
         self._healthy = np.zeros(native.N_HEALTH)
-        self._kind = native.RUNS_RIGHT if fault.side == "right" else _ACTUATOR_KINDS[fault.kind]
+        self._kind = native.RUNAWAY_RIGHT if fault.side == "right" else native.KINDS[fault.kind]
         self._set(_SAVE)
 
     def _set(self, kind: int, offset: float = 0.0, held: float = 0.0) -> None:
@@ -204,7 +196,7 @@ class _ActuatorFault(_DemandFault):
     def engage(self) -> None:
         """Activate the fault."""
         held = 0.0
-        if self._kind == native.STICKS:
+        if self._kind == native.STUCK:
             if not self.memory[0]:
                 native.keep(self.memory, self._capacity, float(self._demand[0]))
             held = native.oldest(self.memory, self._capacity)
@@ -216,7 +208,7 @@ class _ActuatorFault(_DemandFault):
 
     def recover(self) -> None:
         """Start a servo that was free at its present angle (see `resume_part`)."""
-        if self._kind == native.FLOATS:
+        if self._kind == native.FLOAT:
             native.resume_of(self._part.ctypes.data, self._data.act.ctypes.data, self._data.qpos.ctypes.data)
 
 
@@ -264,5 +256,5 @@ class _SensorFault(_Acting):
     def bind(self, record: Any) -> None:
         """Describe the fault in its record for compiled code."""
         super().bind(record)
-        record["kind"], record["place"] = _SENSOR_KINDS[self.fault.kind], list(SENSORS).index(self.fault.part)
+        record["kind"], record["place"] = native.KINDS[self.fault.kind], list(SENSORS).index(self.fault.part)
         record["amount"] = self.fault.size

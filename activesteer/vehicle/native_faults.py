@@ -16,8 +16,14 @@ from activesteer.vehicle import force_block as fb
 
 IDLE, LISTENS, ACTS = range(3)
 """States of a fault: nothing to do. It keeps what it will need. It acts."""
-DEMAND, STUCK, DELAYED, OFFSET, RUNAWAY, REVERSED, DROPOUT = range(7)
-"""Kinds: a demand that comes late, and the faults of a sensor."""
+WORKS, STUCK, RUNAWAY, RUNAWAY_RIGHT, FLOAT, REVERSED, DROPOUT, OFFSET, DELAYED, DEMAND = range(10)
+"""Kinds of a fault. An exported car takes those up to `DROPOUT`. `RUNAWAY` is to the left, or to the strength of a
+brake; `DEMAND` is the part of an actuator's fault that acts in every step."""
+KINDS: Final = {
+    "stuck": STUCK, "runaway": RUNAWAY, "float": FLOAT, "offset": OFFSET, "reversed": REVERSED, "delayed": DELAYED,
+    "dropout": DROPOUT,
+}  # fmt: skip
+"""Kind of a fault in files -> its number."""
 FAULT: Final = numbers_type("amount", words=("state", "kind", "place", "offset", "memory", "capacity"))
 """A fault. `place` is the address of the demand, or the place of the reading among the outputs of the sensors. `offset`
 the address that a late demand is written to. `memory` the address of the count of kept numbers, the place of the next
@@ -88,8 +94,6 @@ def misread(address, count, outputs):
             outputs[fault.place] = reading
 
 
-WORKS, STICKS, RUNS_LEFT, RUNS_RIGHT, FLOATS, REVERSES, DROPS_OUT = range(7)
-"""Kinds of an actuator's fault, as an exported car takes them. One that works can have an offset."""
 PART: Final = numbers_type(
     "ratio", "free_m", words=("variable", "actuator", "record", "has_torque", "act", "qpos", "seized", "backlash")
 )
@@ -131,10 +135,10 @@ def fail_part(part, block, gain, bias, healthy, kind, offset, held):
     """Write a fault of an actuator into the model, in place of what was there."""
     exchange_health(part, block, gain, bias, healthy, False)
     record = part.record
-    if kind == WORKS:
+    if kind in (WORKS, OFFSET):  # an exported car that works can have an offset
         if offset != 0.0:
             block[record + _OFFSET] = offset * part.ratio
-    elif kind == STICKS:
+    elif kind == STUCK:
         if part.seized != 0:
             block[part.seized] = 1.0
         elif part.has_torque != 0:
@@ -142,19 +146,20 @@ def fail_part(part, block, gain, bias, healthy, kind, offset, held):
         else:
             # Without a rate the servo holds its present angle, with its stiffness and its strength.
             block[record + _RATE] = 0.0
-    elif kind == FLOATS and part.backlash != 0:
+    elif kind == FLOAT and part.backlash != 0:
         # The nut is off its thread and moves freely between the end stops.
         block[part.backlash] = part.free_m
-    elif kind == FLOATS:
+    elif kind == FLOAT:
         for number in range(_N_GAIN):
             gain[part.actuator * _N_GAIN + number] = 0.0
         for number in range(_N_BIAS):
             bias[part.actuator * _N_BIAS + number] = 0.0
-    elif kind == REVERSES:
+    elif kind == REVERSED:
         block[record + _SCALE] = -1.0
     else:
-        stop = block[record + (_HIGH if kind == RUNS_LEFT else _LOW)]
-        block[record + _SCALE], block[record + _OFFSET] = 0.0, 0.0 if kind == DROPS_OUT else stop
+        # A demand that is delayed is written in every step.
+        stop = block[record + (_HIGH if kind == RUNAWAY else _LOW)]
+        block[record + _SCALE], block[record + _OFFSET] = 0.0, stop if kind in (RUNAWAY, RUNAWAY_RIGHT) else 0.0
 
 
 @inlined
@@ -179,9 +184,9 @@ def resume_part(part, act, qpos):
 def change_fault(part, block, gain, bias, healthy, acting, kind, offset, ctrl, act, qpos):
     """Replace the fault of a part, by addresses. `acting`: kind, offset, and the demand at which a brake sticks."""
     own, before = carray(_part_pointer(part), (1,))[0], f64_pointer(acting)
-    if before[0] == FLOATS and kind != FLOATS:
+    if before[0] == FLOAT and kind != FLOAT:
         resume_part(own, f64_pointer(act), f64_pointer(qpos))
-    if kind == STICKS and before[0] != STICKS:
+    if kind == STUCK and before[0] != STUCK:
         before[2] = f64_pointer(ctrl)[own.actuator]
     before[0], before[1] = kind, offset
     fail_part(

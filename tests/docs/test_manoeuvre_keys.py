@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from activesteer.config import key_paths
-from activesteer.maneuver.kinds import KINDS
+from activesteer.maneuver import KINDS
 from tools.tables import keys_page
 
 ROOT = Path(__file__).resolve().parents[2]

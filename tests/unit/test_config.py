@@ -280,7 +280,7 @@ def test_file_that_cannot_be_read_is_answered(tmp_path, make):
 
 
 def replaced(path: str, value: Any, table: dict[str, Any] | None = None) -> dict[str, Any]:
-    given = {"speed_kmh": 90, "wheels": {"front": {"radius_m": 0.31}}} if table is None else table
+    given = {"speed_kmh": 90, "spare": {"radius_m": 0.31}} if table is None else table
     return merged(Car, given, path.split("."), value, Source(f"override {path}"))
 
 
@@ -292,8 +292,8 @@ def test_override_in_another_unit_replaces_the_value_of_the_file():
 
 def test_override_reaches_nested_keys_and_leaves_the_rest():
     assert replaced("spare.radius_m", 0.4)["spare"] == {"radius_m": 0.4}
-    assert replaced("wheels.front.radius_m", 0.4)["wheels"] == {"front": {"radius_m": 0.4}}
-    assert replaced("wheels.front.name", "x")["wheels"] == {"front": {"radius_m": 0.31, "name": "x"}}
+    assert replaced("spare.radius_m", 0.4, {"speed_kmh": 90})["spare"] == {"radius_m": 0.4}
+    assert replaced("spare.name", "x")["spare"] == {"radius_m": 0.31, "name": "x"}
 
 
 def test_override_reaches_one_element_of_a_list():
@@ -304,9 +304,9 @@ def test_override_reaches_one_element_of_a_list():
 
 
 def test_override_does_not_change_the_table_it_is_given():
-    table = {"speed_kmh": 90, "wheels": {"front": {"radius_m": 0.31}}, "axles": [{"track_m": 1.5}]}
+    table = {"speed_kmh": 90, "spare": {"radius_m": 0.31}, "axles": [{"track_m": 1.5}]}
     before = json.dumps(table)
-    replaced("wheels.front.radius_m", 0.4, table)
+    replaced("spare.radius_m", 0.4, table)
     replaced("axles.0.track_m", 1.4, table)
     replaced("speed_mps", 1.0, table)
     assert json.dumps(table) == before
@@ -321,7 +321,7 @@ def test_override_does_not_change_the_table_it_is_given():
         ("axles.2.track_m", "axles.2.track_m"),
         ("axles.x.track_m", "axles.x.track_m"),
         ("axles.0.trak_m", "axles.0.trak_m"),
-        ("wheels.frnt.radius_m", "wheels.frnt.radius_m"),
+        ("wheels.front.radius_m", "wheels.front.radius_m"),
     ],
 )
 def test_override_of_a_key_that_does_not_exist_is_answered(path, key):

@@ -11,7 +11,7 @@ from activesteer.analysis import step_response
 from activesteer.analysis.metrics import EVALUATIONS, KEY_METRICS, general_metrics, metrics, weighted, weighting
 from activesteer.core.conventions import CORNERS
 from activesteer.errors import ParameterError, RecordingError
-from activesteer.maneuver.kinds import KINDS
+from activesteer.maneuver import KINDS
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun, step_steer
 

@@ -55,7 +55,7 @@ def test_a_unit_of_the_edge_fills_the_si_field() -> None:
 
 @pytest.mark.parametrize("part", SENSORS)
 def test_every_sensor_can_be_off(part: str) -> None:
-    (fault,) = faults_of({"part": part, "kind": "offset", "start_s": 1.0, f"size_{SENSORS[part].unit}": 0.5})
+    (fault,) = faults_of({"part": part, "kind": "offset", "start_s": 1.0, f"size_{SENSORS[part]}": 0.5})
     assert fault.size == 0.5
 
 

@@ -11,7 +11,7 @@ from activesteer.config import Source
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.braking import BrakeInTurn
-from activesteer.maneuver.steering_tests import SteadyTurn
+from activesteer.maneuver.steering_tests import StepSteer
 from tests.raising import raises
 
 SOURCE = Source("my_turn.toml", error=ManeuverError)
@@ -49,7 +49,8 @@ def test_aim_asks_for_the_search_of_the_step_steer():
     assert maneuver().search is None
     asked = maneuver(turn={"lateral_acceleration_mps2": 5.0}, road={"mu": 0.8})
     search = asked.search
-    assert isinstance(search, SteadyTurn)
+    assert search is not None
+    assert isinstance(search.probe, StepSteer)
     assert search.lateral_acceleration_mps2 == 5.0
     assert search.probe.road == asked.road
     assert search.probe.speed_mps == asked.speed_mps

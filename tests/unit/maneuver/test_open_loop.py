@@ -75,8 +75,8 @@ def test_speed_follows_its_table():
     ("keys", "key"),
     [
         ({"drive": "cruise"}, "drive"),
-        ({"steering": {"time_s": [0, 1], "steering_wheel_deg": [0]}}, "steering"),
-        ({"brake": {"time_s": [], "pedal": []}}, "brake"),
+        ({"steering": {"time_s": [0, 1], "steering_wheel_deg": [0]}}, "steering.steering_wheel_rad"),
+        ({"brake": {"time_s": [], "pedal": []}}, "brake.time_s"),
         ({"speed": {"time_s": [0, 2, 2], "speed_kmh": [0, 1, 2]}}, "speed.time_s"),
         ({"brake": {"time_s": [0], "pedal": [1.5]}}, "brake.pedal"),
         ({"speed": {"time_s": [0]}}, "speed.speed_mps"),

@@ -95,7 +95,7 @@ def test_lap_time_and_overstep_of_a_car_beside_the_path(tmp_path: Path) -> None:
 
 
 def test_columns_that_do_not_fit_are_refused(tmp_path: Path) -> None:
-    with raises(ManeuverError, key="path.speed_mps"):
+    with raises(ManeuverError, key="path.csv"):
         manoeuvre(tmp_path, extra="speed_mps = [10.0, 11.0]\n")
     points = {"x_m": [0.0, 10.0, 20.0, 30.0], "y_m": [0.0] * 4, "width_m": [3.0]}
     with raises(ManeuverError, key="path.width_m"):

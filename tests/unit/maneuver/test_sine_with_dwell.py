@@ -12,7 +12,7 @@ from activesteer.config import Source
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
 from activesteer.maneuver import build_maneuver
-from activesteer.maneuver.steering_tests import RampAngle, SineWithDwell
+from activesteer.maneuver.steering_tests import SineWithDwell, SlowlyIncreasingSteer
 from tests.raising import raises
 
 SOURCE = Source("my_dwell.toml", error=ManeuverError)
@@ -64,7 +64,8 @@ def test_amplitude_by_factor_asks_for_the_ramp_of_fmvss_126():
     assert dwell().search is None
     maneuver = dwell(steer={"steering_wheel_deg": None, "amplitude_factor": 5.0}, road={"mu": 0.8})
     search = maneuver.search
-    assert isinstance(search, RampAngle)
+    assert search is not None
+    assert isinstance(search.probe, SlowlyIncreasingSteer)
     assert search.lateral_acceleration_mps2 == pytest.approx(0.3 * 9.81)
     assert search.probe.steer.rate_radps == pytest.approx(math.radians(13.5))
     assert search.probe.speed_mps == maneuver.speed_mps

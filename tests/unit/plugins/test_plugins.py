@@ -143,6 +143,18 @@ def test_parameters_of_two_runs_tell_their_labels_apart(gains):
     assert labels == ["Mine", "Mine-gain=1", "Mine-gain=2", "Mine-side=a_b"]
 
 
+def test_label_says_once_that_a_controller_of_a_file_uses_the_truth(write):
+    file = write("""
+        class Mine:
+            uses_truth = True
+
+            def __init__(self, gain: float = 1.0) -> None: ...
+
+            def step(self, command, measurement, motion): ...
+        """)
+    assert controller_spec(f"{file}:Mine?gain=2").label == "Mine-gain=2+truth"
+
+
 @pytest.mark.parametrize("given", [5, None, ["ars"], np.zeros(3), object()])
 def test_wrong_object_is_answered(given):
     with raises(ControllerError, key="controller"):

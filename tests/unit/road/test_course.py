@@ -12,7 +12,7 @@ import pytest
 
 from activesteer.config import read_toml
 from activesteer.errors import RecordingError
-from activesteer.maneuver.kinds import build_maneuver
+from activesteer.maneuver import build_maneuver
 from activesteer.resources import find_maneuver
 from activesteer.road.course import Course, Footprint, course_of, footprint_of
 from activesteer.road.road import Road, road_of
