@@ -264,6 +264,7 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
 
 def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
     """Refuse to replace a recording of other settings."""
+    from activesteer.config import leaves
     from activesteer.errors import RecordingError
     from activesteer.recording import Recording
     from activesteer.scenario import describe
@@ -271,28 +272,19 @@ def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
     if not path.is_file():
         return
     try:
-        before = _flat(Recording.open(path, recover=True).metadata)
+        before = leaves(Recording.open(path, recover=True).metadata)
     except RecordingError:  # there is no recording
         return
     own = {"controller": controller.name, "controller_parameters": controller.parameters_with(scenario.user_parameters)}
-    now = _flat({key: value for key, value in (describe(scenario) | own).items() if key != "overrides"})
-    other = sorted(key for key, value in now.items() if before.get(key, value) != value)
+    now = leaves({key: value for key, value in (describe(scenario) | own).items() if key != "overrides"})
+    as_stored = {key: list(value) if isinstance(value, tuple) else value for key, value in now.items()}
+    other = sorted(key for key, value in as_stored.items() if before.get(key, value) != value)
     if other:
-        some = ", ".join(f"{key} {shown(before[key])}" for key in other[:3]) + (" ..." if len(other) > 3 else "")
+        some = ", ".join(f"{'.'.join(key)} {shown(before[key])}" for key in other[:3])
+        some += " ..." if len(other) > 3 else ""
         raise ParameterError(
             f"{path} was made with other settings ({some}); --replace replaces it, or choose another -o"
         )
-
-
-def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, Any]:
-    """Return nested tables as dotted keys, with values as JSON has them."""
-    flat: dict[str, Any] = {}
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            flat |= _flat(value, f"{start}{key}.")
-        else:
-            flat[f"{start}{key}"] = list(value) if isinstance(value, tuple) else value
-    return flat
 
 
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:

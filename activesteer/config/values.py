@@ -249,13 +249,13 @@ def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
     return (name, *rest)
 
 
-def leaf_keys(table: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
-    """Yield the keys of all values of a table, each as the path of names to it."""
+def leaves(table: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+    """Return all values of a table and of the tables in it, by the path of names to each."""
+    found: dict[tuple[str, ...], Any] = {}
     for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from ((str(key), *below) for below in leaf_keys(value))
-        else:
-            yield (str(key),)
+        below = leaves(value) if isinstance(value, Mapping) else {(): value}
+        found |= {(str(key), *path): leaf for path, leaf in below.items()}
+    return found
 
 
 def key_hint(cls: type, key: str) -> str | None:

@@ -7,7 +7,7 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from activesteer.config import Range, field_path, leaf_keys
+from activesteer.config import Range, field_path, leaves
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.registry import IN_EXAMPLES, WITHOUT_FILE
@@ -168,7 +168,7 @@ def declared_parameters(given: Any, gains: ControllerParameters | None = None) -
     if not plugin.is_builtin:
         own = plugin.declared.items()
         return {f"{table}{plugin.key}.{name}": each for name, each in own if name not in plugin.parameters}
-    fixed = {table + ".".join(field_path(ControllerParameters, path)) for path in leaf_keys(plugin.parameters)}
+    fixed = {table + ".".join(field_path(ControllerParameters, path)) for path in leaves(plugin.parameters)}
     found = declared_in(gains or ControllerParameters(), keys_read(plugin), table)
     return {key: each for key, each in found.items() if key not in fixed}
 

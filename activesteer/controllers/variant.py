@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from activesteer.config import Source, build, field_path, leaf_keys, merged, read_toml, to_table
+from activesteer.config import Source, build, field_path, leaves, merged, read_toml, to_table
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.registry import CONTROLLERS
 from activesteer.errors import ControllerError, nearest_names, shown
@@ -82,13 +82,10 @@ class Variant:
             ControllerError: an override names a gain of the variant and would have no effect.
         """
         table = to_table(setup.gains)
-        for path in leaf_keys(self.gains):
+        for path, value in leaves(self.gains).items():
             if (key := ".".join(field_path(ControllerParameters, path))) in setup.overridden:
                 problem = f"{self.name} has its own controllers.{key}, and the override would have no effect"
                 raise self.source.fail(path, f"{problem}; leave it out, or change a copy of this file")
-            value: Any = self.gains
-            for part in path:
-                value = value[part]
             table = merged(ControllerParameters, table, path, value, self.source)
         return build(ControllerParameters, table, self.source)
 

@@ -9,8 +9,6 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import reduce
-from operator import getitem
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -21,7 +19,7 @@ from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.run_page import write_report
-from activesteer.config import field_in_unit, leaf_keys, spellings
+from activesteer.config import field_in_unit, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
 from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.core.metric_table import Better, recorded_metric
@@ -109,9 +107,9 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
 def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
     """Yield sliders of the positive numbers in a file, from half of each to its double."""
     table = tomllib.loads(file.read_text("utf-8"))
-    for path in leaf_keys(table):
+    for path, given in leaves(table).items():
         key = ".".join(path)
-        if path[0] in _COVERED or not _is_number(reduce(getitem, path, table)):
+        if path[0] in _COVERED or not _is_number(given):
             continue
         with suppress(ParameterError):  # such as the keys of a table that is read from another file
             value = value_of(scenario, key)

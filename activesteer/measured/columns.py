@@ -19,6 +19,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from activesteer.config import leaves
 from activesteer.core import limits
 from activesteer.core.child_process import Child, ChildFault
 from activesteer.core.conventions import Array
@@ -313,22 +314,19 @@ def _mat(path: Path) -> list[Column]:
     def read(name: str, values: Any) -> tuple[Array, None]:
         return numbers(values, name, path), None
 
+    # Nested structs give dotted names.
+    vectors = {
+        ".".join(place): value.squeeze()
+        for place, value in leaves(variables).items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.squeeze().ndim == 1
+    }
     units = variables.get("units")
     given = units if isinstance(units, Mapping) else {}
     return [
         Column(name, str(given.get(name, "")), partial(read, name, values))
-        for name, values in _flat(variables)
+        for name, values in vectors.items()
         if not name.startswith(("__", "units.", "metrics.", "meanings."))
     ]
-
-
-def _flat(table: Mapping[str, Any], start: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield vectors of numbers in nested structs by dotted names."""
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{start}{name}.")
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.squeeze().ndim == 1:
-            yield f"{start}{name}", value.squeeze()
 
 
 def _mdf(path: Path) -> list[Column]:

@@ -22,7 +22,7 @@ from activesteer.config import (
     field_path,
     key_hint,
     key_paths,
-    leaf_keys,
+    leaves,
     merged,
     to_table,
 )
@@ -151,7 +151,7 @@ def resolve(
     kind = maneuver_class(table, source)
     if folder is not None:
         # A given table may come from a recording, which holds both an input and the value derived from it.
-        check_overruled(kind, table, source, leaf_keys(table))
+        check_overruled(kind, table, source, leaves(table))
     changes = plain(overrides)
     if isinstance(faults := changes.get("fault"), str):
         changes["fault"] = [fault_table(text) for text in faults.split()]

@@ -7,8 +7,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from datetime import date
-from functools import reduce
-from operator import getitem
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -19,7 +17,7 @@ from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import Group, ReportedRun, groups_of, judge
 from activesteer.analysis.source import entry
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
-from activesteer.config import leaf_keys
+from activesteer.config import leaves
 from activesteer.core.files import write_text
 from activesteer.core.metric_table import Better, recorded_metric
 from activesteer.core.units import display_unit, parameter_label, typeset
@@ -155,7 +153,7 @@ def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
         chosen = {key: run.metadata[key] for key in tables if key in run.metadata}
         one = chosen.get(tables[0])
         table = one if len(tables) == 1 and isinstance(one, Mapping) else chosen
-        flat.append({".".join(path): _text(path[-1], reduce(getitem, path, table)) for path in leaf_keys(table)})
+        flat.append({".".join(path): _text(path[-1], value) for path, value in leaves(table).items()})
     found = []
     for key in dict.fromkeys(key for entries in flat for key in entries):
         values = tuple(entries.get(key, "") for entries in flat)
