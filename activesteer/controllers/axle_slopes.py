@@ -35,9 +35,6 @@ class AxleSlopes(NativeBlock):
 
     F is the curve of a tyre under its static load. On a road of friction mu the curve is mu F(alpha / mu), with the
     same slope at zero slip angle.
-
-    Attributes:
-        loads_N: Static load of one wheel of each axle [N].
     """
 
     _front_excess_rad: Table
@@ -54,31 +51,24 @@ class AxleSlopes(NativeBlock):
         """Read the curves."""
         self._car, known = setup.single_track, setup.estimation
         assert known is not None  # an estimator exists
-        half = 0.5 * self._car.mass_kg * GRAVITY_MPS2 / self._car.wheelbase_m
-        self.loads_N = half * self._car.cg_to_rear_m, half * self._car.cg_to_front_m
+        loads_N = self._car.wheel_loads_N
         self._step_rad = known.tyres[0].slip_angle_step_rad
         self._cg_to_front_m, self._cg_to_rear_m = self._car.cg_to_front_m, self._car.cg_to_rear_m
         curves = []
-        for tyre, load_N in zip(known.tyres, self.loads_N, strict=True):
+        for tyre, load_N in zip(known.tyres, loads_N, strict=True):
             loads = tyre.load_step_N * np.arange(len(tyre.force_N))
             curve = np.array([np.interp(load_N, loads, column) for column in np.array(tyre.force_N).T])
             curves.append(array("d", (curve / (curve[1] / self._step_rad)).tolist()))
         self._front_curve, self._rear_curve = curves
-        car = known.two_track
-        fractions = car.front_load_transfer_fraction, 1.0 - car.front_load_transfer_fraction
-        shifts_kg = (
-            self._car.mass_kg * car.load_height_m * fraction / track_m
-            for fraction, track_m in zip(fractions, (car.front_track_m, car.rear_track_m), strict=True)
-        )
         self._front_excess_rad, self._rear_excess_rad = (
             array("d", _excesses(tyre, load_N, shift_kg))
-            for tyre, load_N, shift_kg in zip(known.tyres, self.loads_N, shifts_kg, strict=True)
+            for tyre, load_N, shift_kg in zip(known.tyres, loads_N, known.load_shifts_kg, strict=True)
         )
         stiffness_Nprad = self._car.front_stiffness_Nprad, self._car.rear_stiffness_Nprad
         self._front_slip_rad, self._rear_slip_rad = (
             array("d", (2.0 * load_N / GRAVITY_MPS2 * _AY_STEP_MPS2 / each * np.arange(len(more)) + more).tolist())
             for load_N, each, more in zip(
-                self.loads_N, stiffness_Nprad, (self._front_excess_rad, self._rear_excess_rad), strict=True
+                loads_N, stiffness_Nprad, (self._front_excess_rad, self._rear_excess_rad), strict=True
             )
         )
 

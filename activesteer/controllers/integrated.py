@@ -152,7 +152,7 @@ class Integrated:
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Make the controller of one run."""
-        self._lqr = Lqr.from_vehicle(setup)
+        self._lqr = Lqr(setup)
         self._parameters, self._stability, servos = (p := setup.gains.integrated), setup.gains.esc, setup.gains.servos
         self._limits_rad = servos.superposition_limit_rad, servos.rear_limit_rad
         self._car, self._slopes = setup.single_track, self._lqr.slopes
@@ -162,8 +162,7 @@ class Integrated:
         self._solve = solver()
         known = setup.estimation
         assert known is not None  # an estimator exists
-        body = known.two_track
-        half_m = 0.5 * np.array([body.front_track_m, body.rear_track_m])
+        half_m = 0.5 * np.array(known.two_track.tracks_m)
         # A brake on the left turns the car to the left.
         self._arms_m = np.repeat(half_m, 2) * (1.0, -1.0, 1.0, -1.0)
         self._radii_m = known.rolling_radius_m
@@ -171,7 +170,7 @@ class Integrated:
         self._most_kN = [self._stability.torque_limit_Nm / (_KILO * radius_m) for radius_m in self._radii_m]
         self._per_moment = 1.0 / setup.gains.lqr.moment_scale_Nm
         self._brake_cost = _KILO * 2.0 * p.brake_threshold_Nm * float(half_m[0]) * self._per_moment**2
-        self._torques = SplitTorques(setup, setup.gains.tv.friction_fraction, setup.gains.tv.least_fraction)
+        self._torques = SplitTorques(setup)
         tracks_m = 2.0 * half_m[[axle.place // 2 for axle in setup.split_axles]]
         forces = _BRAKES + len(setup.split_axles)
         self._stay = np.diag([p.brake_scale_N**-2 * _KILO**2] * forces)
@@ -181,11 +180,6 @@ class Integrated:
         self._demand_rad, self._brakes_Nm = (0.0, 0.0), NO_BRAKES
         per_pressure_Nm = np.array(known.brake_torque_per_pressure_NmpPa) / known.rolling_radius_m
         self._side_moment_m3 = float(per_pressure_Nm @ np.abs(self._arms_m)) / 2.0
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> Integrated:
-        """Make the controller for a car."""
-        return cls(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return angles and brake torques."""

@@ -178,11 +178,6 @@ class Lqr(NativeBlock):
         self._front_compensation_radpNm = -1.0 / (wheelbase_m * self._car.front_stiffness_Nprad)
         self._rear_compensation_radpNm = 1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad)
 
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> Lqr:
-        """Make the controller for a car."""
-        return cls(setup)
-
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return both angles."""
         now = self._estimator.step(measurement)
