@@ -72,37 +72,6 @@ class AxleSlopes(NativeBlock):
             )
         )
 
-    def at(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-        """Return the slopes of front and rear axle, as fractions of the slopes at zero slip angle [-].
-
-        Args:
-            now: The motion, faster than walking speed.
-            front_rad: Angle of the front wheels [rad].
-            rear_rad: Angle of the rear wheels [rad].
-        """
-        front, rear = slopes(self, now, front_rad, rear_rad)
-        return abs(front), abs(rear)
-
-    def used(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-        """Return how far front and rear axle are used: 0 straight ahead to 1 sliding; negative in turns to the right.
-
-        Arguments as in `at`.
-        """
-        front, rear = slopes(self, now, front_rad, rear_rad)
-        return math.copysign(1.0 - abs(front), front), math.copysign(1.0 - abs(rear), rear)
-
-    def excess_rad(self, ay_mps2: float, friction: float) -> tuple[float, float]:
-        """Return the additional slip angles of a steady turn that the curvature of the axle curves requires.
-
-        Args:
-            ay_mps2: Lateral acceleration, limited by the friction [m/s2].
-            friction: Friction of the road [-].
-
-        Returns:
-            Slip angles of front and rear axle, positive to the side of the turn [rad].
-        """
-        return excess(self, ay_mps2, friction)
-
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
     """Return the additional slip angles of an axle against a straight curve, at lateral accelerations from 0 on [rad].
@@ -132,7 +101,16 @@ def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
 
 @shared
 def slopes(block: AxleSlopes, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-    """Law of `AxleSlopes.at`; a slope is negative if the side force of its axle points to the right."""
+    """Return the slopes of front and rear axle, as fractions of the slopes at zero slip angle [-].
+
+    A slope is negative if the side force of its axle points to the right.
+
+    Args:
+        block: The curves.
+        now: The motion, faster than walking speed.
+        front_rad: Angle of the front wheels [rad].
+        rear_rad: Angle of the rear wheels [rad].
+    """
     speed, sideslip, turning, friction = now[_SPEED], now[_SIDESLIP], now[_YAW_RATE], now[_FRICTION]
     turning /= speed
     front = front_rad - sideslip - block._cg_to_front_m * turning
@@ -155,7 +133,16 @@ def _slope(curve: Table, step_rad: float, slip_angle_rad: float, friction: float
 
 @shared
 def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, float]:
-    """Law of `AxleSlopes.excess_rad`."""
+    """Return the additional slip angles of a steady turn that the curvature of the axle curves requires.
+
+    Args:
+        block: The curves.
+        ay_mps2: Lateral acceleration, limited by the friction [m/s2].
+        friction: Friction of the road [-].
+
+    Returns:
+        Slip angles of front and rear axle, positive to the side of the turn [rad].
+    """
     place = abs(ay_mps2) / friction / _AY_STEP_MPS2
     size = math.copysign(friction, ay_mps2)
     return size * _between(table(block._front_excess_rad), place), size * _between(table(block._rear_excess_rad), place)

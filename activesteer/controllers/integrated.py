@@ -52,6 +52,7 @@ from typing import Any
 
 import numpy as np
 
+from activesteer.controllers.axle_slopes import slopes
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.esc import stabilising
 from activesteer.controllers.lqr import Lqr, Turn
@@ -156,7 +157,7 @@ class Integrated:
         self._parameters, self._stability, servos = (p := setup.gains.integrated), setup.gains.esc, setup.gains.servos
         self._limits_rad = servos.superposition_limit_rad, servos.rear_limit_rad
         self._car, self._slopes = setup.single_track, self._lqr.slopes
-        self._confidence = ConfidenceMonitor(setup, self._lqr.estimator)
+        self._confidence = ConfidenceMonitor(setup)
         self._borne = BorneTurnReference(self._car, self._stability, setup.timestep_s)
         self._supervised = [SupervisedActuator(p.tolerance_rad, p.window_s, setup.timestep_s) for _ in range(2)]
         self._solve = solver()
@@ -198,7 +199,9 @@ class Integrated:
         rear = rear if works[1] else self._supervised[1].held_rad
         missing_Nm = self._missing_moment(now, driver, measurement.ay_mps2, steered_Nm)
         front_angle_rad = driver + measurement.superposition_rad
-        used = self._slopes.used(now, front_angle_rad, measurement.rear_steer_rad)
+        front, behind = slopes(self._slopes, now, front_angle_rad, at[1])
+        # How far the axles are used: 0 straight ahead to 1 sliding, negative in turns to the right.
+        used = math.copysign(1.0 - abs(front), front), math.copysign(1.0 - abs(behind), behind)
         losses_m = -used[0] * self._car.cg_to_front_m, used[1] * self._car.cg_to_rear_m
         effects = self._effects
         effects[:_BRAKES] = self._arms_m + p.brake_side_loss * np.repeat(losses_m, 2)
@@ -236,7 +239,7 @@ class Integrated:
             brake_torque_demand_Nm=(fl, fr, rl, rr),
             drive_torque_change_Nm=-min(max(command.drive_torque_demand_Nm, 0.0), fl + fr + rl + rr),
             estimate=now,
-            side_difference_Pa=self._side_difference(turn, at, works, self._slopes.at(now, front_angle_rad, at[1])),
+            side_difference_Pa=self._side_difference(turn, at, works, (abs(front), abs(behind))),
             wheel_torque_demand_Nm=self._torques.of_differences(differences_Nm, ranges, command, measurement),
         )
 
@@ -254,12 +257,12 @@ class Integrated:
         return part * side * max(side * (demand - steered_Nm), 0.0)
 
     def _side_difference(
-        self, turn: Turn, at_rad: tuple[float, float], works: tuple[bool, bool], slopes: tuple[float, float]
+        self, turn: Turn, at_rad: tuple[float, float], works: tuple[bool, bool], shares: tuple[float, float]
     ) -> float:
-        """Return the allowed pressure difference between the sides for the remaining angles [Pa]."""
+        """Return the allowed pressure difference between the sides for the remaining angles and slopes [Pa]."""
         p, car, now = self._parameters, self._car, turn.estimate
         front, rear = (self._limits_rad[axle] - abs(at_rad[axle]) if works[axle] else 0.0 for axle in (0, 1))
-        force_N = min(slopes[0] * car.front_stiffness_Nprad * front, slopes[1] * car.rear_stiffness_Nprad * rear)
+        force_N = min(shares[0] * car.front_stiffness_Nprad * front, shares[1] * car.rear_stiffness_Nprad * rear)
         moment_Nm = car.wheelbase_m * max(force_N, 0.0)
         off = abs(turn.desired_radps - now.yaw_rate_radps) / p.side_yaw_rate_radps
         off += abs(now.sideslip_rad - turn.sideslip_rad) / p.side_sideslip_rad

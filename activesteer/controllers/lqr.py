@@ -9,7 +9,7 @@ lag by T_a, whose commands take effect one call later:
     T_a da/dt = u_a - a,  T_a ddelta_H/dt = u_H - delta_H
 
 The desired turn has the car's own steady-state yaw rate for the driver's angle (eq. 3), limited by the friction (eq.
-6), and no sideslip. Its angles f*, g* solve 0 = A [r*, 0] + B [f*, g*]. `AxleSlopes.excess_rad` adds the slip angles
+6), and no sideslip. Its angles f*, g* solve 0 = A [r*, 0] + B [f*, g*]. `axle_slopes.excess` adds the slip angles
 that the axles need because their curves are not straight: without them a car near its limit slides outwards. While the
 driver brakes, both angles also compensate the yaw moment M of the brakes, known from their pressures, without a side
 force:
@@ -157,7 +157,7 @@ class Lqr(NativeBlock):
         p = self._parameters = setup.gains.lqr
         self._servos = setup.gains.servos
         self._estimator = setup.estimator()
-        self._confidence = ConfidenceMonitor(setup, self._estimator)
+        self._confidence = ConfidenceMonitor(setup)
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._allocation = Allocation(setup)
@@ -183,7 +183,7 @@ class Lqr(NativeBlock):
         now = self._estimator.step(measurement)
         return steering(
             regulated(
-                self, now, self._confidence.innovation, command.front_steer_demand_rad, command.brake_pedal,
+                self, now, self._estimator.innovation, command.front_steer_demand_rad, command.brake_pedal,
                 measurement.superposition_rad, measurement.rear_steer_rad, measurement.brake_pressure_Pa,
             ),
             now,
@@ -208,7 +208,7 @@ class Lqr(NativeBlock):
             self._adapt(works)
         now = self._estimator.step(measurement)
         desired, sideslip, *angles, against = fed_back(
-            self, now, self._confidence.innovation, command.front_steer_demand_rad, command.brake_pedal,
+            self, now, self._estimator.innovation, command.front_steer_demand_rad, command.brake_pedal,
             measurement.superposition_rad, measurement.rear_steer_rad, measurement.brake_pressure_Pa, own_brakes_Nm,
         )  # fmt: skip
         return Turn(now, desired, sideslip, (angles[0], angles[1]), (angles[2], angles[3]), against)
@@ -234,14 +234,9 @@ class Lqr(NativeBlock):
         at_rad = measurement.superposition_rad, measurement.rear_steer_rad
         angles_rad = allocated(
             self._allocation, now, driver_rad, at_rad, turn.demand_rad, turn.against_rad, works,
-            turn.desired_radps * now.speed_mps, self.authority,
+            turn.desired_radps * now.speed_mps, self._confidence._authority,
         )  # fmt: skip
         return *angles_rad, moment_change(self._allocation, now, driver_rad, at_rad, angles_rad)
-
-    @property
-    def authority(self) -> float:
-        """Factor on the demands by the confidence in the estimator, 0 to 1."""
-        return self._confidence.authority
 
     @property
     def estimator(self) -> Estimator:
