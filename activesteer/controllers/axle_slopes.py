@@ -76,10 +76,7 @@ class AxleSlopes(NativeBlock):
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
     """Return the additional slip angles of an axle against a straight curve, at lateral accelerations from 0 on [rad].
 
-    Args:
-        tyre: Tyre of both wheels.
-        load_N: Static load of each wheel [N].
-        shift_kg: Load transfer to the outer wheel per lateral acceleration [N/(m/s2)].
+    `load_N` is the static load of a wheel, `shift_kg` the load transfer per lateral acceleration.
     """
     grid, loads_N = np.array(tyre.force_N), tyre.load_step_N * np.arange(len(tyre.force_N))
     mass_kg = 2.0 * load_N / GRAVITY_MPS2  # an axle carries the same fraction of side force and weight

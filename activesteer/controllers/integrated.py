@@ -102,13 +102,7 @@ class SupervisedActuator:
     """
 
     def __init__(self, tolerance_rad: float, window_s: float, interval_s: float) -> None:
-        """Begin with a sound actuator.
-
-        Args:
-            tolerance_rad: Distance from the demand that is tolerated [rad].
-            window_s: Time in which the actuator must approach its demand [s].
-            interval_s: Time between two steps [s].
-        """
+        """Begin with a sound actuator."""
         self._tolerance_rad = tolerance_rad
         self._steps = max(1, round(window_s / interval_s))
         self._seen: deque[tuple[float, float]] = deque(maxlen=self._steps + 1)

@@ -182,15 +182,7 @@ def pulse_responses(
 
 
 def response_of(pulses: Array, interval_s: float) -> Callable[[Array], NDArray[np.complex128]]:
-    """Return the frequency response of impulse responses.
-
-    Args:
-        pulses: Return value of `pulse_responses`, shape (calls, outputs, inputs).
-        interval_s: Time between two calls [s].
-
-    Returns:
-        Function from frequencies [rad/s], shape (m,), to responses, shape (m, outputs, inputs).
-    """
+    """Return the frequency response of `pulse_responses`, from shape (m,) [rad/s] to shape (m, outputs, inputs)."""
     times_s = interval_s * np.arange(len(pulses))
 
     def response(frequencies_radps: Array) -> NDArray[np.complex128]:

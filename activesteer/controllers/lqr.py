@@ -198,11 +198,8 @@ class Lqr(NativeBlock):
     ) -> Turn:
         """Return the desired turn and the demands of the state feedback, all zero below walking speed.
 
-        Args:
-            command: Command of the driver.
-            measurement: Measurement of the car's sensors.
-            works: Whether superposition and rear steering work.
-            own_brakes_Nm: Brake torques demanded by the controller itself, order of `CORNERS` [Nm].
+        `works` says whether superposition and rear steering work, `own_brakes_Nm` the brake torques that the controller
+        itself demands.
         """
         if works != (self._superposition_works, self._rear_works):
             self._adapt(works)
@@ -222,14 +219,7 @@ class Lqr(NativeBlock):
     def allocate(
         self, turn: Turn, command: DriverCommand, measurement: Measurement, works: tuple[bool, bool]
     ) -> tuple[float, float, float]:
-        """Return superposition and rear angle within their limits [rad], and the change of moment by them [Nm].
-
-        Args:
-            turn: Turn of this call, faster than walking speed.
-            command: Command of the driver.
-            measurement: Measurement of the car's sensors.
-            works: Whether superposition and rear steering work.
-        """
+        """Return superposition and rear angle within their limits [rad], and the change of moment by them [Nm]."""
         now, driver_rad = turn.estimate, command.front_steer_demand_rad
         at_rad = measurement.superposition_rad, measurement.rear_steer_rad
         angles_rad = allocated(
@@ -409,16 +399,8 @@ def schedule(
 ) -> tuple[tuple[float, ...], ...]:
     """Return the gains at `SPEEDS_MPS`.
 
-    Args:
-        car: The known car.
-        parameters: Weights and relaxation length.
-        servo_lag_s: Lag of both servos [s].
-        interval_s: Time between two calls [s].
-        works: Whether superposition and rear steering work.
-
-    Returns:
-        For each speed: front angle, rear angle and sideslip, each per desired yaw rate [s] and per given angle [-];
-        then the rows of K for superposition and rear angle, in the order of `STATES`.
+    For each speed: front angle, rear angle and sideslip, each per desired yaw rate [s] and per given angle [-]; then
+    the rows of K for superposition and rear angle, in the order of `STATES`.
     """
     return tuple(
         (

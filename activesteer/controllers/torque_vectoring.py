@@ -106,13 +106,7 @@ class SplitTorques:
         self._levers = [0.5 * track_m / self._radius_m[2 * axle] for axle, track_m in enumerate(tracks_m)]
 
     def ranges(self, command: DriverCommand, measurement: Measurement, now: Estimate) -> list[Range]:
-        """Return the ranges of the electric axles for the present motion.
-
-        Args:
-            command: Command of the driver, whose torque counts first.
-            measurement: Measurement of the car's sensors.
-            now: Estimated motion.
-        """
+        """Return the ranges of the electric axles for the present motion; the driver's torque counts first."""
         if not self._axles:
             return []
         if command.brake_pedal > 0.0:
@@ -147,14 +141,7 @@ class SplitTorques:
     def for_moment(
         self, moment_Nm: float, command: DriverCommand, measurement: Measurement, now: Estimate
     ) -> tuple[PerWheel, float]:
-        """Return the torques to add at the wheels for a yaw moment, and the moment that they make.
-
-        Args:
-            moment_Nm: Yaw moment, left positive [Nm].
-            command: Command of the driver.
-            measurement: Measurement of the car's sensors.
-            now: Estimated motion.
-        """
+        """Return the torques to add at the wheels for a yaw moment, left positive, and the moment that they make."""
         ranges, side = self.ranges(command, measurement, now), math.copysign(1.0, moment_Nm)
         possible = sum(each.lever * each.largest_Nm(side) for each in ranges)
         if possible <= 0.0 or moment_Nm == 0.0:

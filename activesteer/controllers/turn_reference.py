@@ -30,14 +30,7 @@ class TurnReference(NativeBlock):
     def __init__(
         self, single_track: SingleTrackParameters, length_m: float, friction_fraction: float, interval_s: float
     ) -> None:
-        """Compute the constants.
-
-        Args:
-            single_track: The known car.
-            length_m: Distance over which the yaw rate follows the driver [m].
-            friction_fraction: Fraction of the friction that may be used [-].
-            interval_s: Time between two steps [s].
-        """
+        """Compute the constants; `length_m` is the distance over which the yaw rate follows the driver."""
         self._single_track = SingleTrack(single_track)
         self._length_m, self._interval_s = length_m, interval_s
         self._most_mps2 = friction_fraction * GRAVITY_MPS2
@@ -90,27 +83,14 @@ class BorneTurnReference(TurnReference):
         parameters: EscParameters | TorqueVectoringParameters,
         interval_s: float,
     ) -> None:
-        """Compute the constants.
-
-        Args:
-            single_track: The known car.
-            parameters: Those of the controller.
-            interval_s: Time between two steps [s].
-        """
+        """Compute the constants."""
         super().__init__(single_track, parameters.reference_length_m, parameters.friction_fraction, interval_s)
         self._fraction = -math.expm1(-interval_s / parameters.acceleration_time_s)
         self._shortfall_mps2 = parameters.acceleration_shortfall_mps2
         self._expected_radps = 0.0
 
     def borne(self, front_steer_rad: float, speed_mps: float, friction: float, ay_mps2: float) -> float:
-        """Return the desired yaw rate [rad/s].
-
-        Args:
-            front_steer_rad: The driver's angle at the road wheel [rad].
-            speed_mps: Speed > 0 [m/s].
-            friction: Friction of the road [-].
-            ay_mps2: Measured lateral acceleration, left positive [m/s2].
-        """
+        """Return the desired yaw rate for a speed > 0 and a measured lateral acceleration, left positive [rad/s]."""
         desired_radps = desired_turn(self, front_steer_rad, speed_mps, friction)
         self._expected_radps += self._fraction * (desired_radps - self._expected_radps)
         side = math.copysign(1.0, self._expected_radps)
