@@ -122,9 +122,9 @@ def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, An
     levels = column.drop_null().unique().to_pylist()
     few = len(levels) <= _BINS
     ordered = (sorted(levels) if numeric else [str(level) for level in levels]) if few or not numeric else []
-    relative = next((factor.nominal for factor in study.factors if factor.key == key), "")
+    relative = next((factor.nominal for factor in study.factors if factor.key == key), None)
     words, unit = _label(study, key)
-    told = {"label": f"{words}{_RELATIVE.get(relative, '')}", "unit": "" if relative == "times" else unit}
+    told = {"label": f"{words}{_RELATIVE.get(relative or '', '')}", "unit": "" if relative == "times" else unit}
     return {"key": key, **told, "numeric": numeric, "levels": ordered}
 
 
