@@ -150,7 +150,7 @@ class Integrated:
         self._lqr = Lqr(setup)
         self._parameters, self._stability, servos = (p := setup.gains.integrated), setup.gains.esc, setup.gains.servos
         self._limits_rad = servos.superposition_limit_rad, servos.rear_limit_rad
-        self._car, self._slopes = setup.single_track, self._lqr.slopes
+        self._car, self._slopes = setup.single_track, self._lqr._curves
         self._confidence = ConfidenceMonitor(setup)
         self._borne = BorneTurnReference(self._car, self._stability, setup.timestep_s)
         self._supervised = [SupervisedActuator(p.tolerance_rad, p.window_s, setup.timestep_s) for _ in range(2)]
@@ -245,7 +245,7 @@ class Integrated:
         demand = stabilising(self._stability, borne - now.yaw_rate_radps, now.sideslip_rad)
         # Behind a jump of friction the estimator explains the yaw rate and not the lateral acceleration.
         # Twice: the limits of `confidence` are for the sum over two measured values.
-        innovation = 2.0 * self._lqr.estimator.rate_innovation
+        innovation = 2.0 * self._lqr._estimator.rate_innovation
         demand *= confidence(self._confidence, innovation, now.friction_std)[1] * self._car.yaw_inertia_kgm2
         side, part = math.copysign(1.0, demand), min(abs(demand) / self._parameters.brake_threshold_Nm, 1.0)
         return part * side * max(side * (demand - steered_Nm), 0.0)

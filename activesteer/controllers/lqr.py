@@ -161,7 +161,7 @@ class Lqr(NativeBlock):
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._allocation = Allocation(setup)
-        self._curves = self._allocation.slopes
+        self._curves = self._allocation._curves
         self._adapt(BOTH)
         self._lag_s, self._hold_s, self._decay_s = self._servos.lag_s, p.hold_s, p.decay_s
         self._lacking_radps = p.lacking_radps
@@ -227,16 +227,6 @@ class Lqr(NativeBlock):
             turn.desired_radps * now.speed_mps, self._confidence._authority,
         )  # fmt: skip
         return *angles_rad, moment_change(self._allocation, now, driver_rad, at_rad, angles_rad)
-
-    @property
-    def estimator(self) -> Estimator:
-        """Its estimator."""
-        return self._estimator
-
-    @property
-    def slopes(self) -> AxleSlopes:
-        """Curves of both axles."""
-        return self._curves
 
     def apply(self, superposition_rad: float, rear_rad: float) -> None:
         """Store the final demands of the actuators; for a failed actuator its position."""
