@@ -73,6 +73,6 @@ class Estimator(NativeBlock):
     def step(self, measurement: Measurement) -> Estimate:
         """Process a measurement, and return the estimate."""
         _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement
-        _pack_into(self._said, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
+        _pack_into(self._said.data, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
         _advance()(self._known, self._tyres, self._memory, self._said, self._line)
         return new_message(Estimate, self._memory["estimate"][0].tolist())
