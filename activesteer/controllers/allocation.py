@@ -78,11 +78,6 @@ class Allocation(NativeBlock):
         self._fraction = -math.expm1(-setup.timestep_s / servos.lag_s)
         self._front_shift_rad = self._rear_shift_rad = 0.0
 
-    @property
-    def slopes(self) -> AxleSlopes:
-        """Curves of both axles."""
-        return self._curves
-
 
 @shared
 def allocated(

@@ -35,9 +35,6 @@ class AxleSlopes(NativeBlock):
 
     F is the curve of a tyre under its static load. On a road of friction mu the curve is mu F(alpha / mu), with the
     same slope at zero slip angle.
-
-    Attributes:
-        loads_N: Static load of one wheel of each axle [N].
     """
 
     _front_excess_rad: Table
@@ -54,73 +51,32 @@ class AxleSlopes(NativeBlock):
         """Read the curves."""
         self._car, known = setup.single_track, setup.estimation
         assert known is not None  # an estimator exists
-        half = 0.5 * self._car.mass_kg * GRAVITY_MPS2 / self._car.wheelbase_m
-        self.loads_N = half * self._car.cg_to_rear_m, half * self._car.cg_to_front_m
+        loads_N = self._car.wheel_loads_N
         self._step_rad = known.tyres[0].slip_angle_step_rad
         self._cg_to_front_m, self._cg_to_rear_m = self._car.cg_to_front_m, self._car.cg_to_rear_m
         curves = []
-        for tyre, load_N in zip(known.tyres, self.loads_N, strict=True):
+        for tyre, load_N in zip(known.tyres, loads_N, strict=True):
             loads = tyre.load_step_N * np.arange(len(tyre.force_N))
             curve = np.array([np.interp(load_N, loads, column) for column in np.array(tyre.force_N).T])
             curves.append(array("d", (curve / (curve[1] / self._step_rad)).tolist()))
         self._front_curve, self._rear_curve = curves
-        car = known.two_track
-        fractions = car.front_load_transfer_fraction, 1.0 - car.front_load_transfer_fraction
-        shifts_kg = (
-            self._car.mass_kg * car.load_height_m * fraction / track_m
-            for fraction, track_m in zip(fractions, (car.front_track_m, car.rear_track_m), strict=True)
-        )
         self._front_excess_rad, self._rear_excess_rad = (
             array("d", _excesses(tyre, load_N, shift_kg))
-            for tyre, load_N, shift_kg in zip(known.tyres, self.loads_N, shifts_kg, strict=True)
+            for tyre, load_N, shift_kg in zip(known.tyres, loads_N, known.load_shifts_kg, strict=True)
         )
         stiffness_Nprad = self._car.front_stiffness_Nprad, self._car.rear_stiffness_Nprad
         self._front_slip_rad, self._rear_slip_rad = (
             array("d", (2.0 * load_N / GRAVITY_MPS2 * _AY_STEP_MPS2 / each * np.arange(len(more)) + more).tolist())
             for load_N, each, more in zip(
-                self.loads_N, stiffness_Nprad, (self._front_excess_rad, self._rear_excess_rad), strict=True
+                loads_N, stiffness_Nprad, (self._front_excess_rad, self._rear_excess_rad), strict=True
             )
         )
-
-    def at(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-        """Return the slopes of front and rear axle, as fractions of the slopes at zero slip angle [-].
-
-        Args:
-            now: The motion, faster than walking speed.
-            front_rad: Angle of the front wheels [rad].
-            rear_rad: Angle of the rear wheels [rad].
-        """
-        front, rear = slopes(self, now, front_rad, rear_rad)
-        return abs(front), abs(rear)
-
-    def used(self, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-        """Return how far front and rear axle are used: 0 straight ahead to 1 sliding; negative in turns to the right.
-
-        Arguments as in `at`.
-        """
-        front, rear = slopes(self, now, front_rad, rear_rad)
-        return math.copysign(1.0 - abs(front), front), math.copysign(1.0 - abs(rear), rear)
-
-    def excess_rad(self, ay_mps2: float, friction: float) -> tuple[float, float]:
-        """Return the additional slip angles of a steady turn that the curvature of the axle curves requires.
-
-        Args:
-            ay_mps2: Lateral acceleration, limited by the friction [m/s2].
-            friction: Friction of the road [-].
-
-        Returns:
-            Slip angles of front and rear axle, positive to the side of the turn [rad].
-        """
-        return excess(self, ay_mps2, friction)
 
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
     """Return the additional slip angles of an axle against a straight curve, at lateral accelerations from 0 on [rad].
 
-    Args:
-        tyre: Tyre of both wheels.
-        load_N: Static load of each wheel [N].
-        shift_kg: Load transfer to the outer wheel per lateral acceleration [N/(m/s2)].
+    `load_N` is the static load of a wheel, `shift_kg` the load transfer per lateral acceleration.
     """
     grid, loads_N = np.array(tyre.force_N), tyre.load_step_N * np.arange(len(tyre.force_N))
     mass_kg = 2.0 * load_N / GRAVITY_MPS2  # an axle carries the same fraction of side force and weight
@@ -142,7 +98,16 @@ def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
 
 @shared
 def slopes(block: AxleSlopes, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-    """Law of `AxleSlopes.at`; a slope is negative if the side force of its axle points to the right."""
+    """Return the slopes of front and rear axle, as fractions of the slopes at zero slip angle [-].
+
+    A slope is negative if the side force of its axle points to the right.
+
+    Args:
+        block: The curves.
+        now: The motion, faster than walking speed.
+        front_rad: Angle of the front wheels [rad].
+        rear_rad: Angle of the rear wheels [rad].
+    """
     speed, sideslip, turning, friction = now[_SPEED], now[_SIDESLIP], now[_YAW_RATE], now[_FRICTION]
     turning /= speed
     front = front_rad - sideslip - block._cg_to_front_m * turning
@@ -165,7 +130,16 @@ def _slope(curve: Table, step_rad: float, slip_angle_rad: float, friction: float
 
 @shared
 def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, float]:
-    """Law of `AxleSlopes.excess_rad`."""
+    """Return the additional slip angles of a steady turn that the curvature of the axle curves requires.
+
+    Args:
+        block: The curves.
+        ay_mps2: Lateral acceleration, limited by the friction [m/s2].
+        friction: Friction of the road [-].
+
+    Returns:
+        Slip angles of front and rear axle, positive to the side of the turn [rad].
+    """
     place = abs(ay_mps2) / friction / _AY_STEP_MPS2
     size = math.copysign(friction, ay_mps2)
     return size * _between(table(block._front_excess_rad), place), size * _between(table(block._rear_excess_rad), place)

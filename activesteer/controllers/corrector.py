@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from enum import Enum
-from typing import Final, NamedTuple
+from typing import Final
 
 from activesteer.controllers.parameters import CorrectorParameters, DesiredYawRateParameters
 from activesteer.native.records import NativeBlock
@@ -13,45 +12,14 @@ from activesteer.theory.single_track import SingleTrack, yaw_rate_gain
 from activesteer.theory.tolerance import tolerance
 
 
-class Situation(Enum):
-    """Behaviour of the car compared with the driver's demand."""
-
-    NEUTRAL = "neutral"
-    OVERSTEER = "oversteer"
-    UNDERSTEER = "understeer"
-
-
-class Decision(NamedTuple):
-    """Directions in which the corrector turns the wheels: +1 left, -1 right, 0 not at all."""
-
-    situation: Situation
-    rear: int
-    front: int
-
-
-def decide(yaw_rate_radps: float, error_radps: float) -> Decision:
-    """Return the directions of the additional steer angles.
-
-    For an error of desired less actual yaw rate, the rear wheels turn against the sign of the error and the front
-    wheels with it, in turns to both sides.
-
-    Args:
-        yaw_rate_radps: Yaw rate, left positive [rad/s].
-        error_radps: Desired less actual yaw rate [rad/s], or the angle of the corrector.
-
-    Source: Dorsch 2012, Table I and Fig. 10.
-    """
-    rear = rear_direction(error_radps)
-    oversteer = rear == (1 if yaw_rate_radps >= 0.0 else -1)
-    situation = Situation.OVERSTEER if oversteer else Situation.UNDERSTEER
-    return Decision(situation if rear else Situation.NEUTRAL, rear, -rear)
-
-
 @shared
 def rear_direction(error_radps: float) -> int:
-    """Return the direction of the rear wheels, `Decision.rear`; the front wheels turn the other way.
+    """Return the direction of the rear wheels, 1 left, -1 right or 0; the front wheels turn the other way.
 
-    Table I: with oversteer the rear wheels turn in the direction of the yaw rate, with understeer against it.
+    With oversteer, the error of desired less actual yaw rate has the sign against the turn, and the rear wheels turn in
+    the direction of the yaw rate; with understeer they turn against it.
+
+    Source: Dorsch 2012, Table I and Fig. 10.
     """
     if error_radps == 0.0:
         return 0

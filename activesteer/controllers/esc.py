@@ -18,14 +18,9 @@ and times are chosen.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from activesteer.controllers.parameters import ControllerSetup, EscParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
-
-if TYPE_CHECKING:
-    from activesteer.estimation.estimator import Estimator
 
 
 class Esc:
@@ -35,32 +30,11 @@ class Esc:
     reads = ("esc", "estimator")
     gains = EscParameters
 
-    def __init__(
-        self,
-        reference: BorneTurnReference,
-        estimator: Estimator,
-        parameters: EscParameters,
-        yaw_inertia_kgm2: float,
-        levers: tuple[float, float],
-    ) -> None:
-        """Make the controller of one run.
-
-        Args:
-            reference: Desired yaw rate.
-            estimator: Estimator of speed, yaw rate, sideslip and friction.
-            parameters: Bands, times and limits.
-            yaw_inertia_kgm2: J_z [kg m2].
-            levers: Brake torque of one wheel per yaw moment, at the front and the rear axle [-].
-        """
-        self._reference, self._estimator, self._parameters = reference, estimator, parameters
-        self._yaw_inertia_kgm2, self._levers = yaw_inertia_kgm2, levers
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> Esc:
-        """Make the controller for a car."""
-        p, estimator = setup.gains.esc, setup.estimator()
-        reference = BorneTurnReference(setup.single_track, p, setup.timestep_s)
-        return cls(reference, estimator, p, setup.single_track.yaw_inertia_kgm2, brake_levers(setup))
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Make the controller of one run."""
+        self._parameters, self._estimator = setup.gains.esc, setup.estimator()
+        self._reference = BorneTurnReference(setup.single_track, self._parameters, setup.timestep_s)
+        self._yaw_inertia_kgm2, self._levers = setup.single_track.yaw_inertia_kgm2, brake_levers(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the brake torques."""
@@ -101,7 +75,8 @@ def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
     known = setup.estimation
     assert known is not None  # an estimator exists
     front_m, _, rear_m, _ = known.rolling_radius_m
-    return 2.0 * front_m / known.two_track.front_track_m, 2.0 * rear_m / known.two_track.rear_track_m
+    front_track_m, rear_track_m = known.two_track.tracks_m
+    return 2.0 * front_m / front_track_m, 2.0 * rear_m / rear_track_m
 
 
 def wheel_torques(

@@ -15,7 +15,7 @@ from activesteer.controllers.corrector import (
     rear_direction,
     reset,
 )
-from activesteer.controllers.parameters import ControllerSetup, FrontSuperpositionParameters
+from activesteer.controllers.parameters import ControllerSetup
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import law_of
@@ -33,24 +33,13 @@ class FrontSuperposition(NativeBlock):
     _limit_rad: float
     _saturated: int
 
-    def __init__(self, desired: DesiredYawRate, parameters: FrontSuperpositionParameters, timestep_s: float) -> None:
-        """Make the controller of one run.
-
-        Args:
-            desired: Desired yaw rate for the driver's own angle.
-            parameters: Gains and limit.
-            timestep_s: Time between two steps [s].
-        """
-        self._desired = desired
-        self._corrector = Corrector(parameters.corrector, timestep_s)
-        self._limit_rad = parameters.limit_rad
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Make the controller of one run."""
+        gains, timestep_s = setup.gains, setup.timestep_s
+        self._desired = DesiredYawRate(SingleTrack(setup.single_track), gains.desired_yaw_rate, timestep_s)
+        self._corrector = Corrector(gains.afs.corrector, timestep_s)
+        self._limit_rad = gains.afs.limit_rad
         self._saturated = 0
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> FrontSuperposition:
-        """Make the controller for a car."""
-        desired = DesiredYawRate(SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.timestep_s)
-        return cls(desired, setup.gains.afs, setup.timestep_s)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the angle to add at the front wheels."""

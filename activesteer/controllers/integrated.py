@@ -52,6 +52,7 @@ from typing import Any
 
 import numpy as np
 
+from activesteer.controllers.axle_slopes import slopes
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.esc import stabilising
 from activesteer.controllers.lqr import Lqr, Turn
@@ -101,13 +102,7 @@ class SupervisedActuator:
     """
 
     def __init__(self, tolerance_rad: float, window_s: float, interval_s: float) -> None:
-        """Begin with a sound actuator.
-
-        Args:
-            tolerance_rad: Distance from the demand that is tolerated [rad].
-            window_s: Time in which the actuator must approach its demand [s].
-            interval_s: Time between two steps [s].
-        """
+        """Begin with a sound actuator."""
         self._tolerance_rad = tolerance_rad
         self._steps = max(1, round(window_s / interval_s))
         self._seen: deque[tuple[float, float]] = deque(maxlen=self._steps + 1)
@@ -152,18 +147,17 @@ class Integrated:
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Make the controller of one run."""
-        self._lqr = Lqr.from_vehicle(setup)
+        self._lqr = Lqr(setup)
         self._parameters, self._stability, servos = (p := setup.gains.integrated), setup.gains.esc, setup.gains.servos
         self._limits_rad = servos.superposition_limit_rad, servos.rear_limit_rad
-        self._car, self._slopes = setup.single_track, self._lqr.slopes
-        self._confidence = ConfidenceMonitor(setup, self._lqr.estimator)
+        self._car, self._slopes = setup.single_track, self._lqr._curves
+        self._confidence = ConfidenceMonitor(setup)
         self._borne = BorneTurnReference(self._car, self._stability, setup.timestep_s)
         self._supervised = [SupervisedActuator(p.tolerance_rad, p.window_s, setup.timestep_s) for _ in range(2)]
         self._solve = solver()
         known = setup.estimation
         assert known is not None  # an estimator exists
-        body = known.two_track
-        half_m = 0.5 * np.array([body.front_track_m, body.rear_track_m])
+        half_m = 0.5 * np.array(known.two_track.tracks_m)
         # A brake on the left turns the car to the left.
         self._arms_m = np.repeat(half_m, 2) * (1.0, -1.0, 1.0, -1.0)
         self._radii_m = known.rolling_radius_m
@@ -171,7 +165,7 @@ class Integrated:
         self._most_kN = [self._stability.torque_limit_Nm / (_KILO * radius_m) for radius_m in self._radii_m]
         self._per_moment = 1.0 / setup.gains.lqr.moment_scale_Nm
         self._brake_cost = _KILO * 2.0 * p.brake_threshold_Nm * float(half_m[0]) * self._per_moment**2
-        self._torques = SplitTorques(setup, setup.gains.tv.friction_fraction, setup.gains.tv.least_fraction)
+        self._torques = SplitTorques(setup)
         tracks_m = 2.0 * half_m[[axle.place // 2 for axle in setup.split_axles]]
         forces = _BRAKES + len(setup.split_axles)
         self._stay = np.diag([p.brake_scale_N**-2 * _KILO**2] * forces)
@@ -181,11 +175,6 @@ class Integrated:
         self._demand_rad, self._brakes_Nm = (0.0, 0.0), NO_BRAKES
         per_pressure_Nm = np.array(known.brake_torque_per_pressure_NmpPa) / known.rolling_radius_m
         self._side_moment_m3 = float(per_pressure_Nm @ np.abs(self._arms_m)) / 2.0
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> Integrated:
-        """Make the controller for a car."""
-        return cls(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return angles and brake torques."""
@@ -204,7 +193,9 @@ class Integrated:
         rear = rear if works[1] else self._supervised[1].held_rad
         missing_Nm = self._missing_moment(now, driver, measurement.ay_mps2, steered_Nm)
         front_angle_rad = driver + measurement.superposition_rad
-        used = self._slopes.used(now, front_angle_rad, measurement.rear_steer_rad)
+        front, behind = slopes(self._slopes, now, front_angle_rad, at[1])
+        # How far the axles are used: 0 straight ahead to 1 sliding, negative in turns to the right.
+        used = math.copysign(1.0 - abs(front), front), math.copysign(1.0 - abs(behind), behind)
         losses_m = -used[0] * self._car.cg_to_front_m, used[1] * self._car.cg_to_rear_m
         effects = self._effects
         effects[:_BRAKES] = self._arms_m + p.brake_side_loss * np.repeat(losses_m, 2)
@@ -242,7 +233,7 @@ class Integrated:
             brake_torque_demand_Nm=(fl, fr, rl, rr),
             drive_torque_change_Nm=-min(max(command.drive_torque_demand_Nm, 0.0), fl + fr + rl + rr),
             estimate=now,
-            side_difference_Pa=self._side_difference(turn, at, works, self._slopes.at(now, front_angle_rad, at[1])),
+            side_difference_Pa=self._side_difference(turn, at, works, (abs(front), abs(behind))),
             wheel_torque_demand_Nm=self._torques.of_differences(differences_Nm, ranges, command, measurement),
         )
 
@@ -254,18 +245,18 @@ class Integrated:
         demand = stabilising(self._stability, borne - now.yaw_rate_radps, now.sideslip_rad)
         # Behind a jump of friction the estimator explains the yaw rate and not the lateral acceleration.
         # Twice: the limits of `confidence` are for the sum over two measured values.
-        innovation = 2.0 * self._lqr.estimator.rate_innovation
+        innovation = 2.0 * self._lqr._estimator.rate_innovation
         demand *= confidence(self._confidence, innovation, now.friction_std)[1] * self._car.yaw_inertia_kgm2
         side, part = math.copysign(1.0, demand), min(abs(demand) / self._parameters.brake_threshold_Nm, 1.0)
         return part * side * max(side * (demand - steered_Nm), 0.0)
 
     def _side_difference(
-        self, turn: Turn, at_rad: tuple[float, float], works: tuple[bool, bool], slopes: tuple[float, float]
+        self, turn: Turn, at_rad: tuple[float, float], works: tuple[bool, bool], shares: tuple[float, float]
     ) -> float:
-        """Return the allowed pressure difference between the sides for the remaining angles [Pa]."""
+        """Return the allowed pressure difference between the sides for the remaining angles and slopes [Pa]."""
         p, car, now = self._parameters, self._car, turn.estimate
         front, rear = (self._limits_rad[axle] - abs(at_rad[axle]) if works[axle] else 0.0 for axle in (0, 1))
-        force_N = min(slopes[0] * car.front_stiffness_Nprad * front, slopes[1] * car.rear_stiffness_Nprad * rear)
+        force_N = min(shares[0] * car.front_stiffness_Nprad * front, shares[1] * car.rear_stiffness_Nprad * rear)
         moment_Nm = car.wheelbase_m * max(force_N, 0.0)
         off = abs(turn.desired_radps - now.yaw_rate_radps) / p.side_yaw_rate_radps
         off += abs(now.sideslip_rad - turn.sideslip_rad) / p.side_sideslip_rad

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.controllers.find import is_variant, system_of
-from activesteer.controllers.parameters import ControllerParameters, ControllerSetup, CorrectorParameters
+from activesteer.controllers.parameters import ControllerSetup
 from activesteer.controllers.variant import read_variant
 from activesteer.core.conventions import Array
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
@@ -76,12 +76,7 @@ def linear_controller(given: str, setup: ControllerSetup, speed_mps: float) -> L
             f"{shown(given)} has no linear form; only {', '.join(_LINEAR)} and their variants have one",
             value=given,
         )
-    return _linear_form(system, gains, SingleTrack(setup.single_track), speed_mps, setup.timestep_s)
-
-
-def _linear_form(
-    system: str, gains: ControllerParameters, car: SingleTrack, speed_mps: float, step_s: float
-) -> LinearController:
+    car, step_s, unit = SingleTrack(setup.single_track), setup.timestep_s, np.eye(6)
     desired, predicted, integral, filtered = range(4)  # states
     front, yaw_rate = 4, 5  # inputs, behind the states
     rows = np.zeros((4, 6))
@@ -90,25 +85,19 @@ def _linear_form(
     gain, lead_s, lag_s = car.rear_prediction(speed_mps)
     fraction = 1.0 - math.exp(-step_s / lag_s)
     rows[predicted, predicted], rows[predicted, front] = 1.0 - fraction, fraction
-    error = _unit(desired) - _unit(yaw_rate)
+    error = unit[desired] - unit[yaw_rate]
     demands = np.zeros((2, 6))
-    corrector: CorrectorParameters = gains.afs.corrector if system == "afs" else gains.ars.corrector
-    rows[integral] = _unit(integral) + corrector.integral_gain * step_s * error
-    change = (1.0 - math.exp(-step_s / corrector.derivative_filter_s)) * (error - _unit(filtered))
-    rows[filtered] = _unit(filtered) + change
+    corrector = gains.afs.corrector if system == "afs" else gains.ars.corrector
+    rows[integral] = unit[integral] + corrector.integral_gain * step_s * error
+    change = (1.0 - math.exp(-step_s / corrector.derivative_filter_s)) * (error - unit[filtered])
+    rows[filtered] = unit[filtered] + change
     angle = corrector.proportional_gain_s * error + rows[integral] + corrector.derivative_gain_s2 / step_s * change
     if system == "ars":
-        prediction = gain * _unit(predicted) + lead_s / lag_s * (_unit(front) - _unit(predicted))
+        prediction = gain * unit[predicted] + lead_s / lag_s * (unit[front] - unit[predicted])
         demands[0] = gains.ars.prediction_gain * prediction - angle
     elif system == "afs":
         demands[1] = angle
     return LinearController(rows[:, :4], rows[:, 4:], demands[:, :4], demands[:, 4:])
-
-
-def _unit(index: int) -> Array:
-    row: Any = np.zeros(6)
-    row[index] = 1.0
-    return row
 
 
 SIGNALS: Final = ("yaw_rate_radps", "ay_mps2", "rear_steer_rad", "superposition_rad")
@@ -182,15 +171,7 @@ def pulse_responses(
 
 
 def response_of(pulses: Array, interval_s: float) -> Callable[[Array], NDArray[np.complex128]]:
-    """Return the frequency response of impulse responses.
-
-    Args:
-        pulses: Return value of `pulse_responses`, shape (calls, outputs, inputs).
-        interval_s: Time between two calls [s].
-
-    Returns:
-        Function from frequencies [rad/s], shape (m,), to responses, shape (m, outputs, inputs).
-    """
+    """Return the frequency response of `pulse_responses`, from shape (m,) [rad/s] to shape (m, outputs, inputs)."""
     times_s = interval_s * np.arange(len(pulses))
 
     def response(frequencies_radps: Array) -> NDArray[np.complex128]:

@@ -9,7 +9,7 @@ lag by T_a, whose commands take effect one call later:
     T_a da/dt = u_a - a,  T_a ddelta_H/dt = u_H - delta_H
 
 The desired turn has the car's own steady-state yaw rate for the driver's angle (eq. 3), limited by the friction (eq.
-6), and no sideslip. Its angles f*, g* solve 0 = A [r*, 0] + B [f*, g*]. `AxleSlopes.excess_rad` adds the slip angles
+6), and no sideslip. Its angles f*, g* solve 0 = A [r*, 0] + B [f*, g*]. `axle_slopes.excess` adds the slip angles
 that the axles need because their curves are not straight: without them a car near its limit slides outwards. While the
 driver brakes, both angles also compensate the yaw moment M of the brakes, known from their pressures, without a side
 force:
@@ -157,11 +157,11 @@ class Lqr(NativeBlock):
         p = self._parameters = setup.gains.lqr
         self._servos = setup.gains.servos
         self._estimator = setup.estimator()
-        self._confidence = ConfidenceMonitor(setup, self._estimator)
+        self._confidence = ConfidenceMonitor(setup)
         self._car, self._interval_s = setup.single_track, setup.timestep_s
         self._reference = TurnReference(self._car, p.reference_length_m, p.friction_fraction, setup.timestep_s)
         self._allocation = Allocation(setup)
-        self._curves = self._allocation.slopes
+        self._curves = self._allocation._curves
         self._adapt(BOTH)
         self._lag_s, self._hold_s, self._decay_s = self._servos.lag_s, p.hold_s, p.decay_s
         self._lacking_radps = p.lacking_radps
@@ -178,17 +178,12 @@ class Lqr(NativeBlock):
         self._front_compensation_radpNm = -1.0 / (wheelbase_m * self._car.front_stiffness_Nprad)
         self._rear_compensation_radpNm = 1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad)
 
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> Lqr:
-        """Make the controller for a car."""
-        return cls(setup)
-
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return both angles."""
         now = self._estimator.step(measurement)
         return steering(
             regulated(
-                self, now, self._confidence.innovation, command.front_steer_demand_rad, command.brake_pedal,
+                self, now, self._estimator.innovation, command.front_steer_demand_rad, command.brake_pedal,
                 measurement.superposition_rad, measurement.rear_steer_rad, measurement.brake_pressure_Pa,
             ),
             now,
@@ -203,17 +198,14 @@ class Lqr(NativeBlock):
     ) -> Turn:
         """Return the desired turn and the demands of the state feedback, all zero below walking speed.
 
-        Args:
-            command: Command of the driver.
-            measurement: Measurement of the car's sensors.
-            works: Whether superposition and rear steering work.
-            own_brakes_Nm: Brake torques demanded by the controller itself, order of `CORNERS` [Nm].
+        `works` says whether superposition and rear steering work, `own_brakes_Nm` the brake torques that the controller
+        itself demands.
         """
         if works != (self._superposition_works, self._rear_works):
             self._adapt(works)
         now = self._estimator.step(measurement)
         desired, sideslip, *angles, against = fed_back(
-            self, now, self._confidence.innovation, command.front_steer_demand_rad, command.brake_pedal,
+            self, now, self._estimator.innovation, command.front_steer_demand_rad, command.brake_pedal,
             measurement.superposition_rad, measurement.rear_steer_rad, measurement.brake_pressure_Pa, own_brakes_Nm,
         )  # fmt: skip
         return Turn(now, desired, sideslip, (angles[0], angles[1]), (angles[2], angles[3]), against)
@@ -227,36 +219,14 @@ class Lqr(NativeBlock):
     def allocate(
         self, turn: Turn, command: DriverCommand, measurement: Measurement, works: tuple[bool, bool]
     ) -> tuple[float, float, float]:
-        """Return superposition and rear angle within their limits [rad], and the change of moment by them [Nm].
-
-        Args:
-            turn: Turn of this call, faster than walking speed.
-            command: Command of the driver.
-            measurement: Measurement of the car's sensors.
-            works: Whether superposition and rear steering work.
-        """
+        """Return superposition and rear angle within their limits [rad], and the change of moment by them [Nm]."""
         now, driver_rad = turn.estimate, command.front_steer_demand_rad
         at_rad = measurement.superposition_rad, measurement.rear_steer_rad
         angles_rad = allocated(
             self._allocation, now, driver_rad, at_rad, turn.demand_rad, turn.against_rad, works,
-            turn.desired_radps * now.speed_mps, self.authority,
+            turn.desired_radps * now.speed_mps, self._confidence._authority,
         )  # fmt: skip
         return *angles_rad, moment_change(self._allocation, now, driver_rad, at_rad, angles_rad)
-
-    @property
-    def authority(self) -> float:
-        """Factor on the demands by the confidence in the estimator, 0 to 1."""
-        return self._confidence.authority
-
-    @property
-    def estimator(self) -> Estimator:
-        """Its estimator."""
-        return self._estimator
-
-    @property
-    def slopes(self) -> AxleSlopes:
-        """Curves of both axles."""
-        return self._curves
 
     def apply(self, superposition_rad: float, rear_rad: float) -> None:
         """Store the final demands of the actuators; for a failed actuator its position."""
@@ -419,16 +389,8 @@ def schedule(
 ) -> tuple[tuple[float, ...], ...]:
     """Return the gains at `SPEEDS_MPS`.
 
-    Args:
-        car: The known car.
-        parameters: Weights and relaxation length.
-        servo_lag_s: Lag of both servos [s].
-        interval_s: Time between two calls [s].
-        works: Whether superposition and rear steering work.
-
-    Returns:
-        For each speed: front angle, rear angle and sideslip, each per desired yaw rate [s] and per given angle [-];
-        then the rows of K for superposition and rear angle, in the order of `STATES`.
+    For each speed: front angle, rear angle and sideslip, each per desired yaw rate [s] and per given angle [-]; then
+    the rows of K for superposition and rear angle, in the order of `STATES`.
     """
     return tuple(
         (

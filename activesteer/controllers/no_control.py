@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from activesteer.controllers.corrector import DesiredYawRate, desired_yaw_rate
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import law_of
 from activesteer.theory.single_track import SingleTrack
-
-if TYPE_CHECKING:
-    from activesteer.estimation.estimator import Estimator
 
 
 class NoControl(NativeBlock):
@@ -21,15 +16,9 @@ class NoControl(NativeBlock):
     reads = ("desired_yaw_rate",)
     _desired: DesiredYawRate
 
-    def __init__(self, desired: DesiredYawRate) -> None:
-        """Take the reference model."""
-        self._desired = desired
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> NoControl:
-        """Make the controller for a car."""
-        single_track = SingleTrack(setup.single_track)
-        return cls(DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.timestep_s))
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Make the controller of one run."""
+        self._desired = DesiredYawRate(SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.timestep_s)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return no angles; the desired yaw rate is recorded."""
@@ -50,14 +39,9 @@ class Observer:
 
     reads = ("estimator",)
 
-    def __init__(self, estimator: Estimator) -> None:
-        """Take the estimator."""
-        self._estimator = estimator
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> Observer:
-        """Make the controller for a car; raises as `ControllerSetup.estimator` does."""
-        return cls(setup.estimator())
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Make the controller of one run."""
+        self._estimator = setup.estimator()
 
     def step(self, _command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return no angles; the estimate is recorded."""

@@ -28,15 +28,7 @@ _Length = Annotated[float, Range(0.01, 5.0)]
 
 @functools.cache
 def file_gains(name: str, gains: type[T]) -> T:
-    """Return the gains of a controller from its file in `models/controllers`.
-
-    Args:
-        name: Name of the controller, of its file and of the table in it.
-        gains: Dataclass of the table.
-
-    Raises:
-        ControllerError: a key is missing, unknown or out of range.
-    """
+    """Return the gains of a controller from the table of its name in its file in `models/controllers`."""
     table, source = read_toml(find_controller_variant(name), ControllerError)
     return build(gains, table.get(name, {}), source, (name,))
 
@@ -180,9 +172,7 @@ class IntegratedParameters:
 
 
 _NotNegative = Annotated[float, Range(0.0)]
-_Angle = Annotated[float, Range(0.0, math.radians(10.0))]
 _Rate = Annotated[float, Range(0.01, 100.0)]
-_LagTime = Annotated[float, Range(0.001, 1.0)]
 
 
 @dataclass(frozen=True)
@@ -192,7 +182,7 @@ class DesiredYawRateParameters:
     max_lateral_acceleration_mps2: Annotated[float, Range(0.1, 20.0)] = 8.0
     """a_y_max: the desired yaw rate stays below a_y_max / v. The controllers assume this value on every road, because
     they do not know its friction [m/s2]."""
-    delay_s: _LagTime = 0.06
+    delay_s: _Lag = 0.06
     """Time constant of the delay element: a car cannot follow a sudden change [s]."""
 
 
@@ -210,7 +200,7 @@ class CorrectorParameters:
     """Steer angle per integrated yaw rate error [rad/rad]."""
     derivative_gain_s2: _NotNegative = 0.0
     """Steer angle per rate of change of the yaw rate error [rad/(rad/s2)]."""
-    derivative_filter_s: _LagTime = 0.02
+    derivative_filter_s: _Lag = 0.02
     """Time constant of the filter of the D part [s]."""
 
 
@@ -222,7 +212,7 @@ class RearSteerParameters:
     """Feedback of the yaw rate."""
     prediction_gain: Annotated[float, Range(0.0, 2.0)] = 1.0
     """Fraction of the predicted rear angle that is used; 1 is the zero-sideslip feedforward of eq. 5 [-]."""
-    limit_rad: _Angle = math.radians(3.0)
+    limit_rad: _Limit = math.radians(3.0)
     """Largest rear angle demanded [rad]."""
 
 
@@ -232,7 +222,7 @@ class FrontSuperpositionParameters:
 
     corrector: CorrectorParameters = CorrectorParameters()
     """Feedback of the yaw rate."""
-    limit_rad: _Angle = math.radians(3.0)
+    limit_rad: _Limit = math.radians(3.0)
     """Largest angle added at the road wheels [rad]."""
 
 
@@ -240,13 +230,13 @@ class FrontSuperpositionParameters:
 class ServoParameters:
     """The actuators of both axles as `lqr` and `integrated` know them; angles at the road wheels."""
 
-    lag_s: _LagTime = 0.025
+    lag_s: _Lag = 0.025
     """Lag of both actuators [s]."""
-    rear_limit_rad: _Angle = math.radians(3.0)
+    rear_limit_rad: _Limit = math.radians(3.0)
     """Largest rear angle [rad]."""
     rear_rate_radps: _Rate = math.radians(28.0)
     """Rate of the rear steering [rad/s]."""
-    superposition_limit_rad: _Angle = math.radians(3.0)
+    superposition_limit_rad: _Limit = math.radians(3.0)
     """Largest superposition angle [rad]."""
     superposition_rate_radps: _Rate = math.radians(29.0)
     """Rate of the superposition [rad/s]."""

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from activesteer.controllers.corrector import (
     MIN_SPEED_MPS,
@@ -23,14 +22,11 @@ from activesteer.controllers.corrector import (
     rear_direction,
     reset,
 )
-from activesteer.controllers.parameters import ControllerSetup, RearSteerParameters, SideslipRearSteerParameters
+from activesteer.controllers.parameters import ControllerSetup, SideslipRearSteerParameters
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, steering
 from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import law_of, shared
 from activesteer.theory.single_track import SingleTrack, rear_prediction
-
-if TYPE_CHECKING:
-    from activesteer.estimation.estimator import Estimator
 
 
 class RearPrediction(NativeBlock):
@@ -90,38 +86,14 @@ class RearSteer(NativeBlock):
     _limit_rad: float
     _saturated: int
 
-    def __init__(
-        self,
-        desired: DesiredYawRate,
-        prediction: RearPrediction,
-        parameters: RearSteerParameters,
-        timestep_s: float,
-    ) -> None:
-        """Make the controller of one run.
-
-        Args:
-            desired: Desired yaw rate.
-            prediction: Feedforward.
-            parameters: Gains and limit.
-            timestep_s: Time between two steps [s].
-        """
-        self._desired = desired
-        self._prediction = prediction
-        self._corrector = Corrector(parameters.corrector, timestep_s)
-        self._prediction_gain = parameters.prediction_gain
-        self._limit_rad = parameters.limit_rad
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Make the controller of one run."""
+        single_track, gains, timestep_s = SingleTrack(setup.single_track), setup.gains, setup.timestep_s
+        self._desired = DesiredYawRate(single_track, gains.desired_yaw_rate, timestep_s)
+        self._prediction = RearPrediction(single_track, timestep_s)
+        self._corrector = Corrector(gains.ars.corrector, timestep_s)
+        self._prediction_gain, self._limit_rad = gains.ars.prediction_gain, gains.ars.limit_rad
         self._saturated = 0
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> RearSteer:
-        """Make the controller for a car."""
-        single_track = SingleTrack(setup.single_track)
-        return cls(
-            DesiredYawRate(single_track, setup.gains.desired_yaw_rate, setup.timestep_s),
-            RearPrediction(single_track, setup.timestep_s),
-            setup.gains.ars,
-            setup.timestep_s,
-        )
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the demanded rear angle and its parts."""
@@ -155,25 +127,11 @@ class SideslipRearSteer:
     rates_radps = RearSteer.rates_radps
     gains = SideslipRearSteerParameters
 
-    def __init__(self, paper: RearSteer, estimator: Estimator, sideslip_gain: float, limit_rad: float) -> None:
-        """Make the controller of one run.
-
-        Args:
-            paper: Prediction and correction.
-            estimator: Estimator of yaw rate, speed and sideslip.
-            sideslip_gain: k [rad/rad].
-            limit_rad: Largest rear angle demanded [rad].
-        """
-        self._paper, self._estimator = paper, estimator
-        self._sideslip_gain, self._limit_rad = sideslip_gain, limit_rad
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> SideslipRearSteer:
-        """Make the controller for a car."""
-        gains = setup.gains
-        return cls(
-            RearSteer.from_vehicle(setup), setup.estimator(), gains.ars_sideslip.sideslip_gain, gains.ars.limit_rad
-        )
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Make the controller of one run."""
+        self._paper, self._estimator = RearSteer(setup), setup.estimator()
+        self._sideslip_gain = setup.gains.ars_sideslip.sideslip_gain
+        self._limit_rad = setup.gains.ars.limit_rad
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the demanded rear angle and its parts."""

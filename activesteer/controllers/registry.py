@@ -1,7 +1,6 @@
 """The controllers that come with the package.
 
-A registered class has the method `step` of `Controller` and the classmethod `from_vehicle`, which makes it from a
-`ControllerSetup`. Its attributes say
+A registered class has the method `step` of `Controller` and is made from a `ControllerSetup`. Its attributes say
 
     reads        keys of the table [controllers] that it reads
     interval_s   time between two calls [s]; every step of the simulation if absent

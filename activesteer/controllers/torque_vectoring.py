@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -39,10 +39,6 @@ from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement, PerWheel
 from activesteer.errors import ControllerError
-
-if TYPE_CHECKING:
-    from activesteer.estimation.estimator import Estimator
-
 
 _SIDES: Final = (-1.0, 1.0, -1.0, 1.0)
 """Sign of a torque that turns the car to the left, order of `CORNERS`."""
@@ -93,42 +89,24 @@ def _left_by(slip: float) -> float:
 class SplitTorques:
     """Electric axles of a car as a controller knows them."""
 
-    def __init__(self, setup: ControllerSetup, friction_fraction: float, least_fraction: float) -> None:
-        """Compute the constants.
-
-        Args:
-            setup: The car.
-            friction_fraction: Fraction of the friction that a wheel may use in all directions [-].
-            least_fraction: Fraction of the friction that stays for the torque in a turn at the limit [-].
-        """
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Compute the constants."""
         self._axles, self._battery = setup.split_axles, setup.battery_power_W
-        self._fractions = friction_fraction, least_fraction
+        self._fractions = setup.gains.tv.friction_fraction, setup.gains.tv.least_fraction
         if not self._axles:
             return
-        known, car = setup.estimation, setup.single_track
+        known = setup.estimation
         assert known is not None  # an estimator exists
         self._radius_m, self._drive = known.rolling_radius_m, known.drive_fractions
-        tracks_m = known.two_track.front_track_m, known.two_track.rear_track_m
-        weight_N = car.mass_kg * GRAVITY_MPS2 / (car.cg_to_front_m + car.cg_to_rear_m)
-        shares = known.two_track.front_load_transfer_fraction, 1.0 - known.two_track.front_load_transfer_fraction
-        self._load_N = 0.5 * weight_N * car.cg_to_rear_m, 0.5 * weight_N * car.cg_to_front_m
-        self._shift_kg = [
-            car.mass_kg * known.two_track.load_height_m * share / track_m
-            for share, track_m in zip(shares, tracks_m, strict=True)
-        ]
+        tracks_m = known.two_track.tracks_m
+        self._load_N, self._shift_kg = known.single_track.wheel_loads_N, known.load_shifts_kg
         self._arms_m = [
             0.5 * side * track_m for side, track_m in zip(_SIDES, np.repeat(tracks_m, 2).tolist(), strict=True)
         ]
         self._levers = [0.5 * track_m / self._radius_m[2 * axle] for axle, track_m in enumerate(tracks_m)]
 
     def ranges(self, command: DriverCommand, measurement: Measurement, now: Estimate) -> list[Range]:
-        """Return the ranges of the electric axles for the present motion.
-
-        Args:
-            command: Command of the driver, whose torque counts first.
-            measurement: Measurement of the car's sensors.
-            now: Estimated motion.
-        """
+        """Return the ranges of the electric axles for the present motion; the driver's torque counts first."""
         if not self._axles:
             return []
         if command.brake_pedal > 0.0:
@@ -163,14 +141,7 @@ class SplitTorques:
     def for_moment(
         self, moment_Nm: float, command: DriverCommand, measurement: Measurement, now: Estimate
     ) -> tuple[PerWheel, float]:
-        """Return the torques to add at the wheels for a yaw moment, and the moment that they make.
-
-        Args:
-            moment_Nm: Yaw moment, left positive [Nm].
-            command: Command of the driver.
-            measurement: Measurement of the car's sensors.
-            now: Estimated motion.
-        """
+        """Return the torques to add at the wheels for a yaw moment, left positive, and the moment that they make."""
         ranges, side = self.ranges(command, measurement, now), math.copysign(1.0, moment_Nm)
         possible = sum(each.lever * each.largest_Nm(side) for each in ranges)
         if possible <= 0.0 or moment_Nm == 0.0:
@@ -217,43 +188,17 @@ class TorqueVectoring:
     reads = ("tv", "estimator")
     gains = TorqueVectoringParameters
 
-    def __init__(
-        self,
-        reference: BorneTurnReference,
-        estimator: Estimator,
-        parameters: TorqueVectoringParameters,
-        yaw_inertia_kgm2: float,
-        torques: SplitTorques,
-    ) -> None:
-        """Make the controller of one run.
-
-        Args:
-            reference: Desired yaw rate.
-            estimator: Estimator of speed, yaw rate, sideslip and friction.
-            parameters: Times and limits.
-            yaw_inertia_kgm2: J_z [kg m2].
-            torques: The electric axles.
-        """
-        self._reference, self._estimator, self._parameters = reference, estimator, parameters
-        self._yaw_inertia_kgm2, self._torques = yaw_inertia_kgm2, torques
-
-    @classmethod
-    def from_vehicle(cls, setup: ControllerSetup) -> TorqueVectoring:
-        """Make the controller for a car.
-
-        Raises:
-            ControllerError: the car has no axle whose torques can differ, or no table [two_track].
-        """
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Make the controller of one run. Its car needs an axle whose torques can differ."""
         if not setup.split_axles:
             raise ControllerError(
                 "needs an electric axle whose left and right torques can differ: motors.rl and motors.rr (or fl and "
                 'fr), or differential = "splitting" of motors.rear or motors.front, as compact_electric has it',
                 key="motors",
             )
-        p, estimator = setup.gains.tv, setup.estimator()
-        torques = SplitTorques(setup, p.friction_fraction, p.least_fraction)
-        reference = BorneTurnReference(setup.single_track, p, setup.timestep_s)
-        return cls(reference, estimator, p, setup.single_track.yaw_inertia_kgm2, torques)
+        self._parameters, self._estimator = setup.gains.tv, setup.estimator()
+        self._reference = BorneTurnReference(setup.single_track, self._parameters, setup.timestep_s)
+        self._yaw_inertia_kgm2, self._torques = setup.single_track.yaw_inertia_kgm2, SplitTorques(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the wheel torques."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 from activesteer.controllers.parameters import ControllerSetup, EscParameters, TorqueVectoringParameters
 from activesteer.core.conventions import GRAVITY_MPS2
-from activesteer.core.signals import Estimate, new_message
-from activesteer.estimation.estimator import Estimator
 from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import shared
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, yaw_rate_gain
@@ -32,37 +30,16 @@ class TurnReference(NativeBlock):
     def __init__(
         self, single_track: SingleTrackParameters, length_m: float, friction_fraction: float, interval_s: float
     ) -> None:
-        """Compute the constants.
-
-        Args:
-            single_track: The known car.
-            length_m: Distance over which the yaw rate follows the driver [m].
-            friction_fraction: Fraction of the friction that may be used [-].
-            interval_s: Time between two steps [s].
-        """
+        """Compute the constants; `length_m` is the distance over which the yaw rate follows the driver."""
         self._single_track = SingleTrack(single_track)
         self._length_m, self._interval_s = length_m, interval_s
         self._most_mps2 = friction_fraction * GRAVITY_MPS2
         self._lagged_rad = self._driver_rad = self._speed_mps = self._limit_radps = 0.0
 
-    def step(self, front_steer_rad: float, speed_mps: float, friction: float) -> float:
-        """Return the desired yaw rate [rad/s].
-
-        Args:
-            front_steer_rad: The driver's angle at the road wheel [rad].
-            speed_mps: Speed > 0 [m/s].
-            friction: Friction of the road [-].
-        """
-        return desired_turn(self, front_steer_rad, speed_mps, friction)
-
-    def ahead(self, duration_s: float) -> float:
-        """Return the desired yaw rate after a time, for a constant driver's angle and speed [rad/s]."""
-        return desired_ahead(self, duration_s)
-
 
 @shared
 def desired_turn(block: TurnReference, front_steer_rad: float, speed_mps: float, friction: float) -> float:
-    """Law of `TurnReference.step`."""
+    """Return the desired yaw rate for the driver's angle at the road wheel, a speed > 0 and a friction [rad/s]."""
     block._driver_rad, block._speed_mps = front_steer_rad, speed_mps
     block._limit_radps = block._most_mps2 * friction / speed_mps
     block._lagged_rad = _followed(block, block._interval_s)
@@ -71,7 +48,7 @@ def desired_turn(block: TurnReference, front_steer_rad: float, speed_mps: float,
 
 @shared
 def desired_ahead(block: TurnReference, duration_s: float) -> float:
-    """Law of `TurnReference.ahead`."""
+    """Return the desired yaw rate after a time, for a constant driver's angle and speed [rad/s]."""
     return _desired(block, _followed(block, duration_s))
 
 
@@ -106,28 +83,15 @@ class BorneTurnReference(TurnReference):
         parameters: EscParameters | TorqueVectoringParameters,
         interval_s: float,
     ) -> None:
-        """Compute the constants.
-
-        Args:
-            single_track: The known car.
-            parameters: Those of the controller.
-            interval_s: Time between two steps [s].
-        """
+        """Compute the constants."""
         super().__init__(single_track, parameters.reference_length_m, parameters.friction_fraction, interval_s)
         self._fraction = -math.expm1(-interval_s / parameters.acceleration_time_s)
         self._shortfall_mps2 = parameters.acceleration_shortfall_mps2
         self._expected_radps = 0.0
 
     def borne(self, front_steer_rad: float, speed_mps: float, friction: float, ay_mps2: float) -> float:
-        """Return the desired yaw rate [rad/s].
-
-        Args:
-            front_steer_rad: The driver's angle at the road wheel [rad].
-            speed_mps: Speed > 0 [m/s].
-            friction: Friction of the road [-].
-            ay_mps2: Measured lateral acceleration, left positive [m/s2].
-        """
-        desired_radps = self.step(front_steer_rad, speed_mps, friction)
+        """Return the desired yaw rate for a speed > 0 and a measured lateral acceleration, left positive [rad/s]."""
+        desired_radps = desired_turn(self, front_steer_rad, speed_mps, friction)
         self._expected_radps += self._fraction * (desired_radps - self._expected_radps)
         side = math.copysign(1.0, self._expected_radps)
         # What has fallen meanwhile, by the friction or by the driver, does not fall twice.
@@ -146,18 +110,6 @@ _FALL_S, _RISE_S = 0.3, 2.0
 """Times in which the authority falls from 1 to 0, and rises again [s]."""
 
 
-class Confidence(NamedTuple):
-    """Confidence of an instant.
-
-    Attributes:
-        friction: Part of the variance of the assumed friction that the measurements have removed, 0 to 1.
-        authority: Factor on the demands of the controller: 1 while the model explains the car, falling to 0 otherwise.
-    """
-
-    friction: float
-    authority: float
-
-
 class ConfidenceMonitor(NativeBlock):
     """Monitor of an estimator's friction and innovations."""
 
@@ -168,36 +120,21 @@ class ConfidenceMonitor(NativeBlock):
     _mean: float
     _authority: float
 
-    def __init__(self, setup: ControllerSetup, estimator: Estimator) -> None:
-        """Watch an estimator.
-
-        Args:
-            setup: Setup of the controller.
-            estimator: Its estimator, which the controller calls.
-        """
-        self._estimator, self._prior = estimator, setup.gains.estimator.friction_std
+    def __init__(self, setup: ControllerSetup) -> None:
+        """Compute the constants."""
+        self._prior = setup.gains.estimator.friction_std
         self._fraction = -math.expm1(-setup.timestep_s / _AVERAGED_S)
         self._fall, self._rise = setup.timestep_s / _FALL_S, setup.timestep_s / _RISE_S
         self._mean, self._authority = 0.0, 1.0
 
-    @property
-    def innovation(self) -> float:
-        """Present innovation of the estimator."""
-        return self._estimator.innovation
-
-    @property
-    def authority(self) -> float:
-        """Present factor on the demands of the controller."""
-        return self._authority
-
-    def step(self, now: Estimate) -> Confidence:
-        """Return the confidence in the estimate of this call."""
-        return new_message(Confidence, confidence(self, self.innovation, now.friction_std))
-
 
 @shared
 def confidence(block: ConfidenceMonitor, innovation: float, friction_std: float) -> tuple[float, float]:
-    """Law of `ConfidenceMonitor.step`; returns the fields of `Confidence`."""
+    """Return the confidence in the friction and in the model, 0 to 1 each.
+
+    The first is the part of the variance of the assumed friction that the measurements have removed. The second is a
+    factor on the demands of the controller: 1 while the model explains the car, falling to 0 otherwise.
+    """
     block._mean += block._fraction * (innovation - block._mean)
     if block._mean > _EXPLAINED or block._authority < 1.0:
         wanted = min(max((_UNEXPLAINED - block._mean) / (_UNEXPLAINED - _EXPLAINED), 0.0), 1.0)

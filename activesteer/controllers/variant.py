@@ -73,7 +73,7 @@ class Variant:
 
     def from_vehicle(self, setup: ControllerSetup) -> Any:
         """Make the controller for a car; raises as `gains_in` does."""
-        return CONTROLLERS[self.system].from_vehicle(replace(setup, gains=self.gains_in(setup)))
+        return CONTROLLERS[self.system](replace(setup, gains=self.gains_in(setup)))
 
     def gains_in(self, setup: ControllerSetup) -> ControllerParameters:
         """Merge the gains of the variant into the gains of a car.

@@ -3,6 +3,15 @@
 The inertial sensors are late by their delay and low-pass. The filters run at the time of the measurement: a buffer
 holds angles, wheel speeds and pressures until then. From there the model alone runs to the present, with the later
 angles.
+
+Arguments of the compiled functions of this folder:
+
+    known       knowledge of the car and its sensors, a record of `known_of`
+    tyres       grids of front and rear tyres' lateral force, shape (2, loads, slip angles) [N]
+    memory      states, covariances and inputs, a record of `MEMORY`, which is changed
+    said        a measurement, in the order of `SAID`
+    line        measurements of the last calls, a ring buffer
+    duration_s  time since the last step [s]
 """
 
 from __future__ import annotations
@@ -28,9 +37,8 @@ from activesteer.estimation.records import (
     SAID_WHEEL,
     YAW_RATE,
 )
-from activesteer.estimation.speed_filter import correct_speed, predict_speed, start_speed
+from activesteer.estimation.speed_filter import correct_speed, predict_speed, read_wheels, start_speed
 from activesteer.estimation.two_track_model import SLOWEST_MPS, follow, follow_roll, forces_of
-from activesteer.estimation.wheels import read_wheels
 from activesteer.native.compilation import compiled, inlined
 
 _SHORTEST_S: Final = 0.004
@@ -134,15 +142,7 @@ def _write_estimate(known, memory):
 
 @compiled
 def advance(known, tyres, memory, said, line):
-    """Process the present measurement, and make the estimate.
-
-    Args:
-        known: Record of `known_of`, shape (1,).
-        tyres: Grids of front and rear tyres' lateral force, shape (2, loads, slip angles) [N].
-        memory: A record of `MEMORY`, shape (1,); changed.
-        said: Measurement; see `SAID`.
-        line: Measurements of the last calls, a ring buffer; changed.
-    """
+    """Process the present measurement, and make the estimate; the records have the shape (1,)."""
     k, m = known[0], memory[0]
     first = m.calls == 0
     if first:

@@ -57,8 +57,6 @@ class Estimator(NativeBlock):
         self._known = known_of(setup, parameters, timestep_s)
         self._tyres = np.array([tyre.force_N for tyre in setup.tyres]).reshape(2, *GRID)
         self._memory, self._said = np.zeros(1, MEMORY), np.zeros(len(SAID))
-        self._row = self._said.data
-        self._estimate = self._memory["estimate"][0]
         # One row for each call within the delay of the inertial sensors, and this call.
         self._line = np.zeros((round(float(self._known["age_s"][0]) / timestep_s) + 2, len(SAID)))
 
@@ -75,15 +73,6 @@ class Estimator(NativeBlock):
     def step(self, measurement: Measurement) -> Estimate:
         """Process a measurement, and return the estimate."""
         _, _, yaw_rate, ay, ax, steering_wheel, rear, superposition, spins, pressures = measurement
-        _pack_into(self._row, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
+        _pack_into(self._said.data, 0, yaw_rate, ay, ax, steering_wheel, rear, superposition, *spins, *pressures)
         _advance()(self._known, self._tyres, self._memory, self._said, self._line)
-        return new_message(Estimate, self._estimate.tolist())
-
-    def __getstate__(self) -> dict[str, object]:
-        """The arrays, without the views of them."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_row", "_estimate")}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        """Take over the arrays of a copy, and look at them."""
-        self.__dict__.update(state)
-        self._row, self._estimate = self._said.data, self._memory["estimate"][0]
+        return new_message(Estimate, self._memory["estimate"][0].tolist())

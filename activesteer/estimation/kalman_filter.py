@@ -84,12 +84,7 @@ _CREEP_DENSITY: Final = 0.05
 
 @compiled
 def begin(known, memory):
-    """Start with a car that drives straight ahead.
-
-    Args:
-        known: Record of `known_of`.
-        memory: Record of `MEMORY`; state and covariance are changed.
-    """
+    """Set state and covariance to those of a car that drives straight ahead."""
     state, covariance = memory.state, memory.covariance
     state[:] = 0.0
     state[FRICTION] = known.friction
@@ -193,14 +188,7 @@ def _add_noise(known, tyres, memory, duration_s, added):
 
 @compiled
 def predict(known, tyres, memory, duration_s):
-    """Advance the state and its covariance by an interval.
-
-    Args:
-        known: Record of `known_of`.
-        tyres: Grids of front and rear tyres' lateral force [N].
-        memory: Record of `MEMORY`; state and covariance are changed.
-        duration_s: Length of the interval [s].
-    """
+    """Advance the state and its covariance by an interval."""
     n, covariance = N_STATES, memory.covariance
     moved, slope, half, added = np.empty(n), np.empty((n, n)), np.empty((n, n)), np.zeros((n, n))
     _differentiate(known, tyres, memory, duration_s, moved, slope)
@@ -281,15 +269,7 @@ def _take_in(state, covariance, row, error, variance):
 
 @compiled
 def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
-    """Process a measurement.
-
-    Args:
-        known: Record of `known_of`.
-        tyres: Grids of front and rear tyres' lateral force [N].
-        memory: Record of `MEMORY`; state and covariance are changed.
-        yaw_rate_radps: Measured yaw rate [rad/s].
-        ay_mps2: Measured lateral acceleration [m/s2].
-        duration_s: Time since the last measurement [s].
+    """Process a measurement after an interval, and change state and covariance by it.
 
     Returns:
         Squared error of both values over its expected covariance, chi-square distributed with two degrees of freedom,

@@ -124,13 +124,11 @@ def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s:
 
 def _car(setup: EstimatorSetup, parameters: EstimatorParameters) -> dict[str, float]:
     body, more, (front, rear) = setup.single_track, setup.two_track, setup.tyres
-    wheelbase_m = body.cg_to_front_m + body.cg_to_rear_m
-    per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / wheelbase_m
-    front_N, rear_N = per_metre * body.cg_to_rear_m, per_metre * body.cg_to_front_m
+    front_N, rear_N = body.wheel_loads_N
     # In a steady turn an axle carries its share of the mass, and its roll steer acts like a compliance.
     gradient = 0.5 * more.roll_gradient_radpmps2 * GRAVITY_MPS2
     rolled = parameters.front_roll_steer * gradient / front_N, parameters.rear_roll_steer * gradient / rear_N
-    transfer_kgm, fraction = body.mass_kg * more.load_height_m, more.front_load_transfer_fraction
+    front_kg, rear_kg = setup.load_shifts_kg
     return {
         "mass_kg": body.mass_kg,
         "yaw_inertia_kgm2": body.yaw_inertia_kgm2,
@@ -140,9 +138,9 @@ def _car(setup: EstimatorSetup, parameters: EstimatorParameters) -> dict[str, fl
         "rear_compliance_radpN": 1.0 / body.rear_stiffness_Nprad - 0.5 / rear.stiffness_at(rear_N) - rolled[1],
         "front_load_N": front_N,
         "rear_load_N": rear_N,
-        "front_load_kg": transfer_kgm * fraction / more.front_track_m,
-        "rear_load_kg": transfer_kgm * (1.0 - fraction) / more.rear_track_m,
-        "along_load_kg": 0.5 * transfer_kgm / wheelbase_m,
+        "front_load_kg": front_kg,
+        "rear_load_kg": rear_kg,
+        "along_load_kg": 0.5 * (body.mass_kg * more.load_height_m) / body.wheelbase_m,
         "front_relaxation_m": front.relaxation_length_m,
         "rear_relaxation_m": rear.relaxation_length_m,
         "angle_step_rad": front.slip_angle_step_rad,
@@ -206,7 +204,7 @@ def _wheels(setup: EstimatorSetup) -> dict[str, Any]:
     def of(front_value: float, rear_value: float) -> NDArray[np.float64]:
         return np.repeat([front_value, rear_value], 2)
 
-    half_m = 0.5 * of(more.front_track_m, more.rear_track_m)
+    half_m = 0.5 * of(*more.tracks_m)
     return {
         "half_track_m": half_m,
         "to_axle_m": of(body.cg_to_front_m, -body.cg_to_rear_m),

@@ -153,6 +153,14 @@ class EstimatorSetup:
     sensors: Sensors
 
     @property
+    def load_shifts_kg(self) -> tuple[float, float]:
+        """Load transfer to the outer wheel per lateral acceleration, front and rear [N/(m/s2)]."""
+        front = self.two_track.front_load_transfer_fraction
+        front_m, rear_m = self.two_track.tracks_m
+        moment_kgm = self.single_track.mass_kg * self.two_track.load_height_m
+        return moment_kgm * front / front_m, moment_kgm * (1.0 - front) / rear_m
+
+    @property
     def rolling_radius_m(self) -> tuple[float, float, float, float]:
         """Rolling radius of each wheel [m], order of `CORNERS`."""
         front, rear = self.tyres

@@ -115,14 +115,7 @@ def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N
 
 @compiled
 def forces_of(known, tyres, memory, state):
-    """Return the lateral forces of both axles, across their wheels [N].
-
-    Args:
-        known: Record of `known_of`.
-        tyres: Grids of front and rear tyres' lateral force [N].
-        memory: Record of `MEMORY`: the inputs.
-        state: The states.
-    """
+    """Return the lateral forces of both axles, across their wheels [N]."""
     friction = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     forward_N, along_N = known.along_load_kg * memory.ax_mps2, memory.along_N
     front_N = axle_force(
@@ -150,16 +143,7 @@ def slip_angles(known, memory, state, vx_mps):
 
 @compiled
 def follow(known, tyres, memory, state, duration_s, out):
-    """Advance the state by an interval, for constant inputs.
-
-    Args:
-        known: Record of `known_of`.
-        tyres: Grids of front and rear tyres' lateral force [N].
-        memory: Record of `MEMORY`: the inputs.
-        state: The states.
-        duration_s: Length of the interval [s].
-        out: The new states; may be `state`.
-    """
+    """Write the state after an interval with constant inputs into `out`, which may be `state` itself."""
     for index in range(N_STATES):
         out[index] = state[index]
     vx = memory.speed_mps
@@ -193,15 +177,9 @@ def follow(known, tyres, memory, state, duration_s, out):
 
 @compiled
 def follow_roll(known, memory, ay_mps2, duration_s):
-    """Advance the roll of the body by an interval, with its effects on the wheels.
+    """Advance the roll of the body by an interval, with its effects `loading_mps2` and `rolling_mps` on the wheels.
 
     Springs and dampers carry (p + 2 D p' / w) / k in place of a_y.
-
-    Args:
-        known: Record of `known_of`.
-        memory: Record of `MEMORY`; roll, `loading_mps2` and `rolling_mps` are changed.
-        ay_mps2: Lateral acceleration [m/s2].
-        duration_s: Length of the interval [s].
     """
     speed, damping, gradient = known.roll_speed_radps, known.roll_damping, known.roll_gradient_radpmps2
     steps = max(1, math.ceil(duration_s / _LONGEST_STEP_S - 1e-9))

@@ -258,7 +258,7 @@ class Plugin:
         """
         kind, origin = self.kind, self.origin
         if self.is_builtin:
-            return origin.from_vehicle(setup)
+            return getattr(origin, "from_vehicle", origin)(setup)
         if getattr(origin, "checks_itself", False):
             return self._created(setup)
         try:

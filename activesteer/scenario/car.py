@@ -24,7 +24,7 @@ import numpy as np
 from activesteer.config import Range, Source, build, checked_number, find_file, read_toml, to_table
 from activesteer.controllers import ControllerParameters, SingleTrackParameters
 from activesteer.controllers.parameters import SplitAxle
-from activesteer.core.conventions import DEFAULT_TIMESTEP_S, GRAVITY_MPS2
+from activesteer.core.conventions import DEFAULT_TIMESTEP_S
 from activesteer.core.files import is_file, read_bytes, why_no_file
 from activesteer.driver import DriverParameters, driver_spec, is_driver_file
 from activesteer.errors import (
@@ -390,9 +390,7 @@ def estimator_setup(car: CarSpec) -> EstimatorSetup | None:
     config, body = car.config, car.config.single_track
     if config.two_track is None:
         return None
-    per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / body.wheelbase_m
-    loads_N = per_metre * body.cg_to_rear_m, per_metre * body.cg_to_front_m
-    front, rear = (_known(*pair) for pair in zip(car.new_tyres, loads_N, strict=True))
+    front, rear = (_known(*pair) for pair in zip(car.new_tyres, body.wheel_loads_N, strict=True))
     pressure_Pa = config.brakes.hydraulics.full_pedal_pressure_Pa
     fl, fr, rl, rr = (torque_Nm / pressure_Pa for torque_Nm in config.brakes.torques_Nm)
     air = config.aerodynamics

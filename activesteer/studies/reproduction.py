@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from activesteer.analysis.claims.judge import SCENARIOS, SYSTEMS
 from activesteer.analysis.claims.scorecard import LITERATURE, PAPER, VEHICLE, Scorecard, read_setting, scorecard
@@ -84,7 +84,7 @@ def reproduce(
     numbers = read_setting(setting)
     scenarios = {name: resolve(name, vehicle, {**numbers.overrides(name), **(overrides or {})}) for name in SCENARIOS}
     target = make_folder(folder, ParameterError)
-    paths = {name: {system: _path(target, name, system) for system in SYSTEMS} for name in scenarios}
+    paths = {name: {system: target / f"{name}-{system}.mcap" for system in SYSTEMS} for name in scenarios}
     result = Reproduction(paths, setting=setting)
     for systems in result.paths.values():
         for path in systems.values():
@@ -100,22 +100,13 @@ def reproduce(
     return result
 
 
-def _path(folder: Path, scenario: str, system: str) -> Path:
-    return folder / f"{scenario}-{system}.mcap"
-
-
-class Outcome(NamedTuple):
-    """Outcome of a run with a controller: the reason why it ended early, or an empty text."""
-
-    scenario: str
-    system: str
-    problem: str
-
-
 def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
-) -> Iterator[Outcome]:
-    """Make all runs and yield each as it ends. A search is made once for all controllers."""
+) -> Iterator[tuple[str, str, str]]:
+    """Make all runs. Yield scenario, system, and the reason why the run ended early or an empty text, as each ends.
+
+    A search is made once for all controllers.
+    """
     with workers_for(jobs) as workers:
         queue = TaskQueue(workers)
         for name, scenario in scenarios.items():
@@ -124,9 +115,9 @@ def drive(
             if error is not None and not isinstance(error, ActiveSteerError):
                 raise error
             if system is not None:
-                yield Outcome(name, system, str(error or value))
+                yield name, system, str(error or value)
             elif error is not None:
-                yield from (Outcome(name, other, str(error)) for other in paths[name])
+                yield from ((name, other, str(error)) for other in paths[name])
             else:
                 for other in paths[name]:
                     queue.add((name, other), _run, value, other, paths[name][other])

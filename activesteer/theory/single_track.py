@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.config import Range
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.errors import ParameterError
 from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import shared
@@ -68,6 +69,12 @@ class SingleTrackParameters:
     def wheelbase_m(self) -> float:
         """Distance between the axles, l [m]."""
         return self.cg_to_front_m + self.cg_to_rear_m
+
+    @property
+    def wheel_loads_N(self) -> tuple[float, float]:
+        """Static load of one wheel, front and rear [N]."""
+        per_metre = 0.5 * self.mass_kg * GRAVITY_MPS2 / self.wheelbase_m
+        return per_metre * self.cg_to_rear_m, per_metre * self.cg_to_front_m
 
 
 def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:
@@ -244,3 +251,8 @@ class TwoTrackParameters:
     """Pitch angle per deceleration, nose down [rad/(m/s2)]."""
     wheel_inertia_kgm2: _Positive = 1.0
     """Inertia of a wheel about its axis [kg m2]; 1.0 belongs to a wheel of 18 kg and 16 inches."""
+
+    @property
+    def tracks_m(self) -> tuple[float, float]:
+        """Distances between the contact points of the wheels, front and rear [m]."""
+        return self.front_track_m, self.rear_track_m

@@ -28,26 +28,53 @@ Value = Any
 
 
 @dataclass(frozen=True)
-class Factor:
-    """A factor: a key and its values."""
+class FactorTable:
+    """Keys of a factor in a study file."""
 
-    key: str  # dotted key, as for `--set`
-    kind: str  # one of `KINDS`
-    values: tuple[Value, ...] = ()  # values of a grid or a choice
+    grid: tuple[Value, ...] = ()  # values, each of which meets the whole sample
+    choice: tuple[Value, ...] = ()  # values to draw from
+    uniform: tuple[float, ...] = ()  # lower and upper end
+    log_uniform: tuple[float, ...] = ()  # the same
+    normal: tuple[float, ...] = ()  # mean and standard deviation, before truncation
     weights: tuple[float, ...] = ()  # probability of each value of a choice
-    low: float = 0.0  # lower end of a range
-    high: float = 0.0  # upper end of a range
-    mean: float = 0.0  # mean of a normal distribution before truncation
-    deviation: float = 0.0  # standard deviation of a normal distribution before truncation
-    nominal: str = ""  # `times` or `plus` if the values multiply the value of the files or are added to it; else empty
+    truncate: tuple[float, ...] = ()  # lower and upper end of a normal distribution
+    # `times` or `plus` if the values multiply the value of the files or are added to it
+    nominal: Literal["times", "plus"] | None = None
     # Earlier factor to whose value the values are relative, in place of the value of the files; empty for none
     of: str = ""
     # Other factor -> exponent. The value is also multiplied by that factor, over its value in the files, to the power
     # of the exponent.
-    grows_with: Mapping[str, float] = field(default_factory=dict)
+    grows_with: dict[str, float] = field(default_factory=dict)
     maneuvers: tuple[str, ...] = ()  # names of the manoeuvres in which the factor varies; empty for all
     # Other factor -> its values with which the factor varies; empty for all
-    when: Mapping[str, Value] = field(default_factory=dict)
+    when: dict[str, Value] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Factor(FactorTable):
+    """A factor: a key and its checked table, in which a normal distribution has its ends."""
+
+    key: str = ""  # dotted key, as for `--set`
+
+    @property
+    def kind(self) -> str:
+        """Return the kind, one of `KINDS`."""
+        return next(kind for kind in KINDS if getattr(self, kind))
+
+    @property
+    def values(self) -> tuple[Value, ...]:
+        """Return the values of a grid or a choice, and none for a range."""
+        return self.grid or self.choice
+
+    @property
+    def low(self) -> float:
+        """Return the lower end of a range."""
+        return (self.uniform or self.log_uniform or self.truncate)[0]
+
+    @property
+    def high(self) -> float:
+        """Return the upper end of a range."""
+        return (self.uniform or self.log_uniform or self.truncate)[1]
 
     def acts(self, values: Mapping[str, Value]) -> bool:
         """Return whether the factor varies with these values of the others."""
@@ -66,8 +93,9 @@ class Factor:
             places = np.minimum(np.searchsorted(ends, unit, side="right"), len(self.values) - 1)
             return [self.values[place] for place in places]
         if self.kind == "normal":
-            below, above = ndtr((np.array([self.low, self.high]) - self.mean) / self.deviation)
-            found = self.mean + self.deviation * ndtri(below + unit * (above - below))
+            mean, deviation = self.normal
+            below, above = ndtr((np.array(self.truncate) - mean) / deviation)
+            found = mean + deviation * ndtri(below + unit * (above - below))
         elif self.kind == "log_uniform":
             found = self.low * (self.high / self.low) ** unit
         else:
@@ -81,31 +109,8 @@ class Factor:
 
     def to_table(self) -> dict[str, Any]:
         """Return the factor as the table that `read_factor` takes."""
-        table: dict[str, Any] = {self.kind: list(self.values) or [self.low, self.high]}
-        if self.kind == "normal":
-            table |= {"normal": [self.mean, self.deviation], "truncate": [self.low, self.high]}
-        for name in ("weights", *_ANYWHERE):
-            if value := getattr(self, name):
-                table[name] = list(value) if isinstance(value, tuple) else value
-        return table
-
-
-@dataclass(frozen=True)
-class FactorTable:
-    """Keys of a factor in a study file (see `Factor`)."""
-
-    grid: tuple[Any, ...] = ()
-    choice: tuple[Any, ...] = ()
-    uniform: tuple[float, ...] = ()
-    log_uniform: tuple[float, ...] = ()
-    normal: tuple[float, ...] = ()
-    weights: tuple[float, ...] = ()
-    truncate: tuple[float, ...] = ()
-    nominal: Literal["times", "plus"] | None = None
-    of: str = ""
-    grows_with: dict[str, float] = field(default_factory=dict)
-    maneuvers: tuple[str, ...] = ()
-    when: dict[str, Any] = field(default_factory=dict)
+        given = {name: getattr(self, name) for name in (*KINDS, "truncate", "weights", *_ANYWHERE)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in given.items() if value}
 
 
 def read_factor(key: str, table: object, source: Source) -> Factor:
@@ -127,49 +132,47 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
         raise source.fail((*where, "of"), "names an earlier factor, and stands beside nominal", given.of)
     if given.grows_with and given.nominal != "times":
         raise source.fail((*where, "grows_with"), 'belongs to nominal = "times"', given.grows_with)
-    return replace(
-        _read(key, found[0], given, source),
-        **{name: getattr(given, name) for name in ("of", "grows_with", "maneuvers", "when")},
-        nominal=given.nominal or "",
-    )
+    factor = Factor(**vars(given), key=key)
+    if factor.values:
+        _check_values(factor, source)
+        return factor
+    return replace(factor, truncate=_checked_ends(factor, source))
 
 
-def _read(key: str, kind: str, table: FactorTable, source: Source) -> Factor:
-    """Return the factor of a table whose keys are consistent, after checking its values."""
-    where = ("factors", key, kind)
-    given = getattr(table, kind)
-    if kind in ("grid", "choice"):
-        return _listed_values(key, kind, given, table.weights, source)
-    first, second = _pair(given, source, where)
+def _checked_ends(factor: Factor, source: Source) -> tuple[float, ...]:
+    """Check the numbers of a range, and return the ends of a normal distribution."""
+    kind = factor.kind
+    where = ("factors", factor.key, kind)
+    first, second = _pair(getattr(factor, kind), source, where)
     if kind == "normal":
         if second <= 0.0:
             raise source.fail(where, f"the standard deviation is {second:g}; it must be above 0")
         around = (first - _DEFAULT_TRUNCATION * second, first + _DEFAULT_TRUNCATION * second)
-        place = ("factors", key, "truncate")
-        low, high = _pair(table.truncate, source, place) if table.truncate else around
+        place = ("factors", factor.key, "truncate")
+        low, high = _pair(factor.truncate, source, place) if factor.truncate else around
         if low >= high or ndtr((low - first) / second) == ndtr((high - first) / second):
             raise source.fail(place, f"between {low:g} and {high:g} there is nothing of the distribution")
-        return Factor(key, kind, low=low, high=high, mean=first, deviation=second)
+        return low, high
     if first >= second:
         raise source.fail(where, f"the lower end {first:g} is not below the upper end {second:g}")
     if kind == "log_uniform" and first <= 0.0:
         raise source.fail(where, f"the lower end is {first:g}; it must be above 0")
-    return Factor(key, kind, low=first, high=second)
+    return ()
 
 
-def _listed_values(key: str, kind: str, given: tuple[Value, ...], weights: tuple[float, ...], source: Source) -> Factor:
-    where = ("factors", key, kind)
+def _check_values(factor: Factor, source: Source) -> None:
+    """Check the values of a grid or a choice, and their weights."""
+    where, given, weights = ("factors", factor.key, factor.kind), factor.values, factor.weights
     for value in given:
         if not is_plain(value):
             raise source.fail(where, f"{shown(value)} is no number, text, true or false", value)
     if any(given.count(value) > 1 for value in given):
         raise source.fail(where, "a value stands in it twice")
-    place = ("factors", key, "weights")
+    place = ("factors", factor.key, "weights")
     if weights and len(weights) != len(given):
         raise source.fail(place, f"as many weights as values are needed: {len(given)}")
     if weights and not (min(weights) >= 0.0 and sum(weights) > 0.0):
         raise source.fail(place, f"{shown(list(weights))} are no weights: at least 0, not all of them 0")
-    return Factor(key, kind, given, weights)
 
 
 def _pair(given: Sequence[float], source: Source, where: Sequence[str]) -> tuple[float, float]:

@@ -122,9 +122,9 @@ def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, An
     levels = column.drop_null().unique().to_pylist()
     few = len(levels) <= _BINS
     ordered = (sorted(levels) if numeric else [str(level) for level in levels]) if few or not numeric else []
-    relative = next((factor.nominal for factor in study.factors if factor.key == key), "")
+    relative = next((factor.nominal for factor in study.factors if factor.key == key), None)
     words, unit = _label(study, key)
-    told = {"label": f"{words}{_RELATIVE.get(relative, '')}", "unit": "" if relative == "times" else unit}
+    told = {"label": f"{words}{_RELATIVE.get(relative or '', '')}", "unit": "" if relative == "times" else unit}
     return {"key": key, **told, "numeric": numeric, "levels": ordered}
 
 
@@ -326,7 +326,10 @@ def _violations(found: Tuning) -> Picture:
     panels = [Panel("runs", "least margin so far [-]", [Curve(runs, falls, marker="o")], limits=limits)]
     broken = margins < 0.0
     columns = {key: [trial.values.get(key) for trial in found.trials] for key in found.front[0].values}
-    texts = {key: [] if _all_numbers(column) else sorted(set(map(str, column))) for key, column in columns.items()}
+    texts = {
+        key: [] if all(isinstance(value, int | float) for value in column) else sorted(set(map(str, column)))
+        for key, column in columns.items()
+    }
     numbers = {
         key: np.array([texts[key].index(str(value)) if texts[key] else value for value in column], dtype=np.float64)
         for key, column in columns.items()
@@ -337,17 +340,10 @@ def _violations(found: Tuning) -> Picture:
             for part, label, colour in ((~broken, "holds", _KEPT), (broken, "violated", _BROKEN))
             if part.any()
         ]
-        panels.append(Panel(_label_tuning_figure(key, texts[key]), "margin [-]", points, limits=limits))
+        words = ", ".join(f"{place}: {text}" for place, text in enumerate(texts[key]))
+        panels.append(Panel(f"{key} ({words})" if words else key, "margin [-]", points, limits=limits))
     title = f"{found.controller}, {found.maneuver}: {found.requirement}"
     return Picture(title, panels, None, 3, 12.0, 7.0)
-
-
-def _all_numbers(values: Sequence[object]) -> bool:
-    return all(isinstance(value, int | float) for value in values)
-
-
-def _label_tuning_figure(key: str, texts: Sequence[str]) -> str:
-    return f"{key} ({', '.join(f'{place}: {text}' for place, text in enumerate(texts))})" if texts else key
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:

@@ -268,11 +268,10 @@ def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.
     if problem := _problem(digest({"expected": settings.expected}), settings):
         return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
     rows: list[Row] = []
-    place = 0
-    while place < len(requests) and (not rows or time.monotonic() < end_s):
-        group = [other for other in requests[place:] if _same_drive(other, requests[place])]
-        rows += _drive_sample(settings, group)
-        place += len(group)
+    for _, group in itertools.groupby(requests, lambda one: (one.maneuver, one.vehicle, one.sample, one.factors)):
+        if rows and time.monotonic() >= end_s:
+            break
+        rows += _drive_sample(settings, list(group))
     _give_memory_back()
     return rows
 
@@ -291,10 +290,6 @@ def _problem(key: str, settings: Settings) -> str:
     if key not in _seen:
         _seen[key] = differences(settings)
     return _seen[key]
-
-
-def _same_drive(a: Request, b: Request) -> bool:
-    return (a.maneuver, a.vehicle, a.sample, a.factors) == (b.maneuver, b.vehicle, b.sample, b.factors)
 
 
 def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:

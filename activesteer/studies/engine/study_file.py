@@ -41,26 +41,32 @@ def label_of(item: FileOrTable) -> str:
 
 
 @dataclass(frozen=True)
-class StudyFile:
-    """A study as in its file, with absolute paths."""
+class _Common:
+    """Keys that a study takes over from its file."""
 
-    maneuvers: tuple[FileOrTable, ...]  # names, paths or tables of manoeuvres
+    maneuvers: tuple[Any, ...]  # names, paths or tables of manoeuvres
     controllers: tuple[str, ...] = ("none",)  # names or files of controllers
-    vehicles: tuple[FileOrTable, ...] = ("compact",)  # names, paths or tables of vehicles
-    driver: FileOrTable = DEFAULT_DRIVER  # name, path or table of the driver, or a driver class
+    vehicles: tuple[Any, ...] = ("compact",)  # names, paths or tables of vehicles
+    driver: Any = DEFAULT_DRIVER  # name, path or table of the driver, or a driver class
     overrides: dict[str, Any] = field(default_factory=dict)  # overrides of all runs: dotted key -> value
-    factors: tuple[Factor, ...] = ()
-    design: DesignTable = DesignTable()
-    case_list: Samples | None = None  # cases of a list design; None for other designs
-    seed: int = 0
+    seed: Annotated[int, Range(0)] = 0
     metrics: tuple[str, ...] = ()  # patterns of the metrics to keep, such as `yaw_rate_*`; empty for all
-    recordings: str | int = "none"  # `none`, `failed`, `all`, or a number n for every n-th sample
+    recordings: Any = "none"  # `none`, `failed`, `all`, or a number n for every n-th sample
     curves: tuple[str, ...] = ()  # channels to keep of every run, every `conventions.CURVE_STEP_S`
     claims: bool = False  # whether to check the paper's claims for every sample; this needs its three systems
-    timestep_s: float = DEFAULT_TIMESTEP_S  # step of engine, driver and controller [s]
+    timestep_s: Annotated[float, Range(1e-9)] = DEFAULT_TIMESTEP_S  # step of engine, driver and controller [s]
     tune: dict[str, Any] | None = None  # the table [tune], unparsed; see `tuning`
     fit: dict[str, Any] | None = None  # the table [fit], unparsed; see `measured.fit_file`
     title: str = ""  # one line for the report
+
+
+@dataclass(frozen=True)
+class StudyFile(_Common):
+    """A study as in its file, with absolute paths."""
+
+    factors: tuple[Factor, ...] = ()
+    design: DesignTable = DesignTable()
+    case_list: Samples | None = None  # cases of a list design; None for other designs
     source: Source = Source("study")
 
     def samples(self) -> tuple[Samples, ...]:
@@ -116,8 +122,8 @@ class StudyFile:
 
 
 @dataclass(frozen=True)
-class StudyTable:
-    """Keys of a study file (see `StudyFile`)."""
+class StudyTable(_Common):
+    """Keys of a study file."""
 
     KEY_HINTS: ClassVar = {
         "falsify": 'write [tune] with violate = "harm(controller) <= 1" and trials, the number of sets of each search',
@@ -125,22 +131,8 @@ class StudyTable:
         'S1 = "claim(S1)", and trials and seeds in [tune]',
     }
 
-    maneuvers: tuple[Any, ...]
-    controllers: tuple[str, ...] = StudyFile.controllers
-    vehicles: tuple[Any, ...] = StudyFile.vehicles
-    driver: Any = StudyFile.driver
-    overrides: dict[str, Any] = field(default_factory=dict)
     factors: dict[str, Any] = field(default_factory=dict)
     design: dict[str, Any] = field(default_factory=dict)
-    seed: Annotated[int, Range(0)] = StudyFile.seed
-    metrics: tuple[str, ...] = ()
-    recordings: Any = StudyFile.recordings
-    curves: tuple[str, ...] = ()
-    claims: bool = StudyFile.claims
-    timestep_s: Annotated[float, Range(1e-9)] = StudyFile.timestep_s
-    tune: dict[str, Any] | None = None
-    fit: dict[str, Any] | None = None
-    title: str = ""
 
 
 def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
@@ -161,17 +153,14 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
             raise source.fail((key,), f"{shown(table[key])} is no name, file or table, nor a list of them", table[key])
     if search and search not in table:
         raise source.fail((search,), f"the table is missing: {SEARCHES[search]}")
-    study = StudyFile(
-        **{name: getattr(read, name) for name in ("overrides", "seed", "metrics", "curves", "claims", "timestep_s")},
-        **{name: getattr(read, name) for name in (*SEARCHES, "title")},
-        maneuvers=tuple(_located(item, folder) for item in read.maneuvers),
-        vehicles=tuple(_located(item, folder) for item in read.vehicles),
-        driver=_located_code(read.driver, folder),
-        controllers=tuple(_located_code(item, folder) for item in read.controllers),
-        recordings=_recordings(read.recordings, source),
-        source=source,
-        **_varied(read, folder, source),
-    )
+    located = {
+        "maneuvers": tuple(_located(item, folder) for item in read.maneuvers),
+        "vehicles": tuple(_located(item, folder) for item in read.vehicles),
+        "driver": _located_code(read.driver, folder),
+        "controllers": tuple(_located_code(item, folder) for item in read.controllers),
+        "recordings": _recordings(read.recordings, source),
+    }
+    study = StudyFile(**vars(read) | located | _varied(read, folder, source), source=source)
     both = [key for key in study.keys if key in study.overrides]
     if both:
         raise source.fail(("overrides", both[0]), "is varied by the study too; give it in one place")

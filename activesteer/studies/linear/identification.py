@@ -32,6 +32,7 @@ from activesteer.simulation.preparation import (
 )
 from activesteer.simulation.runner import run_scenario
 from activesteer.simulation.two_track_search import two_track_lines, two_track_of
+from activesteer.studies.linear.linearisation import outputs_of
 from activesteer.theory.single_track import SingleTrack, TwoTrackParameters
 
 RADIUS_TEST: Final = "100 m"
@@ -165,18 +166,9 @@ def single_track_response(
     Raises:
         RecordingError: the recording is too short, or a channel is missing.
     """
-    import control  # noqa: PLC0415 - takes longer to import than a run takes to start
-
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     if len(time_s) < 2:
         raise RecordingError(f"{len(time_s)} samples are too few for a response, at least 2 are needed")
     system = SingleTrack(parameters).state_space(float(np.mean(recording["speed_mps"])))
     front = np.asarray(recording["steering_wheel_rad"]) / steering_ratio + np.asarray(recording["superposition_rad"])
-    inputs = np.array([front, np.asarray(recording["rear_steer_rad"])], dtype=np.float64)
-    outputs = control.forced_response(
-        system,
-        time_s,
-        inputs,  # type: ignore[reportArgumentType] - the type is guessed from the default 0.0
-        squeeze=False,
-    ).outputs
-    return {name: np.asarray(outputs[index]) for index, name in enumerate(("yaw_rate_radps", "sideslip_rad"))}
+    return outputs_of(system, ("yaw_rate_radps", "sideslip_rad"), time_s, [front, recording["rear_steer_rad"]])

@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from activesteer.analysis.source import RecordingLike
 from activesteer.config import Range
@@ -189,6 +190,7 @@ class LinearCar:
             inputs `INPUTS`, outputs `OUTPUTS`.
         """
         import control  # noqa: PLC0415 - takes longer to import than a run takes to start
+        from scipy.linalg import block_diag  # noqa: PLC0415 - the same
 
         modes = self.modes()
         discrete = np.array([np.exp(mode.eigenvalue_1ps * self.timestep_s) for mode in modes])
@@ -224,13 +226,8 @@ class LinearCar:
                 b_rows.append(held.real)
                 c_columns.append(outputs[index].real)
                 names.append(name)
-        a = np.zeros((len(names), len(names)))
-        row = 0
-        for block in blocks:
-            a[row : row + len(block), row : row + len(block)] = block
-            row += len(block)
         return control.StateSpace(
-            a,
+            block_diag(*blocks),
             np.array(b_rows),
             np.array(c_columns).T,
             feedthrough,
@@ -282,6 +279,11 @@ def linearise(
     return linear_car(vehicle, speed_mps, overrides).state_space(cut_off_Hz)
 
 
+def straight_on(speed_mps: float) -> dict[str, Any]:
+    """Return the table of a manoeuvre at a constant speed without steering."""
+    return {"kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0}
+
+
 def linear_car(
     vehicle: FileOrTable = "compact",
     speed_mps: float = 80.0 / 3.6,
@@ -297,11 +299,9 @@ def linear_car(
             value=speed_mps,
             allowed=Range(MIN_SPEED_MPS),
         )
-    straight = {
-        "kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0, "settle_s": _SETTLE_S,
-    }  # fmt: skip
     sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
-    scenario = resolve(straight, vehicle, sliding, controllers=controllers)
+    settling = straight_on(speed_mps) | {"settle_s": _SETTLE_S}
+    scenario = resolve(settling, vehicle, sliding, controllers=controllers)
     check_parts(overrides or {}, scenario, ("vehicle",))
     config = scenario.car.config
     smooth = replace(
@@ -327,17 +327,19 @@ def linear_response(recording: RecordingLike, system: control.StateSpace) -> dic
     Returns:
         The channels `OUTPUTS` over the time of the recording.
     """
+    demands = ("steering_wheel_demand_rad", "rear_steer_demand_rad", "superposition_demand_rad")
+    return outputs_of(system, OUTPUTS, recording.time_s, [recording[name] for name in demands])
+
+
+def outputs_of(
+    system: control.StateSpace, names: Sequence[str], time_s: ArrayLike, inputs: Sequence[ArrayLike]
+) -> dict[str, Array]:
+    """Return the outputs of a linear system over time, by these names."""
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
-    demands = ("steering_wheel_demand_rad", "rear_steer_demand_rad", "superposition_demand_rad")
-    inputs = np.array([np.asarray(recording[name], dtype=np.float64) for name in demands])
-    response = control.forced_response(
-        system,
-        np.asarray(recording.time_s, dtype=np.float64),
-        inputs,  # type: ignore[reportArgumentType] - the type is guessed from the default 0.0
-        squeeze=False,
-    )
-    return {name: np.asarray(response.outputs[index]) for index, name in enumerate(OUTPUTS)}
+    given: Any = np.array(inputs, dtype=np.float64)
+    found = control.forced_response(system, np.asarray(time_s, dtype=np.float64), given, squeeze=False).outputs
+    return {name: np.asarray(output) for name, output in zip(names, found, strict=True)}
 
 
 def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> str:

@@ -58,7 +58,7 @@ from activesteer.studies.engine.plan import Plan, task_size
 from activesteer.studies.engine.study import StudyProgress
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import in_parallel, workers_for
-from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_car
+from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_car, straight_on
 
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 """Default speeds [km/h]."""
@@ -221,11 +221,6 @@ def loop_margins(
     return _margins(controllers, vehicle, speeds_kmh, [overrides or {}], keep_curves=True)[0]
 
 
-def straight_on(speed_mps: float) -> dict[str, Any]:
-    """Return the table of a manoeuvre at a constant speed without steering [m/s]."""
-    return {"kind": "open_loop", "name": "straight", "speed_mps": speed_mps, "duration_s": 1.0}
-
-
 def _margins(
     controllers: Sequence[Any],
     vehicle: FileOrTable,
@@ -280,7 +275,9 @@ def _of_loops(controller: str, speed_kmh: float, returned: Response) -> list[Loo
 
 def _rolling(scenario: Scenario) -> Measurement:
     """Return the measurement of ideal sensors for straight rolling, with all lateral values zero."""
-    rolling = ClosedLoop(replace(scenario, car=replace(scenario.car, config=_ideal(scenario)))).measurement
+    config = scenario.car.config
+    ideal = replace(config, sensors=type(config.sensors)())
+    rolling = ClosedLoop(replace(scenario, car=replace(scenario.car, config=ideal))).measurement
     left, right = rolling.wheel_speed_radps[::2], rolling.wheel_speed_radps[1::2]
     front, rear = (0.5 * (a + b) for a, b in zip(left, right, strict=True))
     still = dict.fromkeys((*SIGNALS, "steering_wheel_rad"), 0.0)
@@ -295,11 +292,6 @@ def _fully_active(setup: ControllerSetup) -> ControllerSetup:
         for name, system in (("ars", gains.ars), ("afs", gains.afs))
     }
     return replace(setup, gains=replace(gains, **acting))
-
-
-def _ideal(scenario: Scenario) -> Any:
-    config = scenario.car.config
-    return replace(config, sensors=type(config.sensors)())
 
 
 def _answer(

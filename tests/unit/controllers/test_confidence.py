@@ -7,28 +7,15 @@ import math
 import pytest
 
 from activesteer.controllers.allocation import angle_range
-from activesteer.controllers.turn_reference import ConfidenceMonitor
-from activesteer.core.signals import Estimate
+from activesteer.controllers.turn_reference import ConfidenceMonitor, confidence
 from activesteer.scenario import resolve
 
 LIMIT_RAD, AGAINST_RAD = math.radians(3.0), math.radians(1.0)
 
 
-class Watched:
-    """An estimator with a constant innovation."""
-
-    innovation = 0.0
-
-
 @pytest.fixture
-def watched():
-    estimator = Watched()
-    setup = resolve("straight_line").controller_setup(0.005)
-    return estimator, ConfidenceMonitor(setup, estimator)  # pyright: ignore[reportArgumentType]
-
-
-def moving(friction_std: float) -> Estimate:
-    return Estimate(25.0, 0.0, 0.0, 0.0, 0.9, 0.0, 0.0, 0.0, 0.0, friction_std)
+def monitor():
+    return ConfidenceMonitor(resolve("straight_line").controller_setup(0.005))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -47,22 +34,20 @@ def test_angles_are_limited_by_what_the_actuator_reaches_and_a_failed_one_stays(
     assert angle_range(-0.03, LIMIT_RAD, 0.02, True, 0.0, 0.1) == pytest.approx((0.0, 0.0))
 
 
-def test_friction_is_certain_as_far_as_its_variance_has_fallen(watched):
-    _, monitor = watched
-    assert monitor.step(moving(0.25)).friction == pytest.approx(0.0)
-    assert monitor.step(moving(0.125)).friction == pytest.approx(0.75)
-    assert monitor.step(moving(0.5)).friction == 0.0
+def test_friction_is_certain_as_far_as_its_variance_has_fallen(monitor):
+    assert confidence(monitor, 0.0, 0.25)[0] == pytest.approx(0.0)
+    assert confidence(monitor, 0.0, 0.125)[0] == pytest.approx(0.75)
+    assert confidence(monitor, 0.0, 0.5)[0] == 0.0
 
 
-def test_a_model_that_does_not_explain_the_car_hands_over_to_the_driver_and_comes_back_slowly(watched):
-    estimator, monitor = watched
-    estimator.innovation = 4.7  # the largest mean of ordinary runs
-    assert {monitor.step(moving(0.1)).authority for _ in range(400)} == {1.0}
-    estimator.innovation = 100.0
-    fading = [monitor.step(moving(0.1)).authority for _ in range(200)]
+def test_a_model_that_does_not_explain_the_car_hands_over_to_the_driver_and_comes_back_slowly(monitor):
+    def authorities(innovation: float, calls: int) -> list[float]:
+        return [confidence(monitor, innovation, 0.1)[1] for _ in range(calls)]
+
+    assert set(authorities(4.7, 400)) == {1.0}  # the largest mean of ordinary runs
+    fading = authorities(100.0, 200)
     assert fading[-1] == 0.0
     assert fading[20] > 0.5  # not in one step
-    estimator.innovation = 1.0
-    back = [monitor.step(moving(0.1)).authority for _ in range(800)]
+    back = authorities(1.0, 800)
     assert back[100] < 0.5
     assert back[-1] == 1.0

@@ -9,7 +9,6 @@ import pytest
 
 from activesteer.controllers import load_controller
 from activesteer.controllers.esc import Esc, brake_levers, wheel_torques
-from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.core.signals import DriverCommand, Estimate
 from activesteer.scenario import resolve
 from activesteer.theory.single_track import SingleTrack
@@ -61,6 +60,7 @@ def test_brake_makes_the_demanded_moment_at_either_axle(known, axle, wheel, yaw_
 def test_brake_turns_a_sliding_car_back_in_a_time_proportional_to_the_sideslip_time(known, sideslip_time_s):
     car, beyond_rad = known.estimation, 0.003
     p = replace(known.gains.esc, sideslip_time_s=sideslip_time_s)
+    setup = replace(known, gains=replace(known.gains, esc=p))
     sideslip_rad = p.sideslip_limit_rad + beyond_rad
 
     class Sliding:
@@ -68,8 +68,8 @@ def test_brake_turns_a_sliding_car_back_in_a_time_proportional_to_the_sideslip_t
             return Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, 0.9, *[0.0] * 5)
 
     inertia_kgm2 = known.single_track.yaw_inertia_kgm2
-    reference = BorneTurnReference(known.single_track, p, known.timestep_s)
-    esc = Esc(reference, Sliding(), p, inertia_kgm2, brake_levers(known))  # pyright: ignore[reportArgumentType]
+    esc = Esc(setup)
+    esc._estimator = Sliding()  # pyright: ignore[reportAttributeAccessIssue]
     torque_Nm = esc.step(steering(0.0), measured(0.0)).brake_torque_demand_Nm[0]
     moment_Nm = torque_Nm / car.rolling_radius_m[0] * 0.5 * car.two_track.front_track_m
     # A constant moment M turns an inertia J from rest by an angle a in the time sqrt(2 a J / M).

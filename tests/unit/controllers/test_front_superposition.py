@@ -23,7 +23,7 @@ def gains(**corrector: float) -> ControllerParameters:
 
 
 def controller(**corrector: float) -> FrontSuperposition:
-    return FrontSuperposition.from_vehicle(setup(gains=gains(**corrector)))
+    return FrontSuperposition(setup(gains=gains(**corrector)))
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_superposed_angle_is_gain_times_tolerated_error():
 
 def test_front_and_rear_answer_the_same_error_with_opposite_angles(rng):
     made = setup(gains=gains(integral_gain=0.2, derivative_gain_s2=0.001))
-    front, rear = FrontSuperposition.from_vehicle(made), RearSteer.from_vehicle(made)
+    front, rear = FrontSuperposition(made), RearSteer(made)
     saturated = 0
     for angle, yaw_rate in 0.1 * rng.standard_normal((500, 2)):
         ahead = front.step(steering(angle), measured(yaw_rate))
@@ -94,7 +94,7 @@ def test_superposition_rests_below_three_metres_per_second():
 
 def test_no_control_turns_nothing_and_tells_the_same_desired_yaw_rate():
     made = setup(gains=gains())
-    none, front, rear = (kind.from_vehicle(made) for kind in (NoControl, FrontSuperposition, RearSteer))
+    none, front, rear = (kind(made) for kind in (NoControl, FrontSuperposition, RearSteer))
     told = set()
     for count in range(300):
         message = steering(0.02 * math.sin(0.05 * count)), measured(0.2)

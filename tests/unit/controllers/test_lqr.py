@@ -136,6 +136,8 @@ def test_tyres_of_the_regulator_follow_an_angle_by_63_percent_over_one_relaxatio
     straight = Estimate(speed_mps, 0.0, 0.0, 0.0, 0.9, *[0.0] * 5)
 
     class Straight:
+        innovation = 0.0
+
         def step(self, _measurement):
             return straight
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.controllers import load_controller
-from activesteer.controllers.axle_slopes import LEAST, AxleSlopes
+from activesteer.controllers.axle_slopes import LEAST, AxleSlopes, excess
 from activesteer.controllers.esc import wheel_torques
 from activesteer.controllers.integrated import Integrated
 from activesteer.controllers.lqr import SPEEDS_MPS, Lqr, _gain, _place, schedule, steady_turn
@@ -30,7 +30,6 @@ def known():
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_rear_wheels_turn_out_of_the_turn_by_what_a_heavily_loaded_axle_needs_more(known, side):
-    slopes = AxleSlopes(known)
     controller, driver = load_controller("lqr", known), steering(0.09 * side)
     answer = held(controller, driver, measured(0.25 * side, SPEED_MPS), 300)
     straight = steady_turn(known.single_track, SPEED_MPS)[1, 0] * answer.yaw_rate_desired_radps
@@ -40,7 +39,7 @@ def test_rear_wheels_turn_out_of_the_turn_by_what_a_heavily_loaded_axle_needs_mo
     friction, ay_mps2 = answer.estimate.friction, SPEED_MPS * answer.yaw_rate_desired_radps
     assert side * ay_mps2 > 0.7 * friction * GRAVITY_MPS2
     assert more * side > math.radians(0.05)
-    assert more == pytest.approx(slopes.excess_rad(ay_mps2, friction)[1], rel=0.1)
+    assert more == pytest.approx(excess(AxleSlopes(known), ay_mps2, friction)[1], rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +88,7 @@ def test_axle_that_carries_all_of_the_load_transfer_feels_twice_the_height(known
             known.estimation.two_track, load_height_m=height_m, front_load_transfer_fraction=front_fraction
         )
         slopes = AxleSlopes(replace(known, estimation=replace(known.estimation, two_track=two_track)))
-        return slopes.excess_rad(6.0, 0.9)
+        return excess(slopes, 6.0, 0.9)
 
     front, rear = excesses(0.6, 1.0)
     assert front == pytest.approx(excesses(1.2, 0.5)[0])
@@ -109,7 +108,7 @@ def effects(known, driver_rad: float = 0.0, **motion: float):
     controller, now = Integrated(known), Estimate(SPEED_MPS, 0.0, 0.0, 0.0, 0.9, *[0.0] * 5)._replace(**motion)
 
     class Known:
-        rate_innovation = 0.0
+        innovation = rate_innovation = 0.0
 
         def step(self, _measurement):
             return now
@@ -147,6 +146,8 @@ def test_car_that_does_what_is_asked_keeps_the_angles_of_its_turn(known):
     assert rear_rad > math.radians(0.02)
 
     class Turning:
+        innovation = 0.0
+
         def step(self, _measurement):
             return Estimate(SPEED_MPS, 0.0, 0.0, yaw_rate_radps, 0.9, *[0.0] * 5)
 

@@ -24,7 +24,7 @@ def controller(prediction_gain: float = 0.0, limit_rad: float = LIMIT_RAD, **cor
     gains = ControllerParameters(
         ars=RearSteerParameters(CorrectorParameters(**corrector), prediction_gain=prediction_gain, limit_rad=limit_rad)
     )
-    return RearSteer.from_vehicle(setup(gains=gains))
+    return RearSteer(setup(gains=gains))
 
 
 @pytest.mark.parametrize("speed_mps", [5.0, NO_PREDICTION_MPS, 22.22, 40.0])
@@ -177,5 +177,5 @@ def test_gains_of_the_vehicle_file_are_used():
     stronger = replace(
         gains, ars=replace(gains.ars, prediction_gain=0.0, corrector=CorrectorParameters(proportional_gain_s=0.02))
     )
-    steer = RearSteer.from_vehicle(setup(gains=stronger)).step(steering(0.0), measured(0.4))
+    steer = RearSteer(setup(gains=stronger)).step(steering(0.0), measured(0.4))
     assert steer.rear_steer_demand_rad == pytest.approx(0.02 * 0.4, rel=1e-12)

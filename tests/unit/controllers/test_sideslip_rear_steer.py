@@ -6,12 +6,13 @@ from typing import Any
 
 import pytest
 
-from activesteer.controllers.parameters import RearSteerParameters
 from activesteer.controllers.rear_steer import RearSteer, SideslipRearSteer
 from activesteer.core.signals import Estimate
-from tests.unit.controllers.cars import measured, setup, steering
+from activesteer.scenario import resolve
+from tests.unit.controllers.cars import measured, steering
 
-GAIN, LIMIT_RAD, SPEED_MPS = 0.5, RearSteerParameters().limit_rad, 25.0
+SETUP = resolve("straight_line").controller_setup(0.001)
+GAIN, LIMIT_RAD, SPEED_MPS = SETUP.gains.ars_sideslip.sideslip_gain, SETUP.gains.ars.limit_rad, 25.0
 
 
 class Knows:
@@ -28,13 +29,14 @@ class Knows:
 
 def answer(sideslip_rad: float, speed_mps: float = SPEED_MPS):
     knows: Any = Knows(sideslip_rad)
-    made = SideslipRearSteer(RearSteer.from_vehicle(setup()), knows, GAIN, LIMIT_RAD)
+    made = SideslipRearSteer(SETUP)
+    made._estimator = knows
     return made.step(steering(0.01), measured(0.05, speed_mps))
 
 
 @pytest.mark.parametrize("sideslip_rad", [-0.02, 0.01])
 def test_rear_wheels_turn_against_the_sideslip_beside_what_the_paper_asks(sideslip_rad):
-    paper = RearSteer.from_vehicle(setup()).step(steering(0.01), measured(0.05, SPEED_MPS))
+    paper = RearSteer(SETUP).step(steering(0.01), measured(0.05, SPEED_MPS))
     found = answer(sideslip_rad)
     assert found.rear_steer_demand_rad - paper.rear_steer_demand_rad == pytest.approx(-GAIN * sideslip_rad)
     assert not found.saturated

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -10,7 +11,6 @@ from activesteer import simulate
 from activesteer.controllers import load_controller
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.torque_vectoring import Range, SplitTorques, TorqueVectoring
-from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import NO_TORQUES, DriverCommand, Estimate
 from activesteer.errors import ControllerError
@@ -30,8 +30,7 @@ def known():
 
 def torques_of(known, moment_Nm, driver=None, now=STRAIGHT, ay_mps2=0.0, speed_mps=SPEED_MPS):
     seen = measured(0.0, speed_mps)._replace(ay_mps2=ay_mps2, wheel_speed_radps=(speed_mps / 0.307,) * 4)
-    split, now = SplitTorques(known, known.gains.tv.friction_fraction, 0.2), now._replace(speed_mps=speed_mps)
-    return split.for_moment(moment_Nm, driver or DriverCommand(), seen, now)
+    return SplitTorques(known).for_moment(moment_Nm, driver or DriverCommand(), seen, now._replace(speed_mps=speed_mps))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -57,8 +56,8 @@ def test_the_moment_grows_with_the_speed_up_to_full_speed_and_no_further(known):
         def step(self, measurement):
             return STRAIGHT._replace(speed_mps=measurement.speed_mps, yaw_rate_radps=0.1)
 
-    reference = BorneTurnReference(known.single_track, p, known.timestep_s)
-    vectoring = TorqueVectoring(reference, Rolling(), p, 2000.0, Kept())  # pyright: ignore[reportArgumentType]
+    vectoring: Any = TorqueVectoring(known)
+    vectoring._estimator, vectoring._torques, vectoring._yaw_inertia_kgm2 = Rolling(), Kept(), 2000.0
     half_mps = 0.5 * (MIN_SPEED_MPS + p.full_speed_mps)
     for speed_mps in (half_mps, p.full_speed_mps, 3.0 * p.full_speed_mps):
         vectoring.step(steering(0.0), measured(0.0, speed_mps))
@@ -93,7 +92,7 @@ def test_a_wheel_gets_no_more_than_its_motor_has_beside_the_torque_of_the_driver
 
 
 def test_a_wheel_that_slips_gets_no_more_in_that_direction(known):
-    split = SplitTorques(known, 0.9, 0.2)
+    split = SplitTorques(known)
     spinning = measured(0.0, SPEED_MPS)._replace(wheel_speed_radps=(81.4, 81.4, 81.4, 1.1 * 81.4))
     (_, _, rl, rr), _ = split.for_moment(300.0, DriverCommand(), spinning, STRAIGHT)
     assert rr == 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.controllers.turn_reference import BorneTurnReference
+from activesteer.controllers.turn_reference import BorneTurnReference, desired_turn
 from tests.unit.controllers.cars import CAR, setup
 
 SPEED_MPS = 25.0
@@ -39,8 +39,8 @@ def test_a_desired_turn_that_has_fallen_meanwhile_does_not_fall_twice(friction):
     reference, steered = (BorneTurnReference(CAR, parameters, 0.005) for _ in range(2))
     for _ in range(1000):
         reference.borne(0.03, SPEED_MPS, 0.9, 8.0)
-        steered.step(0.03, SPEED_MPS, 0.9)
+        desired_turn(steered, 0.03, SPEED_MPS, 0.9)
     angle_rad = 0.03 if friction < 0.9 else 0.005
     for _ in range(20):
-        wanted = steered.step(angle_rad, SPEED_MPS, friction)
+        wanted = desired_turn(steered, angle_rad, SPEED_MPS, friction)
         assert reference.borne(angle_rad, SPEED_MPS, friction, wanted * SPEED_MPS - 0.4) == pytest.approx(wanted)

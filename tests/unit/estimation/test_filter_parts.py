@@ -29,9 +29,8 @@ from activesteer.estimation.records import (
     known_of,
 )
 from activesteer.estimation.setup import GRID
-from activesteer.estimation.speed_filter import brush_slip
+from activesteer.estimation.speed_filter import brush_slip, read_wheels
 from activesteer.estimation.two_track_model import follow, follow_roll, forces_of
-from activesteer.estimation.wheels import read_wheels
 from activesteer.scenario import resolve
 from tests.unit.estimation.drives import estimates, rolling
 

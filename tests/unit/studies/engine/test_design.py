@@ -11,10 +11,10 @@ from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.study_file import read_study
 from tests.raising import raises
 
-SPEED = Factor("speed_kmh", "grid", (70.0, 80.0, 90.0))
-DRIVE = Factor("drive", "grid", ("hold", "coast"))
-MU = Factor("road.mu", "uniform", low=0.8, high=1.0)
-MASS = Factor("mass", "uniform", low=0.0, high=1.0)
+SPEED = Factor(grid=(70.0, 80.0, 90.0), key="speed_kmh")
+DRIVE = Factor(grid=("hold", "coast"), key="drive")
+MU = Factor(uniform=(0.8, 1.0), key="road.mu")
+MASS = Factor(uniform=(0.0, 1.0), key="mass")
 
 
 def test_a_grid_holds_every_combination_once():

@@ -10,9 +10,9 @@ from activesteer.studies.engine.design import draw
 from activesteer.studies.engine.factors import Factor
 
 pytest.importorskip("SALib")
-WIDE = Factor("wide", "uniform", low=1.0, high=3.0)
-NARROW = Factor("narrow", "uniform", low=0.0, high=1.0)
-IDLE = Factor("idle", "uniform", low=5.0, high=6.0)
+WIDE = Factor(uniform=(1.0, 3.0), key="wide")
+NARROW = Factor(uniform=(0.0, 1.0), key="narrow")
+IDLE = Factor(uniform=(5.0, 6.0), key="idle")
 FACTORS = [WIDE, NARROW, IDLE]
 
 

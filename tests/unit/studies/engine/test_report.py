@@ -22,7 +22,7 @@ from activesteer.studies.engine.report import write_report
 from tests.raising import raises
 from tests.unit.studies.short import RATIO, short_study, write_controller
 
-ISHIGAMI = [Factor(key, "uniform", low=-np.pi, high=np.pi) for key in ("x1", "x2", "x3")]
+ISHIGAMI = [Factor(uniform=(-np.pi, np.pi), key=key) for key in ("x1", "x2", "x3")]
 """Ishigami and Homma (1990), with a = 7 and b = 0.1: S1 0.3139, 0.4424, 0; ST 0.5576, 0.4424, 0.2437."""
 
 
@@ -52,7 +52,7 @@ def test_any_sample_gives_first_order_indices(kind):
 
 
 def test_elementary_effects_of_a_plane_are_its_slopes_over_the_range():
-    factors = [Factor("a", "uniform", low=0.0, high=2.0), Factor("b", "uniform", low=-1.0, high=4.0)]
+    factors = [Factor(uniform=(0.0, 2.0), key="a"), Factor(uniform=(-1.0, 4.0), key="b")]
     samples = draw(factors, "morris", 8, 1)
     values = 3.0 * np.array(samples.columns["a"]) - np.array(samples.columns["b"])
     found = {index.factor: index for index in indices("morris", factors, samples.columns, values)}
