@@ -156,6 +156,24 @@ def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("device", ["desk light", "phone light"])
+def test_one_player_moves_the_curves_of_all_pictures_and_stays_in_sight(shown, tmp_path, device):
+    time_s = np.linspace(2.0, 4.0, 50)
+    pictures = [Picture(f"picture {i}", [Panel("time [s]", "angle [deg]", [Curve(time_s, time_s)])]) for i in range(4)]
+    sections = [Section(str(i), ["Text."], [picture]) for i, picture in enumerate(pictures)]
+    page = shown(write_page(Page("all", "Time", [], sections), tmp_path / "t.html"), **DEVICES[device])
+    slider = page.locator("input.time")
+    slider.evaluate("(slider) => { slider.value = slider.max / 2; slider.dispatchEvent(new Event('input')); }")
+    assert page.locator(".player output").inner_text() == "3.00 s"
+    for figure in page.locator("figure").all():
+        figure.scroll_into_view_if_needed()
+        assert float(figure.locator(".values").inner_text().split()[0]) == pytest.approx(3.0, abs=0.05)
+        box = slider.bounding_box()
+        assert box
+        assert 0.0 <= box["y"] < DEVICES[device]["viewport"]["height"]
+
+
+@pytest.mark.slow
 def test_a_slider_and_a_button_move_the_cursor_of_curves_over_time(shown, tmp_path):
     page = shown(every_panel(tmp_path), **DESK)
     values = page.locator("figure").first.locator(".values")

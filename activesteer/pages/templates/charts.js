@@ -9,7 +9,7 @@ mix();
 const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
 // Least size of a cone [px], otherwise cones and cars have their true size; distance between drawn cars [px].
 const LEAST_CONE = 2, CARS_APART = 110;
-// Instants of a picture's slider.
+// Instants of the slider.
 const INSTANTS = 1000;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
 const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 106, PRINTED_TRACK_HEIGHT = 170;
@@ -37,7 +37,7 @@ function padded(low, high, least) {
   return [middle - half, middle + half];
 }
 
-const DARK = matchMedia("(prefers-color-scheme: dark)");
+const DARK = matchMedia("(prefers-color-scheme: dark)"), NARROW = matchMedia("(max-width: 760px)");
 // All that is drawn anew for another colour scheme, another width, or paper.
 const drawn = [];
 
@@ -260,7 +260,7 @@ class Player {
     this.button = element("button", { type: "button", class: "play" }, "\u25b6 Play");
     this.slider = element("input", { type: "range", class: "time", min: 0, max: last, value: 0, "aria-label": "Time" });
     this.clock = element("output", { class: "quiet" });
-    this.parts = [this.button, this.slider, this.clock];
+    this.row = element("div", { class: "player" }, this.button, this.slider, this.clock);
     this.button.addEventListener("click", () => this.play(!this.playing));
     this.slider.addEventListener("input", () => { this.play(false); this.held = true; show(+this.slider.value); });
   }
@@ -321,17 +321,24 @@ function drawPicture(box, picture, place) {
   }
   box.replaceChildren();
   for (const panel of picture.panels) charts.push(new Chart(box, panel, picture));
-  const timed = charts.filter(({ panel }) => panel.x.startsWith("time"));
-  if (timed.length) {
-    const start_s = Math.min(...timed.map(({ limits }) => limits.x[0])), end_s = Math.max(...timed.map(({ limits }) => limits.x[1]));
-    const step_s = (end_s - start_s) / INSTANTS;
-    const player = new Player(INSTANTS, step_s, start_s, (i) => {
-      player.tell(i);
-      for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
-    });
-    bar.append(...player.parts);
-  }
   if (bar.childNodes.length) box.before(bar);
+  return charts;
+}
+
+// One button and one slider for all curves over time of a page, which stay in sight.
+function addPlayer(charts) {
+  const timed = charts.filter(({ panel }) => panel.x.startsWith("time"));
+  if (!timed.length) return;
+  let start_s = Infinity, end_s = -Infinity;
+  for (const time_s of timed.flatMap(({ panel }) => panel.curves.flatMap((curve) => curve.x))) if (time_s != null) { start_s = Math.min(start_s, time_s); end_s = Math.max(end_s, time_s); }
+  if (!(end_s > start_s)) return;
+  const step_s = (end_s - start_s) / INSTANTS;
+  const player = new Player(INSTANTS, step_s, start_s, (i) => {
+    player.tell(i);
+    for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
+  });
+  const box = timed[0].holder.closest(".plots"), bar = box.previousElementSibling;
+  (bar?.classList.contains("toolbar") ? bar : box).before(player.row);
 }
 
 const repaintAll = () => { mix(); for (const each of drawn) each.repaint(); };
@@ -345,4 +352,4 @@ addEventListener("beforeprint", () => {
 addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaintAll(); for (const each of drawn) each.fit(); });
 
 const DATA = JSON.parse(document.getElementById("data")?.textContent ?? "{}");
-(DATA.pictures ?? []).forEach((picture, place) => drawPicture(document.querySelector(`.plots[data-picture="${place}"]`), picture, place));
+addPlayer((DATA.pictures ?? []).flatMap((picture, place) => drawPicture(document.querySelector(`.plots[data-picture="${place}"]`), picture, place)));
