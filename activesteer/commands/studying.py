@@ -35,6 +35,11 @@ _DRIVER_COLUMNS: Final = {
     "crossover_rad_s": "crossover rad/s",
 }
 """Key of a result -> head of its column."""
+_DRIVER_HEADS: Final = (
+    "speed [km/h]", "controller", "damping [-]", "damping after a step of the path", "damping in a run",
+    "largest difference from the run [m]", "phase margin [deg]", "crossover [rad/s]",
+)  # fmt: skip
+"""Heads of the same columns on a page."""
 _CONTROLLER_COLUMNS: Final = {
     "speed_kmh": "km/h",
     "controller": "controller",
@@ -385,7 +390,7 @@ def _driver_loop(options: argparse.Namespace) -> None:
         from activesteer.studies.linear.driver_loop import driver_loops_picture
 
         picture = driver_loops_picture(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-        table = Table("", list(_DRIVER_COLUMNS.values()), terminal.cells(rows, _DRIVER_COLUMNS))
+        table = Table("", _DRIVER_HEADS, terminal.cells(rows, _DRIVER_COLUMNS))
         sections = [Section(pictures=[picture]), Section("Speeds and controllers", tables=[table])]
         page = Page(f"activesteer linearise: {title}", f"Loop of driver and car: {title}", [], sections)
         figures = [save(draw(picture), options.output / "driver.png"), write_page(page, options.output / "driver.html")]

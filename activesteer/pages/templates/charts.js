@@ -146,6 +146,11 @@ class Chart {
       axis.splits = () => levels.map((_, i) => i);
       axis.values = (u) => { const every = Math.ceil((levels.length * room) / (axis === plain ? u.width : u.height)); return levels.map((level, i) => (i % every ? "" : level)); };
     }
+    // uPlot names powers of ten only; a short axis needs more.
+    for (const [key, axis] of [["x", plain], ["y", side]]) {
+      const [low, high] = this.limits[key];
+      if (panel.log.includes(key) && high / low < 300) axis.filter = (_, ticks) => ticks.map((tick) => (/^[125]e/.test((+tick.toPrecision(6)).toExponential()) ? tick : null));
+    }
     const axes = [plain, side];
     if (panel.above) axes.push({ ...axis(26), side: 0, scale: "x", grid: { show: false }, values: (_, ticks) => labels("")(_, ticks.map((tick) => +between(tick, panel.above.first, panel.above.second).toPrecision(2))) });
     this.plot = new uPlot({
@@ -346,10 +351,12 @@ DARK.addEventListener("change", repaintAll);
 addEventListener("beforeprint", () => {
   document.documentElement.classList.add("paper");
   repaintAll();
-  for (const details of document.querySelectorAll(".group > details")) details.open = true;
+  for (const details of document.querySelectorAll(".group > details, details.rows")) details.open = true;
   for (const each of drawn) each.fit(PRINTED);
 });
 addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaintAll(); for (const each of drawn) each.fit(); });
 
+// Long tables are folded on a phone, and open on paper.
+if (NARROW.matches) for (const details of document.querySelectorAll("details.rows")) details.open = false;
 const DATA = JSON.parse(document.getElementById("data")?.textContent ?? "{}");
 addPlayer((DATA.pictures ?? []).flatMap((picture, place) => drawPicture(document.querySelector(`.plots[data-picture="${place}"]`), picture, place)));

@@ -353,6 +353,8 @@ def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> s
     return "\n".join(text_table(rows, text=5))
 
 
+_LEAST_SHARE: Final = 0.005
+"""Participation below it is left out."""
 _MODE_COLUMNS: Final = ("mode", "f [Hz]", "damping", "eigenvalue [1/s]", "participation")
 
 
@@ -362,13 +364,15 @@ def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, 
             continue
         s = mode.eigenvalue_1ps
         value = f"{s.real:.2f}" + (f" +- {s.imag:.2f}i" if s.imag else "")
-        parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in list(mode.participation.items())[:3])
+        largest = list(mode.participation.items())[:3]
+        parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in largest if fraction >= _LEAST_SHARE)
         yield mode.name, f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}", value, parts
 
 
 def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture) -> Page:
     """Return the page of a linear car: its modes, its response to the steering wheel, and its poles over speed."""
-    table = Table("", _MODE_COLUMNS, list(_mode_rows(modes, CUT_OFF_HZ)))
+    rows = [[cell.replace("+-", "\N{PLUS-MINUS SIGN}") for cell in row] for row in _mode_rows(modes, CUT_OFF_HZ)]
+    table = Table("", _MODE_COLUMNS, rows)
     sections = [
         Section("Modes", tables=[table]),
         Section("From the steering wheel to the motion", pictures=[bode]),
