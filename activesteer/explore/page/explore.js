@@ -34,6 +34,8 @@ function describe(ticked) {
   if (!chosen().length) { say("Choose at least one controller."); return; }
   say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "");
   asking.stop();
+  // Another controller leaves the sliders where they are; they apply where the new choice has them.
+  if (ticked) state.wanted = state.values;
   state.values = {};
   state.runs = new Map();
   state.ghosts = new Map();
