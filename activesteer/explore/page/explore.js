@@ -114,7 +114,8 @@ const hear = {
   run(header, arrays) {
     if (header.id !== state.id) return;
     $("title").textContent = header.title;
-    if (state.first == null) { state.first = performance.now() - state.asked; state.runs = new Map(); }
+    // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
+    if (state.first == null) state.first = performance.now() - state.asked;
     if (header.error) say(`${header.name}: ${header.error}`);
     state.runs.set(header.name, { ...header, poses: arrays[0] });
     redraw();

@@ -315,14 +315,14 @@ function drawPicture(box, picture, place) {
     bar.append(button);
   };
   for (const panel of picture.panels) {
-    if (panel.legend) bar.append(element("span", { class: "hint" }, panel.legend));
+    if (panel.legend) bar.append(element("span", { class: "scale" }, panel.legend));
     for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || [1, 2]).map((length) => 2 * length));
     for (const area of panel.areas) entry(area.label, inkOf(area.colour), []);
     for (const [, label] of panel.limits) entry(label, "var(--failed)", [6, 4]);
   }
   if (picture.scale) {
     const [label, low, high] = picture.scale;
-    bar.append(element("span", { class: "hint" }, label), `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`);
+    bar.append(element("span", { class: "scale" }, label), `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`);
   }
   box.replaceChildren();
   for (const panel of picture.panels) charts.push(new Chart(box, panel, picture));
