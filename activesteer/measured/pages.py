@@ -134,8 +134,8 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
         pictures = [_picture(one) for one in shown if one.part == "check"]
         lines, points = ["no value comes from the data"], []
         if found is not None:
-            free = f"free in the fit windows: {', '.join(one.key for one in found.parameters)}"
-            lines, points = [free, *(f"! {note}" for note in found.notes)], rests_on(found)
+            free = f"Free in the fit windows: {', '.join(one.key for one in found.parameters)}"
+            lines, points = [free, *(f"Note: {note}." for note in found.notes)], rests_on(found)
         sections.append(Section(name.capitalize(), lines, pictures, tables, points))
     if result.ends:
         text = (

@@ -24,7 +24,12 @@ const element = (name, attributes = {}, ...children) => {
 // Axis labels with a real minus sign and without rounding errors.
 const labels = (unit) => (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit));
 const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
-const shown = (number) => (number == null ? "–" : number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0).replace("-", "−"));
+// A number with a real minus sign, and none before zero.
+const shown = (number) => {
+  if (number == null) return "–";
+  const text = number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0);
+  return text.replace("-", Number(text) ? "−" : "");
+};
 
 const dashed = (run, width) => run.dashes.map((length) => length * width);
 // Later runs lie over earlier ones; thinner and dashed, they leave these visible.
@@ -262,7 +267,7 @@ class Chart {
 class Player {
   constructor(last, step_s, start_s, show) {
     Object.assign(this, { last, step_s, start_s, show, playing: false, held: false });
-    this.button = element("button", { type: "button", class: "play" }, "\u25b6 Play");
+    this.button = element("button", { type: "button", class: "play" }, "Play");
     this.slider = element("input", { type: "range", class: "time", min: 0, max: last, value: 0, "aria-label": "Time" });
     this.clock = element("output", { class: "quiet" });
     this.row = element("div", { class: "player" }, this.button, this.slider, this.clock);
@@ -272,7 +277,7 @@ class Player {
 
   play(on) {
     this.playing = on;
-    this.button.textContent = on ? "\u23f8 Pause" : "\u25b6 Play";
+    this.button.textContent = on ? "Pause" : "Play";
     if (!on) return;
     this.held = true;
     let exact = +this.slider.value < this.last ? +this.slider.value : 0, before = null;
