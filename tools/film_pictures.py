@@ -67,6 +67,9 @@ SCENES: Final = {
 def draw_films(names: Sequence[str] = ()) -> None:
     """Drive the cars and draw them."""
     wanted = set(names)
+    known = {STILL.name, ANIMATION.name, *(f"film_{page}.webp" for page in SCENES)}
+    if unknown := wanted - known:
+        raise SystemExit(f"no film is named {', '.join(sorted(unknown))}; known are: {', '.join(sorted(known))}")
     for page, scene in SCENES.items():
         name = f"film_{page}.webp"
         if not wanted or name in wanted:

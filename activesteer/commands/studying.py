@@ -35,6 +35,11 @@ _DRIVER_COLUMNS: Final = {
     "crossover_rad_s": "crossover rad/s",
 }
 """Key of a result -> head of its column."""
+_DRIVER_HEADS: Final = (
+    "speed [km/h]", "controller", "damping [-]", "damping after a step of the path", "damping in a run",
+    "largest difference from the run [m]", "phase margin [deg]", "crossover [rad/s]",
+)  # fmt: skip
+"""Heads of the same columns on a page."""
 _CONTROLLER_COLUMNS: Final = {
     "speed_kmh": "km/h",
     "controller": "controller",
@@ -311,7 +316,7 @@ def _identify(options: argparse.Namespace) -> None:
         "with --loop controller: smallest margins over the samples of a study (file or name); controllers are "
         "designed for the car without the factors of the study"),
     arguments.WORKERS,
-    arguments.output("DIR", "folder for figures, with --loop controller for a page (default: none)"),
+    arguments.output("DIR", "folder for a page and figures (default: none)"),
     arguments.JSON,
     description="Print the modes of the full car at a speed. With --loop driver, print crossover frequency, phase "
     "margin and damping of the loop of driver, controller and car, and the damping after a small step of the path, "
@@ -346,13 +351,17 @@ def _modes(options: argparse.Namespace) -> None:
     modes, figures = car.modes(), []
     label = f"{speeds_kmh[0]:g} km/h"
     if options.output is not None:
-        from activesteer.studies.linear.linearisation import draw_bode, draw_root_locus
+        from activesteer.pages import write_page
+        from activesteer.plotting import draw, save
+        from activesteer.studies.linear.linearisation import bode_picture, modes_page, root_locus_picture
 
         speeds = [speed / 3.6 for speed in _LOCUS_KMH]
         systems = [linear_car(options.vehicle, speed, overrides).state_space() for speed in speeds]
+        pictures = {"bode": bode_picture(label, car.state_space()), "root_locus": root_locus_picture(systems, speeds)}
+        page = modes_page(f"{options.vehicle} at {label}", modes, *pictures.values())
         figures = [
-            draw_bode(label, car.state_space(), options.output / "bode.png"),
-            draw_root_locus(systems, speeds, options.output / "root_locus.png"),
+            *(save(draw(picture), options.output / f"{name}.png") for name, picture in pictures.items()),
+            write_page(page, options.output / "modes.html"),
         ]
     values = {
         "speed_mps": car.speed_mps,
@@ -374,16 +383,18 @@ def _driver_loop(options: argparse.Namespace) -> None:
         arguments.overrides_of(options),
     )
     rows = [loop.to_json() for loop in loops]
-    figures = []
+    title, figures = f"{driver} in {options.vehicle}", []
     if options.output is not None:
-        from activesteer.plotting import save
-        from activesteer.studies.linear.driver_loop import driver_loops_figure
+        from activesteer.pages import Page, Section, Table, write_page
+        from activesteer.plotting import draw, save
+        from activesteer.studies.linear.driver_loop import driver_loops_picture
 
-        figure = driver_loops_figure(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-        figures.append(save(figure, options.output / "driver.png"))
-    terminal.tell(
-        options, rows, [f"{driver} in {options.vehicle}", *terminal.table_lines(rows, _DRIVER_COLUMNS)], figures
-    )
+        picture = driver_loops_picture(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
+        table = Table("", _DRIVER_HEADS, terminal.cells(rows, _DRIVER_COLUMNS))
+        sections = [Section(pictures=[picture]), Section("Speeds and controllers", tables=[table])]
+        page = Page(f"activesteer linearise: {title}", f"Loop of driver and car: {title}", [], sections)
+        figures = [save(draw(picture), options.output / "driver.png"), write_page(page, options.output / "driver.html")]
+    terminal.tell(options, rows, [title, *terminal.table_lines(rows, _DRIVER_COLUMNS)], figures)
 
 
 def _controller_loop(options: argparse.Namespace) -> None:

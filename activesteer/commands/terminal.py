@@ -30,9 +30,13 @@ _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 
 def table_lines(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> Iterator[str]:
-    """Yield the lines of a table of rows, a column for each key with its head. Numbers have three digits."""
-    cells = [[row[key] if isinstance(row[key], str) else f"{row[key]:.3g}" for key in columns] for row in rows]
-    return text_table([list(columns.values()), *cells], text=0, repeat=2, least=10, gap=1)
+    """Yield the lines of a table of rows, a column for each key with its head."""
+    return text_table([list(columns.values()), *cells(rows, columns)], text=0, repeat=2, least=10, gap=1)
+
+
+def cells(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[list[str]]:
+    """Return the cells of a table of rows. Numbers have three digits."""
+    return [[row[key] if isinstance(row[key], str) else f"{row[key]:.3g}" for key in keys] for row in rows]
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:

@@ -72,7 +72,7 @@ class Folder:
         if not re.fullmatch(_OWN[kind], name):
             known = self.names()[kind]
             raise ParameterError(
-                f"is {shown(name)}; {nearest_names(name, known)}, or name a file in {self.path} without a folder",
+                f"is {shown(name)}; files in {self.path} are named without a folder; {nearest_names(name, known)}",
                 key=key, value=name,
             )  # fmt: skip
         if not is_file(self.path / file):

@@ -82,6 +82,24 @@ class ParkingBrakeTable:
 
 
 @dataclass(frozen=True)
+class SensorOffsetTable:
+    """Offsets of the sensors of a repeated measurement: what each sensor shows, less the true value."""
+
+    yaw_rate_radps: float = 0.0
+    """Of the yaw rate [rad/s]."""
+    ax_mps2: float = 0.0
+    """Of the longitudinal acceleration [m/s2]."""
+    ay_mps2: float = 0.0
+    """Of the lateral acceleration [m/s2]."""
+    roll_rad: float = 0.0
+    """Of the roll angle [rad]."""
+    pitch_rad: float = 0.0
+    """Of the pitch angle [rad]."""
+    sideslip_rad: float = 0.0
+    """Of the sideslip angle [rad]."""
+
+
+@dataclass(frozen=True)
 class WheelTorqueTable:
     """Torques of each wheel over time. A missing column is zero."""
 
@@ -157,8 +175,10 @@ class OpenLoop(Maneuver, kind="open_loop"):
     drive: DriveMode = "hold_speed"
     """`hold_speed` or `coast`. With wheel torques it holds only before the recording starts."""
     sensor_ahead_m: float = 0.0
-    """Position of the sensors of a repeated measurement, ahead of the centre of gravity [m]: `fit`, `compare` and
-    `validate` use the motion there."""
+    """Position of the sensors of a repeated measurement, ahead of the centre of gravity [m]: `fit` and `compare`
+    use the motion there."""
+    sensor_offset: SensorOffsetTable = SensorOffsetTable()
+    """Offsets of these sensors, which `fit` and `compare` add to the motion."""
     hold_last: bool = False
     """Whether steering or wheel torques that end before `duration_s` keep their last value. A single value always
     does."""

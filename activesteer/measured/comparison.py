@@ -24,6 +24,8 @@ from activesteer.recording import Recording
 INPUTS: Final = ("steering_wheel_rad", "rack_m")
 """Channels that align the clocks if both runs have them: the response of another car may lag, its input may not."""
 RESPONSES: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
+_SEEN: Final = 1e-3
+"""Noise, relative to the tolerance, below which a table leaves it out."""
 _STEP_S: Final = 0.01
 """Step of the search [s]. The result is found between its instants."""
 _NEARLY: Final = 0.01
@@ -355,7 +357,7 @@ def words(found: Compared) -> tuple[str, str, str, str, str]:
     shown = quantity_of(found.channel)
     unit, factor = shown.unit.name, shown.factor
     allowed = f"{found.tolerance.offset * factor:.3g} {unit} + {100.0 * found.tolerance.gain:g} %"
-    allowed += f" + noise {found.noise * factor:.2g}" if found.noise else ""
+    allowed += f" + noise {found.noise * factor:.2g}" if found.noise > _SEEN * found.tolerance.offset else ""
     return (
         shown.label,
         f"{rms(found.residual) * factor:.3g} {unit}",

@@ -104,6 +104,8 @@ _ALIKE: Final = 0.95
 """Correlation of two parameters above which a note is given."""
 _MUCH: Final = 1.5
 """Residual of a channel relative to its noise above which the car does not explain the channel."""
+_CONSTANT: Final = 0.8
+"""Part of the mean square of a residual from which its mean stands for it."""
 _HANGS: Final = 5.0
 """Number of samples per independent sample above which a note is given. Filtered noise of a test vehicle, about 20 Hz,
 has 2 at 100 Hz."""
@@ -200,8 +202,15 @@ class Fit(NamedTuple):
             found.append(f"{one} and {other} can hardly be separated: {correlation}")
         for each in self.compared:
             left = rms(each.after)
-            where = f"{quantity_of(each.channel).label} in {each.recording}"
-            if left > _MUCH:
+            shown = quantity_of(each.channel)
+            where, mean = f"{shown.label} in {each.recording}", float(np.mean(each.after))
+            if left > _MUCH and mean**2 > _CONSTANT * left**2:
+                offset = f"{-each.noise * mean * shown.unit.factor:.3g} {shown.unit.name}"
+                found.append(
+                    f"the residual of the {where} is a constant offset: measured less simulated is {offset}; set "
+                    f"zero_until_s of {each.channel} in the map, or make sensor_offset.{each.channel} a factor"
+                )
+            elif left > _MUCH:
                 found.append(
                     f"the residual of the {where} is {left:.1f} times its noise: car or inputs differ, and errors may "
                     "exceed the intervals"

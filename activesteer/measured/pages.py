@@ -28,14 +28,16 @@ from activesteer.plotting import Area, Curve, Panel, Picture
 
 _EDGE: Final = "#9bbbd4"
 _START: Final = "#888888"
+_SAME_TIME_S: Final = 0.05e-3
+"""Shifts below it are 0.0 ms."""
 
 
 def comparison_page(found: Comparison, measured: list[str], simulated: str) -> Page:
     """Return the page."""
-    lead = [
-        f"Measured: {', '.join(measured)}. Simulated: {simulated}. {STANDARDS[found.standard]}.",
-        f"Measured {', '.join(map(_shift, found.shifts_s))} than simulated; the runs are shown without this shift.",
-    ]
+    shifts = f"Measured {', '.join(map(_shift, found.shifts_s))} than simulated; this shift is removed."
+    if all(abs(shift_s) < _SAME_TIME_S for shift_s in found.shifts_s):
+        shifts = "There is no time shift between measurement and simulation."
+    lead = [f"Measured: {', '.join(measured)}. Simulated: {simulated}. {STANDARDS[found.standard]}.", shifts]
     columns = ["quantity", "rms of the residual", "tolerance", "share inside", ""]
     outside = frozenset(number for number, each in enumerate(found.quantities) if not each.inside)
     table = Table("", columns, [words(each) for each in found.quantities], outside)
@@ -132,8 +134,8 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
         pictures = [_picture(one) for one in shown if one.part == "check"]
         lines, points = ["no value comes from the data"], []
         if found is not None:
-            free = f"free in the fit windows: {', '.join(one.key for one in found.parameters)}"
-            lines, points = [free, *(f"! {note}" for note in found.notes)], rests_on(found)
+            free = f"Free in the fit windows: {', '.join(one.key for one in found.parameters)}"
+            lines, points = [free, *(f"Note: {note}." for note in found.notes)], rests_on(found)
         sections.append(Section(name.capitalize(), lines, pictures, tables, points))
     if result.ends:
         text = (

@@ -279,11 +279,13 @@ def _sideslip(vx: Array, vy: Array) -> Array:
 
 
 def at_sensor(run: Recording) -> Recording:
-    """Return the run with the motion of the point that `sensor_ahead_m` of its manoeuvre names."""
+    """Return the motion of the point `sensor_ahead_m` of the manoeuvre, with the offsets in `sensor_offset`."""
     # The point is on the centre line of a rigid body, ahead of the centre of gravity by x: v_y + x r, a_y + x dr/dt,
     # a_x - x r^2 with the yaw rate r.
-    ahead_m = run.metadata.get("maneuver", {}).get("sensor_ahead_m", 0.0)
-    if ahead_m == 0.0:
+    maneuver = run.metadata.get("maneuver", {})
+    ahead_m = maneuver.get("sensor_ahead_m", 0.0)
+    offsets = {name: offset for name, offset in maneuver.get("sensor_offset", {}).items() if offset}
+    if ahead_m == 0.0 and not offsets:
         return run
     rate = run["yaw_rate_radps"]
     vx, vy = run["vx_mps"], run["vy_mps"] + ahead_m * rate
@@ -294,7 +296,7 @@ def at_sensor(run: Recording) -> Recording:
         "ay_mps2": run["ay_mps2"] + ahead_m * np.gradient(rate, run.time_s),
         "ax_mps2": run["ax_mps2"] - ahead_m * rate**2,
     }
-    values = [moved.get(channel.name, run[channel.name]) for channel in run.channels]
+    values = [moved.get(channel.name, run[channel.name]) + offsets.get(channel.name, 0.0) for channel in run.channels]
     return Recording(run.channels, run.time_s, np.column_stack(values), metadata=run.metadata)
 
 

@@ -134,7 +134,8 @@ def examination_page(result: Examination) -> Page:
     if together:
         sections.append(Section("All controllers", pictures=together))
     for name, found in result.findings.items():
-        words = Markup("{}: {}.").format(_verdict(found), found.error or typeset(found.summary))
+        mark = ":" if found.error or found.passed is None else ""  # none after a chip
+        words = Markup("{}{} {}.").format(_verdict(found), mark, found.error or typeset(found.summary))
         alone = [] if together else found.pictures
         sections.append(Section(name, [words], alone, found.tables))
     sections += [

@@ -44,6 +44,7 @@ def test_linearise_tells_the_modes_and_draws(tmp_path, capsys):
         assert mode in told
     assert (tmp_path / "bode.png").stat().st_size > 10_000
     assert (tmp_path / "root_locus.png").stat().st_size > 10_000
+    assert "wheel hop" in (tmp_path / "modes.html").read_text("utf-8")
 
 
 def test_linearise_takes_other_values_of_the_car(capsys):
@@ -87,6 +88,7 @@ def test_driver_tells_how_stable_the_loop_is_and_draws(tmp_path, capsys):
         # From the slow end of what is measured of humans to a little beyond the quick one, 4 rad/s.
         assert 1.5 < row["crossover_rad_s"] < 4.5
     assert (tmp_path / "driver.png").exists()
+    assert "afs_tuned" in (tmp_path / "driver.html").read_text("utf-8")
 
 
 def test_driver_that_is_code_has_no_linear_form(tmp_path, capsys):

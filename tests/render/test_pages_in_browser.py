@@ -140,6 +140,12 @@ def test_a_phone_shows_every_kind_of_panel_and_a_row_as_a_card(shown, tmp_path):
     assert box["width"] <= 390.0
 
 
+def test_a_value_that_rounds_to_zero_has_no_sign(shown, tmp_path):
+    page = shown(every_panel(tmp_path), **DESK)
+    told = page.evaluate("[-0.001, -0.01, 0, null, -1234.5].map(shown)")
+    assert told == ["0.00", "\N{MINUS SIGN}0.01", "0.00", "\N{EN DASH}", "\N{MINUS SIGN}1235"]
+
+
 def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_path):
     page = shown(every_panel(tmp_path), **DESK)
     figure = page.locator("figure").first
@@ -153,6 +159,25 @@ def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_
     assert button.get_attribute("aria-pressed") == "false"
     page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 20.0)
     assert figure.locator(".values span").count() == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("device", ["desk light", "phone light"])
+def test_one_player_moves_the_curves_of_all_pictures_and_stays_in_sight(shown, tmp_path, device):
+    time_s = np.linspace(2.0, 4.0, 50)
+    pictures = [Picture(f"picture {i}", [Panel("time [s]", "angle [deg]", [Curve(time_s, time_s)])]) for i in range(4)]
+    sections = [Section(str(i), ["Text."], [picture]) for i, picture in enumerate(pictures)]
+    page = shown(write_page(Page("all", "Time", [], sections), tmp_path / "t.html"), **DEVICES[device])
+    slider, height = page.locator("input.time"), page.evaluate("document.body.scrollHeight")
+    slider.evaluate("(slider) => { slider.value = slider.max / 2; slider.dispatchEvent(new Event('input')); }")
+    assert page.evaluate("document.body.scrollHeight") == height  # nothing jumps when values appear
+    assert page.locator(".player output").inner_text() == "3.00 s"
+    for figure in page.locator("figure").all():
+        figure.scroll_into_view_if_needed()
+        assert float(figure.locator(".values").inner_text().split()[0]) == pytest.approx(3.0, abs=0.05)
+        box = slider.bounding_box()
+        assert box
+        assert 0.0 <= box["y"] < DEVICES[device]["viewport"]["height"]
 
 
 @pytest.mark.slow

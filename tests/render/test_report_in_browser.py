@@ -272,6 +272,17 @@ def test_slider_and_play_button_move_the_cars_and_the_cursor(open_page):
 
 
 @pytest.mark.slow
+def test_a_phone_keeps_the_player_in_sight_and_shortens_no_title(open_page):
+    page = open_page(**PHONE)
+    page.locator("#group-1 .plots figure").last.scroll_into_view_if_needed()
+    box = page.locator("#group-1 .player").bounding_box()
+    assert box
+    assert 0.0 <= box["y"] < 100.0
+    cut = "(part) => part.scrollWidth > part.clientWidth + 1"
+    assert not any(part.evaluate(cut) for part in page.locator("figcaption .quiet").all())
+
+
+@pytest.mark.slow
 def test_contents_stay_in_view_and_mark_the_manoeuvre_that_is_read(open_page):
     page = open_page(**DESK)
     page.locator("#group-2 .plots figure").last.scroll_into_view_if_needed()

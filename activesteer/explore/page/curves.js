@@ -57,18 +57,18 @@ export class Curves {
     if (shown && shown.key === key) { shown.plot.setData(data); return; }
     if (!shown) {
       const values = element("span", { class: "quiet" }), holder = element("div", { role: "img", "aria-label": `${title} over time` });
-      const figure = element("div", {}, element("p", {}, element("b", {}, title), ` ${panel.unit} `, values), holder);
+      const figure = element("div", {}, element("p", {}, element("b", {}, title), ` ${[panel.unit, panel.note].filter(Boolean).join(", ")} `, values), holder);
       this.box.append(figure);
       shown = { figure, holder, values };
       this.plots.set(title, shown);
     } else shown.plot.destroy();
     shown.key = key;
-    const axis = (size) => ({ stroke: () => paint("quiet"), font: FONT, size, gap: 4, grid: { stroke: () => paint("grid"), width: 1 }, ticks: { show: false } });
+    const axis = (size, unit = "") => ({ values: (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit)), stroke: () => paint("quiet"), font: FONT, size, gap: 4, grid: { stroke: () => paint("grid"), width: 1 }, ticks: { show: false } });
     shown.plot = new uPlot({
       width: shown.holder.clientWidth || 380, height: HEIGHT, legend: { show: false }, padding: [6, 14, 0, 0],
       cursor: { y: false, sync: { key: "explore" }, drag: { x: false, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
-      axes: [axis(26), axis(44)],
+      axes: [axis(26, " s"), axis(44)],
       series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
       hooks: { setCursor: [(u) => {
         const i = u.cursor.idx;

@@ -34,6 +34,8 @@ function describe(ticked) {
   if (!chosen().length) { say("Choose at least one controller."); return; }
   say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "");
   asking.stop();
+  // Another controller leaves the sliders where they are; they apply where the new choice has them.
+  if (ticked) state.wanted = state.values;
   state.values = {};
   state.runs = new Map();
   state.ghosts = new Map();
@@ -112,7 +114,8 @@ const hear = {
   run(header, arrays) {
     if (header.id !== state.id) return;
     $("title").textContent = header.title;
-    if (state.first == null) { state.first = performance.now() - state.asked; state.runs = new Map(); }
+    // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
+    if (state.first == null) state.first = performance.now() - state.asked;
     if (header.error) say(`${header.name}: ${header.error}`);
     state.runs.set(header.name, { ...header, poses: arrays[0] });
     redraw();

@@ -59,7 +59,7 @@ export class Scene {
     this.heading = null;
     onTheme(() => this.colours());
     this.colours();
-    new ResizeObserver(() => this.fit()).observe(canvas.parentElement);
+    new ResizeObserver(() => this.fit()).observe(canvas);
     this.fit();
   }
 

@@ -9,7 +9,7 @@ mix();
 const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
 // Least size of a cone [px], otherwise cones and cars have their true size; distance between drawn cars [px].
 const LEAST_CONE = 2, CARS_APART = 110;
-// Instants of a picture's slider.
+// Instants of the slider.
 const INSTANTS = 1000;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
 const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 106, PRINTED_TRACK_HEIGHT = 170;
@@ -24,7 +24,12 @@ const element = (name, attributes = {}, ...children) => {
 // Axis labels with a real minus sign and without rounding errors.
 const labels = (unit) => (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit));
 const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
-const shown = (number) => (number == null ? "–" : number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0).replace("-", "−"));
+// A number with a real minus sign, and none before zero.
+const shown = (number) => {
+  if (number == null) return "–";
+  const text = number.toFixed(Math.abs(number) < 10 ? 2 : Math.abs(number) < 1000 ? 1 : 0);
+  return text.replace("-", Number(text) ? "−" : "");
+};
 
 const dashed = (run, width) => run.dashes.map((length) => length * width);
 // Later runs lie over earlier ones; thinner and dashed, they leave these visible.
@@ -37,7 +42,7 @@ function padded(low, high, least) {
   return [middle - half, middle + half];
 }
 
-const DARK = matchMedia("(prefers-color-scheme: dark)");
+const DARK = matchMedia("(prefers-color-scheme: dark)"), NARROW = matchMedia("(max-width: 760px)");
 // All that is drawn anew for another colour scheme, another width, or paper.
 const drawn = [];
 
@@ -145,6 +150,11 @@ class Chart {
       if (!levels) continue;
       axis.splits = () => levels.map((_, i) => i);
       axis.values = (u) => { const every = Math.ceil((levels.length * room) / (axis === plain ? u.width : u.height)); return levels.map((level, i) => (i % every ? "" : level)); };
+    }
+    // uPlot names powers of ten only; a short axis needs more.
+    for (const [key, axis] of [["x", plain], ["y", side]]) {
+      const [low, high] = this.limits[key];
+      if (panel.log.includes(key) && high / low < 300) axis.filter = (_, ticks) => ticks.map((tick) => (/^[125]e/.test((+tick.toPrecision(6)).toExponential()) ? tick : null));
     }
     const axes = [plain, side];
     if (panel.above) axes.push({ ...axis(26), side: 0, scale: "x", grid: { show: false }, values: (_, ticks) => labels("")(_, ticks.map((tick) => +between(tick, panel.above.first, panel.above.second).toPrecision(2))) });
@@ -257,17 +267,17 @@ class Chart {
 class Player {
   constructor(last, step_s, start_s, show) {
     Object.assign(this, { last, step_s, start_s, show, playing: false, held: false });
-    this.button = element("button", { type: "button", class: "play" }, "\u25b6 Play");
+    this.button = element("button", { type: "button", class: "play" }, "Play");
     this.slider = element("input", { type: "range", class: "time", min: 0, max: last, value: 0, "aria-label": "Time" });
     this.clock = element("output", { class: "quiet" });
-    this.parts = [this.button, this.slider, this.clock];
+    this.row = element("div", { class: "player" }, this.button, this.slider, this.clock);
     this.button.addEventListener("click", () => this.play(!this.playing));
     this.slider.addEventListener("input", () => { this.play(false); this.held = true; show(+this.slider.value); });
   }
 
   play(on) {
     this.playing = on;
-    this.button.textContent = on ? "\u23f8 Pause" : "\u25b6 Play";
+    this.button.textContent = on ? "Pause" : "Play";
     if (!on) return;
     this.held = true;
     let exact = +this.slider.value < this.last ? +this.slider.value : 0, before = null;
@@ -310,28 +320,35 @@ function drawPicture(box, picture, place) {
     bar.append(button);
   };
   for (const panel of picture.panels) {
-    if (panel.legend) bar.append(element("span", { class: "hint" }, panel.legend));
+    if (panel.legend) bar.append(element("span", { class: "scale" }, panel.legend));
     for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || [1, 2]).map((length) => 2 * length));
     for (const area of panel.areas) entry(area.label, inkOf(area.colour), []);
     for (const [, label] of panel.limits) entry(label, "var(--failed)", [6, 4]);
   }
   if (picture.scale) {
     const [label, low, high] = picture.scale;
-    bar.append(element("span", { class: "hint" }, label), `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`);
+    bar.append(element("span", { class: "scale" }, label), `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`);
   }
   box.replaceChildren();
   for (const panel of picture.panels) charts.push(new Chart(box, panel, picture));
-  const timed = charts.filter(({ panel }) => panel.x.startsWith("time"));
-  if (timed.length) {
-    const start_s = Math.min(...timed.map(({ limits }) => limits.x[0])), end_s = Math.max(...timed.map(({ limits }) => limits.x[1]));
-    const step_s = (end_s - start_s) / INSTANTS;
-    const player = new Player(INSTANTS, step_s, start_s, (i) => {
-      player.tell(i);
-      for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
-    });
-    bar.append(...player.parts);
-  }
   if (bar.childNodes.length) box.before(bar);
+  return charts;
+}
+
+// One button and one slider for all curves over time of a page, which stay in sight.
+function addPlayer(charts) {
+  const timed = charts.filter(({ panel }) => panel.x.startsWith("time"));
+  if (!timed.length) return;
+  let start_s = Infinity, end_s = -Infinity;
+  for (const time_s of timed.flatMap(({ panel }) => panel.curves.flatMap((curve) => curve.x))) if (time_s != null) { start_s = Math.min(start_s, time_s); end_s = Math.max(end_s, time_s); }
+  if (!(end_s > start_s)) return;
+  const step_s = (end_s - start_s) / INSTANTS;
+  const player = new Player(INSTANTS, step_s, start_s, (i) => {
+    player.tell(i);
+    for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
+  });
+  const box = timed[0].holder.closest(".plots"), bar = box.previousElementSibling;
+  (bar?.classList.contains("toolbar") ? bar : box).before(player.row);
 }
 
 const repaintAll = () => { mix(); for (const each of drawn) each.repaint(); };
@@ -339,10 +356,12 @@ DARK.addEventListener("change", repaintAll);
 addEventListener("beforeprint", () => {
   document.documentElement.classList.add("paper");
   repaintAll();
-  for (const details of document.querySelectorAll(".group > details")) details.open = true;
+  for (const details of document.querySelectorAll(".group > details, details.rows")) details.open = true;
   for (const each of drawn) each.fit(PRINTED);
 });
 addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaintAll(); for (const each of drawn) each.fit(); });
 
+// Long tables are folded on a phone, and open on paper.
+if (NARROW.matches) for (const details of document.querySelectorAll("details.rows")) details.open = false;
 const DATA = JSON.parse(document.getElementById("data")?.textContent ?? "{}");
-(DATA.pictures ?? []).forEach((picture, place) => drawPicture(document.querySelector(`.plots[data-picture="${place}"]`), picture, place));
+addPlayer((DATA.pictures ?? []).flatMap((picture, place) => drawPicture(document.querySelector(`.plots[data-picture="${place}"]`), picture, place)));

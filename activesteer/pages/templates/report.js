@@ -56,7 +56,9 @@
       const reset = element("button", { type: "button", class: "reset" }, "Whole run");
       reset.addEventListener("click", () => { this.zoom(null); if (this.track) this.track.whole(); });
       const touch = matchMedia("(pointer: coarse)").matches;
-      bar.append(reset, ...this.player.parts, element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values, tap a run to hide it." : "Drag to zoom, double-click for the whole run; point at a run to see it alone, click to hide it."));
+      bar.append(reset, this.player.row, element("span", { class: "hint" }, touch ? "Pinch to zoom, slide to read values, tap a run to hide it." : "Drag to zoom, double-click for the whole run; point at a run to see it alone, click to hide it."));
+      // The legend of a phone takes too much room to stay in sight; the player does.
+      if (NARROW.matches) bar.after(this.player.row);
     }
 
     show(i) {
@@ -108,7 +110,7 @@
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
       ctx.strokeStyle = ctx.fillStyle = paint.quiet;
       ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
-      ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
+      ctx.font = FONT.replace("12px", `${11 * devicePixelRatio}px`);
       ctx.textBaseline = "top"; ctx.textAlign = "left";
       let free = bbox.left;
       for (const mark of this.data.marks) {

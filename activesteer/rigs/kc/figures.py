@@ -13,6 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from activesteer.core.conventions import Array
+from activesteer.core.units import typeset
 from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, save_all
 from activesteer.plotting import draw as drawn
@@ -308,4 +309,5 @@ def _place(entry: KcMetric) -> float:
 def _row_name(entry: KcMetric) -> str:
     assert entry.band is not None
     name = entry.name.replace("_", " ")
-    return f"{entry.axle}  {name}  {entry.value:.4g} ({entry.band[0]:g} to {entry.band[1]:g} {entry.unit})"
+    band = f"{entry.band[0]:g} to {entry.band[1]:g} {entry.unit}".removesuffix(" -")
+    return typeset(f"{entry.axle}  {name}  {entry.value:.4g} ({band})")

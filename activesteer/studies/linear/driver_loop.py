@@ -17,7 +17,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,15 +28,12 @@ from activesteer.core.conventions import DEFAULT_TIMESTEP_S, RUN_COLOURS, Array,
 from activesteer.driver import DriverParameters
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
 from activesteer.errors import DriverError, StudyError
-from activesteer.plotting import Curve, Panel, Picture, draw
+from activesteer.plotting import Curve, Panel, Picture
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, check_gains, resolve
 from activesteer.simulation.runner import simulate
 from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_car
 from activesteer.theory.single_track import SingleTrack
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 STEP_M: Final = 0.5
 """Offset of the path beside the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear, and
@@ -305,11 +302,11 @@ def driver_loops(
     return found
 
 
-def driver_loops_figure(
+def driver_loops_picture(
     rows: Sequence[Mapping[str, Any]],
     frequency_radps: NDArray[np.float64],
     responses: Sequence[NDArray[np.complexfloating]],
-) -> Figure:
+) -> Picture:
     """Return Bode diagrams of the open loop of driver and car at the middle speed, and its damping over speed."""
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
@@ -344,4 +341,4 @@ def driver_loops_figure(
         Panel("frequency [rad/s]", "phase [deg]", phase, log="x", x_range=x_range, y_range=(-360.0, -90.0)),
         Panel("speed [km/h]", "damping [-]\nlines linear, dots runs", damping, y_range=(lowest, 1.1)),
     ]
-    return draw(Picture("", panels, columns=1, width_in=7.5, height_in=8.0))
+    return Picture("", panels, columns=1, width_in=7.5, height_in=8.0)

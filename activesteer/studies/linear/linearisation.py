@@ -22,11 +22,9 @@ steered car slides. The friction and play of screws in the toe links are left ou
 from __future__ import annotations
 
 import math
-import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -39,7 +37,8 @@ from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.core.text_table import text_table
 from activesteer.core.units import quantity_of
 from activesteer.errors import ModelError, ParameterError
-from activesteer.plotting import Curve, Panel, Picture, draw, save
+from activesteer.pages import Page, Section, Table
+from activesteer.plotting import Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.vehicle import Vehicle
@@ -349,18 +348,39 @@ def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> s
         modes: Modes, as from `LinearCar.modes`.
         highest_Hz: Natural frequency above which modes are left out [Hz].
     """
-    rows = [("mode", "f [Hz]", "damping", "eigenvalue [1/s]", "participation")]
+    rows = [_MODE_COLUMNS, *_mode_rows(modes, highest_Hz)]
+    for place in (1, 2):  # numbers are aligned to the right
+        width = max(len(row[place]) for row in rows)
+        rows = [(*row[:place], row[place].rjust(width), *row[place + 1 :]) for row in rows]
+    return "\n".join(text_table(rows, text=5))
+
+
+_LEAST_SHARE: Final = 0.005
+"""Participation below it is left out."""
+_MODE_COLUMNS: Final = ("mode", "f [Hz]", "damping", "eigenvalue [1/s]", "participation")
+
+
+def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, ...]]:
     for mode in modes:
         if mode.natural_frequency_Hz > highest_Hz:
             continue
         s = mode.eigenvalue_1ps
         value = f"{s.real:.2f}" + (f" +- {s.imag:.2f}i" if s.imag else "")
-        parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in list(mode.participation.items())[:3])
-        rows.append((mode.name, f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}", value, parts))
-    for place in (1, 2):  # numbers are aligned to the right
-        width = max(len(row[place]) for row in rows)
-        rows = [(*row[:place], row[place].rjust(width), *row[place + 1 :]) for row in rows]
-    return "\n".join(text_table(rows, text=5))
+        largest = list(mode.participation.items())[:3]
+        parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in largest if fraction >= _LEAST_SHARE)
+        yield mode.name, f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}", value, parts
+
+
+def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture) -> Page:
+    """Return the page of a linear car: its modes, its response to the steering wheel, and its poles over speed."""
+    rows = [[cell.replace("+-", "\N{PLUS-MINUS SIGN}") for cell in row] for row in _mode_rows(modes, CUT_OFF_HZ)]
+    table = Table("", _MODE_COLUMNS, rows)
+    sections = [
+        Section("Modes", tables=[table]),
+        Section("From the steering wheel to the motion", pictures=[bode]),
+        Section("Poles over speed", ["Rays are damping ratios, arcs natural frequencies."], [locus]),
+    ]
+    return Page(f"activesteer linearise: {title}", f"Linear car: {title}", [], sections)
 
 
 BODE_RANGE_Hz: Final = (0.1, 10.0)
@@ -376,8 +396,8 @@ _GAIN_UNITS: Final = {
 }  # fmt: skip
 
 
-def draw_bode(label: str, system: control.StateSpace, path: str | os.PathLike[str]) -> Path:
-    """Draw gain and phase of a linear car over frequency, from the steering wheel to its outputs, and save them."""
+def bode_picture(label: str, system: control.StateSpace) -> Picture:
+    """Return gain and phase of a linear car over frequency, from the steering wheel to its outputs."""
     frequency_Hz = np.geomspace(*BODE_RANGE_Hz, 300)
     found = system(2j * math.pi * frequency_Hz, squeeze=False)
     panels = []
@@ -386,17 +406,14 @@ def draw_bode(label: str, system: control.StateSpace, path: str | os.PathLike[st
         gain = Curve(frequency_Hz, np.abs(values), label, RUN_COLOURS[1], "-", 1.5)
         phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), label, RUN_COLOURS[1], "-", 1.5)
         below = "frequency [Hz]" if output == "sideslip_rad" else ""
-        y_label = f"{quantity_of(output).short}\n[{_GAIN_UNITS[output]}]"
-        panels.append(Panel(below, y_label, [gain], log="xy", x_range=BODE_RANGE_Hz))
-        panels.append(Panel(below, "phase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
-    picture = Picture("", panels, columns=2, width_in=7.5, height_in=9.0, shared_legend=True)
-    return save(draw(picture), Path(path))
+        short = quantity_of(output).short
+        panels.append(Panel(below, f"{short}\n[{_GAIN_UNITS[output]}]", [gain], log="xy", x_range=BODE_RANGE_Hz))
+        panels.append(Panel(below, f"{short}:\nphase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
+    return Picture("", panels, columns=2, width_in=7.5, height_in=9.0, shared_legend=True)
 
 
-def draw_root_locus(
-    systems: Sequence[control.StateSpace], speeds_mps: Sequence[float], path: str | os.PathLike[str]
-) -> Path:
-    """Draw the poles of a car over its speed, with rays of equal damping, and save the picture."""
+def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequence[float]) -> Picture:
+    """Return the poles of a car over its speed, with rays of equal damping."""
     limit, angle = 2.0 * math.pi * LOCUS_LIMIT_Hz, np.linspace(math.pi / 2.0, math.pi, 60)
     curves, notes = [], []
     for frequency_Hz in range(1, math.ceil(LOCUS_LIMIT_Hz)):
@@ -415,4 +432,4 @@ def draw_root_locus(
         curves.append(Curve(poles.real, poles.imag, dashes="", marker="o", size=3.5, shade=shade))
     panel = Panel("real part [1/s]", "imaginary part [1/s]", curves, notes=notes, y_range=(-1.0, 1.05 * limit))
     scale = ("speed [km/h]", slowest, fastest)
-    return save(draw(Picture("", [panel], width_in=7.5, height_in=5.5, scale=scale)), Path(path))
+    return Picture("", [panel], width_in=7.5, height_in=5.5, scale=scale)

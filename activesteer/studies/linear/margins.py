@@ -395,7 +395,7 @@ def _picture(loops: Sequence[LoopMargins]) -> Picture:
 
 
 def _table(loops: Sequence[LoopMargins]) -> Table:
-    least = min(range(len(loops)), key=lambda row: loops[row].margins.disk)
+    least = min(loops, key=lambda each: each.margins.disk)
     heads = ["speed [km/h]", "gain margin [dB]", "phase margin [deg]", "delay margin [ms]", "disk margin [-]"]
     heads += ["changed"] if any(each.factors for each in loops) else []
     rows = []
@@ -403,9 +403,10 @@ def _table(loops: Sequence[LoopMargins]) -> Table:
         margins = each.margins
         values = (margins.gain_dB, math.degrees(margins.phase_rad), 1e3 * margins.delay_s, margins.disk)
         numbers = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
+        numbers[-1] += ", the smallest" if each is least else ""
         changed = ", ".join(f"{key} = {value}" for key, value in each.factors.items())
         rows.append([f"{each.speed_kmh:g}", *numbers, changed][: len(heads)])
-    return Table("", heads, rows, frozenset([least]))
+    return Table("", heads, rows)
 
 
 def worst_margins(

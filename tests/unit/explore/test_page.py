@@ -125,6 +125,11 @@ def test_four_controllers_are_asked_for_and_a_fifth_is_unticked_with_a_message(t
     assert page["message"].startswith("esc is not driven")
 
 
+def test_another_controller_leaves_the_sliders_where_they_are(tmp_path: Path) -> None:
+    page = used(tmp_path, "drag(120); finish(); tick('lqr', true); describe();")
+    assert page["runs"] == [[120, True], [120, False]]
+
+
 def test_an_address_names_own_files_and_values_of_sliders(tmp_path: Path) -> None:
     address = "#maneuver=mine.toml&controllers=none,my.py:C%3Fgain=2&speed_kmh=95"
     page = used(tmp_path, "", address)

@@ -48,7 +48,7 @@ def seen(maneuver: Maneuver) -> str:
     met += [maneuver.duration_s, maneuver.speed_mps, frictions, road.grade]
     met += [road.bank_rad, *_surface(road)]
     met += [None if course is None else course.to_table()]
-    met += [getattr(maneuver, "sensor_ahead_m", None)]  # what `fit` and `compare` use
+    met += [getattr(maneuver, key, None) for key in ("sensor_ahead_m", "sensor_offset")]  # what `fit` and `compare` use
     if road.is_uneven or road.areas():
         along = np.linspace(0.0, 100.0, 20)
         met += [np.round(np.stack(road.laid(course).placed(along, 0.1 * along)), 6)]

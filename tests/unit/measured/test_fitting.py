@@ -37,12 +37,18 @@ def truth() -> Recording:
     return activesteer.simulate(table, overrides=TRUTH)
 
 
-def noisy(truth: Recording, path: Path, seed: int) -> None:
-    """Write the channels of a data logger, every 10 ms with noise; the inputs have 0.1 deg and 0.1 km/h of it."""
+def noisy(truth: Recording, path: Path, seed: int, **offsets: float) -> None:
+    """Write the channels of a data logger, every 10 ms with noise and offsets; the inputs have 0.1 deg and 0.1 km/h
+    of noise.
+    """
     rng = np.random.default_rng(seed)
     rows = slice(None, None, 10)
     noise = {"steering_wheel_rad": math.radians(0.1), "speed_mps": 0.1 / 3.6, **NOISE}
-    values = [truth[name][rows] + size * rng.standard_normal(len(truth.time_s[rows])) for name, size in noise.items()]
+    noise |= dict.fromkeys(offsets, math.radians(0.1))
+    values = [
+        truth[name][rows] + offsets.get(name, 0.0) + size * rng.standard_normal(len(truth.time_s[rows]))
+        for name, size in noise.items()
+    ]
     Recording([truth.channels[name] for name in noise], truth.time_s[rows], np.column_stack(values)).save(path)
 
 
@@ -72,6 +78,22 @@ def test_known_values_lie_in_their_intervals_and_are_written(folder):
     assert [path.name for path in write_fit(found, "fit", folder / "out")] == ["fit.json", "overrides.toml", "fit.html"]
     assert read_toml(folder / "out" / "overrides.toml")[0] == {one.key: one.value for one in found.parameters}
     assert 'data-picture="0"' in (folder / "out" / "fit.html").read_text()
+
+
+def test_the_offset_of_a_sensor_is_said_and_can_be_a_parameter(truth, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    noisy(truth, tmp_path / "a.mcap", 4, roll_rad=math.radians(-0.5))
+    noise = {"yaw_rate_degps": 0.2, "roll_deg": 0.1}
+    study = {**STUDY, "overrides": {**STUDY["overrides"], **TRUTH}, "fit": {"noise": noise}}
+    factors = {"factors.anti_roll_bar": {"uniform": [0.6, 1.6]}}
+    (note,) = (note for note in fit({**study, "factors": factors}, jobs=1).notes if "constant offset" in note)
+    assert "roll angle in a" in note
+    assert "zero_until_s of roll_rad" in note
+    assert float(note.partition("simulated is ")[2].split()[0]) == pytest.approx(-0.5, abs=0.1)
+
+    found = fit({**study, "factors": {"sensor_offset.roll_deg": {"uniform": [-2.0, 2.0]}}}, jobs=1)
+    assert found.notes == ()
+    assert found.parameters[0].value == pytest.approx(-0.5, abs=0.02)
 
 
 def test_a_parameter_at_the_end_of_a_range_that_is_too_narrow_is_said(folder):

@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.figures import figure_2
-from activesteer.studies.linear.linearisation import draw_bode, draw_root_locus
+from activesteer.pages import render_page
+from activesteer.plotting import draw
+from activesteer.studies.linear.linearisation import bode_picture, modes_page, root_locus_picture
+from activesteer.vehicle.linear_state import Mode
 from tests.unit.analysis.synthetic import step_steer
 
 OUTPUTS = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
@@ -22,9 +25,8 @@ def system(speed_mps: float = 20.0) -> control.StateSpace:
     )  # fmt: skip
 
 
-def test_bode_diagram_shows_gain_and_phase_of_every_output(figures, tmp_path):
-    draw_bode("a", system(), tmp_path / "bode.png")
-    axes = figures[0].get_axes()
+def test_bode_diagram_shows_gain_and_phase_of_every_output():
+    axes = draw(bode_picture("a", system())).get_axes()
     assert len(axes) == 2 * len(OUTPUTS)
     assert [len(axis.get_lines()) for axis in axes] == [1] * len(axes)
     curve = axes[0].get_lines()[0]
@@ -32,19 +34,28 @@ def test_bode_diagram_shows_gain_and_phase_of_every_output(figures, tmp_path):
     assert np.asarray(curve.get_ydata()) == pytest.approx(np.ravel(expected))
 
 
-def test_root_locus_has_the_poles_of_every_speed(figures, tmp_path):
+def test_root_locus_has_the_poles_of_every_speed():
     speeds = [10.0, 20.0, 40.0]
-    draw_root_locus([system(speed) for speed in speeds], speeds, tmp_path / "locus.png")
+    axes = draw(root_locus_picture([system(speed) for speed in speeds], speeds)).get_axes()
     colormaps = pytest.importorskip("matplotlib").colormaps
-    dots = [line for line in figures[0].get_axes()[0].get_lines() if line.get_marker() == "o"]
+    dots = [line for line in axes[0].get_lines() if line.get_marker() == "o"]
     for speed, line, shade in zip(speeds, dots, (0.0, 1.0 / 3.0, 1.0), strict=True):
         assert line.get_color() == colormaps["viridis"](shade)
         shown = np.asarray(line.get_xdata()) + 1j * np.asarray(line.get_ydata())
         for pole in system(speed).poles():
             if pole.imag > 0 and speed > 10.0:
                 assert np.abs(shown - pole).min() < 1e-9
-    low, high = figures[0].get_axes()[1].get_ylim()
+    low, high = axes[1].get_ylim()
     assert (low, high) == pytest.approx((36.0, 144.0))
+
+
+def test_page_has_a_row_for_each_mode_and_all_panels():
+    modes = [Mode("yaw/sideslip", complex(-3.0, 4.0), {"yaw": 0.99, "drive": 0.001}, np.ones(1), np.ones(1))]
+    page = modes_page("car", modes, bode_picture("a", system()), root_locus_picture([system()], [20.0]))
+    assert page.sections[0].tables[0].rows == [
+        ["yaw/sideslip", "0.80", "0.60", "-3.00 \N{PLUS-MINUS SIGN} 4.00i", "yaw 99%"]
+    ]
+    assert render_page(page).count('class="plots"') == 2
 
 
 def test_figure_2_draws_a_model_only_where_it_has_the_channel(figures, tmp_path):
