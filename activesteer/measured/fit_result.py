@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.series import rms
+from activesteer.config import fields_of
 from activesteer.core.conventions import Array
 from activesteer.core.units import quantity_of
+from activesteer.maneuver.open_loop import SensorOffsetTable
 
 LEVEL: Final = 0.95
 """Probability that an interval contains the true value."""
@@ -206,9 +208,11 @@ class Fit(NamedTuple):
             where, mean = f"{shown.label} in {each.recording}", float(np.mean(each.after))
             if left > _MUCH and mean**2 > _CONSTANT * left**2:
                 offset = f"{-each.noise * mean * shown.unit.factor:.3g} {shown.unit.name}"
+                advice = f"set zero_until_s of {each.channel} in the map"
+                if each.channel in fields_of(SensorOffsetTable):
+                    advice += f", or make sensor_offset.{each.channel} a factor"
                 found.append(
-                    f"the residual of the {where} is a constant offset: measured less simulated is {offset}; set "
-                    f"zero_until_s of {each.channel} in the map, or make sensor_offset.{each.channel} a factor"
+                    f"the residual of the {where} is a constant offset: measured less simulated is {offset}; {advice}"
                 )
             elif left > _MUCH:
                 found.append(
