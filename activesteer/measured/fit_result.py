@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.series import rms
-from activesteer.config import fields_of
 from activesteer.core.conventions import Array
 from activesteer.core.units import quantity_of
 from activesteer.maneuver.open_loop import SensorOffsetTable
@@ -209,7 +208,7 @@ class Fit(NamedTuple):
             if left > _MUCH and mean**2 > _CONSTANT * left**2:
                 offset = f"{-each.noise * mean * shown.unit.factor:.3g} {shown.unit.name}"
                 advice = f"set zero_until_s of {each.channel} in the map"
-                if each.channel in fields_of(SensorOffsetTable):
+                if each.channel in SensorOffsetTable.__dataclass_fields__:
                     advice += f", or make sensor_offset.{each.channel} a factor"
                 found.append(
                     f"the residual of the {where} is a constant offset: measured less simulated is {offset}; {advice}"

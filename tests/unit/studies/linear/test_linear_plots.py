@@ -50,7 +50,11 @@ def test_root_locus_has_the_poles_of_every_speed():
 
 
 def test_page_has_a_row_for_each_mode_and_all_panels():
-    modes = [Mode("yaw/sideslip", complex(-3.0, 4.0), {"yaw": 0.99, "drive": 0.001}, np.ones(1, complex), np.ones(1, complex))]
+    modes = [
+        Mode(
+            "yaw/sideslip", complex(-3.0, 4.0), {"yaw": 0.99, "drive": 0.001}, np.ones(1, complex), np.ones(1, complex)
+        )
+    ]
     page = modes_page("car", modes, bode_picture("a", system()), root_locus_picture([system()], [20.0]))
     assert page.sections[0].tables[0].rows == [
         ["yaw/sideslip", "0.80", "0.60", "-3.00 \N{PLUS-MINUS SIGN} 4.00i", "yaw 99%"]
