@@ -133,7 +133,7 @@ def test_wrong_messages_get_an_answer_and_the_page_goes_on(url: str) -> None:
         page.say("save")
         assert "no run to save" in page.hear("error")["text"]
         page.say("run", maneuver="/etc/passwd")
-        assert "name a file in" in page.hear("error")["text"]
+        assert "named without a folder" in page.hear("error")["text"]
         page.say("run", maneuver=300 * "a")
         assert "length <= 200" in page.hear("error")["text"]
         page.say("describe", id=1, maneuver="step_steer")

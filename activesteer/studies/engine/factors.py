@@ -68,13 +68,17 @@ class Factor(FactorTable):
 
     @property
     def low(self) -> float:
-        """Return the lower end of a range."""
-        return (self.uniform or self.log_uniform or self.truncate)[0]
+        """Return the lower end of a range, 0 without one."""
+        return self._ends[0]
 
     @property
     def high(self) -> float:
-        """Return the upper end of a range."""
-        return (self.uniform or self.log_uniform or self.truncate)[1]
+        """Return the upper end of a range, 0 without one."""
+        return self._ends[1]
+
+    @property
+    def _ends(self) -> tuple[float, ...]:
+        return self.uniform or self.log_uniform or self.truncate or (0.0, 0.0)
 
     def acts(self, values: Mapping[str, Value]) -> bool:
         """Return whether the factor varies with these values of the others."""
