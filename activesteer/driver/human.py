@@ -51,11 +51,6 @@ class HumanDriver(NativeBlock):
         self._constant_radius = ConstantRadiusDriver(robot, single_track.wheelbase_m, setup.timestep_s)
         self._path = PathPreviewDriver(robot, single_track.matrices, setup.parameters, setup.timestep_s)
 
-    @classmethod
-    def from_vehicle(cls, setup: DriverSetup) -> HumanDriver:
-        """Make the driver for a car."""
-        return cls(setup)
-
     def prepare(self, speed_mps: float) -> int:
         """Compute the gains on a path at a speed for compiled code, and return how many there are.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from activesteer.config import Range, Source, build, read_toml
 from activesteer.core.conventions import Array
@@ -109,6 +109,10 @@ class CircleTable:
 @dataclass(frozen=True)
 class MeasuredTable:
     """The file `validation.toml`."""
+
+    KEY_HINTS: ClassVar = dict.fromkeys(
+        ("effects", "steps", "decisions"), "give values of the car in [circle.prediction] and [intervals]"
+    )
 
     vehicle: str
     """Name or file of the car."""

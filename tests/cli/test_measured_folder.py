@@ -19,6 +19,15 @@ def test_a_new_folder_is_made_once(call, tmp_path: Path) -> None:
     assert "is not empty" in told.err
 
 
+def test_a_table_that_is_gone_is_refused_with_its_successor(call) -> None:
+    call("compare", "--new", "mine")
+    file = Path("mine/validation.toml")
+    file.write_text(f"{file.read_text()}\n[effects]\nsteering = 1.0\n")
+    told = call("compare", "mine")
+    assert told.status == 1
+    assert "[circle.prediction]" in told.err
+
+
 @pytest.mark.slow
 def test_the_example_is_predicted_and_fitted(call) -> None:
     call("compare", "--new", "mine")
