@@ -131,12 +131,18 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
             tables.append(_parameter_table(found))
             if len(found.parameters) > 1:
                 tables.append(_correlation_table(found))
-        pictures = [_picture(one) for one in shown if one.part == "check"]
-        lines, points = ["no value comes from the data"], []
+        text = "No value comes from the data."
         if found is not None:
-            free = f"Free in the fit windows: {', '.join(one.key for one in found.parameters)}"
-            lines, points = [free, *(f"Note: {note}." for note in found.notes)], rests_on(found)
-        sections.append(Section(name.capitalize(), lines, pictures, tables, points))
+            text = f"Free in the fit windows: {', '.join(one.key for one in found.parameters)}."
+        sections.append(Section(name.capitalize(), [text], tables))
+        if found is not None and found.notes:
+            sections.append(Section("Notes", [f"{note[0].upper()}{note[1:]}." for note in found.notes], level=3))
+        checked = groupby((one for one in shown if one.part == "check"), lambda one: one.run)
+        sections += [
+            Section(f"{run}: check window", pictures=[*map(_picture, parts)], level=3) for run, parts in checked
+        ]
+        if found is not None:
+            sections.append(Section("Assumptions of the fit", points=rests_on(found), level=3))
     if result.ends:
         text = (
             "The band contains the prediction with each value at either end of its interval. Before that, the free "
@@ -188,7 +194,7 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
         second = f"{found['with_assumptions_deg']:.1f}"
         rows.append(("second prediction, without [circle.prediction]", second, "nominal"))
     table = Table("", ["steering wheel", "deg", ""], rows, kind="comparisons")
-    sections = [Section("", (), [_distributions(result)], [table])]
+    sections = [Section(tables=[table], pictures=[_distributions(result)])]
     if box := found["box"]:
         text = (
             f"From {box['low_deg']:.1f} to {box['high_deg']:.1f} deg, {box['width_deg']:.1f} deg wide: "

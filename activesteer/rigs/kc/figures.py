@@ -84,10 +84,10 @@ def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> 
     outside = frozenset(number for number, entry in enumerate(result.metrics) if entry.inside is False)
     metrics = Section("Metrics", tables=[Table("", columns, rows, outside)])
     sections = [
-        Section(picture.title[0].upper() + picture.title[1:], pictures=[picture._replace(title="")])
-        for picture in pictures
-    ]
-    sections.insert(1 if result.targeted else 0, metrics)  # the bands, if there are any, stand first
+        metrics,
+        *(Section(picture.title[0].upper() + picture.title[1:], pictures=[picture._replace(title="")])
+          for picture in pictures),
+    ]  # fmt: skip
     title = f"Kinematics and compliance: {result.vehicle}"
     return write_page(Page(f"activesteer kc: {result.vehicle}", title, lead, sections), folder / "kc.html")
 
@@ -190,7 +190,7 @@ def _drawn_grid(result: KcResult, grid: Grid) -> Picture:
             labels = grid.x_label if below else "", row_label if not first else ""
             panels.append(Panel(*labels, curves, axle if above else "", zero=True))
     height_in = 1.0 + 1.75 * len(grid.rows)
-    return Picture(grid.title, panels, columns=2, width_in=8.5, height_in=height_in, shared_legend=True)
+    return Picture(grid.title, panels, columns=2, width_in=8.5, height_in=height_in)
 
 
 def _rear_camber(result: KcResult) -> Picture:

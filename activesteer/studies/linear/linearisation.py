@@ -378,7 +378,7 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
     sections = [
         Section("Modes", tables=[table]),
         Section("From the steering wheel to the motion", pictures=[bode]),
-        Section("Poles over speed", ["Rays are damping ratios, arcs natural frequencies."], [locus]),
+        Section("Poles over speed", ["Rays are damping ratios, arcs natural frequencies."], pictures=[locus]),
     ]
     return Page(f"activesteer linearise: {title}", f"Linear car: {title}", [], sections)
 
