@@ -37,7 +37,7 @@ from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.core.text_table import text_table
 from activesteer.core.units import quantity_of
 from activesteer.errors import ModelError, ParameterError
-from activesteer.pages import Page, Section, Table
+from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.simulation.closed_loop import ClosedLoop
@@ -380,7 +380,23 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
         Section("From the steering wheel to the motion", pictures=[bode]),
         Section("Poles over speed", ["Rays are damping ratios, arcs natural frequencies."], pictures=[locus]),
     ]
-    return Page(f"activesteer linearise: {title}", f"Linear car: {title}", [], sections)
+    return Page(f"activesteer linearise: {title}", f"Linear car: {title}", _conclusion(modes), sections)
+
+
+def _conclusion(modes: Sequence[Mode]) -> list[Text]:
+    """Return in words whether the car is stable, and its least damped mode; of yaw and sideslip too."""
+    shown = [mode for mode in modes if mode.natural_frequency_Hz <= CUT_OFF_HZ]
+    growing = ", ".join(dict.fromkeys(mode.name for mode in shown if mode.eigenvalue_1ps.real > 0.0))
+    swinging = sorted((mode for mode in shown if mode.eigenvalue_1ps.imag), key=lambda mode: mode.damping_ratio)
+    steered = [mode for mode in swinging if "yaw" in mode.name]
+    return [
+        failed(f"unstable: {growing}") if growing else passed("stable: every mode decays"),
+        *(
+            f"{words} is {mode.name}: {mode.natural_frequency_Hz:.2f} Hz, damping ratio {mode.damping_ratio:.2f}."
+            for words, found in (("The least damped mode", swinging), ("The least damped mode of yaw", steered))
+            for mode in found[:1]
+        ),
+    ]
 
 
 BODE_RANGE_Hz: Final = (0.1, 10.0)
@@ -409,7 +425,7 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
         short = quantity_of(output).short
         panels.append(Panel(below, f"{short}\n[{_GAIN_UNITS[output]}]", [gain], log="xy", x_range=BODE_RANGE_Hz))
         panels.append(Panel(below, f"{short}:\nphase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
-    return Picture("", panels, columns=2, width_in=7.5, height_in=9.0, shared_legend=True)
+    return Picture("", panels, columns=2, width_in=7.5, height_in=9.0)
 
 
 def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequence[float]) -> Picture:

@@ -36,6 +36,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from activesteer.controllers import Controller, ControllerSetup, controller_spec
@@ -49,7 +50,7 @@ from activesteer.controllers.linear_form import (
 )
 from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.core.signals import Measurement
-from activesteer.pages import Page, Section, Table, write_page
+from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
@@ -66,6 +67,8 @@ FREQUENCIES_RADPS: Final = np.geomspace(0.05, 300.0, 800)
 """Frequencies [rad/s]: from a hundredth of the car's natural frequency to beyond those of its suspensions."""
 LOOPS: Final = ("rear", "superposition")
 """Points at which a loop is opened, in the order of the demands."""
+ASKED_DISK: Final = 0.5
+"""Least disk margin that is asked of a loop: 4.4 dB together with 28 deg [-]."""
 BOTH: Final = "both"
 """Name of the loop in which gain, phase or delay change by the same in both demands."""
 
@@ -351,7 +354,12 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
         pictures = [_picture(loops)] if loops[0].curves else []
         sections.append(Section(f"{controller}, opened at {loop}", pictures=pictures, tables=[_table(loops)]))
     title = f"Stability margins: {vehicle}"
-    lead = [_LEAD] if any(each.curves for each in found) else []
+    least = min(found, key=lambda each: each.margins.disk)
+    value = (passed if least.margins.disk >= ASKED_DISK else failed)(f"{least.margins.disk:.2f}")
+    where = f" with {least.controller}, opened at {least.loop}, at {least.speed_kmh:g} km/h; at least {ASKED_DISK:g} is"
+    lead: list[Text] = [Markup("The smallest disk margin is ") + value + where + " asked: 4.4 dB together with 28 deg."]
+    if any(each.curves for each in found):
+        lead.append(_LEAD)
     return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
 
 
