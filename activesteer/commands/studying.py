@@ -390,7 +390,9 @@ def _driver_loop(options: argparse.Namespace) -> None:
         from activesteer.studies.linear.driver_loop import conclusion, driver_loops_picture
 
         picture = driver_loops_picture(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-        table = Table("", _DRIVER_HEADS, terminal.cells(rows, _DRIVER_COLUMNS))
+        cells = [[speed, name, *(f"{float(cell):#.3g}".rstrip(".") for cell in others)]
+                 for speed, name, *others in terminal.cells(rows, _DRIVER_COLUMNS)]  # fmt: skip
+        table = Table("", _DRIVER_HEADS, cells)
         sections = [Section(tables=[table], pictures=[picture])]
         heading = f"Loop of driver and car: {title}"
         page = Page(f"activesteer linearise: {title}", heading, conclusion(rows), sections)

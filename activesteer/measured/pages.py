@@ -40,11 +40,17 @@ def comparison_page(found: Comparison, measured: list[str], simulated: str) -> P
     lead = [f"Measured: {', '.join(measured)}. Simulated: {simulated}. {STANDARDS[found.standard]}.", shifts]
     columns = ["quantity", "rms of the residual", "tolerance", "share inside", ""]
     outside = frozenset(number for number, each in enumerate(found.quantities) if not each.inside)
-    table = Table("", columns, [words(each) for each in found.quantities], outside)
+    table = Table("", columns, [_cells(each) for each in found.quantities], outside)
     pictures = [picture(each, found.standard, len(measured)) for each in found.quantities]
     heading = "Measured and simulated: " + (passed("inside") if found.inside else failed("outside"))
     sections = [Section(tables=[table]), Section(pictures=pictures), Section("Assumptions", points=assumptions(found))]
     return Page(f"activesteer compare: {simulated}", heading, lead, sections)
+
+
+def _cells(found: Compared) -> tuple[Text, ...]:
+    """Return the cells of a comparison, with the verdict last."""
+    *cells, verdict = words(found)
+    return (*cells, (passed if found.inside else failed)(verdict, chip=True))
 
 
 def _shift(shift_s: float) -> str:
@@ -126,7 +132,7 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
     for name, found in stages.items():
         shown = [one for one in result.parts if one.stage == name]
         outside = frozenset(number for number, one in enumerate(shown) if not one.compared.inside)
-        tables = [Table("", _HEAD, [(one.run, one.part, *words(one.compared)) for one in shown], outside)]
+        tables = [Table("", _HEAD, [(one.run, one.part, *_cells(one.compared)) for one in shown], outside)]
         if found is not None:
             tables.append(_parameter_table(found))
             if len(found.parameters) > 1:
@@ -271,7 +277,7 @@ def fit_page(found: Fit, name: str) -> Page:
         rows.append((each.recording, shown.label, *numbers, *samples))
     sections.append(Section("Remaining differences", tables=[Table("", columns, rows)]))
     for recording, compared in groupby(found.compared, lambda each: each.recording):
-        sections.append(Section(recording, pictures=[*map(_fit_picture, compared)]))
+        sections.append(Section(f"Recording {recording}", pictures=[*map(_fit_picture, compared)]))
     sections.append(Section("Assumptions", points=rests_on(found)))
     return Page(f"activesteer fit: {name}", f"Parameters from recordings: {name}", lead, sections)
 

@@ -121,6 +121,7 @@ _NARROW: Final = 3
 """Most columns that fit on a phone."""
 _LONG: Final = 60
 """Length of a cell that needs a line of its own there."""
+_NUMBER: Final = re.compile(r"[+\-\N{MINUS SIGN}]?\d[\d.]*(e[+-]?\d+)?|none|-|\N{EN DASH}")
 
 
 class Table(NamedTuple):
@@ -134,7 +135,7 @@ class Table(NamedTuple):
         quiet: Numbers of the rows that nothing is asked of.
         kind: Class of the stylesheet.
         numbers: Number of columns at the end that hold numbers.
-        folded: Whether a page shows only the title until a reader opens the table.
+        folded: Whether a page shows only the title until a reader opens the table. Paper shows up to 100 rows.
         note: Text below the table.
     """
 
@@ -154,6 +155,13 @@ class Table(NamedTuple):
         if self.kind == "contents":  # its rows belong together
             return False
         return len(self.columns) > _NARROW or any(len(cell) > _LONG for row in self.rows for cell in row)
+
+    @property
+    def number_columns(self) -> frozenset[int]:
+        """Places of the columns that are aligned to the right: the last `numbers`, and others with only numbers."""
+        columns = [[_plain(cell) for cell in column] for column in zip(*self.rows, strict=True)]
+        found = {place for place, column in enumerate(columns) if place and all(map(_NUMBER.fullmatch, column))}
+        return frozenset(found.union(range(len(self.columns) - self.numbers, len(self.columns))))
 
     def lines(self) -> Iterator[str]:
         """Yield the table as aligned text. `!` marks rows that break a limit, `~` rows that nothing is asked of."""

@@ -124,7 +124,7 @@ class Chart {
     new ResizeObserver(() => this.fit()).observe(this.holder);
   }
 
-  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? 32) * this.panel.names.length : this.panel.equal ? 360 : 230; }
+  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? 32) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : 230; }
 
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
@@ -336,7 +336,7 @@ function drawPicture(box, picture, place) {
   }
   if (picture.scale) {
     const [label, low, high] = picture.scale;
-    bar.append(element("span", { class: "scale" }, label), `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`);
+    bar.append(element("span", { class: "scale" }, label), element("span", { class: "scale" }, `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`));
   }
   box.replaceChildren();
   const made = picture.panels.map((panel) => new Chart(box, panel, picture));
@@ -365,7 +365,7 @@ DARK.addEventListener("change", repaintAll);
 addEventListener("beforeprint", () => {
   document.documentElement.classList.add("paper");
   repaintAll();
-  for (const details of document.querySelectorAll("section[id] > details, details.rows")) details.open = true;
+  for (const details of document.querySelectorAll("details.printed, details.rows")) details.open = true;
   for (const each of drawn) each.fit(PRINTED);
 });
 addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaintAll(); for (const each of drawn) each.fit(); });

@@ -117,9 +117,15 @@ function parallel(metric, rows) {
   show("parallel", [panelOf("", "", { curves, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], row_px: 64 })]);
 }
 
+// Numbers are aligned to the right, and a long table can be folded, as on every page.
+const NUMBER = /^[+−]?\d[\d.]*(e[+-]?\d+)?$|^-$/;
 function tableOf(header, lines) {
-  const rows = lines.map((line) => element("tr", {}, ...line.map((cell, i) => element(i ? "td" : "th", { "data-title": header[i] }, cell))));
-  body.append(element("div", { class: "scrolling", tabindex: 0 }, element("table", { class: "findings cards" }, element("thead", {}, element("tr", {}, ...header.map((text) => element("th", {}, text)))), element("tbody", {}, ...rows))));
+  const sides = header.map((_, i) => (i && lines.every((line) => NUMBER.test(line[i])) ? "number" : ""));
+  const rows = lines.map((line) => element("tr", {}, ...line.map((cell, i) => element(i ? "td" : "th", { class: sides[i], "data-title": header[i] }, cell))));
+  const head = element("tr", {}, ...header.map((text, i) => element("th", { class: sides[i] }, text)));
+  const box = element("div", { class: "scrolling", tabindex: 0 }, element("table", { class: "findings cards" }, element("thead", {}, head), element("tbody", {}, ...rows)));
+  const many = lines.length > 15;
+  body.append(many ? element("details", NARROW.matches ? { class: "rows" } : { class: "rows", open: "" }, element("summary", {}, `${lines.length} rows`), box) : box);
 }
 
 function replayLine(command) {
@@ -173,7 +179,7 @@ function drawAll() {
     if (!DATA.by_group[group][other.name]) continue;
     const all = rows.map((i) => DATA.rows.metrics[other.name][i]).filter((value) => value != null);
     if (constantIn(...endsOf(all))) constant.push(`${other.label} ${all.length ? short(all[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
-    else others.push(histogram(other, DATA.by_group[group][other.name].histogram));
+    else others.push({ ...histogram(other, DATA.by_group[group][other.name].histogram), title: other.label });
   }
   begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
   show("all", others);

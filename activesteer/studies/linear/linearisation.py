@@ -377,7 +377,7 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
     table = Table("", _MODE_COLUMNS, rows)
     sections = [
         Section("Modes", tables=[table]),
-        Section("From the steering wheel to the motion", pictures=[bode]),
+        Section("From the steering wheel to the motion", pictures=[bode._replace(title="")]),
         Section("Poles over speed", ["Rays are damping ratios, arcs natural frequencies."], pictures=[locus]),
     ]
     return Page(f"activesteer linearise: {title}", f"Linear car: {title}", _conclusion(modes), sections)
@@ -392,9 +392,11 @@ def _conclusion(modes: Sequence[Mode]) -> list[Text]:
     return [
         failed(f"unstable: {growing}") if growing else passed("stable: every mode decays"),
         *(
-            f"{words} is {mode.name}: {mode.natural_frequency_Hz:.2f} Hz, damping ratio {mode.damping_ratio:.2f}."
-            for words, found in (("The least damped mode", swinging), ("The least damped mode of yaw", steered))
-            for mode in found[:1]
+            f"{words} at {mode.natural_frequency_Hz:.2f} Hz with a damping ratio of {mode.damping_ratio:.2f}."
+            for mode, words in (
+                *((mode, f"The least damped mode is {mode.name},") for mode in swinging[:1]),
+                *((mode, "Yaw and sideslip swing") for mode in steered[:1]),
+            )
         ),
     ]
 
@@ -419,13 +421,13 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
     panels = []
     for output in _GAIN_UNITS:
         values = found[system.output_labels.index(output), system.input_labels.index("steering_wheel_rad")]
-        gain = Curve(frequency_Hz, np.abs(values), label, RUN_COLOURS[1], "-", 1.5)
-        phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), label, RUN_COLOURS[1], "-", 1.5)
+        gain = Curve(frequency_Hz, np.abs(values), "", RUN_COLOURS[1], "-", 1.5)
+        phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), "", RUN_COLOURS[1], "-", 1.5)
         below = "frequency [Hz]" if output == "sideslip_rad" else ""
         short = quantity_of(output).short
         panels.append(Panel(below, f"{short}\n[{_GAIN_UNITS[output]}]", [gain], log="xy", x_range=BODE_RANGE_Hz))
         panels.append(Panel(below, f"{short}:\nphase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
-    return Picture("", panels, columns=2, width_in=7.5, height_in=9.0)
+    return Picture(label, panels, columns=2, width_in=7.5, height_in=9.0)
 
 
 def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequence[float]) -> Picture:
@@ -446,6 +448,8 @@ def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequen
         poles = poles[(poles.imag >= -1e-9) & (np.abs(poles) <= limit)]
         shade = (3.6 * speed_mps - slowest) / max(fastest - slowest, 1e-9)
         curves.append(Curve(poles.real, poles.imag, dashes="", marker="o", size=3.5, shade=shade))
-    panel = Panel("real part [1/s]", "imaginary part [1/s]", curves, notes=notes, y_range=(-1.0, 1.05 * limit))
+    panel = Panel(
+        "real part [1/s]", "imaginary part [1/s]", curves, notes=notes, y_range=(-1.0, 1.05 * limit), equal=True
+    )
     scale = ("speed [km/h]", slowest, fastest)
     return Picture("", [panel], width_in=7.5, height_in=5.5, scale=scale)

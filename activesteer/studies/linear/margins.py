@@ -338,9 +338,10 @@ _SHOWN: Final = (-3.2, 1.6), (-2.4, 2.4)
 """Range of the real and of the imaginary part in a picture."""
 _LEAD: Final = (
     "Each curve is the loop gain L over frequency, from 0.008 to 48 Hz, with its mirror image left out. The loop is "
-    "marginal where L = -1 (cross). The red disk has the smallest disk margin alpha of all speeds: the curve of that "
-    "speed touches it. Gain and phase may then change together by any complex factor f with |f - 1| / |f + 1| < "
-    "alpha / 2, such as gains from (2 - alpha) / (2 + alpha) to (2 + alpha) / (2 - alpha)."
+    "marginal where L = \N{MINUS SIGN}1 (cross). The red disk has the smallest disk margin alpha of all speeds: the "
+    "curve of that speed touches it. Gain and phase may then change together by any complex factor f with "
+    "|f\N{MINUS SIGN}1| / |f+1| < alpha / 2, such as gains from (2 \N{MINUS SIGN} alpha) / (2 + alpha) to "
+    "(2 + alpha) / (2 \N{MINUS SIGN} alpha)."
 )
 
 
@@ -411,10 +412,9 @@ def _table(loops: Sequence[LoopMargins]) -> Table:
         margins = each.margins
         values = (margins.gain_dB, math.degrees(margins.phase_rad), 1e3 * margins.delay_s, margins.disk)
         numbers = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
-        numbers[-1] += ", the smallest" if each is least else ""
         changed = ", ".join(f"{key} = {value}" for key, value in each.factors.items())
         rows.append([f"{each.speed_kmh:g}", *numbers, changed][: len(heads)])
-    return Table("", heads, rows)
+    return Table("", heads, rows, note=f"The smallest disk margin is at {least.speed_kmh:g} km/h.")
 
 
 def worst_margins(

@@ -151,6 +151,7 @@ const element = (name, attributes = {}, ...children) => ({
   replaceChildren(...others) { this.children = others; }, addEventListener() {},
 });
 const document = { querySelector() { return element("div"); } };
+const NARROW = { matches: false };
 const short = (value) => String(+value.toPrecision(3));
 const drawPicture = (box, picture, id) => { pictures[id] = picture; };
 """
