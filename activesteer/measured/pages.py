@@ -107,7 +107,7 @@ def picture(
     return Picture("", panels, columns=2, height_in=2.6)
 
 
-_HEAD: Final = ["run", "window", "quantity", "rms of the residual", "tolerance", "share inside", ""]
+_HEAD: Final = ["quantity", "run", "window", "rms of the residual", "tolerance", "share inside", ""]
 _BAND_COLOUR: Final = "#b3a369"
 
 
@@ -132,7 +132,10 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
     for name, found in stages.items():
         shown = [one for one in result.parts if one.stage == name]
         outside = frozenset(number for number, one in enumerate(shown) if not one.compared.inside)
-        tables = [Table("", _HEAD, [(one.run, one.part, *_cells(one.compared)) for one in shown], outside)]
+        rows = [
+            (quantity, one.run, one.part, *others) for one in shown for quantity, *others in (_cells(one.compared),)
+        ]
+        tables = [Table("", _HEAD, rows, outside)]
         if found is not None:
             tables.append(_parameter_table(found))
             if len(found.parameters) > 1:
@@ -142,7 +145,7 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
             text = f"Free in the fit windows: {', '.join(one.key for one in found.parameters)}."
         sections.append(Section(name.capitalize(), [text], tables))
         if found is not None and found.notes:
-            sections.append(Section("Notes", [f"{note[0].upper()}{note[1:]}." for note in found.notes], level=3))
+            sections.append(Section("Notes", [*map(_sentence, found.notes)], level=3))
         checked = groupby((one for one in shown if one.part == "check"), lambda one: one.run)
         sections += [
             Section(f"{run}: check window", pictures=[*map(_picture, parts)], level=3) for run, parts in checked
@@ -261,7 +264,7 @@ def fit_page(found: Fit, name: str) -> Page:
         f"{found.runs} runs in {found.rounds} rounds; the remaining difference is {found.misfit:.3g} times the noise "
         "as stated."
     ]
-    lead += [Markup('<span class="failed">{}.</span>').format(note[0].upper() + note[1:]) for note in found.notes]
+    lead += [Markup('<span class="failed">{}</span>').format(_sentence(note)) for note in found.notes]
     sections = [Section(tables=[_parameter_table(found)])]
     if len(found.parameters) > 1:
         sections.append(Section("Correlation of their errors", tables=[_correlation_table(found)]))
@@ -280,6 +283,11 @@ def fit_page(found: Fit, name: str) -> Page:
         sections.append(Section(f"Recording {recording}", pictures=[*map(_fit_picture, compared)]))
     sections.append(Section("Assumptions", points=rests_on(found)))
     return Page(f"activesteer fit: {name}", f"Parameters from recordings: {name}", lead, sections)
+
+
+def _sentence(note: str) -> str:
+    """Return a note with a capital letter, unless it starts with a key, and a full stop."""
+    return f"{note if '.' in note.partition(' ')[0] else note[0].upper() + note[1:]}."
 
 
 def _parameter_table(found: Fit) -> Table:
