@@ -36,7 +36,7 @@ _DRIVER_COLUMNS: Final = {
 }
 """Key of a result -> head of its column."""
 _DRIVER_HEADS: Final = (
-    "speed [km/h]", "controller", "damping [-]", "damping after a step of the path", "damping in a run",
+    "controller, speed", "damping [-]", "damping after a step of the path", "damping in a run",
     "largest difference from the run [m]", "phase margin [deg]", "crossover [rad/s]",
 )  # fmt: skip
 """Heads of the same columns on a page."""
@@ -390,7 +390,7 @@ def _driver_loop(options: argparse.Namespace) -> None:
         from activesteer.studies.linear.driver_loop import conclusion, driver_loops_picture
 
         picture = driver_loops_picture(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-        cells = [[speed, name, *(f"{float(cell):#.3g}".rstrip(".") for cell in others)]
+        cells = [[f"{name}, {speed} km/h", *(f"{float(cell):#.3g}".rstrip(".") for cell in others)]
                  for speed, name, *others in terminal.cells(rows, _DRIVER_COLUMNS)]  # fmt: skip
         table = Table("", _DRIVER_HEADS, cells)
         sections = [Section(tables=[table], pictures=[picture])]

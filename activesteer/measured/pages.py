@@ -202,7 +202,7 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
     if two := found["with_assumptions_deg"] != ours["nominal"]:
         second = f"{found['with_assumptions_deg']:.1f}"
         rows.append(("second prediction, without [circle.prediction]", second, "nominal"))
-    table = Table("", ["steering wheel", "deg", ""], rows, kind="comparisons")
+    table = Table("", ["steering wheel", "deg", ""], rows)
     sections = [Section(tables=[table], pictures=[_distributions(result)])]
     if box := found["box"]:
         text = (
@@ -216,7 +216,7 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
             for each in box["intervals"]
         ]
         head = ["interval", "low end, deg", "high end, deg", "source"]
-        sections.append(Section("Probability box", [text], tables=[Table("", head, ends, kind="comparisons")]))
+        sections.append(Section("Probability box", [text], tables=[Table("", head, ends)]))
     return lead, sections
 
 

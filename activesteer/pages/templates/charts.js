@@ -103,8 +103,9 @@ function inkOf(colour, shade) {
   if (shade != null) colour = scaleColour(shade);
   if (colour.startsWith("run-")) return paint[colour];
   if (!onDark() || !colour.startsWith("#")) return colour;
-  // In the dark, a pale colour recedes and a dark one comes forward.
+  // In the dark, a pale colour recedes unless it is one of the scale, and a dark one comes forward.
   const parts = channels(colour), pale = parts[0] + parts[1] + parts[2] > 480;
+  if (pale && shade != null) return colour;
   return blend(parts, pale ? [22, 24, 27] : [255, 255, 255], pale ? 0.55 : 0.35);
 }
 

@@ -347,19 +347,15 @@ _LEAD: Final = (
 
 def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str | os.PathLike[str]) -> Path:
     """Write `margins.html` and return its path."""
-    sections = []
-    for (controller, loop), rows in groupby(
-        sorted(found, key=lambda each: (each.controller, each.loop)), lambda each: (each.controller, each.loop)
-    ):
-        loops = list(rows)
-        pictures = [_picture(loops)] if loops[0].curves else []
-        sections.append(Section(f"{controller}, opened at {loop}", pictures=pictures, tables=[_table(loops)]))
+    loops = sorted(found, key=_name)  # the speeds of a loop stay in their order
+    drawn = [each for each in loops if each.curves]
+    sections = [Section(tables=[_table(loops)], pictures=[_picture(drawn)] if drawn else [])]
     title = f"Stability margins: {vehicle}"
     least = min(found, key=lambda each: each.margins.disk)
     value = (passed if least.margins.disk >= ASKED_DISK else failed)(f"{least.margins.disk:.2f}")
-    where = f" with {least.controller}, opened at {least.loop}, at {least.speed_kmh:g} km/h; at least {ASKED_DISK:g} is"
+    where = f" with {_name(least)}, at {least.speed_kmh:g} km/h; at least {ASKED_DISK:g} is"
     lead: list[Text] = [Markup("The smallest disk margin is ") + value + where + " asked: 4.4 dB together with 28 deg."]
-    if any(each.curves for each in found):
+    if drawn:
         lead.append(_LEAD)
     return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
 
@@ -379,9 +375,19 @@ def disk(alpha: float) -> tuple[float, float]:
     return 0.5 * (near + far), 0.5 * (near - far)
 
 
-def _picture(loops: Sequence[LoopMargins]) -> Picture:
-    speeds = [each.speed_kmh for each in loops]
+def _name(found: LoopMargins) -> str:
+    return f"{found.controller}, opened at {found.loop}"
+
+
+def _picture(found: Sequence[LoopMargins]) -> Picture:
+    speeds = [each.speed_kmh for each in found]
     low, high = min(speeds), max(speeds)
+    panels = [_panel(name, list(loops), low, high) for name, loops in groupby(found, _name)]
+    return Picture("", panels, scale=("speed [km/h]", low, high) if high > low else None, columns=2)
+
+
+def _panel(name: str, loops: Sequence[LoopMargins], low: float, high: float) -> Panel:
+    """Return the curves of a loop at all speeds, with the disk of the smallest disk margin."""
     curves = [
         Curve(part.real, part.imag, shade=(each.speed_kmh - low) / (high - low) if high > low else 0.5)
         for each in loops
@@ -394,18 +400,15 @@ def _picture(loops: Sequence[LoopMargins]) -> Picture:
         centre, radius = disk(alpha)
         angle = np.linspace(0.0, math.pi, 181)
         x, y = centre + radius * np.cos(angle), radius * np.sin(angle)
-        areas.append(Area(x, -y, y, f"disk margin {alpha:.2f}", "#d9534f", 0.25, "#b3261e"))
-    panel = Panel(
-        "real part of L [-]", "imaginary part of L [-]", curves, areas=areas,
+        areas.append(Area(x, -y, y, "disk of the smallest disk margin", "#d9534f", 0.25, "#b3261e"))
+    return Panel(
+        "real part of L [-]", "imaginary part of L [-]", curves, f"{name}: disk margin {alpha:.2f}", areas,
         x_range=_SHOWN[0], y_range=_SHOWN[1], zero=True, equal=True,
     )  # fmt: skip
-    scale = ("speed [km/h]", low, high) if high > low else None
-    return Picture("", [panel], scale=scale, width_in=6.4, height_in=4.8)
 
 
 def _table(loops: Sequence[LoopMargins]) -> Table:
-    least = min(loops, key=lambda each: each.margins.disk)
-    heads = ["speed [km/h]", "gain margin [dB]", "phase margin [deg]", "delay margin [ms]", "disk margin [-]"]
+    heads = ["loop, speed", "gain margin [dB]", "phase margin [deg]", "delay margin [ms]", "disk margin [-]"]
     heads += ["changed"] if any(each.factors for each in loops) else []
     rows = []
     for each in loops:
@@ -413,8 +416,9 @@ def _table(loops: Sequence[LoopMargins]) -> Table:
         values = (margins.gain_dB, math.degrees(margins.phase_rad), 1e3 * margins.delay_s, margins.disk)
         numbers = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
         changed = ", ".join(f"{key} = {value}" for key, value in each.factors.items())
-        rows.append([f"{each.speed_kmh:g}", *numbers, changed][: len(heads)])
-    return Table("", heads, rows, note=f"The smallest disk margin is at {least.speed_kmh:g} km/h.")
+        rows.append([f"{_name(each)}, {each.speed_kmh:g} km/h", *numbers, changed][: len(heads)])
+    outside = frozenset(number for number, each in enumerate(loops) if each.margins.disk < ASKED_DISK)
+    return Table("", heads, rows, outside)
 
 
 def worst_margins(
