@@ -401,7 +401,7 @@ def comparison_figure(made: Comparison) -> Figure:
         "not told apart, or neither better nor worse",
     )
     width_in, height_in = 4.2 + 0.85 * len(made.controllers), 1.2 + 0.26 * len(lines)
-    return draw(Picture("", [heat], None, 1, width_in, height_in, legend, shared_legend=True))
+    return draw(Picture("", [heat], None, 1, width_in, height_in, legend))
 
 
 def _shade(metric: str, value: float, first: float) -> float:
@@ -440,4 +440,4 @@ def comparison_population_figure(made: Population) -> Figure:
     legend = _legend("better", f"worse; full colour: all runs, or {TRACK_HARM_M:g} m", "as without control")
     title = f"{made.samples} samples of {made.vehicle}, seed {made.seed}; -: no such run"
     width_in, height_in = 2.0 + 1.5 * max(len(names), 4), 1.4 + 0.3 * len(scenarios)
-    return draw(Picture(title, panels, None, len(panels), width_in, height_in, legend, shared_legend=True))
+    return draw(Picture(title, panels, None, len(panels), width_in, height_in, legend))

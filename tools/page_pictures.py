@@ -28,8 +28,8 @@ PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 SIZE: Final = (1000, 760)
 """Width and height of the browser's window [px]."""
 COLOURS: Final = 64
-FROM: Final = {"measured_lane_change": "Fitted"}
-"""Picture -> heading at its top. By default it shows the top of the page."""
+FROM: Final = {"measured_lane_change": ": check window"}
+"""Picture -> end of the last heading with it, at the top of the picture. By default it shows the top of the page."""
 
 
 def write_pages(folder: Path) -> dict[str, Path]:
@@ -94,7 +94,8 @@ def draw_pages() -> None:
             shown = browser.new_page(viewport={"width": width, "height": height})
             shown.goto(page.as_uri())
             if name in FROM:
-                shown.locator(f"h2:has-text('{FROM[name]}')").evaluate("heading => heading.scrollIntoView()")
+                heading = shown.locator(f"h3:has-text('{FROM[name]}')").last
+                heading.evaluate("heading => heading.scrollIntoView()")
             shown.wait_for_timeout(500)
             pictures[name] = Image.open(io.BytesIO(shown.screenshot())).convert("RGB")
         for name, picture in pictures.items():

@@ -344,7 +344,7 @@ def _envelope(name: str) -> Figure:
     names = [f"{value:g}" for value in speeds], [f"{value:g} m" for value in lines]
     heat = Heat(counts, texts, *names, (0.0, float(len(SYSTEMS))), ("#e6b8af", "#fff2cc", "#d9ead3"), "speed [km/h]")
     legend = [("all get through", "#d9ead3"), ("none", "#e6b8af")]
-    return draw(Picture(f"{name}: systems that get through", [heat], None, 1, 9.0, 3.6, legend, shared_legend=True))
+    return draw(Picture(f"{name}: systems that get through", [heat], None, 1, 9.0, 3.6, legend))
 
 
 def _draw(kind: str, runs: Mapping[str, Any]) -> Figure:

@@ -109,5 +109,4 @@ def difference_text(name: str, value: float, first: float) -> Cell:
 
 def _decimal(value: float) -> str:
     decimals = next((decimals for top, decimals in ((10.0, 3), (100.0, 2), (1000.0, 1)) if abs(value) < top), 0)
-    text = f"{value:.{decimals}f}"
-    return typeset(text.lstrip("-") if float(text) == 0.0 else text)
+    return typeset(f"{value:z.{decimals}f}")

@@ -167,7 +167,7 @@ def _compare(options: argparse.Namespace) -> bool:
     written = [] if options.output is None else [write_page(page, options.output)]
     shifts = []
     for name, shift_s in zip(names[:-1], found.shifts_s, strict=True):
-        later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{round(1e3 * shift_s, 1) + 0.0:+.1f} ms"
+        later = "unknown (nothing moves)" if math.isnan(shift_s) else f"{1e3 * shift_s:+z.1f} ms"
         shifts.append(f"time shift of {name}: {later}")
     terminal.tell(options, found.to_json(), (*page.lines(), *shifts, *assumptions(found)), written, "page")
     return not found.inside

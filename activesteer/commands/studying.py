@@ -387,12 +387,15 @@ def _driver_loop(options: argparse.Namespace) -> None:
     if options.output is not None:
         from activesteer.pages import Page, Section, Table, write_page
         from activesteer.plotting import draw, save
-        from activesteer.studies.linear.driver_loop import driver_loops_picture
+        from activesteer.studies.linear.driver_loop import conclusion, driver_loops_picture
 
         picture = driver_loops_picture(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-        table = Table("", _DRIVER_HEADS, terminal.cells(rows, _DRIVER_COLUMNS))
-        sections = [Section(pictures=[picture]), Section("Speeds and controllers", tables=[table])]
-        page = Page(f"activesteer linearise: {title}", f"Loop of driver and car: {title}", [], sections)
+        cells = [[speed, name, *(f"{float(cell):#.3g}".rstrip(".") for cell in others)]
+                 for speed, name, *others in terminal.cells(rows, _DRIVER_COLUMNS)]  # fmt: skip
+        table = Table("", _DRIVER_HEADS, cells)
+        sections = [Section(tables=[table], pictures=[picture])]
+        heading = f"Loop of driver and car: {title}"
+        page = Page(f"activesteer linearise: {title}", heading, conclusion(rows), sections)
         figures = [save(draw(picture), options.output / "driver.png"), write_page(page, options.output / "driver.html")]
     terminal.tell(options, rows, [title, *terminal.table_lines(rows, _DRIVER_COLUMNS)], figures)
 

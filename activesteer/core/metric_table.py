@@ -100,8 +100,7 @@ class Metric(NamedTuple):
             return "-"
         if self.form is Form.YES_OR_NO:
             return "yes" if value else "no"
-        text = f"{value:.0f}" if self.form is Form.COUNT else f"{value * self.unit.factor:.3f}"
-        return text.lstrip("-") if float(text) == 0.0 else text
+        return f"{value:z.0f}" if self.form is Form.COUNT else f"{value * self.unit.factor:z.3f}"
 
     def cost(self, value: float) -> float:
         """Return what shall be small [SI]. The value itself where the metric has no preferred direction."""

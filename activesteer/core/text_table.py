@@ -7,6 +7,8 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
+from activesteer.core.units import unsigned_zeros
+
 COLUMNS: Final = 80
 _COLOUR: Final = re.compile(r"\x1b\[\d*m")
 
@@ -29,6 +31,7 @@ def text_table(
     A table that is too wide gets narrower columns, then smaller gaps. If that is not enough, it is split into several
     tables below each other, or its words are wrapped.
     """
+    rows = [[unsigned_zeros(cell) for cell in row] for row in rows]
     marks = marks or [""] * len(rows)
     width = COLUMNS - len(marks[0])
     widths = [max(map(_length, column)) for column in zip(*rows, strict=True)]

@@ -188,8 +188,7 @@ class Quantity(NamedTuple):
         """Return a value as text without its unit, and a zero without a minus sign."""
         if not math.isfinite(value):
             return "n/a"
-        text = f"{value * self.factor:.{self.digits}f}"
-        return text.lstrip("-") if float(text) == 0.0 else text
+        return f"{value * self.factor:z.{self.digits}f}"
 
 
 _FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides"})
@@ -224,9 +223,14 @@ _NEGATIVE_ZERO: Final = re.compile(r"(?<![\w.)\]-])-(?=0(?:\.0+)?(?![\d.]))")
 _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 
+def unsigned_zeros(text: str) -> str:
+    """Return a text of numbers without the minus sign of a zero."""
+    return _NEGATIVE_ZERO.sub("", text)
+
+
 def typeset(text: str) -> str:
     """Return a text of numbers for a page: minus signs instead of hyphens, none before zero, and m/s² as such."""
-    return _NEGATIVE.sub("\N{MINUS SIGN}", _NEGATIVE_ZERO.sub("", text)).replace("m/s2", "m/s²")
+    return _NEGATIVE.sub("\N{MINUS SIGN}", unsigned_zeros(text)).replace("m/s2", "m/s²")
 
 
 def _row(

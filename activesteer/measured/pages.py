@@ -40,11 +40,17 @@ def comparison_page(found: Comparison, measured: list[str], simulated: str) -> P
     lead = [f"Measured: {', '.join(measured)}. Simulated: {simulated}. {STANDARDS[found.standard]}.", shifts]
     columns = ["quantity", "rms of the residual", "tolerance", "share inside", ""]
     outside = frozenset(number for number, each in enumerate(found.quantities) if not each.inside)
-    table = Table("", columns, [words(each) for each in found.quantities], outside)
+    table = Table("", columns, [_cells(each) for each in found.quantities], outside)
     pictures = [picture(each, found.standard, len(measured)) for each in found.quantities]
     heading = "Measured and simulated: " + (passed("inside") if found.inside else failed("outside"))
     sections = [Section(tables=[table]), Section(pictures=pictures), Section("Assumptions", points=assumptions(found))]
     return Page(f"activesteer compare: {simulated}", heading, lead, sections)
+
+
+def _cells(found: Compared) -> tuple[Text, ...]:
+    """Return the cells of a comparison, with the verdict last."""
+    *cells, verdict = words(found)
+    return (*cells, (passed if found.inside else failed)(verdict, chip=True))
 
 
 def _shift(shift_s: float) -> str:
@@ -101,7 +107,7 @@ def picture(
     return Picture("", panels, columns=2, height_in=2.6)
 
 
-_HEAD: Final = ["run", "window", "quantity", "rms of the residual", "tolerance", "share inside", ""]
+_HEAD: Final = ["quantity", "run", "window", "rms of the residual", "tolerance", "share inside", ""]
 _BAND_COLOUR: Final = "#b3a369"
 
 
@@ -126,17 +132,26 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
     for name, found in stages.items():
         shown = [one for one in result.parts if one.stage == name]
         outside = frozenset(number for number, one in enumerate(shown) if not one.compared.inside)
-        tables = [Table("", _HEAD, [(one.run, one.part, *words(one.compared)) for one in shown], outside)]
+        rows = [
+            (quantity, one.run, one.part, *others) for one in shown for quantity, *others in (_cells(one.compared),)
+        ]
+        tables = [Table("", _HEAD, rows, outside)]
         if found is not None:
             tables.append(_parameter_table(found))
             if len(found.parameters) > 1:
                 tables.append(_correlation_table(found))
-        pictures = [_picture(one) for one in shown if one.part == "check"]
-        lines, points = ["no value comes from the data"], []
+        text = "No value comes from the data."
         if found is not None:
-            free = f"Free in the fit windows: {', '.join(one.key for one in found.parameters)}"
-            lines, points = [free, *(f"Note: {note}." for note in found.notes)], rests_on(found)
-        sections.append(Section(name.capitalize(), lines, pictures, tables, points))
+            text = f"Free in the fit windows: {', '.join(one.key for one in found.parameters)}."
+        sections.append(Section(name.capitalize(), [text], tables))
+        if found is not None and found.notes:
+            sections.append(Section("Notes", [*map(_sentence, found.notes)], level=3))
+        checked = groupby((one for one in shown if one.part == "check"), lambda one: one.run)
+        sections += [
+            Section(f"{run}: check window", pictures=[*map(_picture, parts)], level=3) for run, parts in checked
+        ]
+        if found is not None:
+            sections.append(Section("Assumptions of the fit", points=rests_on(found), level=3))
     if result.ends:
         text = (
             "The band contains the prediction with each value at either end of its interval. Before that, the free "
@@ -188,7 +203,7 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
         second = f"{found['with_assumptions_deg']:.1f}"
         rows.append(("second prediction, without [circle.prediction]", second, "nominal"))
     table = Table("", ["steering wheel", "deg", ""], rows, kind="comparisons")
-    sections = [Section("", (), [_distributions(result)], [table])]
+    sections = [Section(tables=[table], pictures=[_distributions(result)])]
     if box := found["box"]:
         text = (
             f"From {box['low_deg']:.1f} to {box['high_deg']:.1f} deg, {box['width_deg']:.1f} deg wide: "
@@ -249,7 +264,7 @@ def fit_page(found: Fit, name: str) -> Page:
         f"{found.runs} runs in {found.rounds} rounds; the remaining difference is {found.misfit:.3g} times the noise "
         "as stated."
     ]
-    lead += [Markup('<span class="failed">{}.</span>').format(note[0].upper() + note[1:]) for note in found.notes]
+    lead += [Markup('<span class="failed">{}</span>').format(_sentence(note)) for note in found.notes]
     sections = [Section(tables=[_parameter_table(found)])]
     if len(found.parameters) > 1:
         sections.append(Section("Correlation of their errors", tables=[_correlation_table(found)]))
@@ -265,9 +280,14 @@ def fit_page(found: Fit, name: str) -> Page:
         rows.append((each.recording, shown.label, *numbers, *samples))
     sections.append(Section("Remaining differences", tables=[Table("", columns, rows)]))
     for recording, compared in groupby(found.compared, lambda each: each.recording):
-        sections.append(Section(recording, pictures=[*map(_fit_picture, compared)]))
+        sections.append(Section(f"Recording {recording}", pictures=[*map(_fit_picture, compared)]))
     sections.append(Section("Assumptions", points=rests_on(found)))
     return Page(f"activesteer fit: {name}", f"Parameters from recordings: {name}", lead, sections)
+
+
+def _sentence(note: str) -> str:
+    """Return a note with a capital letter, unless it starts with a key, and a full stop."""
+    return f"{note if '.' in note.partition(' ')[0] else note[0].upper() + note[1:]}."
 
 
 def _parameter_table(found: Fit) -> Table:

@@ -1,4 +1,4 @@
-"""HTML pages that need no other file and no network: jinja2 templates with one frame and one stylesheet.
+"""HTML pages that need no other file and no network, from one jinja2 template and one stylesheet.
 
 In: tables, pictures and texts.
 Out: HTML pages that work without a network.
@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
 from activesteer.core.files import make_folder, write_text
-from activesteer.core.units import parameter_title, typeset
+from activesteer.core.units import typeset
 from activesteer.core.version import __version__
 from activesteer.errors import ParameterError
 from activesteer.pages.model import Page, Section, Table, Text, failed, passed, picture_values
@@ -24,18 +23,15 @@ from activesteer.pages.model import Page, Section, Table, Text, failed, passed, 
 def render_page(page: Page) -> str:
     """Return a page as HTML."""
     charts = [picture_values(picture) for section in page.sections for picture in section.pictures]
-    return render("document.html", page=page, charts=charts)
+    scripts = ["uPlot.iife.min.js", "charts.js", *page.scripts] if charts or page.scripts else []
+    data = {"pictures": charts, **page.data}
+    return _environment().get_template("document.html").render(page=page, scripts=scripts, data=data)
 
 
 def write_page(page: Page, path: Path) -> Path:
     """Write a page as HTML and return its path. An existing file is replaced."""
     make_folder(path.parent, ParameterError)
     return write_text(path, render_page(page), ParameterError)
-
-
-def render(template: str, **content: Any) -> str:
-    """Return the HTML of a template."""
-    return _environment().get_template(template).render(content)
 
 
 @cache
@@ -51,7 +47,7 @@ def _environment() -> Environment:
     environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False, "separators": (",", ":"), "allow_nan": False}
     environment.globals |= {"version": __version__, "asset": _asset}
     environment.globals |= {"run_colours": RUN_COLOURS, "run_colours_on_dark": RUN_COLOURS_ON_DARK}
-    environment.filters |= {"typeset": _typeset, "label": parameter_title}
+    environment.filters["typeset"] = _typeset
     return environment
 
 
@@ -65,4 +61,4 @@ def _asset(name: str) -> Markup:
     return Markup(loader.get_source(_environment(), name)[0])
 
 
-__all__ = ["Page", "Section", "Table", "Text", "failed", "passed", "render", "render_page", "write_page"]
+__all__ = ["Page", "Section", "Table", "Text", "failed", "passed", "render_page", "write_page"]

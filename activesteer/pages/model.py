@@ -1,10 +1,11 @@
-"""The parts of a page that is read from the top to the end: texts, tables, pictures and points in sections."""
+"""The parts of a page that is read from the top to the end: texts, tables, points and pictures in sections."""
 
 from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -120,6 +121,7 @@ _NARROW: Final = 3
 """Most columns that fit on a phone."""
 _LONG: Final = 60
 """Length of a cell that needs a line of its own there."""
+_NUMBER: Final = re.compile(r"[+\-\N{MINUS SIGN}]?\d[\d.]*(e[+-]?\d+)?|none|-|\N{EN DASH}")
 
 
 class Table(NamedTuple):
@@ -132,6 +134,9 @@ class Table(NamedTuple):
         outside: Numbers of the rows that break a limit.
         quiet: Numbers of the rows that nothing is asked of.
         kind: Class of the stylesheet.
+        numbers: Number of columns at the end that hold numbers.
+        folded: Whether a page shows only the title until a reader opens the table. Paper shows up to 100 rows.
+        note: Text below the table.
     """
 
     title: str
@@ -140,11 +145,23 @@ class Table(NamedTuple):
     outside: frozenset[int] = frozenset()
     quiet: frozenset[int] = frozenset()
     kind: str = "findings"
+    numbers: int = 0
+    folded: bool = False
+    note: Text = ""
 
     @property
     def cards(self) -> bool:
         """True if a phone shows each row as a card, because the table is too wide for it."""
+        if self.kind == "contents":  # its rows belong together
+            return False
         return len(self.columns) > _NARROW or any(len(cell) > _LONG for row in self.rows for cell in row)
+
+    @property
+    def number_columns(self) -> frozenset[int]:
+        """Places of the columns that are aligned to the right: the last `numbers`, and others with only numbers."""
+        columns = [[_plain(cell) for cell in column] for column in zip(*self.rows, strict=True)]
+        found = {place for place, column in enumerate(columns) if place and all(map(_NUMBER.fullmatch, column))}
+        return frozenset(found.union(range(len(self.columns) - self.numbers, len(self.columns))))
 
     def lines(self) -> Iterator[str]:
         """Yield the table as aligned text. `!` marks rows that break a limit, `~` rows that nothing is asked of."""
@@ -152,6 +169,8 @@ class Table(NamedTuple):
         places = range(-1, len(self.rows))
         marks = ["! " if place in self.outside else "~ " if place in self.quiet else "  " for place in places]
         yield from text_table(rows, text=len(self.columns), marks=marks)
+        if self.note:
+            yield from wrapped_line(_plain(self.note))
 
 
 class Section(NamedTuple):
@@ -160,18 +179,22 @@ class Section(NamedTuple):
     Attributes:
         title: Its heading; empty for none.
         texts: Paragraphs.
-        pictures: Pictures, whose panels the page draws.
-        tables: Tables.
+        tables: Tables. They stand before the pictures: a reader wants the verdict first.
         points: Items of a list.
+        pictures: Pictures, whose panels the page draws.
         level: Level of its heading: 2, or 3 for a part of the section before.
+        kind: Class of the list in the stylesheet.
+        anchor: Name by which links and the page's own script find the section, which ends with what the script draws.
     """
 
     title: str = ""
     texts: Sequence[Text] = ()
-    pictures: Sequence[Picture] = ()
     tables: Sequence[Table] = ()
-    points: Sequence[str] = ()
+    points: Sequence[Text] = ()
+    pictures: Sequence[Picture] = ()
     level: int = 2
+    kind: str = ""
+    anchor: str = ""
 
 
 class Page(NamedTuple):
@@ -181,13 +204,17 @@ class Page(NamedTuple):
         title: Title of the window.
         heading: Heading of the page.
         lead: Paragraphs below the heading.
-        sections: The sections.
+        sections: The sections. The first has level 2.
+        scripts: Scripts of this kind of page, in the order in which they run.
+        data: What these scripts draw, as JSON values.
     """
 
     title: str
     heading: Text
     lead: Sequence[Text]
     sections: Sequence[Section]
+    scripts: Sequence[str] = ()
+    data: Mapping[str, Any] = MappingProxyType({})
 
     def lines(self) -> Iterator[str]:
         """Yield heading, paragraphs and tables as text."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -83,7 +83,7 @@ def draw(picture: Picture) -> Figure:
         if isinstance(panel, Heat):
             _fill_heat(axis, panel)
         else:
-            _fill(axis, panel, own_legend=not picture.shared_legend)
+            _fill(axis, panel)
     if picture.scale is not None:
         from matplotlib.cm import ScalarMappable  # noqa: PLC0415 - an extra, and slow to import
 
@@ -91,8 +91,7 @@ def draw(picture: Picture) -> Figure:
         colours = ScalarMappable(cmap=_SCALE)
         colours.set_clim(low, high)
         figure.colorbar(colours, ax=used, label=label)
-    if picture.shared_legend:
-        _share_legend(figure, used[0], picture)
+    _add_legends(figure, used, picture)
     figure.align_ylabels(axes)
     return figure
 
@@ -109,7 +108,7 @@ def save_all(
     return paths
 
 
-def _fill(axis: Axes, panel: Panel, *, own_legend: bool) -> None:
+def _fill(axis: Axes, panel: Panel) -> None:
     for area in panel.areas:
         axis.fill_between(
             np.asarray(area.x), area.low, area.high, facecolor=area.colour, alpha=area.alpha, label=area.label or None,
@@ -121,8 +120,6 @@ def _fill(axis: Axes, panel: Panel, *, own_legend: bool) -> None:
     for x, y, text in panel.notes:
         axis.annotate(text, (x, y), (0, -2), textcoords="offset points", ha="center", va="top", fontsize="xx-small")
     _set_axes(axis, panel)
-    if own_legend and panel.legend is not None and axis.get_legend_handles_labels()[1]:
-        axis.legend(frameon=False, fontsize="x-small", title=panel.legend or None, title_fontsize="x-small")
 
 
 def _draw_curves(axis: Axes, panel: Panel) -> None:
@@ -221,13 +218,22 @@ def _fill_heat(axis: Axes, heat: Heat) -> None:
         axis.axhline(row - 0.5, color="black", linewidth=0.8)
 
 
-def _share_legend(figure: Figure, axis: Axes, picture: Picture) -> None:
+def _add_legends(figure: Figure, axes: Sequence[Axes], picture: Picture) -> None:
+    """Add a legend to each panel with names, or one below all panels if they have the same names."""
     from matplotlib.patches import Patch  # noqa: PLC0415 - an extra, and slow to import
 
-    handles, labels = axis.get_legend_handles_labels()
-    for label, colour in picture.legend:
-        handles.append(Patch(facecolor=colour, edgecolor="0.6"))
-        labels.append(label)
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=min(len(labels), 4), frameon=False, fontsize="x-small"
-    )
+    look: dict[str, Any] = {"frameon": False, "fontsize": "x-small", "title_fontsize": "x-small"}
+    shared: list[Any] = [Patch(facecolor=colour, edgecolor="0.6", label=label) for label, colour in picture.legend]
+    named = []
+    for axis, panel in zip(axes, picture.panels, strict=True):
+        handles, labels = axis.get_legend_handles_labels()
+        if labels and isinstance(panel, Panel) and panel.legend is not None:
+            named.append((axis, panel.legend or None, handles, labels))
+    if len(named) > 1 and all(labels == named[0][3] for *_, labels in named):
+        _, look["title"], handles, _ = named.pop(0)
+        shared = [*handles, *shared]
+        named.clear()
+    for axis, title, *_ in named:
+        axis.legend(**look, title=title)
+    if shared:
+        figure.legend(handles=shared, **look, loc="outside lower center", ncols=min(len(shared), 4))

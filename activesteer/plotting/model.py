@@ -136,9 +136,7 @@ class Picture(NamedTuple):
         columns: Number of panels beside each other; 0 for a number that fits.
         width_in: Width [in].
         height_in: Height [in]; 0 for a height that fits.
-        legend: Label and colour of each entry of a legend below all panels; empty with `shared_legend` for the
-            curves of the first panel.
-        shared_legend: Whether one legend below all panels replaces those of the panels.
+        legend: Label and colour of more entries of a legend below all panels.
         widths: Relative widths of the columns; empty for equal ones.
     """
 
@@ -149,5 +147,4 @@ class Picture(NamedTuple):
     width_in: float = 9.0
     height_in: float = 0.0
     legend: Sequence[tuple[str, str]] = ()
-    shared_legend: bool = False
     widths: Sequence[float] = ()

@@ -131,13 +131,12 @@ def examination_page(result: Examination) -> Page:
     rows = [(name, _verdict(found), found.error or found.summary) for name, found in result.findings.items()]
     sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])]
     together = _together(result.findings) if standard.overlaid else []
-    if together:
-        sections.append(Section("All controllers", pictures=together))
     for name, found in result.findings.items():
         mark = ":" if found.error or found.passed is None else ""  # none after a chip
         words = Markup("{}{} {}.").format(_verdict(found), mark, found.error or typeset(found.summary))
-        alone = [] if together else found.pictures
-        sections.append(Section(name, [words], alone, found.tables))
+        sections.append(Section(name, [words], found.tables, pictures=[] if together else found.pictures))
+    if together:
+        sections.append(Section("All controllers", pictures=together))
     sections += [
         Section("Scope of this implementation", [standard.edition]),
         Section("Implemented", points=standard.implemented, level=3),
@@ -170,7 +169,7 @@ def _together(findings: Mapping[str, Findings]) -> list[Picture]:
                 )
             ]
             panels.append(parts[0]._replace(curves=curves))
-        pictures.append(alike[0]._replace(panels=panels, shared_legend=True))
+        pictures.append(alike[0]._replace(panels=panels))
     return pictures
 
 

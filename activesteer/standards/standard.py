@@ -222,4 +222,4 @@ def time_panels(runs: Mapping[str, StandardRun], channels: Sequence[str], begin_
 
 def cell(value: float | None, digits: int) -> str:
     """Format a number for a table: a hyphen for None or nan, and no minus before a zero."""
-    return "-" if value is None or math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f}"
+    return "-" if value is None or math.isnan(value) else f"{value:z.{digits}f}"

@@ -55,7 +55,7 @@ def test_kc_draws_into_a_folder(tmp_path, capsys, monkeypatch):
     page = (tmp_path / "kc" / "kc.html").read_text(encoding="utf-8")
     pictures = list((tmp_path / "kc").glob("*.png"))
     assert len(re.findall(r'data-picture="\d', page)) == len(pictures)
-    assert page.index("<h2>Target bands") < page.index("<h2>Metrics")
+    assert page.index("<h2>Metrics") < page.index("<h2>Target bands")
     assert "40 of 41 target bands are met" in page
     assert 'class="outside"' in page
     assert {picture.stem for picture in pictures} >= {"rear_camber", "parallel_travel", "steering", "targets"}

@@ -52,7 +52,7 @@ def test_wheel_holds_models_and_maneuvers_and_no_tests(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     for wanted in (
         "activesteer/py.typed",
-        "activesteer/pages/templates/report.html",
+        "activesteer/pages/templates/document.html",
         "activesteer/pages/templates/page.css",
         "activesteer/pages/templates/uPlot.LICENSE",
         "activesteer/_data/maneuvers/step_steer.toml",

@@ -12,14 +12,20 @@ import pytest
 from activesteer import study
 from activesteer.analysis.report import write_report
 from activesteer.commands.cli import main
+from activesteer.measured.comparison import compare
+from activesteer.measured.fitting import fit
+from activesteer.measured.pages import comparison_page, write_fit
 from activesteer.pages import Page, Section, Table, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.standards.examination import examination_page
 from activesteer.studies.engine.report import write_report as write_study_report
 from tests.conftest import PHONE
 from tests.contrast import contrast
-from tests.render.test_report_in_browser import TEXT_COLOURS
+from tests.render.test_report_in_browser import TEXT_COLOURS, pixels
 from tests.unit.analysis.synthetic_files import lane_changes
+from tests.unit.measured.test_comparison import TIME_S, step
+from tests.unit.measured.test_comparison import run as signals
+from tests.unit.measured.test_fitting import STUDY, noisy, step_to_either_side
 from tests.unit.standards.test_page import examination
 from tests.unit.studies.short import RATIO, short_study
 
@@ -64,7 +70,7 @@ def every_panel(folder: Path) -> Path:
     picture = Picture("every kind of panel", panels, ("speed [km/h]", 60.0, 160.0))
     table = Table("", ["quantity", "value", "unit", "remark"], [["yaw rate", "-1.2", "deg/s", "a remark " * 12]] * 3)
     page = Page(
-        "all", "A page with everything", ["A lead."], [Section("Part", ["Text."], [picture], [table], ["item"])]
+        "all", "A page with everything", ["A lead."], [Section("Part", ["Text."], [table], ["item"], [picture])]
     )
     return write_page(page, folder / "all.html")
 
@@ -72,6 +78,28 @@ def every_panel(folder: Path) -> Path:
 def kc(folder: Path) -> Path:
     assert main(["kc", "-o", str(folder)]) == 0
     return folder / "kc.html"
+
+
+def comparison(folder: Path) -> Path:
+    """Write a comparison of two quantities, one inside its corridor and one outside."""
+    steering, rate = step(TIME_S), 0.3 * step(TIME_S)
+    measured = signals(steering_wheel_rad=steering, yaw_rate_radps=1.2 * rate, ay_mps2=4.0 * steering)
+    found = compare([measured], signals(steering_wheel_rad=steering, yaw_rate_radps=rate, ay_mps2=4.0 * steering))
+    return write_page(comparison_page(found, ["car"], "model"), folder / "compare.html")
+
+
+def fitted(folder: Path) -> Path:
+    noisy(step_to_either_side(), folder / "a.mcap", 4)
+    found = fit({**STUDY, "maneuvers": [str(folder / "a.mcap")]}, jobs=1)
+    return next(path for path in write_fit(found, "fit", folder) if path.suffix == ".html")
+
+
+def linearised(name: str, *words: str) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        assert main(["linearise", *words, "-o", str(folder)]) == 0
+        return folder / f"{name}.html"
+
+    return write
 
 
 def of_study(folder: Path) -> Path:
@@ -89,6 +117,11 @@ PAGES: dict[str, Callable[[Path], Path]] = {
     ),
     "kc": kc,
     "study": of_study,
+    "compare": comparison,
+    "fit": fitted,
+    "modes": linearised("modes"),
+    "driver": linearised("driver", "--loop", "driver", "--speed-kmh", "80,100"),
+    "margins": linearised("margins", "--loop", "controller", "--speed-kmh", "80,100"),
 }
 
 
@@ -161,12 +194,27 @@ def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_
     assert figure.locator(".values span").count() == 1
 
 
+def test_pictures_of_a_section_with_the_same_names_share_one_legend(shown, tmp_path):
+    x = np.linspace(0.0, 1.0, 20)
+
+    def pictures(*names: str) -> list[Picture]:
+        return [Picture("", [Panel("x [m]", "y [m]", [Curve(x, x, name, "#d55e00")])]) for name in names]
+
+    sections = [Section("one", pictures=pictures("a", "a", "b")), Section("two", pictures=pictures("a"))]
+    page = shown(write_page(Page("all", "Legends", [], sections), tmp_path / "l.html"), **DESK)
+    assert page.locator(".legend").all_inner_texts() == ["a", "b", "a"]
+    first = page.locator(".legend button").first
+    first.click()
+    drawn = [pixels(figure, "#d55e00") > 20 for figure in page.locator("figure").all()]
+    assert drawn == [False, False, True, True]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("device", ["desk light", "phone light"])
 def test_one_player_moves_the_curves_of_all_pictures_and_stays_in_sight(shown, tmp_path, device):
     time_s = np.linspace(2.0, 4.0, 50)
     pictures = [Picture(f"picture {i}", [Panel("time [s]", "angle [deg]", [Curve(time_s, time_s)])]) for i in range(4)]
-    sections = [Section(str(i), ["Text."], [picture]) for i, picture in enumerate(pictures)]
+    sections = [Section(str(i), ["Text."], pictures=[picture]) for i, picture in enumerate(pictures)]
     page = shown(write_page(Page("all", "Time", [], sections), tmp_path / "t.html"), **DEVICES[device])
     slider, height = page.locator("input.time"), page.evaluate("document.body.scrollHeight")
     slider.evaluate("(slider) => { slider.value = slider.max / 2; slider.dispatchEvent(new Event('input')); }")

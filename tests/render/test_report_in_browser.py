@@ -145,7 +145,7 @@ def test_first_screen_says_what_came_out(open_page):
         box = page.get_by_text(words).first.bounding_box()
         assert box
         assert box["y"] + box["height"] < 800.0, words
-    red, green = (page.locator(f"header .chip.{kind}").first for kind in ("failed", "passed"))
+    red, green = (page.locator(f".contents .chip.{kind}").first for kind in ("failed", "passed"))
     assert (red.inner_text()[0], green.inner_text()[0]) == ("\N{BALLOT X}", "\N{CHECK MARK}")
 
 
@@ -337,7 +337,7 @@ def test_phone_shows_everything_within_its_width(open_page):
 @pytest.mark.slow
 def test_no_number_of_the_first_screen_is_without_a_name_on_a_phone(open_page):
     page = open_page(**PHONE)
-    names = page.locator(".headline:not(:empty), .results td.number").evaluate_all(
+    names = page.locator(".contents td:nth-child(3):not(:empty), .results td.number").evaluate_all(
         "parts => parts.map(part => getComputedStyle(part, '::before').content)"
     )
     assert names
@@ -409,7 +409,7 @@ def test_printed_plots_fit_the_paper(open_page):
 def test_names_of_printed_runs_end_before_their_results(open_page):
     page = open_page(viewport={"width": 600, "height": 850})  # paper less wide than A4
     page.emulate_media(media="print")
-    overlaps = page.locator(".contents .run:has(.swatch), .results tbody th").evaluate_all("""cells => {
+    overlaps = page.locator(":is(.contents, .results) tbody th:has(.swatch)").evaluate_all("""cells => {
       const range = document.createRange();
       return cells.filter((cell) => {
         range.selectNodeContents(cell);

@@ -11,7 +11,7 @@ from jinja2 import UndefinedError
 from markupsafe import Markup
 
 from activesteer.analysis.report import report_page
-from activesteer.pages import render, render_page
+from activesteer.pages import _environment, render_page
 from activesteer.pages.model import Table, picture_values
 from activesteer.plotting import Curve, Panel, Picture
 from tests.contrast import contrast
@@ -73,7 +73,7 @@ def test_every_text_can_be_read_on_every_page():
 
 def test_what_a_template_needs_must_be_given():
     with pytest.raises(UndefinedError):
-        render("document.html")
+        _environment().get_template("document.html").render()
 
 
 def test_lines_of_a_cell_are_apart_in_the_terminal():

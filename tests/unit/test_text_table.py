@@ -46,3 +46,9 @@ def test_a_long_line_goes_on_further_to_the_right():
     assert rest
     assert all(line.startswith("      word") for line in rest)
     assert max(map(len, (first, *rest))) <= COLUMNS
+
+
+def test_a_zero_has_no_minus_sign():
+    cells = ["-0.000", "-0", "-0.0004", "-0.0 deg", "x-0", "1.5 to -0.0"]
+    shown = [line.strip() for line in text_table([["a"], *([cell] for cell in cells)])][1:]
+    assert shown == ["0.000", "0", "-0.0004", "0.0 deg", "x-0", "1.5 to 0.0"]

@@ -10,7 +10,9 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from activesteer.analysis.claims.scorecard import Scorecard, Verdict, number_lines
+from markupsafe import Markup
+
+from activesteer.analysis.claims.scorecard import Judged, Scorecard, Verdict, number_lines
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
 from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
@@ -18,11 +20,12 @@ from activesteer.analysis.report.groups import Group, ReportedRun, groups_of, ju
 from activesteer.analysis.source import entry
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
 from activesteer.config import leaves
+from activesteer.core.conventions import RunLook
 from activesteer.core.files import write_text
 from activesteer.core.metric_table import Better, recorded_metric
-from activesteer.core.units import display_unit, parameter_label, typeset
+from activesteer.core.units import display_unit, parameter_label, parameter_title, typeset
 from activesteer.errors import ParameterError
-from activesteer.pages import render
+from activesteer.pages import Page, Section, Table, Text, failed, passed, render_page
 from activesteer.recording import Recording
 from activesteer.recording.contents import events_of
 
@@ -61,53 +64,179 @@ def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[st
 def report_page(recordings: Mapping[str, Recording], made: date | None = None) -> str:
     """Return the report of runs as HTML. The same recordings and date give the same page."""
     groups = groups_of(recordings)
-    sections = [_section(group, f"group-{number}") for number, group in enumerate(groups, start=1)]
-    several = len(groups) > 1
+    anchors = {f"group-{number}": group for number, group in enumerate(groups, start=1)}
+    cards, several = [judge(group) for group in groups], len(groups) > 1
     runs = [run for group in groups for run in group.runs]
-    every = [run.recording for run in runs]
-    file_titles, files = file_rows(groups)
-    cards = [section["scorecard"] for section in sections]
+    counted = f"{len(runs)} run{'s' * (len(runs) > 1)} of {len(groups)} manoeuvre{'s' * several}"
+    facts = " · ".join([*_facts(groups, made or date.today()), counted])
+    lead: list[Text] = [Markup('<span class="quiet">{}</span>').format(facts)]
+    lead += [
+        Markup('<span class="failed"><b>Incomplete:</b> {}: {}</span>').format(run.source, run.problem)
+        for run in runs
+        if run.problem
+    ]
     everything = Scorecard(tuple(item for card in cards for item in card.judged))
-    return render(
-        "report.html",
-        title=TITLE if several else f"{TITLE}: {groups[0].title}",
-        heading=f"Report: {len(groups)} manoeuvres" if several else groups[0].title,
-        headline=HEADLINE if any(HEADLINE in section["key_titles"] for section in sections) else "",
-        facts=_facts(groups, made or date.today()),
-        runs=runs,
-        sections=sections,
-        verdicts=everything.counts,
-        verdict_class={verdict: look[0] for verdict, look in _VERDICT_LOOK.items()},
-        verdict_mark={verdict: look[1] for verdict, look in _VERDICT_LOOK.items()},
-        change_mark=_CHANGE_MARK,
-        number_lines=number_lines,
-        typeset=typeset,
-        friction_utilisation_notes=lambda runs: notes({run.name: run.recording.metrics for run in runs}),
-        names=[f"{group.name} {run.name}" if several else run.name for group in groups for run in group.runs],
-        vehicle=rows(every, "vehicle"),
-        versions=rows(every, "versions"),
-        file_titles=file_titles,
-        files=files,
-        data=[{"anchor": section["anchor"], **plots(section["group"])} for section in sections],
+    if everything.judged:
+        counts = [
+            Markup('<b class="{}">{} {} {}</b>').format(*_VERDICT_LOOK[verdict], count, verdict.value)
+            for verdict, count in everything.counts.items()
+        ]
+        lead.append(Markup("Of {} claims of the paper: {}.").format(len(everything.judged), Markup(", ").join(counts)))
+    sections = [_contents(anchors, cards)] if several else []
+    for (anchor, group), card in zip(anchors.items(), cards, strict=True):
+        sections += _sections(group, anchor, card, group.title if several else "")
+    names = [f"{group.name} {run.name}" if several else run.name for group in groups for run in group.runs]
+    data = [{"anchor": anchor, **plots(group)} for anchor, group in anchors.items()]
+    page = Page(
+        TITLE if several else f"{TITLE}: {groups[0].title}",
+        f"Report: {len(groups)} manoeuvres" if several else groups[0].title,
+        lead, [*sections, _vehicle(groups, names)], ("car.js", "report.js"), {"groups": data},
+    )  # fmt: skip
+    return render_page(page)
+
+
+def _contents(anchors: Mapping[str, Group], cards: Sequence[Scorecard]) -> Section:
+    """Return the table of all manoeuvres: a row with the claims about each, then a row for each of its runs."""
+    has_headline = any(HEADLINE in key_figures(group) for group in anchors.values())
+    lines, about = [], []
+    for (anchor, group), card in zip(anchors.items(), cards, strict=True):
+        chips = Markup(" ").join(_chip(item, anchor) for item in card.judged)
+        lines.append([Markup('<a href="#{}">{}</a>').format(anchor, group.title), chips, ""])
+        titles = list(key_figures(group))
+        place = titles.index(HEADLINE) if HEADLINE in titles else None
+        for found in results(group):
+            headline = "" if place is None else _told(found["figures"][place])
+            lines.append([_swatch(found["run"].look) + found["run"].name, _outcome(found), headline])
+        if card.judged:
+            about.append(f"{card.judged[0].claim.id} to {card.judged[-1].claim.id} about {group.title}")
+    note = (
+        f"The paper's statements: {'; '.join(about)}. \N{CHECK MARK} the runs show it, \N{NOT EQUAL TO} they do not, "
+        "and the report gives the reason; \N{BALLOT X} they do not, unexpectedly."
+    )
+    heads = ["Manoeuvre, run", "Result", *([HEADLINE] if has_headline else [])]
+    rows = [line[: len(heads)] for line in lines]
+    return Section(tables=[Table("", heads, rows, kind="contents", note=note if about else "")])
+
+
+def _swatch(look: RunLook) -> Markup:
+    dashes = " ".join(f"{2 * length:g}" for length in look.dashes)
+    return Markup(
+        '<svg class="swatch" style="--run: var(--run-{})" viewBox="0 0 28 6" aria-hidden="true">'
+        '<path d="M0 3h28" stroke-dasharray="{}"/></svg>'
+    ).format(look.place, dashes)
+
+
+def _outcome(found: Mapping[str, Any]) -> Markup:
+    """Return what a run lost and what it kept."""
+    looks = ((failed, found["losses"]), (passed, found["kept"]))
+    return Markup(" ").join(look(", ".join(words), chip=True) for look, words in looks if words)
+
+
+def _told(figure: Mapping[str, Any]) -> Text:
+    """Return a key figure with its difference from the first run."""
+    if not figure["difference"]:
+        return figure["text"]
+    change: Change = figure["change"]
+    difference = f"{_CHANGE_MARK[change]} {figure['difference']}"
+    return Markup('{} <span class="{}">{}</span>').format(figure["text"], change.value, difference)
+
+
+def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Section]:
+    """Return the sections of a manoeuvre: its results and plots, the claims about it, its metrics and parameters."""
+    runs, found, titles = [run.recording for run in group.runs], results(group), list(key_figures(group))
+    names = [run.name for run in group.runs]
+    changed = [*dict.fromkeys(filter(None, map(changed_parameters, group.runs))), *_events(group)]
+    driven = Markup("Driven with <b>{}</b> in place of the manoeuvre's own.").format("; ".join(changed))
+    judged = any(each["losses"] or each["kept"] for each in found)
+    rows = [
+        [_swatch(each["run"].look) + each["run"].look.label, *([_outcome(each)] if judged else []),
+         *map(_told, each["figures"])]
+        for each in found
+    ]  # fmt: skip
+    note = Markup(
+        '<span class="better">\N{CHECK MARK} better</span>, <span class="worse">\N{BALLOT X} worse</span> than {}; '
+        "\N{ALMOST EQUAL TO} a difference that neither a driver nor a sensor could tell."
+    ).format(names[0])
+    heads = ["Run", *(["Result"] if judged else []), *titles]
+    compared = Table(
+        "", heads, rows, kind="results", numbers=len(titles), note=note if len(found) > 1 and titles else ""
+    )
+    verdicts = [
+        _chip(item, anchor)
+        + Markup(' {} <b class="{}">{}</b>').format(
+            item.claim.text, _VERDICT_LOOK[item.verdict][0], item.verdict.value
+        )
+        for item in card.judged
+    ]  # fmt: skip
+    first = Section(
+        title, [driven] if changed else [], [compared] if len(heads) > 1 else [], verdicts, kind="verdicts",
+        anchor=anchor,
+    )  # fmt: skip
+    details = [_claim(item, anchor) for item in card.judged]
+    claims = Section("What the paper claims", points=details, level=3, kind="claims")
+    told = [f"The claims of the paper are not judged: {card.obstacle}."] if card.obstacle and not card.judged else []
+    told += [f"{each}." for each in notes({run.name: run.recording.metrics for run in group.runs})]
+    for name, run in zip(names, runs, strict=True):
+        if error := run.metadata.get("metrics_error"):
+            told.append(f"{name}: no metrics: {error}")
+    others = [title for name in names[1:] for title in (name, f"{name} against {names[0]}")]
+    metrics = metric_rows(group)
+    tables = [Table("", ["Metric", "Unit", names[0], *others], metrics, kind="metrics", numbers=len(others) + 1)]
+    settings = parameter_table(
+        "Manoeuvre: parameters", parameters(runs, "controller", "maneuver", "timestep_s"), names, folded=True
+    )
+    last = Section("Metrics" if metrics else "", told, [*(tables if metrics else []), settings], level=3)
+    return [first, *([claims] if card.judged else []), last]
+
+
+def _chip(item: Judged, anchor: str) -> Markup:
+    """Return the number of a claim with its verdict, which leads to its details."""
+    (kind, mark), claim = _VERDICT_LOOK[item.verdict], item.claim
+    return Markup('<a class="chip {}" href="#{}-{}" title="{} ({})">{} {}</a>').format(
+        kind, anchor, claim.id, claim.text, item.verdict.value, mark, claim.id
     )
 
 
-def _section(group: Group, anchor: str) -> dict[str, Any]:
-    """Return the content of one manoeuvre, by the names of the template."""
-    recordings, first = [run.recording for run in group.runs], group.runs[0].name
-    others = [title for run in group.runs[1:] for title in (run.name, f"{run.name} against {first}")]
-    return {
-        "anchor": anchor,
-        "group": group,
-        "scorecard": judge(group),
-        "changed": [*dict.fromkeys(filter(None, map(changed_parameters, group.runs))), *_events(group)],
-        "key_titles": list(key_figures(group)),
-        "results": results(group),
-        "metric_titles": ["Metric", "Unit", first, *others],
-        "metrics": metric_rows(group),
-        "parameters": rows(recordings, "controller", "maneuver", "timestep_s"),
-        "names": [run.name for run in group.runs],
-    }
+def _claim(item: Judged, anchor: str) -> Markup:
+    """Return a claim with its numbers, its criterion, and the reason if it is not reproduced."""
+    (kind, mark), claim = _VERDICT_LOOK[item.verdict], item.claim
+    numbers = Markup().join(Markup("<li>{}</li>").format(typeset(line)) for line in number_lines(claim.values))
+    why = Markup('<p class="why"><b>Why:</b> {}</p>').format(item.reason) if item.reason else ""
+    return Markup(
+        '<p id="{}-{}"><span class="chip {}">{} {}</span> {} <span class="verdict {}">{}</span></p>'
+        '<ul class="numbers">{}</ul><details><summary>Criterion</summary><p>{}</p></details>{}'
+    ).format(
+        anchor, claim.id, kind, mark, claim.id, claim.text, kind, item.verdict.value, numbers,
+        claim.statement.criterion, why,
+    )  # fmt: skip
+
+
+def parameter_table(title: str, found: Sequence[Row], names: Sequence[str], *, folded: bool = False) -> Table:
+    """Return the table of parameters. Rows in which the runs differ are marked."""
+    outside = frozenset(number for number, row in enumerate(found) if row.differs)
+    columns = names if outside else ["Value"]
+    rows = [
+        [
+            Markup('{} <code class="key quiet">{}</code>').format(parameter_title(row.key), row.key),
+            *(row.values if row.differs else row.values * len(columns)),
+        ]
+        for row in found
+    ]
+    return Table(title, ["Parameter", *columns], rows, outside, kind="parameters", folded=folded)
+
+
+def _vehicle(groups: Sequence[Group], names: Sequence[str]) -> Section:
+    recordings = [run.recording for group in groups for run in group.runs]
+    vehicle = parameters(recordings, "vehicle")
+    differing, alike = ([row for row in vehicle if row.differs is wanted] for wanted in (True, False))
+    tables = [parameter_table("Vehicle: differences between the runs", differing, names)] if differing else []
+    tables += [
+        parameter_table("Vehicle: parameters of all runs", alike, names, folded=True),
+        Table("Files", *file_rows(groups), kind="files"),
+        parameter_table("Versions", parameters(recordings, "versions"), names),
+    ]
+    thinned = "The curves are thinned to 200 values per second; the metrics use every recorded value."
+    return Section("Vehicle and versions", [thinned], tables)
 
 
 def _events(group: Group) -> list[str]:
@@ -146,7 +275,7 @@ class Row(NamedTuple):
         return len(self.values) > 1
 
 
-def rows(recordings: Sequence[Recording], *tables: str) -> list[Row]:
+def parameters(recordings: Sequence[Recording], *tables: str) -> list[Row]:
     """Return the entries of tables of the metadata: those of the first run in its order, then those of later runs."""
     flat = []
     for run in recordings:
@@ -246,17 +375,18 @@ def changed_parameters(run: ReportedRun) -> str:
     return ", ".join(f"{words} {changed[key]} {unit}".rstrip() + f" ({key})" for key, (words, unit) in labels.items())
 
 
-def metric_rows(group: Group) -> list[dict[str, Any]]:
-    """Return the metrics, with their differences from the first run."""
+def metric_rows(group: Group) -> list[list[Text]]:
+    """Return the metrics with their units, with their differences from the first run."""
     values = [run.recording.metrics for run in group.runs]
     rows = []
     for name in dict.fromkeys(name for metrics in values for name in metrics):
         metric = recorded_metric(name)
         first, *others = (metrics.get(name, math.nan) for metrics in values)
         texts = [shown(name, run, number(name, run.get(name, math.nan))) for run in values]
-        cells = [Cell(texts[0])]
+        cells: list[Text] = [metric.label, metric.unit_name, texts[0]]
         for value, text in zip(others, texts[1:], strict=True):
             compared = difference_text(name, value, first) if LOST not in (text, texts[0]) else Cell("\N{EN DASH}")
-            cells += [Cell(text), compared]
-        rows.append({"name": metric.label, "unit": metric.unit_name, "cells": cells})
+            percent = Markup('{} <span class="quiet">({})</span>').format(*compared)
+            cells += [text, percent if compared.percent else compared.text]
+        rows.append(cells)
     return rows

@@ -1,4 +1,4 @@
-// Plots of a page: shared parts, and charts of the panels of a picture, from `pictures.py`.
+// Plots of a page: shared parts, and charts of the panels of a picture, from `model.py`.
 "use strict";
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 // Colours of the stylesheet, light or dark; read again when the scheme changes.
@@ -124,7 +124,7 @@ class Chart {
     new ResizeObserver(() => this.fit()).observe(this.holder);
   }
 
-  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? 32) * this.panel.names.length : this.panel.equal ? 360 : 230; }
+  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? 32) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : 230; }
 
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
@@ -303,36 +303,46 @@ function between(x, first, second) {
   return y0 + (y1 - y0) * ((x - x0) / (x1 - x0 || 1));
 }
 
-// The panels of a picture with one legend, whose entries hide what they name.
+// The legend of the picture before. Pictures of a section with a name in common share one.
+let legend = null;
+
+// The panels of a picture with a legend, whose entries hide what they name.
 function drawPicture(box, picture, place) {
-  Object.assign(picture, { place, hidden: new Set() });
-  const bar = element("div", { class: "toolbar legend" }), seen = new Set(), charts = [];
+  const names = picture.panels.flatMap(({ curves, areas, limits }) => [...curves, ...areas].map(({ label }) => label).concat(limits.map(([, label]) => label))).filter(Boolean);
+  const section = box.closest("section"), shared = legend?.section === section && legend.bar.isConnected && names.some((label) => legend.seen.has(label));
+  const own = shared ? legend : { section, bar: element("div", { class: "toolbar legend" }), seen: new Set(), hidden: new Set(), charts: [] };
+  const { bar, seen, hidden, charts } = own;
+  if (names.length) legend = own;
+  bar.classList.toggle("shared", shared);
+  Object.assign(picture, { place, hidden });
   const entry = (label, colour, dashes) => {
     if (!label || seen.has(label)) return;
     seen.add(label);
     const button = element("button", { type: "button", "aria-pressed": "true" }, swatchOf(colour, dashes), label);
     button.addEventListener("click", () => {
-      const hide = !picture.hidden.delete(label);
-      if (hide) picture.hidden.add(label);
+      const hide = !hidden.delete(label);
+      if (hide) hidden.add(label);
       button.setAttribute("aria-pressed", String(!hide));
       for (const chart of charts) chart.plot.redraw(false);
     });
     bar.append(button);
   };
   for (const panel of picture.panels) {
-    if (panel.legend) bar.append(element("span", { class: "scale" }, panel.legend));
+    if (panel.legend && !seen.has(panel.legend)) bar.append(element("span", { class: "scale" }, panel.legend));
+    seen.add(panel.legend);
     for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || [1, 2]).map((length) => 2 * length));
     for (const area of panel.areas) entry(area.label, inkOf(area.colour), []);
     for (const [, label] of panel.limits) entry(label, "var(--failed)", [6, 4]);
   }
   if (picture.scale) {
     const [label, low, high] = picture.scale;
-    bar.append(element("span", { class: "scale" }, label), `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`);
+    bar.append(element("span", { class: "scale" }, label), element("span", { class: "scale" }, `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`));
   }
   box.replaceChildren();
-  for (const panel of picture.panels) charts.push(new Chart(box, panel, picture));
-  if (bar.childNodes.length) box.before(bar);
-  return charts;
+  const made = picture.panels.map((panel) => new Chart(box, panel, picture));
+  charts.push(...made);
+  if (bar.childNodes.length && !shared) box.before(bar);
+  return made;
 }
 
 // One button and one slider for all curves over time of a page, which stay in sight.
@@ -347,8 +357,7 @@ function addPlayer(charts) {
     player.tell(i);
     for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
   });
-  const box = timed[0].holder.closest(".plots"), bar = box.previousElementSibling;
-  (bar?.classList.contains("toolbar") ? bar : box).before(player.row);
+  timed[0].holder.closest("section").before(player.row);
 }
 
 const repaintAll = () => { mix(); for (const each of drawn) each.repaint(); };
@@ -356,7 +365,7 @@ DARK.addEventListener("change", repaintAll);
 addEventListener("beforeprint", () => {
   document.documentElement.classList.add("paper");
   repaintAll();
-  for (const details of document.querySelectorAll(".group > details, details.rows")) details.open = true;
+  for (const details of document.querySelectorAll("details.printed, details.rows")) details.open = true;
   for (const each of drawn) each.fit(PRINTED);
 });
 addEventListener("afterprint", () => { document.documentElement.classList.remove("paper"); repaintAll(); for (const each of drawn) each.fit(); });

@@ -1,5 +1,5 @@
 // The plots of the report. Each group of runs has linked plots over one time axis, and a track that marks the same
-// instant. Data: the JSON in #data, from `curves.plots`. Shared parts: `charts.js`.
+// instant. Data: `groups` of the JSON in #data, from `curves.plots`. Shared parts: `charts.js`.
 (() => {
   class Group {
     constructor(data) {
@@ -8,8 +8,10 @@
       this.visible = data.runs.map(() => true);
       this.focus = null;
       this.time = Array.from({ length: data.samples }, (_, i) => data.start_s + i * data.step_s);
-      this.box = document.querySelector(`.plots[data-group="${data.anchor}"]`);
-      this.toolbar();
+      this.box = element("div", { class: "plots" });
+      const bar = element("div", { class: "toolbar" });
+      document.querySelector(`#${data.anchor} > .drawn`).replaceChildren(bar, this.box);
+      this.toolbar(bar);
       if (data.track) this.track = new Track(this, data.track);
       for (const panel of data.panels) this.plots.push(this.panel(panel));
       new ResizeObserver(() => this.fit()).observe(this.box);
@@ -34,8 +36,7 @@
       return [holder, values];
     }
 
-    toolbar() {
-      const bar = document.querySelector(`.toolbar[data-group="${this.data.anchor}"]`);
+    toolbar(bar) {
       this.data.runs.forEach((run, i) => {
         const swatch = swatchOf(`var(--run-${run.place})`, dashed(run, 2));
         const button = element("button", { type: "button", "aria-pressed": "true" }, swatch, run.label);
@@ -327,10 +328,10 @@
     }
   }
 
-  drawn.push(...DATA.map((data) => new Group(data)));
+  drawn.push(...DATA.groups.map((data) => new Group(data)));
   // The contents mark the manoeuvre that is read.
   const seen = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) document.querySelector(`.jump a[href="#${target.id}"]`)?.setAttribute("aria-current", isIntersecting);
   }, { rootMargin: "-15% 0px -84% 0px" });
-  for (const section of document.querySelectorAll(".group")) seen.observe(section);
+  for (const section of document.querySelectorAll("section[id]")) seen.observe(section);
 })();

@@ -1,6 +1,6 @@
 "use strict";
-// The page of a study: panels of the chosen manoeuvre and metric, drawn by `charts.js`.
-const at = (id) => document.getElementById(id);
+// The page of a study: tables, and panels by `charts.js`, of the chosen manoeuvre and metric.
+const body = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
 const SHOWN_RUNS = 600, FIELDS = 8;
 const PANEL = { x: "", y: "", title: "", curves: [], areas: [], limits: [], names: [], notes: [], log: "", x_range: null, y_range: null, zero: false, equal: false, legend: null, above: null };
 const panelOf = (x, y, parts) => ({ ...PANEL, x, y, ...parts });
@@ -12,8 +12,10 @@ const number = (value) => (value == null ? "-" : short(value));
 const endsOf = (values) => { let low = Infinity, high = -Infinity; for (const v of values) if (v != null) { low = Math.min(low, v); high = Math.max(high, v); } return [low, high]; };
 const constantIn = (low, high) => !(high - low > 1e-3 * Math.max(Math.abs(low), Math.abs(high)));
 
+function begin(title, ...texts) { body.append(element("h2", {}, title), ...texts.filter(Boolean).map((text) => element("p", {}, text))); }
+
 function show(id, panels, scale = null) {
-  const box = at(id).appendChild(element("div", { class: "plots", "data-picture": id }));
+  const box = body.appendChild(element("div", { class: "plots", "data-picture": id }));
   drawPicture(box, { panels, scale }, id);
 }
 
@@ -63,7 +65,7 @@ function binned(rows, values) {
 function heat(metric, { keys, levels, maps }) {
   const [low, high] = endsOf(maps.flat(2));
   if (constantIn(low, high)) {
-    at("heat").append(element("p", {}, low <= high ? `${axisOf(metric)} is ${short(low)} in every field, within 0.1 %.` : `${axisOf(metric)} has no value in any field.`));
+    body.append(element("p", {}, low <= high ? `${axisOf(metric)} is ${short(low)} in every field, within 0.1 %.` : `${axisOf(metric)} has no value in any field.`));
     return;
   }
   const [x, y] = keys.map((key) => axisOf(DATA.factors.find((factor) => factor.key === key)));
@@ -115,10 +117,15 @@ function parallel(metric, rows) {
   show("parallel", [panelOf("", "", { curves, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], row_px: 64 })]);
 }
 
-function tableOf(parent, header, lines) {
-  const body = element("tbody");
-  for (const line of lines) body.append(element("tr", {}, ...line.map((cell, i) => element("td", { "data-title": header[i] }, cell))));
-  parent.append(element("table", { class: "findings cards" }, element("thead", {}, element("tr", {}, ...header.map((text) => element("th", {}, text)))), body));
+// Numbers are aligned to the right, and a long table can be folded, as on every page.
+const NUMBER = /^[+−]?\d[\d.]*(e[+-]?\d+)?$|^-$/;
+function tableOf(header, lines) {
+  const sides = header.map((_, i) => (i && lines.every((line) => NUMBER.test(line[i])) ? "number" : ""));
+  const rows = lines.map((line) => element("tr", {}, ...line.map((cell, i) => element(i ? "td" : "th", { class: sides[i], "data-title": header[i] }, cell))));
+  const head = element("tr", {}, ...header.map((text, i) => element("th", { class: sides[i] }, text)));
+  const box = element("div", { class: "scrolling", tabindex: 0 }, element("table", { class: "findings cards" }, element("thead", {}, head), element("tbody", {}, ...rows)));
+  const many = lines.length > 15;
+  body.append(many ? element("details", NARROW.matches ? { class: "rows" } : { class: "rows", open: "" }, element("summary", {}, `${lines.length} rows`), box) : box);
 }
 
 function replayLine(command) {
@@ -135,61 +142,66 @@ function replayLine(command) {
   return element("details", {}, element("summary", {}, "show"), button, line);
 }
 
-const PARTS = ["distribution", "quantiles", "scatter", "paired", "paired-table", "heat", "indices", "parallel", "extremes", "all"];
-
 function drawAll() {
   for (const chart of drawn.splice(0)) chart.plot.destroy();
-  for (const id of PARTS) at(id).replaceChildren();
-  const group = Number(at("group").value), metric = DATA.metrics.find((each) => each.name === at("metric").value);
+  body.replaceChildren();
+  const group = Number(chosenGroup.value), metric = DATA.metrics.find((each) => each.name === chosenMetric.value);
   const found = DATA.by_group[group][metric.name];
-  for (const id of ["paired-part", "heat-part", "indices-part"]) at(id).hidden = true;
-  if (!found) { at("distribution").append(element("p", {}, "No run of this manoeuvre has this metric.")); return; }
+  begin("Distribution", found ? "" : "No run of this manoeuvre has this metric.");
+  if (!found) return;
   const rows = [...DATA.rows.group.keys()].filter((i) => DATA.rows.group[i] === group), values = DATA.rows.metrics[metric.name];
   const quantiles = ["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit)), first = DATA.controllers[0];
+  tableOf(["controller", ...quantiles], DATA.controllers.map((name, c) => [name, ...(found.quantiles[c] || [null, null, null]).map(number)]));
   show("distribution", [histogram(metric, found.histogram)]);
-  tableOf(at("quantiles"), ["controller", ...quantiles], DATA.controllers.map((name, c) => [name, ...(found.quantiles[c] || [null, null, null]).map(number)]));
-  at("shown").textContent = DATA.all > DATA.rows.run.length ? `Points are ${DATA.rows.run.length} of ${DATA.all} runs; everything else uses all runs.` : "";
+  begin("Metric over factors", DATA.all > DATA.rows.run.length ? `Points are ${DATA.rows.run.length} of ${DATA.all} runs; everything else uses all runs.` : "");
   show("scatter", varied(rows).map((factor) => scatter(factor, axisOf(metric), rows, (i) => values[i])));
   if (found.paired.some((pair) => pair)) {
-    at("paired-part").hidden = false;
     const base = new Map(rows.filter((i) => DATA.rows.controller[i] === 0).map((i) => [DATA.rows.sample[i], values[i]]));
     const pairs = rows.filter((i) => DATA.rows.controller[i] > 0 && values[i] != null && base.get(DATA.rows.sample[i]) != null);
-    show("paired", varied(pairs).map((factor) => scatter(factor, `difference from ${first}: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]))));
-    tableOf(at("paired-table"), [`difference from ${first}`, ...quantiles, "smaller in magnitude [%]"],
+    begin("Difference from the first controller in the same sample");
+    tableOf([`difference from ${first}`, ...quantiles, "smaller in magnitude [%]"],
       found.paired.map((pair, n) => [DATA.controllers[n + 1], ...(pair ? [...pair.quantiles.map(number), short(100 * pair.smaller)] : ["-", "-", "-", "-"])]));
+    show("paired", varied(pairs).map((factor) => scatter(factor, `difference from ${first}: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]))));
   }
   const map = found.heat || binned(rows, values);
-  if (map) { at("heat-part").hidden = false; heat(metric, map); }
-  if (found.indices.length) { at("indices-part").hidden = false; sensitivity(metric, found.indices); }
+  if (map) { begin("Mean over two factors"); heat(metric, map); }
+  if (found.indices.length) {
+    begin("Sensitivity", "Points are indices, lines their 95 % confidence. S1: share of the variance due to the factor alone; ST: share with all its interactions; mu*: mean magnitude of the change over the whole range of the factor, in the unit of the metric.");
+    sensitivity(metric, found.indices);
+  }
+  begin("Parallel coordinates");
   parallel(metric, rows);
-  tableOf(at("extremes"), ["controller", "run", axisOf(metric), "command to drive and replay it"],
+  begin("Largest and smallest magnitudes");
+  tableOf(["controller", "run", axisOf(metric), "command to drive and replay it"],
     found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), replayLine(command)])));
   const constant = [], others = [];
   for (const other of DATA.metrics) {
     if (!DATA.by_group[group][other.name]) continue;
     const all = rows.map((i) => DATA.rows.metrics[other.name][i]).filter((value) => value != null);
     if (constantIn(...endsOf(all))) constant.push(`${other.label} ${all.length ? short(all[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
-    else others.push(histogram(other, DATA.by_group[group][other.name].histogram));
+    else others.push({ ...histogram(other, DATA.by_group[group][other.name].histogram), title: other.label });
   }
+  begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
   show("all", others);
-  at("constant").textContent = constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "";
 }
 
 // Select a metric that the manoeuvre has: the shown one, else a common one.
 function choose() {
-  const has = DATA.by_group[Number(at("group").value)];
-  if (has[at("metric").value]) return;
+  const has = DATA.by_group[Number(chosenGroup.value)];
+  if (has[chosenMetric.value]) return;
   const names = DATA.metrics.map((metric) => metric.name).filter((name) => has[name]);
   const asked = names.find((name) => ["sideslip_peak_abs_rad", "sideslip_peak_rad", "yaw_rate_peak_radps"].includes(name));
-  if (names.length) at("metric").value = asked || names[0];
+  if (names.length) chosenMetric.value = asked || names[0];
 }
 
-DATA.groups.forEach((text, place) => at("group").append(element("option", { value: place }, text)));
-for (const metric of DATA.metrics) at("metric").append(element("option", { value: metric.name }, metric.label));
+document.querySelector("#study > .drawn").replaceChildren(
+  element("p", { class: "choices" }, element("label", {}, "manoeuvre, vehicle ", chosenGroup), element("label", {}, "metric ", chosenMetric)), body);
+DATA.groups.forEach((text, place) => chosenGroup.append(element("option", { value: place }, text)));
+for (const metric of DATA.metrics) chosenMetric.append(element("option", { value: metric.name }, metric.label));
 if (DATA.metrics.length) {
-  at("group").addEventListener("change", () => { choose(); drawAll(); });
-  at("metric").addEventListener("change", drawAll);
-  at("metric").value = "sideslip_peak_abs_rad";
+  chosenGroup.addEventListener("change", () => { choose(); drawAll(); });
+  chosenMetric.addEventListener("change", drawAll);
+  chosenMetric.value = "sideslip_peak_abs_rad";
   choose();
   drawAll();
 }

@@ -29,6 +29,8 @@ _LEFT, _RIGHT, _THIRD, _GREY = "#0072b2", "#d55e00", "#009e73", "#777777"
 _DASHES: Final = (0.0, (4.0, 3.0))
 _DEG: Final = math.degrees(1.0)
 _AXLES: Final = (("front axle", 0), ("rear axle", 2))
+_NOTHING: Final = 1e-9
+"""Values below it are rounding errors."""
 _FURTHEST: Final = 0.6
 """How far beyond its band a metric is drawn, in widths of the band."""
 
@@ -79,33 +81,38 @@ def _pictures(result: KcResult) -> dict[str, Callable[[], Picture]]:
 def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> Path:
     met = len(result.targeted) - len(result.outside)
     lead = [f"{met} of {len(result.targeted)} target bands are met."] if result.targeted else []
-    rows = [_metric_row(entry, banded=bool(result.targeted)) for entry in result.metrics]
-    columns = ["axle", "metric", "value", "unit", *(["target band", "", "remark or source"] if result.targeted else [])]
-    outside = frozenset(number for number, entry in enumerate(result.metrics) if entry.inside is False)
-    metrics = Section("Metrics", tables=[Table("", columns, rows, outside)])
-    sections = [
-        Section(picture.title[0].upper() + picture.title[1:], pictures=[picture._replace(title="")])
-        for picture in pictures
+    heads = ["axle", "metric", "value", "unit"]
+    banded = sorted(result.targeted, key=lambda entry: entry.inside is True)  # those outside first
+    others = [_metric_row(entry)[:4] for entry in result.metrics if entry.inside is None]
+    tables = [
+        Table(f"{len(others)} metrics without a target band" if banded else "", heads, others, folded=bool(banded))
     ]
-    sections.insert(1 if result.targeted else 0, metrics)  # the bands, if there are any, stand first
+    if banded:
+        outside = frozenset(range(len(result.outside)))
+        columns = [*heads, "target band", "", "remark or source"]
+        tables.insert(0, Table("", columns, [_metric_row(entry) for entry in banded], outside))
+    metrics = Section("Metrics", tables=tables)
+    sections = [
+        metrics,
+        *(Section(picture.title[0].upper() + picture.title[1:], pictures=[picture._replace(title="")])
+          for picture in pictures),
+    ]  # fmt: skip
     title = f"Kinematics and compliance: {result.vehicle}"
     return write_page(Page(f"activesteer kc: {result.vehicle}", title, lead, sections), folder / "kc.html")
 
 
-def _metric_row(entry: KcMetric, *, banded: bool) -> list[Text]:
-    """Return the cells of a metric. Those about bands only if the car has any."""
-    value = [
+def _metric_row(entry: KcMetric) -> list[Text]:
+    """Return the cells of a metric."""
+    value = entry.value if abs(entry.value) > _NOTHING else 0.0
+    return [
         entry.axle,
         Markup('<span title="{}">{}</span>').format(entry.definition, entry.name.replace("_", " ")),
-        f"{entry.value:.4g}" if math.isfinite(entry.value) else "none",
+        f"{value:.4g}" if math.isfinite(value) else "none",
         entry.unit,
-    ]
-    band = [
         f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else "",
         {None: "", True: passed("inside", chip=True), False: failed("outside", chip=True)}[entry.inside],
         entry.remark or entry.source,
     ]
-    return [*value, *(band if banded else [])]
 
 
 def rear_camber_figure(result: KcResult) -> Figure:
@@ -190,7 +197,7 @@ def _drawn_grid(result: KcResult, grid: Grid) -> Picture:
             labels = grid.x_label if below else "", row_label if not first else ""
             panels.append(Panel(*labels, curves, axle if above else "", zero=True))
     height_in = 1.0 + 1.75 * len(grid.rows)
-    return Picture(grid.title, panels, columns=2, width_in=8.5, height_in=height_in, shared_legend=True)
+    return Picture(grid.title, panels, columns=2, width_in=8.5, height_in=height_in)
 
 
 def _rear_camber(result: KcResult) -> Picture:

@@ -110,7 +110,7 @@ class KcResult:
 def _number(value: float) -> str:
     if not math.isfinite(value):
         return "-"
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.4g}" if abs(value) >= 1.0 else f"{value:.3f}"
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.4g}" if abs(value) >= 1.0 else f"{value:z.3f}"
 
 
 @dataclass(frozen=True)

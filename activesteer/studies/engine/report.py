@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
+from markupsafe import Markup
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
@@ -20,12 +21,12 @@ from activesteer.core.metric_table import recorded_metric
 from activesteer.core.units import parameter_label
 from activesteer.driver import driver_spec
 from activesteer.errors import ActiveSteerError, StudyError
-from activesteer.pages import render
+from activesteer.pages import Page, Section, Table, Text, render_page
 from activesteer.plotting import Curve, Panel, Picture, draw, save
 from activesteer.studies.engine.analysis import MAX_SAMPLES, indices
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.runs import CURVE, run_command
-from activesteer.studies.engine.store import IDENTITY, OUTCOME, Store
+from activesteer.studies.engine.store import IDENTITY, OUTCOME, Progress, Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.tuning import Goal, Trial, Tuning
 
@@ -50,13 +51,37 @@ def write_report(folder: str | os.PathLike[str]) -> Path:
     table = store.read()
     if not table.num_rows:
         raise StudyError(f"{home}: no run is done yet")
-    content = {
-        "title": study.title or home.resolve().name,
-        "progress": progress.to_json(),
-        "data": _data(study, table),
-        "study": study.to_toml(),
-    }
-    return write_text(home / "report.html", render("study.html", **content), StudyError)
+    page = _page(study, progress, table, home.resolve().name)
+    return write_text(home / "report.html", render_page(page), StudyError)
+
+
+def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> Page:
+    """Return the page: what ran, then what `study.js` draws, then the factors and the file of the study."""
+    title, data = study.title or name, _data(study, table)
+    counts = ", ".join(f"{number} {status}" for status, number in progress.by_status.items())
+    lead: list[Text] = [f"{progress.done} of {progress.total} runs: {counts}."]
+    lead += [
+        Markup("Without effect: <code>{}</code> changes no metric of any run.").format(key)
+        for key in progress.without_effect
+    ]
+    errors = [(str(number), error) for error, number in progress.errors.items()]
+    factors = [
+        (
+            f"{each['label']} [{each['unit']}]" if each["unit"] else each["label"],
+            Markup("<code>{}</code>").format(each["key"]),
+        )
+        for each in data["factors"]
+    ]
+    sections = [
+        Section(tables=[Table("", ["runs", "error"], errors)] if errors else [], anchor="study"),
+        Section(
+            "Factors",
+            ["Relative: ratio to the value of the file; change: difference from it."],
+            [Table("", ["factor", "key"], factors)],
+        ),
+        Section("The study", [Markup('<code class="file">{}</code>').format(study.to_toml())]),
+    ]
+    return Page(title, title, lead, sections, ["study.js"], data)
 
 
 def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
@@ -28,6 +29,7 @@ from activesteer.core.conventions import DEFAULT_TIMESTEP_S, RUN_COLOURS, Array,
 from activesteer.driver import DriverParameters
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
 from activesteer.errors import DriverError, StudyError
+from activesteer.pages import Text, failed, passed
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, check_gains, resolve
@@ -101,6 +103,10 @@ def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
 
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
 """Default speeds [km/h]."""
+LEAST_DAMPING: Final = 0.25
+"""Least damping ratio that is asked of a loop."""
+LEAST_PHASE_MARGIN_DEG: Final = 30.0
+"""Least phase margin of humans, as McRuer and Krendel measured it [deg]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.2, 60.0, 300)
 """Frequencies of the response [rad/s]."""
 _NOTICED: Final = 0.05
@@ -299,6 +305,24 @@ def driver_loops(
             loop = driver_loop(car, linear, who, gains, setup.steering_ratio)
             run = small_step(car.speed_mps, name, vehicle, overrides, driver)
             found.append(LoopAtSpeed(3.6 * car.speed_mps, name, loop, run))
+    return found
+
+
+def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
+    """Return in words the smallest phase margin and the smallest damping, against what is asked."""
+    found: list[Text] = []
+    for key, words, unit, asked, digits in (
+        ("phase_margin_deg", "phase margin", " deg", LEAST_PHASE_MARGIN_DEG, 0),
+        ("damping", "damping ratio of the linear loop", "", LEAST_DAMPING, 2),
+        ("damping_in_run", "damping ratio in a run", "", LEAST_DAMPING, 2),
+    ):
+        judged = [row for row in rows if math.isfinite(row[key])]
+        if not judged:
+            continue
+        row = min(judged, key=lambda row: row[key])
+        value = (passed if row[key] >= asked else failed)(f"{row[key]:.{digits}f}{unit}")
+        where = f" with {row['controller']} at {row['speed_kmh']:g} km/h; at least {asked:g}{unit} is asked."
+        found.append(Markup("The smallest {} is ").format(words) + value + where)
     return found
 
 

@@ -37,7 +37,7 @@ from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.core.text_table import text_table
 from activesteer.core.units import quantity_of
 from activesteer.errors import ModelError, ParameterError
-from activesteer.pages import Page, Section, Table
+from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.simulation.closed_loop import ClosedLoop
@@ -377,10 +377,28 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
     table = Table("", _MODE_COLUMNS, rows)
     sections = [
         Section("Modes", tables=[table]),
-        Section("From the steering wheel to the motion", pictures=[bode]),
-        Section("Poles over speed", ["Rays are damping ratios, arcs natural frequencies."], [locus]),
+        Section("From the steering wheel to the motion", pictures=[bode._replace(title="")]),
+        Section("Poles over speed", ["Rays are damping ratios, arcs natural frequencies."], pictures=[locus]),
     ]
-    return Page(f"activesteer linearise: {title}", f"Linear car: {title}", [], sections)
+    return Page(f"activesteer linearise: {title}", f"Linear car: {title}", _conclusion(modes), sections)
+
+
+def _conclusion(modes: Sequence[Mode]) -> list[Text]:
+    """Return in words whether the car is stable, and its least damped mode; of yaw and sideslip too."""
+    shown = [mode for mode in modes if mode.natural_frequency_Hz <= CUT_OFF_HZ]
+    growing = ", ".join(dict.fromkeys(mode.name for mode in shown if mode.eigenvalue_1ps.real > 0.0))
+    swinging = sorted((mode for mode in shown if mode.eigenvalue_1ps.imag), key=lambda mode: mode.damping_ratio)
+    steered = [mode for mode in swinging if "yaw" in mode.name]
+    return [
+        failed(f"unstable: {growing}") if growing else passed("stable: every mode decays"),
+        *(
+            f"{words} at {mode.natural_frequency_Hz:.2f} Hz with a damping ratio of {mode.damping_ratio:.2f}."
+            for mode, words in (
+                *((mode, f"The least damped mode is {mode.name},") for mode in swinging[:1]),
+                *((mode, "Yaw and sideslip swing") for mode in steered[:1]),
+            )
+        ),
+    ]
 
 
 BODE_RANGE_Hz: Final = (0.1, 10.0)
@@ -403,13 +421,13 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
     panels = []
     for output in _GAIN_UNITS:
         values = found[system.output_labels.index(output), system.input_labels.index("steering_wheel_rad")]
-        gain = Curve(frequency_Hz, np.abs(values), label, RUN_COLOURS[1], "-", 1.5)
-        phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), label, RUN_COLOURS[1], "-", 1.5)
+        gain = Curve(frequency_Hz, np.abs(values), "", RUN_COLOURS[1], "-", 1.5)
+        phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), "", RUN_COLOURS[1], "-", 1.5)
         below = "frequency [Hz]" if output == "sideslip_rad" else ""
         short = quantity_of(output).short
         panels.append(Panel(below, f"{short}\n[{_GAIN_UNITS[output]}]", [gain], log="xy", x_range=BODE_RANGE_Hz))
         panels.append(Panel(below, f"{short}:\nphase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
-    return Picture("", panels, columns=2, width_in=7.5, height_in=9.0, shared_legend=True)
+    return Picture(label, panels, columns=2, width_in=7.5, height_in=9.0)
 
 
 def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequence[float]) -> Picture:
@@ -430,6 +448,8 @@ def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequen
         poles = poles[(poles.imag >= -1e-9) & (np.abs(poles) <= limit)]
         shade = (3.6 * speed_mps - slowest) / max(fastest - slowest, 1e-9)
         curves.append(Curve(poles.real, poles.imag, dashes="", marker="o", size=3.5, shade=shade))
-    panel = Panel("real part [1/s]", "imaginary part [1/s]", curves, notes=notes, y_range=(-1.0, 1.05 * limit))
+    panel = Panel(
+        "real part [1/s]", "imaginary part [1/s]", curves, notes=notes, y_range=(-1.0, 1.05 * limit), equal=True
+    )
     scale = ("speed [km/h]", slowest, fastest)
     return Picture("", [panel], width_in=7.5, height_in=5.5, scale=scale)

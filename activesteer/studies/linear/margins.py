@@ -36,6 +36,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from activesteer.controllers import Controller, ControllerSetup, controller_spec
@@ -49,7 +50,7 @@ from activesteer.controllers.linear_form import (
 )
 from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.core.signals import Measurement
-from activesteer.pages import Page, Section, Table, write_page
+from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
@@ -66,6 +67,8 @@ FREQUENCIES_RADPS: Final = np.geomspace(0.05, 300.0, 800)
 """Frequencies [rad/s]: from a hundredth of the car's natural frequency to beyond those of its suspensions."""
 LOOPS: Final = ("rear", "superposition")
 """Points at which a loop is opened, in the order of the demands."""
+ASKED_DISK: Final = 0.5
+"""Least disk margin that is asked of a loop: 4.4 dB together with 28 deg [-]."""
 BOTH: Final = "both"
 """Name of the loop in which gain, phase or delay change by the same in both demands."""
 
@@ -335,9 +338,10 @@ _SHOWN: Final = (-3.2, 1.6), (-2.4, 2.4)
 """Range of the real and of the imaginary part in a picture."""
 _LEAD: Final = (
     "Each curve is the loop gain L over frequency, from 0.008 to 48 Hz, with its mirror image left out. The loop is "
-    "marginal where L = -1 (cross). The red disk has the smallest disk margin alpha of all speeds: the curve of that "
-    "speed touches it. Gain and phase may then change together by any complex factor f with |f - 1| / |f + 1| < "
-    "alpha / 2, such as gains from (2 - alpha) / (2 + alpha) to (2 + alpha) / (2 - alpha)."
+    "marginal where L = \N{MINUS SIGN}1 (cross). The red disk has the smallest disk margin alpha of all speeds: the "
+    "curve of that speed touches it. Gain and phase may then change together by any complex factor f with "
+    "|f\N{MINUS SIGN}1| / |f+1| < alpha / 2, such as gains from (2 \N{MINUS SIGN} alpha) / (2 + alpha) to "
+    "(2 + alpha) / (2 \N{MINUS SIGN} alpha)."
 )
 
 
@@ -351,7 +355,12 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
         pictures = [_picture(loops)] if loops[0].curves else []
         sections.append(Section(f"{controller}, opened at {loop}", pictures=pictures, tables=[_table(loops)]))
     title = f"Stability margins: {vehicle}"
-    lead = [_LEAD] if any(each.curves for each in found) else []
+    least = min(found, key=lambda each: each.margins.disk)
+    value = (passed if least.margins.disk >= ASKED_DISK else failed)(f"{least.margins.disk:.2f}")
+    where = f" with {least.controller}, opened at {least.loop}, at {least.speed_kmh:g} km/h; at least {ASKED_DISK:g} is"
+    lead: list[Text] = [Markup("The smallest disk margin is ") + value + where + " asked: 4.4 dB together with 28 deg."]
+    if any(each.curves for each in found):
+        lead.append(_LEAD)
     return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
 
 
@@ -403,10 +412,9 @@ def _table(loops: Sequence[LoopMargins]) -> Table:
         margins = each.margins
         values = (margins.gain_dB, math.degrees(margins.phase_rad), 1e3 * margins.delay_s, margins.disk)
         numbers = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
-        numbers[-1] += ", the smallest" if each is least else ""
         changed = ", ".join(f"{key} = {value}" for key, value in each.factors.items())
         rows.append([f"{each.speed_kmh:g}", *numbers, changed][: len(heads)])
-    return Table("", heads, rows)
+    return Table("", heads, rows, note=f"The smallest disk margin is at {least.speed_kmh:g} km/h.")
 
 
 def worst_margins(

@@ -51,7 +51,7 @@ def run_picture(run: str, ours: Table, reference: Table | None) -> Picture:
             curves.append(_reference(trace.time_s, factor * trace.reference))
         curves.append(_ours(ours["t"], factor * ours[quantity.column]))
         panels.append(Panel("time [s]", label, curves, areas=areas))
-    return Picture(run, panels, height_in=5.2, shared_legend=True)
+    return Picture(run, panels, height_in=5.2)
 
 
 def uneven_picture(run: str, ours: Table, reference: Table) -> Picture:
@@ -61,7 +61,7 @@ def uneven_picture(run: str, ours: Table, reference: Table) -> Picture:
         start = 1e3 * (ours[column][0] - reference[column][0]) if column == "z" else 0.0
         reference_y, our_y = factor * reference[column], factor * ours[column] - start
         panels.append(Panel("time [s]", label, [_reference(reference["t"], reference_y), _ours(ours["t"], our_y)]))
-    return Picture(run, panels, height_in=7.5, shared_legend=True)
+    return Picture(run, panels, height_in=7.5)
 
 
 def cross_picture(run: str, ours: Table, reference: Table | None) -> Picture:
@@ -78,7 +78,7 @@ def cross_picture(run: str, ours: Table, reference: Table | None) -> Picture:
             curves.append(_reference(u, v))
         curves.append(_ours(x_factor * ours[x], y_factor * ours[y]))
         panels.append(Panel(x_label, y_label, curves))
-    return Picture(f"{run}: cross-plots", panels, height_in=5.2, shared_legend=True)
+    return Picture(f"{run}: cross-plots", panels, height_in=5.2)
 
 
 def sweep_picture(curves: list[Curves]) -> Picture:
@@ -99,6 +99,4 @@ def sweep_picture(curves: list[Curves]) -> Picture:
         for curve in curves
     ]  # fmt: skip
     title = "kinematics: curves (top), difference ours - reference with tolerance (bottom)"
-    return Picture(
-        title, above + below, columns=len(curves), width_in=2.6 * len(curves), height_in=4.6, shared_legend=True
-    )
+    return Picture(title, above + below, columns=len(curves), width_in=2.6 * len(curves), height_in=4.6)

@@ -69,7 +69,7 @@ def _runs(result: Validation) -> list[Section]:
             ["The reference of this run is not known here; the page shows our run alone."] if reference is None else []
         )
         tables = [comparison_table(by_run[run])] if run in by_run else []
-        sections.append(Section(run, texts, pictures, tables))
+        sections.append(Section(run, texts, tables, pictures=pictures))
     return sections
 
 

@@ -16,7 +16,7 @@ import pytest
 from activesteer.analysis.report import open_all, report_page, write_report
 from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
 from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of, judge, outcome, verdict
-from activesteer.analysis.report.run_page import results, rows
+from activesteer.analysis.report.run_page import parameters, results
 from activesteer.analysis.tables import Change, difference_text, number
 from activesteer.core.metric_table import recorded_metric
 from activesteer.core.signals import Channel
@@ -74,7 +74,7 @@ def data_of(page: str) -> list[dict[str, Any]]:
     def refuse(word: str) -> None:
         pytest.fail(f"{word} is no JSON")
 
-    return json.loads(found[1], parse_constant=refuse)
+    return json.loads(found[1], parse_constant=refuse)["groups"]
 
 
 @pytest.fixture(scope="module")
@@ -229,7 +229,7 @@ def test_claims_are_not_judged_of_runs_that_cannot_be_compared(change, reason):
 def test_parameters_that_differ_stand_beside_each_other():
     one = recording_of(step_steer(), "ars", {"speed_mps": 20.0, "road": {"mu": 0.9}})
     two = recording_of(step_steer(), "ars", {"speed_mps": 10.0, "road": {"mu": 0.9}})
-    found = {row.key: row.values for row in rows([one, two], "controller", "maneuver")}
+    found = {row.key: row.values for row in parameters([one, two], "controller", "maneuver")}
     assert found["maneuver.speed_mps"] == ("20 (72 km/h)", "10 (36 km/h)")
     assert found["maneuver.road.mu"] == ("0.9",)
     assert found["controller"] == ("ars",)

@@ -27,14 +27,18 @@ STUDY: dict[str, Any] = {
 }
 
 
-@pytest.fixture(scope="module")
-def truth() -> Recording:
-    """Return a step to either side with known parameters."""
+def step_to_either_side() -> Recording:
+    """Return a run with known parameters."""
     table = {
         "kind": "open_loop", "speed_kmh": 80.0, "duration_s": 1.6, "settle_s": 0.3, "hold_last": True,
         "steering": {"time_s": [0.1, 0.3, 0.7, 1.0], "steering_wheel_deg": [0.0, 40.0, 40.0, -40.0]},
     }  # fmt: skip
     return activesteer.simulate(table, overrides=TRUTH)
+
+
+@pytest.fixture(scope="module")
+def truth() -> Recording:
+    return step_to_either_side()
 
 
 def noisy(truth: Recording, path: Path, seed: int, **offsets: float) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import control
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from activesteer.analysis.figures import figure_2
 from activesteer.pages import render_page
 from activesteer.plotting import draw
+from activesteer.studies.linear.driver_loop import conclusion
 from activesteer.studies.linear.linearisation import bode_picture, modes_page, root_locus_picture
 from activesteer.vehicle.linear_state import Mode
 from tests.unit.analysis.synthetic import step_steer
@@ -55,11 +57,32 @@ def test_page_has_a_row_for_each_mode_and_all_panels():
             "yaw/sideslip", complex(-3.0, 4.0), {"yaw": 0.99, "drive": 0.001}, np.ones(1, complex), np.ones(1, complex)
         )
     ]
-    page = modes_page("car", modes, bode_picture("a", system()), root_locus_picture([system()], [20.0]))
+    pictures = bode_picture("a", system()), root_locus_picture([system()], [20.0])
+    page = modes_page("car", modes, *pictures)
     assert page.sections[0].tables[0].rows == [
         ["yaw/sideslip", "0.80", "0.60", "-3.00 \N{PLUS-MINUS SIGN} 4.00i", "yaw 99%"]
     ]
     assert render_page(page).count('class="plots"') == 2
+    verdict, least, _ = page.lead
+    assert "stable" in verdict
+    assert least == "The least damped mode is yaw/sideslip, at 0.80 Hz with a damping ratio of 0.60."
+
+
+def test_a_page_begins_with_what_is_unstable():
+    grows = Mode("yaw/sideslip", complex(0.1, 4.0), {"yaw": 1.0}, np.ones(1, complex), np.ones(1, complex))
+    page = modes_page("car", [grows], bode_picture("a", system()), root_locus_picture([system()], [20.0]))
+    assert "unstable: yaw/sideslip" in page.lead[0]
+
+
+def test_the_loop_of_the_driver_is_judged_by_what_is_asked():
+    rows = [
+        {"controller": name, "speed_kmh": 80.0, "phase_margin_deg": margin, "damping": 0.4, "damping_in_run": damping}
+        for name, margin, damping in (("none", 41.0, 1.0), ("ars", 27.2, 0.3), ("afs", float("nan"), 0.24))
+    ]
+    margin, linear, in_run = map(Markup.striptags, map(Markup, conclusion(rows)))
+    assert margin == "The smallest phase margin is \N{BALLOT X} 27 deg with ars at 80 km/h; at least 30 deg is asked."
+    assert "\N{CHECK MARK} 0.40" in linear
+    assert "\N{BALLOT X} 0.24 with afs" in in_run
 
 
 def test_figure_2_draws_a_model_only_where_it_has_the_channel(figures, tmp_path):

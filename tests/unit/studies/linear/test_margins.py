@@ -274,4 +274,5 @@ def test_page_of_margins_shows_each_loop_with_its_disk(tmp_path):
     assert text.count('<div class="plots"') == 1
     assert "&lt;b&gt;, opened at rear" in text
     assert f"disk margin {margins.disk:.2f}" in text
+    assert f'The smallest disk margin is <b class="passed">\N{CHECK MARK} {margins.disk:.2f}</b>' in text
     assert "car.mass_kg = 1500.0" in text
