@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { dark, element, mostControllers, number, onTheme, runColour, setTheme } from "./look.js";
+import { dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -56,19 +56,19 @@ function readAddress() {
 function writeAddress() {
   const { controllers, ...names } = choice();
   history.replaceState(null, "", `#${new URLSearchParams({ ...names, controllers: controllers.join(","), ...state.values })}`);
-  $("chosen").textContent = [...Object.values(names), controllers.join(", ")].join(" · ");
+  $("chosen").textContent = [...Object.values(names).map(inWords), controllers.join(", ")].join(" · ");
 }
 
 // Choose a name in a list; the program answers a name that it does not know.
 function offer(list, name) {
-  if (![...list.options].some((option) => option.value === name)) list.append(element("option", { value: name }, name));
+  if (![...list.options].some((option) => option.value === name)) list.append(option(name));
   list.value = name;
 }
 
 function addBox(name) {
   const box = element("input", { type: "checkbox", value: name });
   box.addEventListener("change", () => describe(box));
-  $("controllers").append(element("label", {}, box, ` ${name}`));
+  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, ` ${name}`));
 }
 
 const asking = new Asking((dragging) => {
@@ -92,9 +92,10 @@ function keepGhosts() {
 const hear = {
   ready(header) {
     for (const [id, names] of [["maneuver", header.maneuvers], ["vehicle", header.vehicles], ["driver", header.drivers]]) {
-      $(id).replaceChildren(...names.map((name) => element("option", { value: name }, name)));
+      $(id).replaceChildren(...names.map((name) => option(name)));
     }
     $("controllers").querySelectorAll("label").forEach((label) => label.remove());
+    state.titles = header.titles;
     header.controllers.forEach(addBox);
     drive.offer(header);
     readAddress();
@@ -177,17 +178,29 @@ function showSliders() {
   const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
-    box.open = open.size ? open.has(group) : i === 0 || (!narrow && i !== 1 && i < 4);
+    box.open = open.size ? open.has(group) : i === 0 || (i !== 1 && i < 4);
     for (const slider of state.sliders.filter((other) => other.group === group)) box.append(sliderOf(slider));
     return box;
   }));
+  const before = $("group").value;
+  $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, group[0].toUpperCase() + group.slice(1))));
+  if (groups.includes(before)) $("group").value = before;
+  if (narrow) showGroup();
+}
+
+// A phone has room for one group of sliders above the results.
+function showGroup() {
+  for (const box of $("sliders").children) {
+    box.hidden = box.dataset.group !== $("group").value;
+    box.open = true;
+  }
 }
 
 const wayOf = (event) => ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 })[event.key];
 
 function sliderOf(slider) {
   const digits = Math.max(0, -Math.floor(Math.log10(slider.step)));
-  const shown = element("output", {}), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": slider.label, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
+  const shown = element("output", {}), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": `${slider.group}: ${slider.label}`, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
   const box = element("div", { class: "slider" }, element("span", {}, slider.label), shown, input);
   const write = () => { shown.textContent = `${number(+input.value, digits)} ${slider.unit}`; box.classList.toggle("changed", slider.key in state.values); };
   const moved = (dragging) => {
@@ -255,6 +268,7 @@ const player = {
 $("choice").open = !narrow;
 addEventListener("hashchange", readAddress);
 for (const id of NAMED) $(id).addEventListener("change", () => describe());
+$("group").addEventListener("change", showGroup);
 $("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
 $("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });
