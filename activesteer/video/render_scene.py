@@ -43,6 +43,8 @@ _BASE: Final = """
 <mujoco>
   <option><flag contact="disable" gravity="disable"/></option>
   <visual>
+    <!-- The haze hides the far end of the road. It has the colour of the sky at the horizon; the default is white. -->
+    <rgba haze="0.59 0.695 0.81 1"/>
     <headlight ambient="0.42 0.42 0.42" diffuse="0.32 0.32 0.32" specular="0.05 0.05 0.05"/>
     <global offwidth="{width}" offheight="{height}"/>
     <!-- Lengths in units of the extent below: 0.3 m and 600 m. -->
