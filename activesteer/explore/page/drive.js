@@ -107,6 +107,7 @@ export class Drive {
     this.ready = true;
     this.course = $("course").value;
     this.timed = header.cones.length > 0 || header.radius_m > 0;
+    this.way = header.radius_m > 0 ? "Last lap" : "First to last gate";
     this.scene.setShape(header.shape, arrays);
     this.scene.car("you", 2);
     this.scene.setCourse(header.cones, header.lanes, header.radius_m);
@@ -240,7 +241,7 @@ export class Drive {
     this.values();
     if (this.frames.length && (lap || !before)) this.ghosts.set(this.course, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
-    const timed = lap ? ` Lap or gates: ${number(lap, 2)} s${faster}.` : "";
+    const timed = lap ? ` ${this.way}: ${number(lap, 2)} s${faster}.` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
     const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
     $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${latency} Saved as ${header.file} in ${header.folder}.`;

@@ -164,7 +164,7 @@ function redraw() {
 
 function showFigures() {
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", {}, ""), ...runs.map((run) => element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), narrow ? run.name.replace(/^.*:|\?.*|\.toml$/g, "") : run.label)));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), narrow ? run.name.replace(/^.*:|\?.*|\.toml$/g, "") : run.label)));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
