@@ -209,7 +209,7 @@ export class Drive {
     const lap = header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
     const rows = {
       speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
-      time: this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": `${this.struck}`,
+      time: this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": this.scene.cones.length ? `${this.struck}` : "–",
       "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear wheels": `${number(header.rear_deg, 1)}°`,
       "added in front": `${number(header.superposition_deg, 1)}°`, control: header.controller,
     };

@@ -33,6 +33,7 @@ function describe(ticked) {
   const unticked = untickBeyond(mostControllers, boxes(), ticked);
   if (!chosen().length) { say("Choose at least one controller."); return; }
   say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "");
+  if (unticked.includes(ticked?.value)) return;
   asking.stop();
   // Another controller leaves the sliders where they are; they apply where the new choice has them.
   if (ticked) state.wanted = state.values;
