@@ -27,9 +27,17 @@ from tests.render.headless import Headless
 PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 SIZE: Final = (1000, 760)
 """Width and height of the browser's window [px]."""
+TITLE_BAR: Final = 37
+"""Height of the viewer's title bar, which warns of a machine without a graphics card and of a container [px]."""
 COLOURS: Final = 64
 FROM: Final = {"measured_lane_change": "Fitted"}
-"""Picture -> heading at its top. By default it shows the top of the page."""
+"""Picture -> heading of the plots that it shows. By default it shows the top of the page."""
+TO_PLOTS: Final = """(heading) => {
+  let part = heading;
+  while (part.nextElementSibling && !part.querySelector("canvas")) part = part.nextElementSibling;
+  scrollTo(0, part.getBoundingClientRect().top + scrollY - 80);
+}"""
+"""Scroll to the first plots below a heading, and leave room for the slider of time at the top of the window."""
 
 
 def write_pages(folder: Path) -> dict[str, Path]:
@@ -65,6 +73,7 @@ def draw_explore(browser: Browser, folder: Path) -> Image.Image:
         shown.goto(json.loads(server.stdout.readline())["url"])
         shown.wait_for_selector("#state:has-text('all after')", timeout=60_000)
         shown.locator("#time").fill("2.6")
+        shown.locator("#time").blur()
         shown.wait_for_timeout(3000)
         # The latencies are those of the machine that draws the pictures.
         shown.locator("#state").evaluate("(state) => { state.textContent = ''; }")
@@ -81,7 +90,8 @@ def draw_viewer(folder: Path) -> Image.Image:
     activesteer(["replay", *files, "--compare", "-o", str(folder / "runs.rrd")])
     with Headless(folder) as viewer:
         viewer.open(folder / "runs.rrd")
-        return viewer.window(2.6)
+        window = viewer.window(2.6)
+    return window.crop((0, TITLE_BAR, *window.size))
 
 
 def draw_pages() -> None:
@@ -94,7 +104,7 @@ def draw_pages() -> None:
             shown = browser.new_page(viewport={"width": width, "height": height})
             shown.goto(page.as_uri())
             if name in FROM:
-                shown.locator(f"h2:has-text('{FROM[name]}')").evaluate("heading => heading.scrollIntoView()")
+                shown.locator(f"h2:has-text('{FROM[name]}')").evaluate(TO_PLOTS)
             shown.wait_for_timeout(500)
             pictures[name] = Image.open(io.BytesIO(shown.screenshot())).convert("RGB")
         for name, picture in pictures.items():
