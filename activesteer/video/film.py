@@ -133,7 +133,7 @@ class Film:
         groups = [[run] for run in runs] if settings.layout == "side-by-side" else [runs]
         edges = np.linspace(0, settings.size[0], len(groups) + 1).astype(int)
         self._panes = [
-            _Pane(group, runs, settings, (int(width), settings.size[1]), "" if number else title)
+            _Pane(group, runs, settings, (int(width), settings.size[1]), title, headed=number == 0)
             for number, (group, width) in enumerate(zip(groups, np.diff(edges), strict=True))
         ]
         self._canvases: list[Offscreen] = []
@@ -161,11 +161,6 @@ class Film:
         drawn = [pane.picture(canvas, time_s) for pane, canvas in zip(self._panes, self._canvases, strict=True)]
         return drawn[0] if len(drawn) == 1 else np.hstack(drawn)
 
-    def pictures(self, times_s: Sequence[float] | NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
-        """Yield the frames of several instants."""
-        for time_s in times_s:
-            yield self.picture(float(time_s))
-
 
 class _Run(NamedTuple):
     """A run in a film."""
@@ -178,7 +173,14 @@ class _Pane:
     """A pane of the frame with a scene and a camera of its own."""
 
     def __init__(
-        self, runs: Sequence[_Run], every: Sequence[_Run], settings: Settings, size: tuple[int, int], title: str
+        self,
+        runs: Sequence[_Run],
+        every: Sequence[_Run],
+        settings: Settings,
+        size: tuple[int, int],
+        title: str,
+        *,
+        headed: bool,
     ) -> None:
         self.size = size
         self._settings = settings
@@ -200,14 +202,15 @@ class _Pane:
         notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
         notes += ["road heights to scale"] if drawn is not None else []
         if settings.camera != "wheel" and settings.gauges == "full":
-            shown_with = [run.dials.recording for run in every]
-            markings = Markings(first, self._tracks[0], self._dials[0].colour, shown_with)
+            recordings = [run.dials.recording for run in every]
+            markings = Markings(first, self._tracks[0], self._dials[0].colour, recordings)
             self._marks.append(markings.add)
             notes += [markings.note] if markings.note else []
         if settings.gauges == "sideslip":
             self._gauges = LargeSideslip(self._dials, size)
         else:
-            self._gauges = Gauges(self._dials, title, size, ", ".join(notes), [run.dials for run in every])
+            shown_with = [run.dials for run in every]
+            self._gauges = Gauges(self._dials, title, size, ", ".join(notes), shown_with, headed=headed)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
 
@@ -355,10 +358,10 @@ def make_film(
     rate = frame_rate(path, settings.rate_hz)
     with Film(recordings, settings) as film:
         times = film.times(rate)
-        samples = film.pictures(times[:: max(1, len(times) // _SAMPLES)])
+        samples = (film.picture(time_s) for time_s in times[:: max(1, len(times) // _SAMPLES)])
         with encoder(path, settings.size, rate, samples) as write:
-            for number, pixels in enumerate(film.pictures(times), start=1):
-                write(pixels)
+            for number, time_s in enumerate(times, start=1):
+                write(film.picture(time_s))
                 if progress is not None:
                     progress(number / len(times))
     return FilmInfo(len(times), rate)
