@@ -25,6 +25,7 @@ const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(
 const drive = new Drive(socket, say);
 
 const NAMED = ["maneuver", "vehicle", "driver"];
+const swatches = new Map(); // name of a controller -> its colour beside its box
 const boxes = () => [...$("controllers").querySelectorAll("input")];
 const chosen = () => boxes().filter((box) => box.checked).map((box) => box.value);
 const choice = () => ({ ...Object.fromEntries(NAMED.map((id) => [id, $(id).value])), controllers: chosen() });
@@ -69,7 +70,8 @@ function offer(list, name) {
 function addBox(name) {
   const box = element("input", { type: "checkbox", value: name });
   box.addEventListener("change", () => describe(box));
-  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, ` ${name}`));
+  swatches.set(name, element("i", { class: "swatch" }));
+  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, swatches.get(name), name));
 }
 
 const asking = new Asking((dragging) => {
@@ -163,9 +165,23 @@ function redraw() {
   showFigures();
 }
 
+const swatchOf = (run) => element("i", { class: "swatch", style: `background:${runColour(run.place)}` });
+const shortName = (run) => run.name.replace(/^.*:|\?.*|\.toml$/g, "");
+
+// Colours stay in sight beside the sliders: at the boxes of the controllers, on a phone in a line of its own.
+function showColours() {
+  for (const [name, swatch] of swatches) {
+    const run = state.runs.get(name);
+    swatch.hidden = !run;
+    if (run) swatch.setAttribute("style", `background:${runColour(run.place)}`);
+  }
+  $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run))));
+}
+
 function showFigures() {
+  showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), narrow ? run.name.replace(/^.*:|\?.*|\.toml$/g, "") : run.label)));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), narrow ? shortName(run) : run.label)));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
