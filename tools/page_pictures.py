@@ -27,6 +27,8 @@ from tests.render.headless import Headless
 PICTURES: Final = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 SIZE: Final = (1000, 760)
 """Width and height of the browser's window [px]."""
+TITLE_BAR: Final = 37
+"""Height of the viewer's title bar, which warns of a machine without a graphics card and of a container [px]."""
 COLOURS: Final = 64
 FROM: Final = {"measured_lane_change": ": check window"}
 """Picture -> end of the last heading with it, at the top of the picture. By default it shows the top of the page."""
@@ -65,6 +67,7 @@ def draw_explore(browser: Browser, folder: Path) -> Image.Image:
         shown.goto(json.loads(server.stdout.readline())["url"])
         shown.wait_for_selector("#state:has-text('all after')", timeout=60_000)
         shown.locator("#time").fill("2.6")
+        shown.locator("#time").blur()
         shown.wait_for_timeout(3000)
         # The latencies are those of the machine that draws the pictures.
         shown.locator("#state").evaluate("(state) => { state.textContent = ''; }")
@@ -81,7 +84,8 @@ def draw_viewer(folder: Path) -> Image.Image:
     activesteer(["replay", *files, "--compare", "-o", str(folder / "runs.rrd")])
     with Headless(folder) as viewer:
         viewer.open(folder / "runs.rrd")
-        return viewer.window(2.6)
+        window = viewer.window(2.6)
+    return window.crop((0, TITLE_BAR, *window.size))
 
 
 def draw_pages() -> None:

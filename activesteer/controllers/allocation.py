@@ -21,7 +21,7 @@ give up the share s = (M - M_l) / (l_V F_V) of their force, at most all of it, a
 what is left. Within the straight part of the curves M = M_l, and the angles stay as they are.
 
 No angle is larger than its actuator removes in the time in which the car answers: an angle that stays after the driver
-has steered back turns the car further in.
+has steered back turns the car further in. Front wheels get no angle beyond the slip angle of their largest force.
 
 Source: T. A. Johansen and T. I. Fossen, Control allocation - A survey, Automatica 49 (2013).
 """
@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.controllers.axle_slopes import AxleSlopes, axle_forces, excess, front_slip, slopes
+from activesteer.controllers.axle_slopes import AxleSlopes, axle_forces, excess, front_slip, slopes, useful_range
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.core.signals import Estimate
 from activesteer.native.records import NativeBlock
@@ -86,7 +86,7 @@ def allocated(
     driver_rad: float,
     at_rad: tuple[float, float],
     demand_rad: tuple[float, float],
-    against_rad: float,
+    range_rad: tuple[float, float],
     works: tuple[bool, bool],
     ay_mps2: float,
     authority: float,
@@ -99,7 +99,7 @@ def allocated(
         driver_rad: The driver's angle at the road wheels.
         at_rad: Measured angles of superposition and rear wheels.
         demand_rad: Angles that the state feedback demands, without limits.
-        against_rad: Limit of the superposition against the driver's angle.
+        range_rad: Least and largest superposition angle that are allowed beside the limits.
         works: Whether superposition and rear steering work.
         ay_mps2: Lateral acceleration of the desired turn [m/s2].
         authority: Factor on the demands of the state feedback, 0 to 1 [-].
@@ -112,12 +112,12 @@ def allocated(
     front_Nm, rear_Nm = front_N * block._to_front_m, -rear_N * block._to_rear_m
     moment = front_Nm * demand_rad[0] + rear_Nm * demand_rad[1]
     force = front_N * demand_rad[0] + rear_N * demand_rad[1]
-    least_front, most_front = angle_range(
-        at_rad[0], block._front_limit_rad, block._front_reach_rad, works[0], against_rad, driver_rad
-    )
-    least_rear, most_rear = angle_range(
-        at_rad[1], block._rear_limit_rad, block._rear_reach_rad, works[1], math.inf, 0.0
-    )
+    limit = block._front_limit_rad
+    useful = useful_range(block._curves, now, driver_rad)
+    allowed = max(range_rad[0], useful[0], -limit), min(range_rad[1], useful[1], limit)
+    least_front, most_front = angle_range(at_rad[0], allowed, block._front_reach_rad, works[0])
+    limit = block._rear_limit_rad
+    least_rear, most_rear = angle_range(at_rad[1], (-limit, limit), block._rear_reach_rad, works[1])
     of_moment, of_force = block._per_moment2, block._per_force2
     h_front = of_moment * front_Nm * front_Nm + of_force * front_N * front_N + block._front_stay
     h_rear = of_moment * rear_Nm * rear_Nm + of_force * rear_N * rear_N + block._rear_stay
@@ -187,14 +187,11 @@ def _relieved(
 
 
 @shared
-def angle_range(
-    place_rad: float, most_rad: float, reach_rad: float, works: bool, against_rad: float, driver_rad: float
-) -> tuple[float, float]:
-    """Return least and greatest angle: limits and rate, or the position of a failed actuator [rad]."""
+def angle_range(place_rad: float, range_rad: tuple[float, float], reach_rad: float, works: bool) -> tuple[float, float]:
+    """Return least and greatest angle: range and rate, or the position of a failed actuator [rad]."""
     if not works:
         return place_rad, place_rad
-    against = min(against_rad, most_rad)
-    least, most = -against if driver_rad > 0.0 else -most_rad, against if driver_rad < 0.0 else most_rad
+    least, most = range_rad
     low = max(least, place_rad - reach_rad)
     high = max(min(most, place_rad + reach_rad), low)
     return min(low, most), high

@@ -103,7 +103,7 @@ class Turn(NamedTuple):
         sideslip_rad: Steady-state sideslip angle [rad].
         steady_rad: Steady-state angles [rad].
         demand_rad: Angles that the state feedback demands, without limits [rad].
-        against_rad: Limit of the superposition against the driver's angle [rad].
+        range_rad: Least and largest superposition angle that the driver and the yaw rate allow [rad].
     """
 
     estimate: Estimate
@@ -111,7 +111,7 @@ class Turn(NamedTuple):
     sideslip_rad: float
     steady_rad: tuple[float, float]
     demand_rad: tuple[float, float]
-    against_rad: float
+    range_rad: tuple[float, float]
 
 
 class Lqr(NativeBlock):
@@ -204,11 +204,12 @@ class Lqr(NativeBlock):
         if works != (self._superposition_works, self._rear_works):
             self._adapt(works)
         now = self._estimator.step(measurement)
-        desired, sideslip, *angles, against = fed_back(
+        desired, sideslip, *angles = fed_back(
             self, now, self._estimator.innovation, command.front_steer_demand_rad, command.brake_pedal,
             measurement.superposition_rad, measurement.rear_steer_rad, measurement.brake_pressure_Pa, own_brakes_Nm,
         )  # fmt: skip
-        return Turn(now, desired, sideslip, (angles[0], angles[1]), (angles[2], angles[3]), against)
+        steady, demand, allowed = (angles[0], angles[1]), (angles[2], angles[3]), (angles[4], angles[5])
+        return Turn(now, desired, sideslip, steady, demand, allowed)
 
     def _adapt(self, works: tuple[bool, bool]) -> None:
         """Take the gains for the actuators that work."""
@@ -223,7 +224,7 @@ class Lqr(NativeBlock):
         now, driver_rad = turn.estimate, command.front_steer_demand_rad
         at_rad = measurement.superposition_rad, measurement.rear_steer_rad
         angles_rad = allocated(
-            self._allocation, now, driver_rad, at_rad, turn.demand_rad, turn.against_rad, works,
+            self._allocation, now, driver_rad, at_rad, turn.demand_rad, turn.range_rad, works,
             turn.desired_radps * now.speed_mps, self._confidence._authority,
         )  # fmt: skip
         return *angles_rad, moment_change(self._allocation, now, driver_rad, at_rad, angles_rad)
@@ -245,7 +246,7 @@ def regulated(
     pressures_Pa: PerWheel,
 ) -> tuple[float, float, float, float, float, bool]:
     """Law of `Lqr.step`; returns the first fields of an `ActuatorCommand`."""
-    desired, _, _, steady, front_demand, rear_demand, against = fed_back(
+    desired, _, _, steady, front_demand, rear_demand, least, most = fed_back(
         block, now, innovation, driver_rad, brake_pedal, superposition_rad, rear_rad, pressures_Pa, NO_BRAKES
     )
     speed = now[_SPEED]
@@ -255,8 +256,8 @@ def regulated(
     fade = min((speed - MIN_SPEED_MPS) / (_FULL_MPS - MIN_SPEED_MPS), 1.0)
     front_demand, rear_demand = fade * front_demand, fade * rear_demand
     added, rear = allocated(
-        block._allocation, now, driver_rad, (superposition_rad, rear_rad), (front_demand, rear_demand), against, BOTH,
-        desired * speed, fade * block._confidence._authority,
+        block._allocation, now, driver_rad, (superposition_rad, rear_rad), (front_demand, rear_demand), (least, most),
+        BOTH, desired * speed, fade * block._confidence._authority,
     )  # fmt: skip
     block._superposition_before_rad, block._rear_before_rad = added, rear
     off = max(abs(added - front_demand), abs(rear - rear_demand))
@@ -274,12 +275,12 @@ def fed_back(
     rear_rad: float,
     pressures_Pa: PerWheel,
     own_brakes_Nm: PerWheel,
-) -> tuple[float, float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float, float, float, float]:
     """Law of `Lqr.turn`; returns the fields of `Turn` behind the estimate, one after the other."""
     speed, friction = now[_SPEED], now[_FRICTION]
     certain, authority = confidence(block._confidence, innovation, now[_FRICTION_STD])
     if speed < MIN_SPEED_MPS:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     assumed = friction + block._friction_deviations * now[_FRICTION_STD]
     desired = desired_turn(block._reference, driver_rad, speed, assumed)
     # The tyres follow the angles over their relaxation length.
@@ -322,14 +323,17 @@ def fed_back(
     for place in range(len(errors)):
         front_feedback += _gain(rows, start, part, _STEADY + place) * errors[place]
         rear_feedback += _gain(rows, start, part, _STEADY + len(errors) + place) * errors[place]
+    limit = block._superposition_limit_rad
     against = block._against_driver_rad
-    against += certain * max(block._superposition_limit_rad - against, 0.0)
+    against += certain * max(limit - against, 0.0)
     against *= _patience(block, driver_rad)
-    # Against the driver it lessens the turn, which a car that turns less than desired does not need.
-    lacking = math.copysign(1.0, driver_rad) * (desired - now[_YAW_RATE])
-    against *= min(max(1.0 - lacking / block._lacking_radps, 0.0), 1.0)
+    least, most = -against if driver_rad > 0.0 else -limit, against if driver_rad < 0.0 else limit
+    # It does not turn a car further from the desired yaw rate: with sliding rear wheels, the sideslip would ask for it.
+    lacking = (desired - now[_YAW_RATE]) / block._lacking_radps
+    least *= min(max(1.0 - lacking, 0.0), 1.0)
+    most *= min(max(1.0 + lacking, 0.0), 1.0)
     front_demand, rear_demand = authority * (held_front - front_feedback), authority * (held_rear - rear_feedback)
-    return desired, sideslip, steady, rear, front_demand, rear_demand, against
+    return desired, sideslip, steady, rear, front_demand, rear_demand, least, most
 
 
 @shared

@@ -72,8 +72,7 @@ class LqrParameters:
     decay_s: _Lag
     """Time in which it then decays to zero [s]."""
     lacking_radps: _Scale
-    """Yaw rate by which the car turns less than desired, from which the superposition is not held against the driver
-    [rad/s]."""
+    """Error of the yaw rate from which the superposition does not turn the car further from the desired one [rad/s]."""
     relaxation_length_m: _Length
     """Distance over which a tyre of the model builds up its force [m]."""
     moment_scale_Nm: _Size

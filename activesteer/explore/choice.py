@@ -10,12 +10,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from activesteer.controllers import CONTROLLERS
+from activesteer.config import read_toml
+from activesteer.controllers import CONTROLLERS, read_variant
 from activesteer.core.files import is_file
 from activesteer.errors import ParameterError, nearest_names, shown
 from activesteer.explore.messages import Choice
 from activesteer.maneuver import KINDS
 from activesteer.resources import (
+    find_driver_file,
+    find_maneuver,
     list_controller_variants,
     list_drivers,
     list_maneuvers,
@@ -90,6 +93,15 @@ def _of_package() -> dict[str, list[str]]:
         "drivers": list_drivers(),
         "controllers": list(dict.fromkeys([*CONTROLLERS, *list_controller_variants()])),
     }
+
+
+def titles() -> dict[str, str]:
+    """Return the titles of the package's manoeuvres, drivers and controllers, by their names."""
+    found = {name: (controller.__doc__ or "").splitlines()[0].rstrip(".") for name, controller in CONTROLLERS.items()}
+    found |= {name: read_variant(name).title for name in list_controller_variants()}
+    files = {name: find_maneuver(name) for name in list_maneuvers()}
+    files |= {name: find_driver_file(name) for name in list_drivers()}
+    return found | {name: read_toml(file)[0].get("title", "") for name, file in files.items()}
 
 
 def _content_of(file: Path) -> Iterator[tuple[str, str]]:

@@ -61,6 +61,8 @@ _CAR: Final = {
     "factors.servo_lag": (0.2, 4.0, 0.1),
 }
 """The same for keys of a vehicle."""
+_UNIT: Final = "control unit and bus"
+"""Group of the parameters that all controllers share."""
 _TIMES: Final = 4.0
 """Greatest value of the slider of a gain, in multiples of its present value."""
 _STEPS: Final = 200
@@ -72,9 +74,9 @@ class Slider(NamedTuple):
     """A slider."""
 
     key: str  # key as `--set` takes it
-    label: str  # label in words
+    label: str  # label in words, without its group
     unit: str  # unit of its value; empty for a pure number
-    group: str  # `manoeuvre`, `car`, or the name of a controller or of a table of gains, in words
+    group: str  # `manoeuvre`, `car`, or a table of the parameters of controllers, in words
     low: float  # least value
     high: float  # greatest value
     step: float  # distance between two values
@@ -142,7 +144,8 @@ def _gain(key: str, declared: Declared) -> Slider | None:
     bottom = max(low, 0.0 if value >= 0.0 else -top)
     digits = 4 - math.floor(math.log10(max(top - bottom, 1e-9)))
     label, unit = _label(f"{tables}.{shown}")
-    group = parameter_words(tables.split(".")[1] if "." in tables else tables)
+    group = parameter_words(tables.split(".")[1]) if "." in tables else _UNIT
+    label = label.removeprefix(group).removeprefix(":").strip()
     return Slider(
         f"{tables}.{shown}", label, unit or declared.unit, group, bottom, round(top, digits),
         round((top - bottom) / _STEPS, digits), value,

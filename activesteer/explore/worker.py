@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from activesteer.errors import ActiveSteerError
-from activesteer.explore.choice import Folder
+from activesteer.explore.choice import Folder, titles
 from activesteer.explore.drive import DriveSession
 from activesteer.explore.messages import Act, Describe, End, Message, Report, RunRequest, Save, Start, add
 from activesteer.explore.runs import Reply, Runs
@@ -39,7 +39,7 @@ class _Worker:
 
     def run(self) -> None:
         """Answer messages, and drive in real time while a drive is on."""
-        self._send(Reply({"kind": "ready", **self._folder.names(), "folder": str(self._folder.path)}))
+        self._send(Reply({"kind": "ready", **self._folder.names(), "titles": titles()}))
         try:
             while True:
                 driven = self._drive is not None and self._drive.path is not None

@@ -40,67 +40,30 @@ _WHEELS_SEEN: Final = 0.25
 """Opacity of a shell that lets the wheels be seen from above."""
 
 
-class View(NamedTuple):
-    """A camera on a car."""
-
-    aim: Callable[[mujoco.MjvCamera, float], None]  # function that aims a MuJoCo camera for an instant [s]
-    shell_opacity: float  # opacity of the car's shell, 0 to 1; low for a view of the suspension
-    marked: bool = True  # whether the view shows the wedges and arrows beside the car
+_SHELL_OPACITY: Final = {"top": _WHEELS_SEEN, "wheel": CUTAWAY}
+"""Camera -> opacity of the shell of a car, if it is not opaque."""
 
 
-def view(name: str, track: Track, corner: str = CORNERS[0]) -> View:
-    """Return the camera of a name."""
-    if name == "chase":
-        return View(_chase(track), 1.0)
-    if name == "top":
-        return View(_top(track), _WHEELS_SEEN)
-    if name == "wheel":
-        return View(_wheel(track, corner), CUTAWAY, marked=False)
-    raise ParameterError(f"there is no camera {name!r}; {nearest_names(name, CAMERAS)}", value=name)
+def aim(camera: mujoco.MjvCamera, name: str, track: Track, time_s: float, corner: str = CORNERS[0]) -> None:
+    """Aim a camera at an instant [s].
 
-
-def _chase(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
-    """Place the camera behind and above the car, seen in its direction of motion, looking over the roof at the road.
-
-    A car that slides turns in the picture.
+    `chase` is behind and above the car, in its direction of motion, so that a car that slides turns in the picture.
+    `top` is above the car, x to the right and y up as in the plots. `wheel` is inboard of a wheel, where its links are,
+    and follows the chassis without roll and heave.
     """
-
-    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
+    if name == "chase":
         direction = track.direction(time_s)
-        ahead = np.array([math.cos(direction), math.sin(direction), 0.0])
-        camera.lookat = track.middle(time_s) + 0.9 * ahead + np.array([0.0, 0.0, 0.15])
+        camera.lookat = track.middle(time_s) + np.array([0.9 * math.cos(direction), 0.9 * math.sin(direction), 0.15])
         camera.distance, camera.elevation, camera.azimuth = 8.3, -20.0, math.degrees(direction)
-
-    return aim
-
-
-def _top(track: Track) -> Callable[[mujoco.MjvCamera, float], None]:
-    """Place the camera above the car, x to the right and y up as in the plots. It does not rotate with the car."""
-
-    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
+    elif name == "top":
         camera.lookat = track.middle(time_s)
         camera.distance, camera.elevation, camera.azimuth = 15.0, -90.0, 90.0
-
-    return aim
-
-
-def _wheel(track: Track, corner: str) -> Callable[[mujoco.MjvCamera, float], None]:
-    """Place the camera inboard of a wheel, where its links are. It follows the chassis without roll and heave."""
-    if corner not in CORNERS:
-        raise ParameterError(f"there is no corner {corner!r}; {nearest_names(corner, CORNERS)}", value=corner)
-    place = track.wheel_place(corner)
-    side, end = (1.0 if corner[1] == "l" else -1.0), (1.0 if corner[0] == "f" else -1.0)
-    # Look from the end of the car towards its middle, and outwards by 28 degrees.
-    azimuth = side * (90.0 + 62.0 * end)
-
-    def aim(camera: mujoco.MjvCamera, time_s: float) -> None:
-        heading = track.heading(time_s)
-        cos, sin = math.cos(heading), math.sin(heading)
-        x, y, z = place
-        camera.lookat = track.chassis(time_s) + np.array([cos * x - sin * y, sin * x + cos * y, z + 0.05])
-        camera.distance, camera.elevation, camera.azimuth = 1.9, -10.0, math.degrees(heading) + azimuth
-
-    return aim
+    else:
+        side, end = (1.0 if corner[1] == "l" else -1.0), (1.0 if corner[0] == "f" else -1.0)
+        camera.lookat = track.wheel_centre(corner, time_s) + np.array([0.0, 0.0, 0.05])
+        # Look from the end of the car towards its middle, and outwards by 28 degrees.
+        azimuth = math.degrees(track.heading(time_s)) + side * (90.0 + 62.0 * end)
+        camera.distance, camera.elevation, camera.azimuth = 1.9, -10.0, azimuth
 
 
 LAYOUTS: Final = ("overlay", "side-by-side")
@@ -135,7 +98,12 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Check the settings."""
-        for kind, name, names in (("layout", self.layout, LAYOUTS), ("kind of gauges", self.gauges, GAUGES)):
+        for kind, name, names in (
+            ("camera", self.camera, CAMERAS),
+            ("corner", self.corner, CORNERS),
+            ("layout", self.layout, LAYOUTS),
+            ("kind of gauges", self.gauges, GAUGES),
+        ):
             if name not in names:
                 raise ParameterError(f"there is no {kind} {name!r}; {nearest_names(name, names)}", value=name)
         for name, value, low, high in (
@@ -155,30 +123,30 @@ class Film:
             raise ParameterError("there is no recording to make a film of, at least one is needed")
         self.settings = settings
         looks = run_looks(recordings)
-        actors = [
-            _Actor(recording, Track(recording, name), looks[name].label, looks[name].on_dark)
+        runs = [
+            _Run(Track(recording, name), Dials(recording, looks[name].label, looks[name].on_dark))
             for name, recording in recordings.items()
         ]
-        self._tracks = [actor.track for actor in actors]
-        maneuver = actors[0].recording.metadata.get("maneuver", {})
+        self._tracks = [run.track for run in runs]
+        maneuver = runs[0].dials.recording.metadata.get("maneuver", {})
         title = str(maneuver.get("title") or maneuver.get("name") or "")
-        groups = [[actor] for actor in actors] if settings.layout == "side-by-side" else [actors]
+        groups = [[run] for run in runs] if settings.layout == "side-by-side" else [runs]
         edges = np.linspace(0, settings.size[0], len(groups) + 1).astype(int)
         self._panes = [
-            _Pane(group, actors, settings, (int(width), settings.size[1]), "" if number else title)
+            _Pane(group, runs, settings, (int(width), settings.size[1]), title, headed=number == 0)
             for number, (group, width) in enumerate(zip(groups, np.diff(edges), strict=True))
         ]
+        self._canvases: list[Offscreen] = []
 
     def __enter__(self) -> Self:
         """Open the canvases."""
-        for pane in self._panes:
-            pane.open()
+        self._canvases = [Offscreen(pane.scene.model, pane.size) for pane in self._panes]
         return self
 
     def __exit__(self, *_: object) -> None:
         """Close the canvases."""
-        for pane in self._panes:
-            pane.close()
+        for canvas in self._canvases:
+            canvas.close()
 
     def times(self, rate_hz: float) -> NDArray[np.float64]:
         """Return the instants of the frames [s], from the first pose of any car to the last."""
@@ -190,30 +158,15 @@ class Film:
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
         """Return the frame of an instant, shape (height, width, 3)."""
-        drawn = [pane.picture(time_s) for pane in self._panes]
+        drawn = [pane.picture(canvas, time_s) for pane, canvas in zip(self._panes, self._canvases, strict=True)]
         return drawn[0] if len(drawn) == 1 else np.hstack(drawn)
 
-    def pictures(self, times_s: Sequence[float] | NDArray[np.float64]) -> Iterator[NDArray[np.uint8]]:
-        """Yield the frames of several instants."""
-        for time_s in times_s:
-            yield self.picture(float(time_s))
 
-
-class _Actor(NamedTuple):
+class _Run(NamedTuple):
     """A run in a film."""
 
-    recording: Recording
     track: Track
-    label: str
-    colour: str
-
-    @property
-    def dials(self) -> Dials:
-        return Dials(self.recording, self.label, self.colour)
-
-    @property
-    def size(self) -> Footprint | None:
-        return footprint_of(self.recording.metadata)
+    dials: Dials
 
 
 class _Pane:
@@ -221,80 +174,57 @@ class _Pane:
 
     def __init__(
         self,
-        actors: Sequence[_Actor],
-        every: Sequence[_Actor],
+        runs: Sequence[_Run],
+        every: Sequence[_Run],
         settings: Settings,
         size: tuple[int, int],
         title: str,
+        *,
+        headed: bool,
     ) -> None:
-        first = actors[0]
-        self._tracks = [actor.track for actor in actors]
-        self._view = view(settings.camera, first.track, settings.corner)
-        opacity = CUTAWAY if settings.cutaway else self._view.shell_opacity
-        cars = [
-            FilmedCar(
-                actor.recording.scene,
-                actor.track.bodies,
-                actor.colour,
-                opacity,
-                ghost=number > 0,
-                size=actor.size,
-                tail_opens=number == 0 and opacity == 1.0 and used(actor.recording, "rear_steer_rad"),
+        self.size = size
+        self._settings = settings
+        self._tracks, self._dials = [run.track for run in runs], [run.dials for run in runs]
+        first = self._dials[0].recording
+        course, drawn = course_of(first.metadata), surface_in(first.metadata)
+        edges = edges_beside([run.track.path()[1] for run in every]) if course is None and drawn is None else None
+        opacity = CUTAWAY if settings.cutaway else _SHELL_OPACITY.get(settings.camera, 1.0)
+        cars, self._marks = [], []
+        for number, (track, dials) in enumerate(runs):
+            recording, footprint = dials.recording, footprint_of(dials.recording.metadata)
+            opens = number == 0 and opacity == 1.0 and used(recording, "rear_steer_rad")
+            cars.append(
+                FilmedCar(recording.scene, track.bodies, dials.colour, opacity, number > 0, footprint, tail_opens=opens)
             )
-            for number, actor in enumerate(actors)
-        ]
-        metadata = first.recording.metadata
-        self._size = size
-        drawn = surface_in(metadata)
-        course = course_of(metadata)
-        edges = None
-        if course is None and drawn is None:
-            edges = edges_beside([actor.track.path()[1] for actor in every])
-        self._scene = RenderScene(cars, course, road_of(metadata), size, drawn, edges)
+            trace = Traces(recording, track, footprint or Footprint(), dials.colour, number, uneven=drawn is not None)
+            self._marks.append(trace.add)
+        self.scene = RenderScene(cars, course, road_of(first.metadata), size, drawn, edges)
         notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
         notes += ["road heights to scale"] if drawn is not None else []
-        footprint = first.size or Footprint()
-        self._traces = [
-            Traces(actor.recording, actor.track, footprint, actor.colour, number, uneven=drawn is not None)
-            for number, actor in enumerate(actors)
-        ]
-        self._markings = None
-        if self._view.marked and settings.gauges == "full":
-            recordings = [actor.recording for actor in every]
-            self._markings = Markings(first.recording, first.track, footprint, first.colour, recordings)
-            notes += [self._markings.note] if self._markings.note else []
-        self._dials = [actor.dials for actor in actors]
+        if settings.camera != "wheel" and settings.gauges == "full":
+            recordings = [run.dials.recording for run in every]
+            markings = Markings(first, self._tracks[0], self._dials[0].colour, recordings)
+            self._marks.append(markings.add)
+            notes += [markings.note] if markings.note else []
         if settings.gauges == "sideslip":
             self._gauges = LargeSideslip(self._dials, size)
         else:
-            self._gauges = Gauges(self._dials, title, size, ", ".join(notes), [actor.dials for actor in every])
+            shown_with = [run.dials for run in every]
+            self._gauges = Gauges(self._dials, title, size, ", ".join(notes), shown_with, headed=headed)
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-        self._canvas: Offscreen | None = None
 
-    def open(self) -> None:
-        self._canvas = Offscreen(self._scene.model, self._size)
-
-    def close(self) -> None:
-        if self._canvas is not None:
-            self._canvas.close()
-            self._canvas = None
-
-    def picture(self, time_s: float) -> NDArray[np.uint8]:
-        if self._canvas is None:
-            raise RuntimeError("a film is drawn in a `with` block")
+    def picture(self, canvas: Offscreen, time_s: float) -> NDArray[np.uint8]:
         for number, track in enumerate(self._tracks):
-            self._scene.place(number, *track.poses(time_s))
+            self.scene.place(number, *track.poses(time_s))
         rear_steer = abs(self._dials[0].value("rear_steer_rad", time_s))
-        self._scene.open_tail(0, float(np.interp(rear_steer, _TAIL_OPENS_RAD, (0.0, 1.0))))
-        self._scene.update()
-        self._view.aim(self._camera, time_s)
-        scene = self._canvas.prepare(self._scene.data, self._camera)
-        for traces in self._traces:
-            traces.add(scene, time_s)
-        if self._markings is not None:
-            self._markings.add(scene, time_s)
-        return self._gauges.draw(self._canvas.draw(), time_s)
+        self.scene.open_tail(0, float(np.interp(rear_steer, _TAIL_OPENS_RAD, (0.0, 1.0))))
+        self.scene.update()
+        aim(self._camera, self._settings.camera, self._tracks[0], time_s, self._settings.corner)
+        scene = canvas.prepare(self.scene.data, self._camera)
+        for add in self._marks:
+            add(scene, time_s)
+        return self._gauges.draw(canvas.draw(), time_s)
 
 
 Pixels = NDArray[np.uint8]
@@ -428,10 +358,10 @@ def make_film(
     rate = frame_rate(path, settings.rate_hz)
     with Film(recordings, settings) as film:
         times = film.times(rate)
-        samples = film.pictures(times[:: max(1, len(times) // _SAMPLES)])
+        samples = (film.picture(time_s) for time_s in times[:: max(1, len(times) // _SAMPLES)])
         with encoder(path, settings.size, rate, samples) as write:
-            for number, pixels in enumerate(film.pictures(times), start=1):
-                write(pixels)
+            for number, time_s in enumerate(times, start=1):
+                write(film.picture(time_s))
                 if progress is not None:
                     progress(number / len(times))
     return FilmInfo(len(times), rate)

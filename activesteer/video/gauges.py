@@ -86,9 +86,11 @@ class Gauges:
         size: tuple[int, int],
         note: str = "",
         shown_with: Sequence[Dials] = (),
+        *,
+        headed: bool = True,
     ) -> None:
-        """Choose fonts and values."""
-        self._dials = list(dials)
+        """Choose fonts and values. A pane that is not headed leaves room for the title, so that all panes are alike."""
+        self._dials, self._headed = list(dials), headed and bool(title)
         self._title, self._note = title, note
         self._size = size
         self._every = list(shown_with or dials)
@@ -99,37 +101,41 @@ class Gauges:
             for reading in READINGS
             if reading.channel not in _ADDED or any(used(recording, reading.channel) for recording in recordings)
         ]
-        area, scale = size[0] * size[1], text_scale(size)
-        while self._fit(scale) > _ROWS_SHARE * area and scale > LEGIBLE:
-            scale *= 0.95
-        while len(self._readings) > 1 and (self._columns[-1] > size[0] or self._fit(scale) > _ROWS_SHARE * area):
+        # A small frame shows fewer values rather than small ones.
+        while (scale := self._largest_scale()) < LEGIBLE and len(self._readings) > 1:
             self._readings.pop()
-            self._columns = self._places()
-        while self._fit(scale) > _ROWS_SHARE * area and scale > _SMALLEST:
-            scale *= 0.95
-        left = LARGEST_SHARE * area - self._fit(scale)
+        left = LARGEST_SHARE * size[0] * size[1] - self._fit(max(scale, _SMALLEST))
         height = min(_TALLEST_PLAN * size[1], math.sqrt(max(left, 0.0) / max(1, len(dials)) / _PLAN_ASPECT))
         self._plan = int(_PLAN_ASPECT * height), int(height)
+        # A plan whose words do not fit beside the middle of its car is left out.
+        self._has_plans = self._small.getlength("88.8 deg right") < 2.0 * (1.0 - _CAR_AT) * self._plan[0]
+
+    def _largest_scale(self) -> float:
+        """Return the largest scale at which the rows fit into the frame, and rows and title into their share of it."""
+        width, height = self._size
+        covered = self._fit(1.0)
+        return min(text_scale(self._size), math.sqrt(_ROWS_SHARE * width * height / covered), width / self._columns[-1])
 
     def _fit(self, scale: float) -> float:
-        """Set the sizes for a scale. Return the height that title and rows cover [pixels]."""
+        """Set the sizes for a scale. Return the area that title and rows cover [pixels]."""
         self._scale = scale
         self._row, self._title_row = max(1, round(_ROW * scale)), max(1, round(_TITLE_ROW * scale))
         self._text, self._small = font(_TEXT * scale), font(_SMALL * scale)
         self._columns = self._places()
-        return self._columns[-1] * self._row * len(self._dials) + self._title_area()
+        words = self._text.getlength(f"{self._title}  {self._note}  88.88 s") + 4 * _GAP * scale
+        return self._columns[-1] * self._row * len(self._dials) + self._title_row * min(words, self._size[0])
 
     def draw(self, pixels: NDArray[np.uint8], time_s: float) -> NDArray[np.uint8]:
         """Draw the gauges over a frame."""
         picture = Image.fromarray(np.ascontiguousarray(pixels))
-        if self._title:
+        if self._headed:
             self._headline(picture, f"{time_s:.2f} s")
         panel = Image.new("RGBA", (self._columns[-1], self._row * len(self._dials)), PANEL)
         for number, dial in enumerate(self._dials):
             self._readings_of(panel, dial, time_s, number * self._row)
         picture.paste(panel, (0, self._size[1] - panel.height), panel)
         width, height = self._plan
-        if width > 30:
+        if self._has_plans:
             first = self._size[0] - len(self._dials) * width
             top = self._size[1] - height - (panel.height if first < panel.width else 0)
             for number, dial in enumerate(self._dials):
@@ -147,20 +153,15 @@ class Gauges:
             places.append(places[-1] + name + value + 2.8 * gap)
         return [round(place) for place in places]
 
-    def _title_area(self) -> float:
-        words = f"{self._title}  {self._note}  88.88 s"
-        return self._title_row * min(self._text.getlength(words) + 4 * _GAP * self._scale, self._size[0])
-
     def _headline(self, picture: Image.Image, time: str) -> None:
         gap = round(_GAP * self._scale)
         right = f"{self._note}   {time}" if self._note else time
         room = self._size[0] - 4 * gap - self._text.getlength(right)
         # A title that does not fit is written smaller, and is cut only if it still does not fit.
         letters = self._text if self._text.getlength(self._title) <= room else self._small
-        title, whole = self._title, len(self._title)
-        while whole and letters.getlength(title) > room:
-            whole -= 1
-            title = self._title[:whole].rstrip(" .,-") + "..." if whole > 2 else ""
+        title = self._title
+        while title and letters.getlength(title) > room:
+            title = f"{title[:-4].rstrip(' .,-')}..." if len(title) > 6 else ""
         # The width is the same at any other time: all figures of this font have the same width.
         ends = gap + letters.getlength(title) + (2 * gap if title else 0)
         if title != self._title:

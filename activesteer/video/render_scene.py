@@ -26,23 +26,27 @@ _PAINT: Final = (0.23, 0.46, 0.72)
 _SHADED_BELOW: Final = 0.2
 _CUTAWAY_SHADE: Final = 0.3
 """Opacity of a shell below which it is darker, and its brightness then: a bright one would tint the tyres behind it."""
-_TAIL_OPACITY: Final = 0.12
-"""Opacity of the tail of a body that lets the steered rear wheels be seen."""
 _TAIL: Final = "_tail"
+_OPEN_TAIL: Final = np.array((*(3 * (_CUTAWAY_SHADE,)), 0.12))
+"""Brightness and opacity of the tail of a body that lets the steered rear wheels be seen."""
 _GHOST_OPACITY: Final = 0.35
 """Opacity of a ghost's solid relative to the same solid of an opaque car."""
 _GLASS: Final = (0.1, 0.13, 0.17)
 _GLASS_OPACITY: Final = 0.85
+_SHADOW: Final = "shadow"
 _SHADOW_OPACITY: Final = 0.62
-_SHADOW_FADE_M: Final = 0.3
-"""Width of the shadow's faded edge on either side of the outline [m]. A shadow cast by the light would triple the
-rendering time and have a hard edge."""
-_SHADOW_PIXELS: Final = 64
+_SHADOW_SIZE: Final = 1.15
+"""Size of the shadow relative to the car. Its outer part fades: a shadow cast by the light would triple the rendering
+time and have a hard edge."""
+_SHADOW_FADES: Final = 0.3
+"""Share of the shadow's width and length in which it fades, on either side."""
 
 _BASE: Final = """
 <mujoco>
   <option><flag contact="disable" gravity="disable"/></option>
   <visual>
+    <!-- The haze hides the far end of the road. It has the colour of the sky at the horizon; the default is white. -->
+    <rgba haze="0.59 0.695 0.81 1"/>
     <headlight ambient="0.42 0.42 0.42" diffuse="0.32 0.32 0.32" specular="0.05 0.05 0.05"/>
     <global offwidth="{width}" offheight="{height}"/>
     <!-- Lengths in units of the extent below: 0.3 m and 600 m. -->
@@ -101,6 +105,7 @@ class RenderScene:
                 add_course(spec, course)
             if edges is not None:
                 add_edges(spec, edges)
+            _add_shadow_material(spec)
             for number, car in enumerate(cars):
                 _add_car(spec, car, f"{number}/")
             self.model = spec.compile()
@@ -111,7 +116,7 @@ class RenderScene:
             np.array([self._mocap_id(f"{number}/{body}") for body in car.bodies]) for number, car in enumerate(cars)
         ]
         self._chassis = [car.bodies.index(CHASSIS) for car in cars]
-        self._shadow = [self._mocap_id(f"{number}/shadow") for number in range(len(cars))]
+        self._shadow = [self._mocap_id(f"{number}/{_SHADOW}") for number in range(len(cars))]
         self._opacity = self.model.geom_rgba[:, 3].copy(), self.model.tendon_rgba[:, 3].copy()
         self._tails = [
             [index for index in self._drawn(number)[0] if self.model.geom(index).name.endswith(_TAIL)]
@@ -141,8 +146,7 @@ class RenderScene:
 
     def open_tail(self, car: int, share: float) -> None:
         """Make the tail of a body transparent, so that the rear wheels are seen from behind."""
-        open_rgba = np.array([*(3 * [_CUTAWAY_SHADE]), _TAIL_OPACITY])
-        self.model.geom_rgba[self._tails[car]] = self._tail_rgba[car] * (1.0 - share * (1.0 - open_rgba))
+        self.model.geom_rgba[self._tails[car]] = self._tail_rgba[car] * (1.0 - share * (1.0 - _OPEN_TAIL))
 
     def update(self) -> None:
         """Update everything that is attached to the bodies; a ghost fades out near the car that it accompanies."""
@@ -161,102 +165,96 @@ class RenderScene:
 def _add_car(spec: mujoco.MjSpec, car: FilmedCar, prefix: str) -> None:
     bodies = {name: spec.worldbody.add_body(name=prefix + name, mocap=True) for name in car.bodies}
     solids = [part for part in car.parts if isinstance(part, Primitive) and part.body in bodies]
+    parts, panels = dressed(car.parts, car.size)
+    for panel in panels:
+        if panel.body not in bodies:
+            continue
+        shown = ((panel, ""),)
+        if panel.shell and car.size is not None and car.tail_opens:
+            shown = zip(without_tail(panel, car.size), ("", _TAIL), strict=True)
+        for surface, end in shown:
+            _add_panel(spec, bodies[panel.body], surface, car, f"{prefix}{panel.body}/{panel.name}{end}")
+    for part in parts:
+        if isinstance(part, Primitive):
+            if part.body in bodies:
+                _add_solid(bodies[part.body], part, car)
+        elif all(body in bodies for body, _ in part.points):
+            rgba = (*part.rgba[:3], part.rgba[3] * _opacity(car))
+            tendon = spec.add_tendon(name=f"{prefix}{part.name}", width=part.radius_m, rgba=rgba)
+            for number, (body, point) in enumerate(part.points):
+                site = f"{prefix}{part.name}/{number}"
+                bodies[body].add_site(name=site, pos=point, group=4)
+                tendon.wrap_site(site)
+    _add_shadow(spec, f"{prefix}{_SHADOW}", [solid for solid in solids if solid.body == CHASSIS], car)
+
+
+def _opacity(car: FilmedCar) -> float:
+    """Return the opacity of the solids of a car relative to an opaque car."""
+    return _GHOST_OPACITY if car.ghost else 1.0
+
+
+def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: BodySurface, car: FilmedCar, name: str) -> None:
+    if not len(panel.faces):
+        return
+    mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+    mesh.uservert, mesh.userface = panel.vertices_m.ravel(), panel.faces.ravel()
+    mesh.usernormal, mesh.userfacenormal = panel.normals.ravel(), panel.faces.ravel()
+    rgb = panel.rgb or (shares_of(car.colour) if car.colour else _PAINT)
+    if panel.shell and car.shell_opacity < _SHADED_BELOW:
+        rgb = tuple(_CUTAWAY_SHADE * value for value in rgb)
+    opacity = (car.shell_opacity if panel.shell else 1.0) * _opacity(car)
+    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity))
+
+
+def _add_solid(body: mujoco.MjsBody, solid: Primitive, car: FilmedCar) -> None:
+    """Add a solid of the model. A shell in it is the body of a car of unknown size; the round one is its greenhouse."""
     kinds = {
         "box": mujoco.mjtGeom.mjGEOM_BOX,
         "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
         "sphere": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
     }
-    parts, panels = dressed(car.parts, car.size)
-    for panel in panels:
-        if panel.body in bodies:
-            _add_panel(spec, bodies[panel.body], panel, car, f"{prefix}{panel.body}/{panel.name}")
-    for part in parts:
-        if isinstance(part, Primitive):
-            if part.body not in bodies:
-                continue
-            x, y, z = part.size_m
-            size = (0.5 * x, 0.5 * z, 0.0) if part.kind == "cylinder" else (0.5 * x, 0.5 * y, 0.5 * z)
-            bodies[part.body].add_geom(
-                type=kinds[part.kind],
-                size=size,
-                pos=part.position_m,
-                quat=part.quaternion,
-                # The round solid of a shell is the greenhouse.
-                rgba=_colour_of(part.rgba, car, shell=part.rgba[3] < SEE_THROUGH, glass=part.kind == "sphere"),
-            )
-        elif all(body in bodies for body, _ in part.points):
-            tendon = spec.add_tendon(name=f"{prefix}{part.name}", width=part.radius_m, rgba=_colour_of(part.rgba, car))
-            for number, (body, point) in enumerate(part.points):
-                site = f"{prefix}{part.name}/{number}"
-                bodies[body].add_site(name=site, pos=point, group=4)
-                tendon.wrap_site(site)
-    # Tyres seen through the body would be dark on a dark background.
-    _add_shadow(spec, prefix, solids, car.shell_opacity * (_GHOST_OPACITY if car.ghost else 1.0))
+    half = np.multiply(solid.size_m, 0.5)
+    *rgb, opacity = solid.rgba
+    if opacity < SEE_THROUGH:
+        glass = solid.kind == "sphere"
+        rgb = _GLASS if glass else shares_of(car.colour) if car.colour else rgb
+        opacity = car.shell_opacity * (_GLASS_OPACITY if glass else 1.0)
+    body.add_geom(
+        type=kinds[solid.kind],
+        size=(half[0], half[2], 0.0) if solid.kind == "cylinder" else half,
+        pos=solid.position_m,
+        quat=solid.quaternion,
+        rgba=(*rgb, opacity * _opacity(car)),
+    )
 
 
-def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: BodySurface, car: FilmedCar, name: str) -> None:
-    if panel.shell and car.size is not None and car.tail_opens:
-        panel, tail = without_tail(panel, car.size)
-        _add_mesh(spec, body, tail, car, f"{name}{_TAIL}")
-    _add_mesh(spec, body, panel, car, name)
+def _add_shadow_material(spec: mujoco.MjSpec) -> None:
+    """Add the black of the shadows, opaque in the middle and transparent at the edges."""
+    away = np.abs(np.linspace(-1.0, 1.0, 64))
+    inside = np.clip((1.0 - away) / _SHADOW_FADES, 0.0, 1.0)
+    faded = inside**2 * (3.0 - 2.0 * inside)
+    pixels = np.zeros((64, 64, 4), np.uint8)
+    pixels[..., 3] = 255.0 * np.outer(faded, faded)
+    texture = spec.add_texture(name=_SHADOW, type=mujoco.mjtTexture.mjTEXTURE_2D, width=64, height=64, nchannel=4)
+    texture.data = pixels.tobytes()
+    material = spec.add_material(name=_SHADOW, specular=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _SHADOW
 
 
-def _add_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: BodySurface, car: FilmedCar, name: str) -> None:
-    if not len(panel.faces):
-        return
-    mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
-    mesh.uservert, mesh.userface = panel.vertices_m.ravel(), panel.faces.ravel()
-    mesh.usernormal = panel.normals.ravel()
-    mesh.userfacenormal = panel.faces.ravel()
-    rgb = panel.rgb or (shares_of(car.colour) if car.colour else _PAINT)
-    if panel.shell and car.shell_opacity < _SHADED_BELOW:
-        rgb = tuple(_CUTAWAY_SHADE * value for value in rgb)
-    opacity = (car.shell_opacity if panel.shell else 1.0) * (_GHOST_OPACITY if car.ghost else 1.0)
-    body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=(*rgb, opacity))
-
-
-def _colour_of(
-    rgba: tuple[float, float, float, float], car: FilmedCar, *, shell: bool = False, glass: bool = False
-) -> tuple[float, float, float, float]:
-    r, g, b, a = rgba
-    if shell:
-        r, g, b = _GLASS if glass else shares_of(car.colour) if car.colour else (r, g, b)
-        a = car.shell_opacity * (_GLASS_OPACITY if glass else 1.0)
-    return (r, g, b, a * _GHOST_OPACITY if car.ghost else a)
-
-
-def _add_shadow(spec: mujoco.MjSpec, prefix: str, solids: Sequence[Primitive], opacity: float) -> None:
-    """Add the shadow below the chassis: as long and wide, with the same heading, but on the road."""
-    body = spec.worldbody.add_body(name=f"{prefix}shadow", mocap=True)
-    hull = [solid for solid in solids if solid.body == CHASSIS]
+def _add_shadow(spec: mujoco.MjSpec, name: str, hull: Sequence[Primitive], car: FilmedCar) -> None:
+    """Add the shadow below the chassis: with the same heading, but on the road."""
+    body = spec.worldbody.add_body(name=name, mocap=True)
     if not hull:
         return
     low = np.min([np.subtract(solid.position_m, np.multiply(solid.size_m, 0.5)) for solid in hull], axis=0)
     high = np.max([np.add(solid.position_m, np.multiply(solid.size_m, 0.5)) for solid in hull], axis=0)
-    half_m = 0.5 * (high - low)[:2]
-    name = f"{prefix}shadow"
-    texture = spec.add_texture(
-        name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=_SHADOW_PIXELS, height=_SHADOW_PIXELS, nchannel=4
-    )
-    # The shadow is opaque in the middle and fades towards its edge.
-    pixels = np.zeros((_SHADOW_PIXELS, _SHADOW_PIXELS, 4), np.uint8)
-    along, across = (_faded(float(half)) for half in half_m)
-    pixels[..., 3] = np.outer(across, along) * _SHADOW_OPACITY * opacity * 255.0
-    texture.data = pixels.tobytes()
-    material = spec.add_material(name=name, specular=0.0)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
-    # MuJoCo blends a texture only if its material is not fully opaque.
+    half_m = 0.5 * _SHADOW_SIZE * (high - low)
+    # Tyres seen through the body would be dark on a dark background.
+    opacity = _SHADOW_OPACITY * car.shell_opacity * _opacity(car)
     body.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         pos=(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.03),
-        size=(half_m[0] + _SHADOW_FADE_M, half_m[1] + _SHADOW_FADE_M, 1.0),
-        material=name,
-        rgba=(1.0, 1.0, 1.0, 0.99),
+        size=(half_m[0], half_m[1], 1.0),
+        material=_SHADOW,
+        rgba=(1.0, 1.0, 1.0, opacity),
     )
-
-
-def _faded(half_m: float) -> Array:
-    """Return the darkness of the shadow along one side, from the outer end of one faded edge to the other, 0 to 1."""
-    away = np.linspace(-half_m - _SHADOW_FADE_M, half_m + _SHADOW_FADE_M, _SHADOW_PIXELS)
-    inside = np.clip((half_m + _SHADOW_FADE_M - np.abs(away)) / (2.0 * _SHADOW_FADE_M), 0.0, 1.0)
-    return inside**2 * (3.0 - 2.0 * inside)

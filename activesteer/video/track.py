@@ -83,12 +83,18 @@ class Track:
         """Return the averaged direction of motion at an instant [rad] (see `drawing.cars`)."""
         return float(np.interp(time_s, self._time_s, self._direction_rad))
 
+    def chassis(self, time_s: float) -> Array:
+        """Return the point on the road below the chassis origin [m], shape (3,)."""
+        positions, _ = self.poses(time_s)
+        return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
+
+    def turn(self, time_s: float) -> Array:
+        """Return the matrix from the axes along the heading to the world, shape (3, 3)."""
+        return _turn(self.heading(time_s))
+
     def middle(self, time_s: float) -> Array:
         """Return the point on the road below the midpoint of the axles [m], shape (3,)."""
-        positions, _ = self.poses(time_s)
-        heading = self.heading(time_s)
-        forward = np.array([np.cos(heading), np.sin(heading), 0.0])
-        return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0) + self._middle_m * forward
+        return self.chassis(time_s) + self.turn(time_s) @ (self._middle_m, 0.0, 0.0)
 
     def path(self) -> tuple[Array, Array]:
         """Return all instants [s], shape (k,), and the midpoints of the axles at the height of the chassis [m].
@@ -97,22 +103,20 @@ class Track:
         """
         return self._time_s, self._middles_m
 
-    def wheel_place(self, corner: str) -> Array:
-        """Return the initial centre of a wheel relative to the chassis, in axes along its heading [m], shape (3,)."""
+    def wheel_centre(self, corner: str, time_s: float) -> Array:
+        """Return where the centre of a wheel is at an instant [m], if it does not move relative to the chassis."""
         body = f"{corner}_wheel"
         if body not in self.bodies:
             raise PlaybackError(
                 f"the recording has no body {body!r}; it has {', '.join(self.bodies)}", value=body, allowed=self.bodies
             )
-        positions, _ = self.poses(self.start_s)
-        x, y, z = positions[self.bodies.index(body)] - positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
-        cos, sin = np.cos(self.heading(self.start_s)), np.sin(self.heading(self.start_s))
-        return np.array([cos * x + sin * y, -sin * x + cos * y, z])
+        place = self.poses(self.start_s)[0][self.bodies.index(body)] - self.chassis(self.start_s)
+        return self.chassis(time_s) + self.turn(time_s) @ self.turn(self.start_s).T @ place
 
-    def chassis(self, time_s: float) -> Array:
-        """Return the point on the road below the chassis origin [m], shape (3,)."""
-        positions, _ = self.poses(time_s)
-        return positions[self.bodies.index(CHASSIS)] * (1.0, 1.0, 0.0)
+
+def _turn(angle_rad: float) -> Array:
+    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([(cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)])
 
 
 class Traces:
@@ -164,25 +168,19 @@ def _pieces(times: Array, places: Array, drawn: np.ndarray) -> tuple[Array, Arra
 
 def _strip(scene: mujoco.MjvScene, start: Array, stop: Array, width_m: float, rgba: tuple[float, ...]) -> None:
     x, y, _ = stop - start
-    length = max(float(np.hypot(x, y)), 1e-6)
-    cos, sin = x / length, y / length
-    frame = np.array([(cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)])
     # Pieces overlap a little, so that no gap opens on the outside of a bend.
-    size = np.array([0.5 * length + 0.02, 0.5 * width_m, 0.002])
-    add_geom(scene, mujoco.mjtGeom.mjGEOM_BOX, size, 0.5 * (start + stop), frame, rgba)
+    size = np.array([0.5 * float(np.hypot(x, y)) + 0.02, 0.5 * width_m, 0.002])
+    add_geom(scene, mujoco.mjtGeom.mjGEOM_BOX, size, 0.5 * (start + stop), _turn(np.arctan2(y, x)), rgba)
 
 
 class Markings:
     """The markings of one car; `note` gives the scale of the arrows in words and is empty without arrows."""
 
-    def __init__(
-        self, recording: Recording, track: Track, size: Footprint, colour: str, shown_with: Sequence[Recording]
-    ) -> None:
+    def __init__(self, recording: Recording, track: Track, colour: str, shown_with: Sequence[Recording]) -> None:
         """Prepare the markings."""
-        self._track, self._rgb = track, shares_of(colour)
-        self._tips = wheel_angles.tips_beside(size)
+        self._recording, self._track, self._rgb = recording, track, shares_of(colour)
+        self._tips = wheel_angles.tips_beside(footprint_of(recording.metadata) or Footprint())
         self._factors = wheel_angles.factors(shown_with)
-        self._recording = recording
         self._arrows, self.note = None, ""
         if all(name in recording for name in tyre_forces.CHANNELS):
             scale_NpM = tyre_forces.force_scale(shown_with)
@@ -193,9 +191,7 @@ class Markings:
         """Add the markings at an instant [s] to a scene."""
         if wheel_angles.CHANNELS[0] in self._recording:
             angles = wheel_angles.angles_at(self._recording, time_s)
-            origin, heading = self._track.chassis(time_s), self._track.heading(time_s)
-            cos, sin = np.cos(heading), np.sin(heading)
-            turn = np.array([(cos, -sin, 0.0), (sin, cos, 0.0), (0.0, 0.0, 1.0)])
+            origin, turn = self._track.chassis(time_s), self._track.turn(time_s)
             for angle, factor, tip in zip(angles, self._factors, self._tips, strict=True):
                 if abs(angle) >= _SHOWN_RAD:
                     self._add_wedge(scene, origin + turn @ (*tip, _ABOVE_ROAD_M), turn, float(angle), factor)

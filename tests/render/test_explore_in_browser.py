@@ -120,9 +120,18 @@ def test_both_tabs_have_their_parts_in_sight(browser: Browser, served: tuple[str
     height, phone = page.evaluate("innerHeight"), device.startswith("phone")
     page.wait_for_selector(DONE, timeout=LIMIT_MS)
     assert_readable(page)
+    gain = page.locator("[data-key='controllers.ars.prediction_gain']")
+    assert gain.is_visible() != phone  # a phone shows one group of sliders at a time
+    if phone:
+        page.select_option("#group", "ARS")
+        assert gain.is_visible()
+        page.select_option("#group", "manoeuvre")
     page.locator("#curves").scroll_into_view_if_needed()
     page.evaluate("scrollBy(0, 400)")
     sliders, curves = page.evaluate(BOX, "tuning"), page.evaluate(BOX, "curves")
+    if phone:  # so do the colours of the curves
+        assert page.evaluate(BOX, "legend")["bottom"] < sliders["bottom"]
+        assert page.inner_text("#legend").split() == ["none", "ars", "afs"]
     assert 0 <= sliders["top"] < 0.5 * height  # the sliders stay in sight beside or above the curves
     assert sliders["bottom"] < 0.4 * height if phone else sliders["right"] <= curves["left"]
     page.click("#tab-drive")
@@ -132,10 +141,11 @@ def test_both_tabs_have_their_parts_in_sight(browser: Browser, served: tuple[str
     stage, gauges = page.evaluate(BOX, "stage"), page.evaluate(BOX, "gauges")
     assert stage["bottom"] <= height
     assert gauges["height"] < 0.12 * stage["height"]
-    # The strip does not cover the road: some browsers then leave the other end of the picture empty.
+    # Neither gauges nor pads cover the road: some browsers then leave the other end of the picture empty.
     view = page.evaluate(BOX, "drive-view")
     assert view["top"] == pytest.approx(gauges["bottom"], abs=1.0)
-    assert view["bottom"] == pytest.approx(stage["bottom"], abs=2.0)
+    end = page.evaluate(BOX, "touch")["top"] if phone else stage["bottom"]
+    assert view["bottom"] == pytest.approx(end, abs=2.0)
     assert page.evaluate(BOX, "waiting")["bottom"] < stage["top"] + 0.5 * stage["height"]  # the car is free
     assert page.locator("#touch-throttle").is_visible() == page.locator(".thumbs").is_visible() == phone
     assert problems == []
@@ -150,10 +160,9 @@ def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, serv
     page.select_option("#course", "plane")
     page.tap("#start", timeout=LIMIT_MS)
     page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
-    wheel, throttle = page.evaluate(BOX, "touch-steer"), page.evaluate(BOX, "touch-throttle")
-    y = wheel["y"] + wheel["height"] / 2
-    left = {"x": wheel["x"] + 0.3 * wheel["width"], "y": y, "id": 1}
-    right = {"x": throttle["x"] + throttle["width"] / 2, "y": y, "id": 2}
+    pad, throttle = page.evaluate(BOX, "touch-steer"), page.evaluate(BOX, "touch-throttle")
+    left = {"x": pad["x"] + 0.3 * pad["width"], "y": pad["y"] + pad["height"] / 2, "id": 1}
+    right = {"x": throttle["x"] + throttle["width"] / 2, "y": throttle["y"] + throttle["height"] / 2, "id": 2}
     thumbs = page.context.new_cdp_session(page)
     thumbs.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [left]})
     thumbs.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [left, right]})
@@ -165,6 +174,40 @@ def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, serv
     recording = activesteer.Recording.open(served[1] / file)
     assert recording["y_m"][-1] > 1.0
     assert recording["speed_mps"].max() > 65.0 / 3.6
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(390, 844), (844, 390)])
+def test_choices_fold_away_on_a_phone_while_the_car_drives(
+    browser: Browser, served: tuple[str, Path], size: tuple[int, int]
+) -> None:
+    width, height = size
+    page, problems = opened(browser, served[0], **(PHONE | {"viewport": {"width": width, "height": height}}))
+    page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
+    page.tap("#tab-drive")
+    page.select_option("#drive-controller", "ars")
+    assert page.locator("#drive-vehicle").is_visible()
+    page.tap("#start", timeout=LIMIT_MS)
+    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
+    assert not page.locator("#drive-vehicle").is_visible()
+    assert not page.locator("header").is_visible()
+    assert page.inner_text("#drive-chosen") == "Double lane change · compact · ars"
+    view, pad, throttle = (page.evaluate(BOX, name) for name in ("drive-view", "touch-steer", "touch-throttle"))
+    assert view["height"] > 0.65 * height
+    assert pad["width"] > 220
+    assert pad["height"] > 120
+    assert throttle["right"] <= width
+    assert max(pad["bottom"], page.evaluate(BOX, "touch-brake")["bottom"]) <= height
+    page.tap("#drive-chosen")  # the choices come back while the car drives
+    page.select_option("#drive-controller", "none")
+    page.wait_for_selector("#gauges dd:text-is('none')", state="attached")
+    page.tap("#drive-chosen")
+    page.tap("#end")
+    page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
+    assert page.locator("header").is_visible()
+    assert page.locator("#drive-vehicle").is_visible()
     assert problems == []
     page.close()
 

@@ -71,6 +71,12 @@ def test_chase_camera_shows_car_road_cones_and_sky(picture):
     assert pixels[-1].std() > 1.0  # the surface has a pattern
 
 
+def test_no_stripe_parts_the_road_from_the_sky(drives):
+    with Film({"afs": drives["afs"]}, Settings(size=SIZE, gauges="sideslip")) as film:
+        rows = film.picture(1.7)[:60, 300:316].mean(axis=(1, 2))  # without a title
+    assert rows.max() < rows[0] + 5.0
+
+
 @pytest.mark.slow
 def test_top_camera_shows_the_car_in_the_middle(picture):
     pixels = picture(2.0, camera="top")
@@ -196,7 +202,8 @@ def test_side_by_side_every_car_has_a_picture_of_its_own(drives, folder):
 
 @pytest.mark.slow
 def test_shadow_is_dark_at_the_car_and_has_no_edge(drives, monkeypatch):
-    monkeypatch.setattr("activesteer.video.film._WHEELS_SEEN", 1.0)  # a body to be seen through has little shadow
+    # A body to be seen through has little shadow.
+    monkeypatch.setattr("activesteer.video.film._SHELL_OPACITY", {"top": 1.0})
     with Film({"none": drives["none"]}, Settings(size=(640, 480), camera="top")) as film:
         pixels = film.picture(0.2).astype(int)
     # From the road behind the car, which begins 80 pixels behind the middle, to its end, beside the path.

@@ -1,10 +1,12 @@
 // The tab Drive: keys, gamepad and touch in; the car, its ghost, gauges and cones out.
-import { courses, element, number } from "./look.js";
+import { courses, element, inWords, number, option } from "./look.js";
 import { Scene } from "./scene.js";
 
 const $ = (id) => document.getElementById(id);
 const KEYS = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "throttle", w: "throttle", ArrowDown: "brake", s: "brake", " ": "brake" };
 const SWITCH = ["none", "ars", "afs", "lqr", "esc"], DEAD = 0.06;
+const PAD_REACH = 0.4; // distance of the thumb from the middle of the pad for full steering, as a share of its width
+const small = matchMedia("(max-width: 760px), (max-height: 500px)");
 const PLAIN = ["speed", "sideslip", "grip used", "time", "cones hit"]; // gauges that a phone shows
 
 export class Drive {
@@ -18,10 +20,10 @@ export class Drive {
     this.last = "";
     this.ghosts = new Map(); // course -> {frames, lap_s} of the last drive, preferably of a complete one
     this.touch = { steer: 0, throttle: 0, brake: 0 };
-    $("course").replaceChildren(...Object.entries(courses).map(([name, { title }]) => element("option", { value: name }, title)));
+    $("course").replaceChildren(...Object.entries(courses).map(([name, { title }]) => option(name, title)));
     $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
     $("drive-vehicle").addEventListener("change", () => this.prepare());
-    $("drive-controller").addEventListener("change", () => { if (!this.act({ controller: $("drive-controller").value })) this.prepare(); });
+    $("drive-controller").addEventListener("change", () => { this.values(); if (!this.act({ controller: $("drive-controller").value })) this.prepare(); });
     for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => this.act({ mu: +$("drive-mu").value })]]) {
       $(id).addEventListener("input", () => { this.values(); write(); });
       $(id).addEventListener("change", () => { if (!this.running) { this.start_kmh = +$("drive-speed").value; this.prepare(); } });
@@ -33,22 +35,37 @@ export class Drive {
     addEventListener("keydown", (event) => this.key(event, true));
     addEventListener("keyup", (event) => this.key(event, false));
     addEventListener("blur", () => { this.pressed.clear(); this.hands(); });
-    $("touch-steer").addEventListener("input", () => { this.touch.steer = -$("touch-steer").value; this.hands(); });
-    for (const end of ["change", "pointerup", "pointercancel"]) $("touch-steer").addEventListener(end, () => { $("touch-steer").value = this.touch.steer = 0; this.hands(); });
+    const pad = $("touch-steer");
+    if (matchMedia("(pointer: coarse)").matches) pad.prepend($("wheel"));
+    const slide = (event) => {
+      const { left, width } = pad.getBoundingClientRect(), aside = (event.clientX - left) / width - 0.5;
+      this.steer(Math.max(-1, Math.min(1, -aside / PAD_REACH)));
+    };
+    pad.addEventListener("pointerdown", (event) => { pad.setPointerCapture(event.pointerId); slide(event); });
+    pad.addEventListener("pointermove", (event) => { if (pad.hasPointerCapture(event.pointerId)) slide(event); });
+    pad.addEventListener("lostpointercapture", () => this.steer(0));
     for (const pedal of ["brake", "throttle"]) {
-      const press = (value) => (event) => { event.preventDefault(); this.touch[pedal] = value; this.hands(); };
-      $(`touch-${pedal}`).addEventListener("pointerdown", press(1));
-      for (const end of ["pointerup", "pointerleave", "pointercancel"]) $(`touch-${pedal}`).addEventListener(end, press(0));
+      const button = $(`touch-${pedal}`), press = (value) => (event) => { event.preventDefault(); this.touch[pedal] = value; button.setAttribute("aria-pressed", String(!!value)); this.hands(); };
+      button.addEventListener("pointerdown", press(1));
+      for (const end of ["pointerup", "pointerleave", "pointercancel"]) button.addEventListener(end, press(0));
     }
+    small.addEventListener("change", () => this.fold());
     this.ofCourse();
     window.activesteerDrive = this; // for tests and the curious
   }
 
   offer(names) {
-    for (const [id, list, first] of [["drive-vehicle", names.vehicles, "compact"], ["drive-controller", names.controllers, "none"]]) {
-      $(id).replaceChildren(...list.map((name) => element("option", { value: name }, name)));
-      $(id).value = first;
-    }
+    $("drive-vehicle").replaceChildren(...names.vehicles.map((name) => option(name)));
+    $("drive-controller").replaceChildren(...names.controllers.map((name) => option(name, names.titles[name] ? `${name}: ${names.titles[name]}` : name)));
+    $("drive-vehicle").value = "compact";
+    $("drive-controller").value = "none";
+    this.values();
+  }
+
+  // On a small screen, the choices fold away while the car drives.
+  fold() {
+    document.body.classList.toggle("driving", this.running);
+    $("drive-setup").open = !(this.running && small.matches);
   }
 
   show(shown) {
@@ -70,11 +87,13 @@ export class Drive {
   values(speed_kmh = +$("drive-speed").value) {
     $("drive-speed").previousElementSibling.textContent = `${number(speed_kmh, 0)} km/h`;
     $("drive-mu").previousElementSibling.textContent = number(+$("drive-mu").value, 2);
+    $("drive-chosen").textContent = [courses[$("course").value].title, inWords($("drive-vehicle").value), $("drive-controller").value].filter(Boolean).join(" · ");
   }
 
   // Put a car at the start, where it waits for the button. A drive ends.
   prepare() {
     this.say("");
+    this.values();
     this.ready = false;
     $("start").disabled = true;
     $("start").textContent = "Getting the car ready …";
@@ -88,6 +107,7 @@ export class Drive {
     this.ready = true;
     this.course = $("course").value;
     this.timed = header.cones.length > 0 || header.radius_m > 0;
+    this.way = header.radius_m > 0 ? "Last lap" : "First to last gate";
     this.scene.setShape(header.shape, arrays);
     this.scene.car("you", 2);
     this.scene.setCourse(header.cones, header.lanes, header.radius_m);
@@ -104,6 +124,7 @@ export class Drive {
 
   going() {
     this.running = true;
+    this.fold();
     this.latencies = [];
     $("start").blur();
     $("waiting").hidden = true;
@@ -112,13 +133,20 @@ export class Drive {
     this.hold();
   }
 
+  steer(way) {
+    this.touch.steer = way;
+    $("touch-steer").style.setProperty("--at", -way);
+    $("touch-steer").setAttribute("aria-valuenow", -Math.round(100 * way));
+    this.hands();
+  }
+
   hold() { this.act({ speed_kmh: $("hold").checked ? +$("drive-speed").value : null }); }
 
   key(event, down) {
     if (!this.shown || !this.running || event.ctrlKey || event.metaKey || event.altKey) return;
     if (down && event.key === "Escape") { this.end(); return; }
     const place = Number(event.key) - 1;
-    if (down && SWITCH[place]) { $("drive-controller").value = SWITCH[place]; this.act({ controller: SWITCH[place] }); return; }
+    if (down && SWITCH[place]) { $("drive-controller").value = SWITCH[place]; this.values(); this.act({ controller: SWITCH[place] }); return; }
     const what = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!what) return;
     event.preventDefault();
@@ -181,7 +209,7 @@ export class Drive {
     const lap = header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
     const rows = {
       speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
-      time: this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": `${this.struck}`,
+      time: this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": this.scene.cones.length ? `${this.struck}` : "–",
       "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear wheels": `${number(header.rear_deg, 1)}°`,
       "added in front": `${number(header.superposition_deg, 1)}°`, control: header.controller,
     };
@@ -204,6 +232,7 @@ export class Drive {
 
   ended(header) {
     this.running = false;
+    this.fold();
     this.sent.clear();
     this.last = "";
     $("end").hidden = true;
@@ -212,7 +241,7 @@ export class Drive {
     this.values();
     if (this.frames.length && (lap || !before)) this.ghosts.set(this.course, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
-    const timed = lap ? ` Lap or gates: ${number(lap, 2)} s${faster}.` : "";
+    const timed = lap ? ` ${this.way}: ${number(lap, 2)} s${faster}.` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
     const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
     $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${latency} Saved as ${header.file} in ${header.folder}.`;

@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { dark, element, mostControllers, number, onTheme, runColour, setTheme } from "./look.js";
+import { dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -25,6 +25,7 @@ const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(
 const drive = new Drive(socket, say);
 
 const NAMED = ["maneuver", "vehicle", "driver"];
+const swatches = new Map(); // name of a controller -> its colour beside its box
 const boxes = () => [...$("controllers").querySelectorAll("input")];
 const chosen = () => boxes().filter((box) => box.checked).map((box) => box.value);
 const choice = () => ({ ...Object.fromEntries(NAMED.map((id) => [id, $(id).value])), controllers: chosen() });
@@ -33,6 +34,7 @@ function describe(ticked) {
   const unticked = untickBeyond(mostControllers, boxes(), ticked);
   if (!chosen().length) { say("Choose at least one controller."); return; }
   say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "");
+  if (unticked.includes(ticked?.value)) return;
   asking.stop();
   // Another controller leaves the sliders where they are; they apply where the new choice has them.
   if (ticked) state.wanted = state.values;
@@ -56,19 +58,20 @@ function readAddress() {
 function writeAddress() {
   const { controllers, ...names } = choice();
   history.replaceState(null, "", `#${new URLSearchParams({ ...names, controllers: controllers.join(","), ...state.values })}`);
-  $("chosen").textContent = [...Object.values(names), controllers.join(", ")].join(" · ");
+  $("chosen").textContent = [...Object.values(names).map(inWords), controllers.join(", ")].join(" · ");
 }
 
 // Choose a name in a list; the program answers a name that it does not know.
 function offer(list, name) {
-  if (![...list.options].some((option) => option.value === name)) list.append(element("option", { value: name }, name));
+  if (![...list.options].some((option) => option.value === name)) list.append(option(name));
   list.value = name;
 }
 
 function addBox(name) {
   const box = element("input", { type: "checkbox", value: name });
   box.addEventListener("change", () => describe(box));
-  $("controllers").append(element("label", {}, box, ` ${name}`));
+  swatches.set(name, element("i", { class: "swatch" }));
+  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, swatches.get(name), name));
 }
 
 const asking = new Asking((dragging) => {
@@ -92,9 +95,10 @@ function keepGhosts() {
 const hear = {
   ready(header) {
     for (const [id, names] of [["maneuver", header.maneuvers], ["vehicle", header.vehicles], ["driver", header.drivers]]) {
-      $(id).replaceChildren(...names.map((name) => element("option", { value: name }, name)));
+      $(id).replaceChildren(...names.map((name) => option(name)));
     }
     $("controllers").querySelectorAll("label").forEach((label) => label.remove());
+    state.titles = header.titles;
     header.controllers.forEach(addBox);
     drive.offer(header);
     readAddress();
@@ -161,9 +165,23 @@ function redraw() {
   showFigures();
 }
 
+const swatchOf = (run) => element("i", { class: "swatch", style: `background:${runColour(run.place)}` });
+const shortName = (run) => run.name.replace(/^.*:|\?.*|\.toml$/g, "");
+
+// Colours stay in sight beside the sliders: at the boxes of the controllers, on a phone in a line of its own.
+function showColours() {
+  for (const [name, swatch] of swatches) {
+    const run = state.runs.get(name);
+    swatch.hidden = !run;
+    if (run) swatch.setAttribute("style", `background:${runColour(run.place)}`);
+  }
+  $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run))));
+}
+
 function showFigures() {
+  showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", {}, ""), ...runs.map((run) => element("th", {}, element("i", { class: "swatch", style: `background:${runColour(run.place)}` }), narrow ? run.name.replace(/^.*:|\?.*|\.toml$/g, "") : run.label)));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), narrow ? shortName(run) : run.label)));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
@@ -177,17 +195,29 @@ function showSliders() {
   const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
-    box.open = open.size ? open.has(group) : i === 0 || (!narrow && i !== 1 && i < 4);
+    box.open = open.size ? open.has(group) : i === 0 || (i !== 1 && i < 4);
     for (const slider of state.sliders.filter((other) => other.group === group)) box.append(sliderOf(slider));
     return box;
   }));
+  const before = $("group").value;
+  $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, group[0].toUpperCase() + group.slice(1))));
+  if (groups.includes(before)) $("group").value = before;
+  if (narrow) showGroup();
+}
+
+// A phone has room for one group of sliders above the results.
+function showGroup() {
+  for (const box of $("sliders").children) {
+    box.hidden = box.dataset.group !== $("group").value;
+    box.open = true;
+  }
 }
 
 const wayOf = (event) => ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 })[event.key];
 
 function sliderOf(slider) {
   const digits = Math.max(0, -Math.floor(Math.log10(slider.step)));
-  const shown = element("output", {}), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": slider.label, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
+  const shown = element("output", {}), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": `${slider.group}: ${slider.label}`, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
   const box = element("div", { class: "slider" }, element("span", {}, slider.label), shown, input);
   const write = () => { shown.textContent = `${number(+input.value, digits)} ${slider.unit}`; box.classList.toggle("changed", slider.key in state.values); };
   const moved = (dragging) => {
@@ -255,6 +285,7 @@ const player = {
 $("choice").open = !narrow;
 addEventListener("hashchange", readAddress);
 for (const id of NAMED) $(id).addEventListener("change", () => describe());
+$("group").addEventListener("change", showGroup);
 $("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
 $("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });

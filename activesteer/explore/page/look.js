@@ -22,4 +22,8 @@ export const element = (name, attributes = {}, ...children) => {
   made.append(...children);
   return made;
 };
+
+// A name of the package in words; a file keeps its name.
+export const inWords = (name) => (name.includes(".") ? name : name.replaceAll("_", " "));
+export const option = (name, text = inWords(name)) => element("option", { value: name }, text);
 export { number } from "./number.js";

@@ -10,7 +10,7 @@ from activesteer.controllers.allocation import angle_range
 from activesteer.controllers.turn_reference import ConfidenceMonitor, confidence
 from activesteer.scenario import resolve
 
-LIMIT_RAD, AGAINST_RAD = math.radians(3.0), math.radians(1.0)
+LIMIT_RAD = math.radians(3.0)
 
 
 @pytest.fixture
@@ -18,20 +18,13 @@ def monitor():
     return ConfidenceMonitor(resolve("straight_line").controller_setup(0.005))
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_against_the_driver_less_is_allowed_than_with_him(side: float):
-    far, driver = 1.0, side * 0.1
-    least, most = angle_range(0.0, LIMIT_RAD, far, True, AGAINST_RAD, driver)
-    assert (least, most) == ((-AGAINST_RAD, LIMIT_RAD) if side > 0.0 else (-LIMIT_RAD, AGAINST_RAD))
-    assert angle_range(0.0, LIMIT_RAD, far, True, AGAINST_RAD, 0.0) == (-LIMIT_RAD, LIMIT_RAD)
-
-
 def test_angles_are_limited_by_what_the_actuator_reaches_and_a_failed_one_stays():
-    assert angle_range(0.01, LIMIT_RAD, 0.02, True, AGAINST_RAD, 0.0) == pytest.approx((-0.01, 0.03))
-    assert angle_range(0.04, LIMIT_RAD, 0.02, True, AGAINST_RAD, 0.0) == pytest.approx((0.02, LIMIT_RAD))
-    assert angle_range(0.07, LIMIT_RAD, 0.02, False, AGAINST_RAD, 0.1) == (0.07, 0.07)
+    both = -LIMIT_RAD, LIMIT_RAD
+    assert angle_range(0.01, both, 0.02, True) == pytest.approx((-0.01, 0.03))
+    assert angle_range(0.04, both, 0.02, True) == pytest.approx((0.02, LIMIT_RAD))
+    assert angle_range(0.07, both, 0.02, False) == (0.07, 0.07)
     # An angle beyond a limit that has shrunk comes back within its rate at once.
-    assert angle_range(-0.03, LIMIT_RAD, 0.02, True, 0.0, 0.1) == pytest.approx((0.0, 0.0))
+    assert angle_range(-0.03, (0.0, LIMIT_RAD), 0.02, True) == pytest.approx((0.0, 0.0))
 
 
 def test_friction_is_certain_as_far_as_its_variance_has_fallen(monitor):

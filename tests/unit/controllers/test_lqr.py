@@ -10,6 +10,7 @@ import pytest
 
 from activesteer.controllers import ControllerParameters, load_controller
 from activesteer.controllers.allocation import Allocation, allocated, moment_change
+from activesteer.controllers.axle_slopes import AxleSlopes, axle_forces, useful_range
 from activesteer.controllers.lqr import BOTH, SPEEDS_MPS, STATES, Lqr, feedback, model, schedule, steady_turn
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import Estimate
@@ -205,33 +206,41 @@ def test_superposition_is_not_held_against_a_driver_who_does_not_steer_back(know
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_superposition_is_not_against_the_driver_while_the_car_turns_less_than_desired(known, side):
-    def limit_rad(yaw_rate_radps):
+def test_superposition_does_not_turn_a_car_further_from_the_desired_yaw_rate(known, side):
+    def turn(yaw_rate_radps, friction_std=0.001):
         controller, rate = Lqr(known), side * yaw_rate_radps
 
-        class Certain:
+        class Known:
             innovation = 0.0
 
             def step(self, _measurement):
-                return Estimate(25.0, 0.0, 0.0, rate, 0.3, *[0.001] * 5)
+                return Estimate(25.0, 0.0, 0.0, rate, 0.3, *[0.001] * 4, friction_std)
 
-        controller._estimator = Certain()  # pyright: ignore[reportAttributeAccessIssue]
+        controller._estimator = Known()  # pyright: ignore[reportAttributeAccessIssue]
         return [controller.turn(steering(0.2 * side), measured(rate)) for _ in range(40)][-1]
 
-    free = limit_rad(1.0)
-    band = known.gains.lqr.lacking_radps
-    desired = abs(free.desired_radps)
-    most = known.gains.servos.superposition_limit_rad
-    assert free.against_rad == pytest.approx(most, rel=0.01)
-    assert limit_rad(desired - 0.5 * band).against_rad == pytest.approx(0.5 * most, rel=0.02)
-    assert limit_rad(desired - 1.1 * band).against_rad == 0.0
+    def along_and_against_rad(found):
+        return sorted((side * angle for angle in found.range_rad), reverse=True)
+
+    band, most = known.gains.lqr.lacking_radps, known.gains.servos.superposition_limit_rad
+    desired = abs(turn(1.0).desired_radps)
+    assert along_and_against_rad(turn(desired)) == pytest.approx([most, -most], rel=0.01)
+    assert along_and_against_rad(turn(desired - 0.5 * band)) == pytest.approx([most, -0.5 * most], rel=0.02)
+    assert along_and_against_rad(turn(desired + 0.5 * band)) == pytest.approx([0.5 * most, -most], rel=0.02)
+    assert along_and_against_rad(turn(desired - 1.1 * band)) == pytest.approx([most, 0.0], abs=1e-9)
+    assert along_and_against_rad(turn(desired + 1.1 * band)) == pytest.approx([0.0, -most], abs=0.001)
+    # Against the driver less is allowed while the friction is unknown.
+    unknown = known.gains.estimator.friction_std
+    along, against = along_and_against_rad(turn(abs(turn(1.0, unknown).desired_radps), unknown))
+    assert along == pytest.approx(most)
+    assert against == pytest.approx(-known.gains.lqr.against_driver_rad, rel=0.01)
 
 
 def test_angles_follow_the_demand_within_limits_and_rates(known):
     allocation = Allocation(known)
     now = Estimate(25.0, 0.0, 0.0, 0.02, 0.9, *[0.0] * 5)
     demand = 0.005, -0.004
-    found = allocated(allocation, now, 0.002, (0.0, 0.0), demand, 0.05, BOTH, 0.5, 1.0)
+    found = allocated(allocation, now, 0.002, (0.0, 0.0), demand, (-0.05, 0.05), BOTH, 0.5, 1.0)
     assert found == pytest.approx(demand, rel=1e-3)
 
 
@@ -251,21 +260,37 @@ def test_front_wheels_steer_back_while_the_rear_axle_slides(known, side):
     demand = math.radians(-1.5 * side), at[1]
 
     def added(ay_mps2, authority, estimate=now):
-        return allocated(Allocation(known), estimate, driver, at, demand, 0.06, BOTH, ay_mps2, authority)
+        return allocated(Allocation(known), estimate, driver, at, demand, (-0.06, 0.06), BOTH, ay_mps2, authority)
 
     front, rear = added(desired_mps2, 1.0)
     moment_Nm = moment_change(Allocation(known), now, driver, at, (front, rear))
-    assert rear == pytest.approx(demand[1])
+    assert rear == pytest.approx(demand[1], rel=0.05)
     assert side * front > math.radians(0.5)
     # At most all of the side force that the front axle has on this road.
     most_Nm = now.friction * 9.81 * car.mass_kg * car.cg_to_rear_m / car.wheelbase_m * car.cg_to_front_m
     assert 0.1 * most_Nm < side * moment_Nm < most_Nm
-    # A feedback without authority, a car that turns too little, and a straight curve leave the demand.
-    assert added(desired_mps2, 0.0)[0] == pytest.approx(demand[0])
+    # Without this, and in a car that turns too little, wheels that slide get no more angle. A straight curve leaves it.
+    assert added(desired_mps2, 0.0)[0] == pytest.approx(0.0)
     slow = now._replace(yaw_rate_radps=-0.05 * side, sideslip_rad=0.0)
-    assert added(desired_mps2, 1.0, slow)[0] == pytest.approx(demand[0])
+    assert added(desired_mps2, 1.0, slow)[0] == pytest.approx(0.0)
     grips = SLIDING._replace(friction=30.0)
     assert added(desired_mps2, 1.0, mirrored(grips, side))[0] == pytest.approx(demand[0], abs=1e-4)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_front_wheels_are_not_steered_beyond_the_slip_angle_of_their_largest_force(known, side):
+    """The driver's angle is his own: nothing is taken from it, and to the other side all angles are free."""
+    now, curves = Estimate(20.0, 0.0, 0.0, 0.0, 0.3, *[0.0] * 5), AxleSlopes(known)
+
+    def along_and_against_rad(driver_rad):
+        return sorted((side * angle for angle in useful_range(curves, now, side * driver_rad)), reverse=True)
+
+    most, _ = along_and_against_rad(0.0)
+    slip_rad, _, force_mps2, _ = axle_forces(curves, now, most, 0.0)
+    assert slip_rad == pytest.approx(most)
+    assert force_mps2 == pytest.approx(axle_forces(curves, now, 1.0, 0.0)[2])
+    assert along_and_against_rad(0.6 * most)[0] == pytest.approx(0.4 * most)
+    assert along_and_against_rad(1.5 * most) == pytest.approx([0.0, -2.5 * most])
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -277,7 +302,7 @@ def test_front_wheels_keep_the_moment_when_the_rear_wheels_are_too_slow(known, s
     allocation = Allocation(replace(known, gains=replace(known.gains, servos=slow)))
     # One axle takes over with the lag of the actuators.
     front, rear = [
-        allocated(allocation, now, 0.0, (0.0, 0.0), demand, 0.05, BOTH, 0.0, 1.0)
+        allocated(allocation, now, 0.0, (0.0, 0.0), demand, (-0.05, 0.05), BOTH, 0.0, 1.0)
         for _ in range(round(10.0 * slow.lag_s / INTERVAL_S))
     ][-1]
     moment_Nm = moment_change(allocation, now, 0.0, (0.0, 0.0), (front, rear))

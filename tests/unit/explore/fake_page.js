@@ -31,11 +31,12 @@ export const element = (name, attributes = {}, ...children) => {
   made.append(...children);
   return made;
 };
+export const inWords = (name) => name, option = (name) => element("option", { value: name });
 export { number } from "./number.mjs";
 
 export const names = ["none", "ars", "afs", "lqr", "esc"];
 export function start() {
-  hear({ kind: "ready", maneuvers: ["step_steer"], vehicles: ["compact"], drivers: ["typical"], controllers: names }, []);
+  hear({ kind: "ready", maneuvers: ["step_steer"], vehicles: ["compact"], drivers: ["typical"], controllers: names, titles: {} }, []);
   describe();
   finish();
 }

@@ -62,6 +62,11 @@ def test_a_count_has_no_decimals_and_groups_of_gains_are_named_in_words(tmp_path
     figures = next(iter(runs.run(RunRequest(**choice), lambda: False))).header["figures"]
     assert {figure["title"]: figure["digits"] for figure in figures}["Cones hit"] == 0
     assert {figure["title"]: figure["digits"] for figure in figures}["Peak sideslip"] is None
-    groups = {slider["group"] for slider in runs.describe(Describe(**choice)).header["sliders"]}
-    assert {"ARS", "desired yaw rate"} <= groups
+    sliders = {slider["key"]: slider for slider in runs.describe(Describe(**choice)).header["sliders"]}
+    groups = {slider["group"] for slider in sliders.values()}
+    assert {"ARS", "desired yaw rate", "control unit and bus"} <= groups
     assert not any("_" in group for group in groups)
+    assert "controllers" not in groups
+    # The heading of the group is not repeated in each label.
+    assert sliders["controllers.ars.corrector.proportional_gain_s"]["label"] == "corrector: proportional gain"
+    assert sliders["controllers.ars.prediction_gain"]["label"] == "prediction gain"

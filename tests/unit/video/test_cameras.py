@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import ParameterError
-from activesteer.video.film import view
+from activesteer.video.film import Settings, aim
 from activesteer.video.track import Track
 from tests.raising import raises
 from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, circle
@@ -16,7 +16,7 @@ from tests.unit.playback.synthetic import RADIUS_M, SPEED_MPS, circle
 def eye(name: str, time_s: float, corner: str = "fl") -> tuple[np.ndarray, np.ndarray]:
     """Return position and target of the camera."""
     camera = mujoco.MjvCamera()
-    view(name, Track(circle(), "circle"), corner).aim(camera, time_s)
+    aim(camera, name, Track(circle(), "circle"), time_s, corner)
     azimuth, elevation = math.radians(camera.azimuth), math.radians(camera.elevation)
     forward = np.array(
         [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)]
@@ -50,7 +50,7 @@ def test_top_camera_looks_straight_down_on_the_middle_of_the_car():
 @pytest.mark.parametrize("corner", ["fl", "fr", "rl", "rr"])
 def test_wheel_camera_sees_the_inner_side_of_its_wheel(corner):
     at, _ = eye("wheel", 1.0, corner)
-    wheel = Track(circle(), "circle").wheel_place(corner)
+    wheel = local(Track(circle(), "circle").wheel_centre(corner, 1.0), 1.0)
     x, y, _ = local(at, 1.0)
     assert (x - wheel[0]) * (1 if corner[0] == "f" else -1) > 1.0  # from the end of the car
     assert abs(y) < abs(wheel[1])
@@ -58,8 +58,7 @@ def test_wheel_camera_sees_the_inner_side_of_its_wheel(corner):
 
 
 def test_unknown_names_are_told_with_those_that_exist():
-    track = Track(circle(), "circle")
     with raises(ParameterError, value="chse"):
-        view("chse", track)
+        Settings(camera="chse")
     with raises(ParameterError, value="lf"):
-        view("wheel", track, "lf")
+        Settings(camera="wheel", corner="lf")

@@ -155,6 +155,21 @@ def test_panes_of_several_runs_have_the_same_gauges():
     assert Gauges([short], "", (427, 480), "", [short, long]).draw(empty, 0.5).shape == empty.shape
 
 
+def test_only_the_first_pane_has_the_title_and_all_panes_have_the_same_plan():
+    dials, empty = [Dials(recording(), "no", ORANGE)], np.full((480, 427, 3), 100, np.uint8)
+    first, second = (Gauges(dials, "Step steer", (427, 480), headed=headed) for headed in (True, False))
+    shown = [gauges.draw(empty, 0.5) for gauges in (first, second)]
+    assert (shown[0][:10, :60] != 100).any()
+    assert (shown[1][:10] == 100).all()
+    assert (shown[0][100:] == shown[1][100:]).all()
+
+
+def test_a_plan_without_room_for_its_words_is_left_out():
+    small, large = (drawn(recording(), size=size) for size in ((320, 240), (640, 480)))
+    assert (small[-60:-20, -40:] == 100).all()
+    assert (large[-60:-20, -40:] != 100).any()
+
+
 def test_large_sideslip_changes_with_the_angle_and_is_left_out_at_rest():
     def shown(**values: float) -> np.ndarray:
         dial = Dials(recording(**values), "2 active rear steering", ORANGE)

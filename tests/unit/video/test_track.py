@@ -58,12 +58,14 @@ def test_heading_counts_turns():
 def test_wheel_place_is_in_the_frame_of_the_car():
     track = Track(circle(), "circle")
     for corner, (x, y) in WHEELS.items():
-        assert track.wheel_place(corner)[:2] == pytest.approx([x, y], abs=1e-6)
+        for time_s in (0.0, 1.0):
+            place = track.turn(time_s).T @ (track.wheel_centre(corner, time_s) - track.chassis(time_s))
+            assert place[:2] == pytest.approx([x, y], abs=1e-6)
 
 
 def test_missing_wheel_is_named_with_the_bodies_there_are():
     with raises(PlaybackError, value="fl_wheel", allowed=("chassis",)):
-        Track(turning(np.zeros(3)), "x").wheel_place("fl")
+        Track(turning(np.zeros(3)), "x").wheel_centre("fl", 0.0)
 
 
 def test_poses_that_are_not_finite_are_left_out():
