@@ -214,7 +214,7 @@ def test_superposition_does_not_turn_a_car_further_from_the_desired_yaw_rate(kno
             innovation = 0.0
 
             def step(self, _measurement):
-                return Estimate(25.0, 0.0, 0.0, rate, 0.3, *[0.001] * 4, friction_std)
+                return Estimate(25.0, 0.0, 0.0, rate, 0.3, *[0.001] * 5)._replace(friction_std=friction_std)
 
         controller._estimator = Known()  # pyright: ignore[reportAttributeAccessIssue]
         return [controller.turn(steering(0.2 * side), measured(rate)) for _ in range(40)][-1]

@@ -232,7 +232,8 @@ def test_worst_margins_are_those_of_single_cars_that_the_controller_does_not_kno
     quick, nominal, slow = (
         loop_margins(["ars"], speeds_kmh=[100.0], overrides=car)[0].margins for car in (cars[0], {}, cars[1])
     )
-    assert found.margins == weakest([quick, slow])
+    # Another process sums in another order.
+    assert vars(found.margins) == pytest.approx(vars(weakest([quick, slow])), rel=1e-9)
     # A servo that is slower than the controller knows takes phase, one that is quicker gives some.
     assert slow.phase_rad < nominal.phase_rad < quick.phase_rad
     assert found.factors == cars[1]
