@@ -21,7 +21,7 @@ give up the share s = (M - M_l) / (l_V F_V) of their force, at most all of it, a
 what is left. Within the straight part of the curves M = M_l, and the angles stay as they are.
 
 No angle is larger than its actuator removes in the time in which the car answers: an angle that stays after the driver
-has steered back turns the car further in. Front wheels get no angle beyond the slip angle of their largest force.
+has steered back turns the car further in.
 
 Source: T. A. Johansen and T. I. Fossen, Control allocation - A survey, Automatica 49 (2013).
 """
@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.controllers.axle_slopes import AxleSlopes, axle_forces, excess, front_slip, slopes, useful_range
+from activesteer.controllers.axle_slopes import AxleSlopes, axle_forces, excess, front_slip, slopes
 from activesteer.controllers.parameters import ControllerSetup
 from activesteer.core.signals import Estimate
 from activesteer.native.records import NativeBlock
@@ -113,8 +113,7 @@ def allocated(
     moment = front_Nm * demand_rad[0] + rear_Nm * demand_rad[1]
     force = front_N * demand_rad[0] + rear_N * demand_rad[1]
     limit = block._front_limit_rad
-    useful = useful_range(block._curves, now, driver_rad)
-    allowed = max(range_rad[0], useful[0], -limit), min(range_rad[1], useful[1], limit)
+    allowed = max(range_rad[0], -limit), min(range_rad[1], limit)
     least_front, most_front = angle_range(at_rad[0], allowed, block._front_reach_rad, works[0])
     limit = block._rear_limit_rad
     least_rear, most_rear = angle_range(at_rad[1], (-limit, limit), block._rear_reach_rad, works[1])

@@ -172,18 +172,6 @@ def front_slip(block: AxleSlopes, force_mps2: float, friction: float) -> float:
 
 
 @shared
-def useful_range(block: AxleSlopes, now: Estimate, front_rad: float) -> tuple[float, float]:
-    """Return least and greatest angle to add to the front wheels up to `_MOST` of their largest force, with 0 [rad].
-
-    Beyond it more angle makes more drag.
-    """
-    slips = table(block._front_slip_rad)
-    slip_rad = front_rad - now[_SIDESLIP] - block._cg_to_front_m * now[_YAW_RATE] / now[_SPEED]
-    most_rad = now[_FRICTION] * slips[len(slips) - 1]
-    return min(-most_rad - slip_rad, 0.0), max(most_rad - slip_rad, 0.0)
-
-
-@shared
 def _borne_mps2(slips: Table, slip_angle_rad: float, friction: float) -> float:
     """Return the side force of an axle per mass on it at a slip angle [m/s2]."""
     wanted, low, high = abs(slip_angle_rad) / friction, 0, len(slips) - 1

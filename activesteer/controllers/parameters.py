@@ -164,6 +164,8 @@ class IntegratedParameters:
     """Yaw rate error at which this pressure difference is zero [rad/s]."""
     side_sideslip_rad: _Scale
     """Sideslip error at which this pressure difference is zero [rad]."""
+    side_acceleration_mps2: _Scale
+    """Lateral acceleration of a turn at which this pressure difference is zero; it falls from half of it [m/s2]."""
     tolerance_rad: _Limit
     """Distance of an actuator from its demand that is tolerated [rad]."""
     window_s: _Lag

@@ -10,7 +10,6 @@ import pytest
 
 from activesteer.controllers import ControllerParameters, load_controller
 from activesteer.controllers.allocation import Allocation, allocated, moment_change
-from activesteer.controllers.axle_slopes import AxleSlopes, axle_forces, useful_range
 from activesteer.controllers.lqr import BOTH, SPEEDS_MPS, STATES, Lqr, feedback, model, schedule, steady_turn
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import Estimate
@@ -264,33 +263,17 @@ def test_front_wheels_steer_back_while_the_rear_axle_slides(known, side):
 
     front, rear = added(desired_mps2, 1.0)
     moment_Nm = moment_change(Allocation(known), now, driver, at, (front, rear))
-    assert rear == pytest.approx(demand[1], rel=0.05)
+    assert rear == pytest.approx(demand[1])
     assert side * front > math.radians(0.5)
     # At most all of the side force that the front axle has on this road.
     most_Nm = now.friction * 9.81 * car.mass_kg * car.cg_to_rear_m / car.wheelbase_m * car.cg_to_front_m
     assert 0.1 * most_Nm < side * moment_Nm < most_Nm
-    # Without this, and in a car that turns too little, wheels that slide get no more angle. A straight curve leaves it.
-    assert added(desired_mps2, 0.0)[0] == pytest.approx(0.0)
+    # A feedback without authority, a car that turns too little, and a straight curve leave the demand.
+    assert added(desired_mps2, 0.0)[0] == pytest.approx(demand[0])
     slow = now._replace(yaw_rate_radps=-0.05 * side, sideslip_rad=0.0)
-    assert added(desired_mps2, 1.0, slow)[0] == pytest.approx(0.0)
+    assert added(desired_mps2, 1.0, slow)[0] == pytest.approx(demand[0])
     grips = SLIDING._replace(friction=30.0)
     assert added(desired_mps2, 1.0, mirrored(grips, side))[0] == pytest.approx(demand[0], abs=1e-4)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_front_wheels_are_not_steered_beyond_the_slip_angle_of_their_largest_force(known, side):
-    """The driver's angle is his own: nothing is taken from it, and to the other side all angles are free."""
-    now, curves = Estimate(20.0, 0.0, 0.0, 0.0, 0.3, *[0.0] * 5), AxleSlopes(known)
-
-    def along_and_against_rad(driver_rad):
-        return sorted((side * angle for angle in useful_range(curves, now, side * driver_rad)), reverse=True)
-
-    most, _ = along_and_against_rad(0.0)
-    slip_rad, _, force_mps2, _ = axle_forces(curves, now, most, 0.0)
-    assert slip_rad == pytest.approx(most)
-    assert force_mps2 == pytest.approx(axle_forces(curves, now, 1.0, 0.0)[2])
-    assert along_and_against_rad(0.6 * most)[0] == pytest.approx(0.4 * most)
-    assert along_and_against_rad(1.5 * most) == pytest.approx([0.0, -2.5 * most])
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
