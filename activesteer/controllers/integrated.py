@@ -22,7 +22,8 @@ wheel against understeer. The cost c of a brake force keeps the brakes idle for 
 
 On a road of two sides the anti-lock system holds back the brakes of the better side, to help the driver. Here the
 steering compensates the moment of the brakes (see `lqr`), so the sides may differ more. The controller sets this
-pressure difference: a limit that falls with the errors of the car and in turns, and at most what the remaining angles can hold with the tyres in their present state.
+pressure difference: a limit that falls with the errors of the car, and at most what the remaining angles can hold with
+the tyres in their present state. It falls in turns too: there the outer rear wheel needs its side force.
 
 If an actuator does not follow its demand (`SupervisedActuator`), it holds its position. The state feedback is then
 computed for the other actuator alone, about the turn that is still possible. The controller gets no message about a
@@ -259,6 +260,5 @@ class Integrated:
         moment_Nm = car.wheelbase_m * max(force_N, 0.0)
         off = abs(turn.desired_radps - now.yaw_rate_radps) / p.side_yaw_rate_radps
         off += abs(now.sideslip_rad - turn.sideslip_rad) / p.side_sideslip_rad
-        # In a turn the rear axle needs its side force, and its outer wheel could brake more than the inner one.
         off += max(2.0 * abs(now.yaw_rate_radps) * now.speed_mps / p.side_acceleration_mps2 - 1.0, 0.0)
         return min(max(1.0 - off, 0.0) * p.side_difference_Pa, moment_Nm / self._side_moment_m3)
