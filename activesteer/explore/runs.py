@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.analysis.harm import losses
 from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
@@ -229,13 +230,13 @@ class Runs:
         self.folder.check(choice)
         overrides = choice.values
         check_numbers(overrides, self._limits(choice))
-        scenario = self._held(choice, self._resolved(choice, overrides))
+        scenario, held = self._held(choice, self._resolved(choice, overrides))
         looks = run_looks(choice.controllers)
         self._kept, self._choice = {}, (choice, overrides)
         for name in choice.controllers:
             look = looks[name]
             run = {"kind": "run", "name": name, "label": look.label, "place": look.place, "dashes": look.dashes}
-            run["title"] = scenario.maneuver.title or choice.maneuver
+            run["title"] = (scenario.maneuver.title or choice.maneuver) + held
             try:
                 controller = controller_spec(self.folder.located(name))
                 recording = self._driven(scenario, controller, stale)
@@ -247,6 +248,7 @@ class Runs:
             self._kept[name] = controller.label, recording
             step_s, poses = poses_of(recording)
             shown = plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE)
+            run["losses"] = list(losses(recording.metrics))
             yield Reply({**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}, (poses,))
         yield Reply({"kind": "finished", **self._commands(choice, overrides)})
 
@@ -288,18 +290,22 @@ class Runs:
             self._limits_of = names, {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
         return self._limits_of[1]
 
-    def _held(self, choice: RunRequest, scenario: Scenario) -> Scenario:
-        """Return a scenario with its amplitude: that of the last search while a slider moves, else a new one."""
+    def _held(self, choice: RunRequest, scenario: Scenario) -> tuple[Scenario, str]:
+        """Return a scenario with its amplitude, and words for its title.
+
+        While a slider moves, the amplitude is that of the last search, else a new one.
+        """
         maneuver: Any = scenario.maneuver
         if maneuver.search is None:
-            return with_amplitude_found(scenario)
+            return with_amplitude_found(scenario), ""
         key = choice.maneuver, choice.vehicle
         if choice.dragging and key in self._held_rad:
-            return replace(scenario, maneuver=maneuver.with_amplitude(self._held_rad[key]))
+            held = replace(scenario, maneuver=maneuver.with_amplitude(self._held_rad[key]))
+            return held, " (amplitude as before, until you let go)"
         ready = with_amplitude_found(scenario)
         steer: Any = ready.maneuver
         self._held_rad[key] = steer.steer.steering_wheel_rad
-        return ready
+        return ready, ""
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
         """Return the recording of a run, or None if a newer choice has come."""

@@ -230,9 +230,9 @@ def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> l
 
 
 def _heat(study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequence[Array]) -> dict[str, Any] | None:
-    """Return the means over the first two grids, by controller."""
-    grids = [factor for factor in study.factors if factor.kind == "grid"]
-    if len(grids) != 2:
+    """Return the means over the first two grids, by controller: over all values of further grids."""
+    grids = [factor for factor in study.factors if factor.kind == "grid"][:2]
+    if len(grids) < 2:
         return None
     places = []
     for factor in grids:

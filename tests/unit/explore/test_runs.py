@@ -32,15 +32,24 @@ def test_a_run_of_the_page_is_the_run_of_its_command(tmp_path: Path) -> None:
 
 
 def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_path: Path) -> None:
-    runs, amplitudes = Runs(Folder(tmp_path)), []
+    runs, amplitudes, titles = Runs(Folder(tmp_path)), [], []
     for speed, dragging in ((80.0, False), (100.0, True), (100.0, False)):
         (run, _) = runs.run(
             RunRequest(maneuver="step_steer", dragging=dragging, values={"speed_kmh": speed}), lambda: False
         )
         wheel = next(panel for panel in run.header["plots"]["panels"] if panel["title"].startswith("Steering wheel"))
         amplitudes.append(wheel["series"][0]["values"][-1])
+        titles.append(run.header["title"])
     assert amplitudes[1] == pytest.approx(amplitudes[0], rel=1e-3)  # the column twists a little
     assert amplitudes[2] < 0.9 * amplitudes[0]  # 0.4 g needs less steering at a higher speed
+    assert ["amplitude as before" in title for title in titles] == [False, True, False]
+
+
+def test_a_run_that_is_lost_says_so_beside_its_figures(tmp_path: Path) -> None:
+    choice = RunRequest(maneuver="sine_with_dwell", controllers=("none", "ars"))
+    lost, held, _ = (reply.header for reply in Runs(Folder(tmp_path)).run(choice, lambda: False))
+    assert lost["losses"] == ["lost at 45 deg of sideslip"]
+    assert held["losses"] == []
 
 
 def test_a_newer_choice_drops_the_rest_of_the_runs(tmp_path: Path) -> None:

@@ -82,6 +82,19 @@ def page(tmp_path_factory):
     return text, json.loads(data[1]), rows
 
 
+def test_a_heat_map_of_three_grids_shows_driven_values_of_two_and_means_over_the_third(tmp_path):
+    table = short_study(0.8, 1.0, key=RATIO, controllers=["none"])
+    table["factors"] |= {"speed_kmh": {"grid": [70.0, 80.0]}, "road.mu": {"grid": [0.5, 0.9]}}
+    rows = study(table, output=tmp_path / "s", jobs=1).to_pylist()
+    text = write_report(tmp_path / "s").read_text(encoding="utf-8")
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    assert found is not None
+    heat = json.loads(found[1])["by_group"][0]["yaw_rate_peak_radps"]["heat"]
+    assert heat["levels"] == [[0.8, 1.0], [70.0, 80.0]]
+    peaks = [row["yaw_rate_peak_radps"] for row in rows if (row[RATIO], row["speed_kmh"]) == (1.0, 70.0)]
+    assert heat["maps"][0][1][0] == pytest.approx(np.degrees(np.mean(peaks)), rel=1e-4)
+
+
 def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_shows(page):
     text, *_ = page
     assert not re.search(r"""(src|href|url)\s*[=(]\s*["']?https?:""", text)
