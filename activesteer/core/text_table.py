@@ -7,10 +7,9 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from activesteer.core.units import unsigned_zeros
-
 COLUMNS: Final = 80
 _COLOUR: Final = re.compile(r"\x1b\[\d*m")
+_NEGATIVE_ZERO: Final = re.compile(r"(?<![\w.)\]-])-(?=0(?:\.0+)?(?![\d.]))")
 
 WHOLE: Final[dict[str, Any]] = {"break_on_hyphens": False, "break_long_words": False, "replace_whitespace": False}
 """Arguments of `textwrap` that keep words and columns as they are."""
@@ -90,3 +89,8 @@ def _lines(rows: Rows, widths: Sequence[int], text: int, gap: int, marks: Sequen
                 for blanks in (" " * (width - _length(part)),)
             )
             yield f"{mark if n == 0 else ' ' * len(mark)}{(' ' * gap).join(padded)}".rstrip()
+
+
+def unsigned_zeros(text: str) -> str:
+    """Return a text of numbers without the minus sign of a zero."""
+    return _NEGATIVE_ZERO.sub("", text)

@@ -11,6 +11,7 @@ import re
 from typing import Final, NamedTuple
 
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2
+from activesteer.core.text_table import unsigned_zeros
 
 _DEG, _G, _TURN = math.radians(1.0), GRAVITY_MPS2, 2.0 * math.pi
 
@@ -219,13 +220,7 @@ def parameter_title(key: str) -> str:
 
 
 _POWER: Final = re.compile(r"(?<=[a-z])2\b")
-_NEGATIVE_ZERO: Final = re.compile(r"(?<![\w.)\]-])-(?=0(?:\.0+)?(?![\d.]))")
 _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
-
-
-def unsigned_zeros(text: str) -> str:
-    """Return a text of numbers without the minus sign of a zero."""
-    return _NEGATIVE_ZERO.sub("", text)
 
 
 def typeset(text: str) -> str:
