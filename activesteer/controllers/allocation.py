@@ -99,7 +99,7 @@ def allocated(
         driver_rad: The driver's angle at the road wheels.
         at_rad: Measured angles of superposition and rear wheels.
         demand_rad: Angles that the state feedback demands, without limits.
-        range_rad: Least and largest superposition angle that are allowed beside the limits.
+        range_rad: Least and largest superposition angle that are allowed within the limits.
         works: Whether superposition and rear steering work.
         ay_mps2: Lateral acceleration of the desired turn [m/s2].
         authority: Factor on the demands of the state feedback, 0 to 1 [-].

@@ -328,7 +328,7 @@ def fed_back(
     against += certain * max(limit - against, 0.0)
     against *= _patience(block, driver_rad)
     least, most = -against if driver_rad > 0.0 else -limit, against if driver_rad < 0.0 else limit
-    # It does not turn a car further from the desired yaw rate: with sliding rear wheels, the sideslip would ask for it.
+    # No superposition turns the car further from the desired yaw rate, as the sideslip asks while the rear axle slides.
     lacking = (desired - now[_YAW_RATE]) / block._lacking_radps
     least *= min(max(1.0 - lacking, 0.0), 1.0)
     most *= min(max(1.0 + lacking, 0.0), 1.0)

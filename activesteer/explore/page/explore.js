@@ -187,7 +187,7 @@ function showFigures() {
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
     return element("td", {}, number(now?.value, now?.digits), element("span", {}, Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change, now.digits)}`));
   })));
-  if (runs.some((run) => run.losses.length)) rows.unshift(element("tr", { class: "losses" }, element("th", {}, "Fails"), ...runs.map((run) => element("td", {}, run.losses.join("; ")))));
+  if (runs.some((run) => run.losses.length)) rows.unshift(element("tr", {}, element("th", {}, "Fails"), ...runs.map((run) => element("td", {}, run.losses.join("; ")))));
   $("figures").replaceChildren(head, ...rows);
 }
 
