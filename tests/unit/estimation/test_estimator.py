@@ -167,6 +167,32 @@ def test_packed_snow_is_found_as_soon_as_the_tyres_slide_on_it_and_is_not_taken_
     assert run["estimated_front_stiffness"][later].min() > 0.6
 
 
+@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+def test_a_friction_that_jumps_is_not_taken_for_soft_tyres(vehicle):
+    """From dry road to snow and back within a second. Before, the error reached 0.57 and stayed behind the snow."""
+    run = drive("mu_jump", vehicle).recording
+    mu = np.array([run[f"{corner}_mu"] for corner in ("fl", "fr", "rl", "rr")])
+    snow, behind = (mu < 0.5).all(axis=0), run.time_s > run.time_s[(mu < 0.5).any(axis=0)][-1]
+    # 0.3 s after the last wheel has reached it.
+    shows = snow & (run.time_s > run.time_s[snow][0] + 0.3)
+    assert shows.any()
+    assert np.abs(run["estimated_friction"] - 0.3)[shows].max() < 0.1
+    behind &= run.time_s > run.time_s[behind][0] + 0.3
+    assert np.abs(run["estimated_friction"] - 0.9)[behind].max() < 0.3
+    for axle in ("front", "rear"):
+        assert np.abs(run[f"estimated_{axle}_stiffness"] - 1.0).max() < 0.4
+    assert np.abs(run["estimated_sideslip_rad"] - run["sideslip_rad"])[snow].max() < math.radians(1.0)
+
+
+@pytest.mark.parametrize(("vehicle", "mu"), [("compact", 0.4), ("sedan", 0.6)])
+def test_wheels_that_the_anti_lock_system_lets_slide_show_the_friction(vehicle, mu):
+    turn = {"road.mu": mu, "turn.lateral_acceleration_mps2": 2.0, "brake.pedal": 0.9, "duration_s": 8.0}
+    run = drive("brake_in_turn", vehicle, **turn).recording
+    braked = (run.time_s > 7.0) & (run["vx_mps"] > 5.0)
+    assert np.abs(run["estimated_friction"] - mu)[braked].max() < 0.15
+    assert (np.abs(run["estimated_friction"] - mu) < 2.0 * run["estimated_friction_std"])[braked].all()
+
+
 @pytest.mark.parametrize(("front", "rear"), [(1.0, 0.75), (0.75, 1.0)])
 def test_the_friction_is_that_of_the_axle_with_the_worse_tyres(front, rear):
     changes = {"factors.front_tyre_friction": front, "factors.rear_tyre_friction": rear, "road.mu": 0.9}
