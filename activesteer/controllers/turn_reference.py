@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.controllers.parameters import ControllerSetup, EscParameters, TorqueVectoringParameters
+from activesteer.controllers.parameters import ControllerSetup, YawMomentParameters
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import shared
@@ -80,7 +80,7 @@ class BorneTurnReference(TurnReference):
     def __init__(
         self,
         single_track: SingleTrackParameters,
-        parameters: EscParameters | TorqueVectoringParameters,
+        parameters: YawMomentParameters,
         interval_s: float,
     ) -> None:
         """Compute the constants."""
