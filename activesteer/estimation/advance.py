@@ -72,20 +72,25 @@ _SLIDING_USED: Final = 0.95
 _SLIDING_MPS2: Final = 1.0
 """Slip of a wheel at its limit, in the brush model at 3 u / c: 5 % on snow; time for which it counts, a cycle of the
 anti-lock system [s]; fraction of the friction that the car then uses; least deceleration [m/s2]."""
+_ALIKE: Final = 0.6
+"""Ratio of the used friction of both sides below which the road has two frictions, and no number is right for both."""
 
 
 @inlined
 def _slides(memory, duration_s):
-    """Return whether the brakes slide wheels of both sides, as an anti-lock system does again and again."""
+    """Return whether the brakes slide wheels of both sides on one friction, as an anti-lock system does repeatedly."""
+    left, right = 0.0, 0.0
     for wheel in range(4):
         slip = 1.0 - memory.by_wheel_mps[wheel] / max(memory.speed_mps, SLOWEST_MPS)
         if memory.along_N[wheel] < 0.0 and slip > _SLIDING_SLIP:
             memory.not_slid_s[wheel] = 0.0
         else:
             memory.not_slid_s[wheel] += duration_s
-    left = min(memory.not_slid_s[0], memory.not_slid_s[2])
-    right = min(memory.not_slid_s[1], memory.not_slid_s[3])
-    return max(left, right) < _SLIDING_S and memory.ax_mps2 < -_SLIDING_MPS2
+        used = max(-memory.along_N[wheel], 0.0) / max(memory.load_N[wheel], 1.0)
+        left, right = (left + used, right) if wheel % 2 == 0 else (left, right + used)
+    since_s = max(min(memory.not_slid_s[0], memory.not_slid_s[2]), min(memory.not_slid_s[1], memory.not_slid_s[3]))
+    alike = min(left, right) > _ALIKE * max(left, right)
+    return since_s < _SLIDING_S and alike and memory.ax_mps2 < -_SLIDING_MPS2
 
 
 @inlined
