@@ -112,7 +112,7 @@ def test_a_metric_pattern_that_matches_nothing_is_said(call, tmp_path):
     ("words", "made", "how"),
     [
         (("study",), "parts/[0-9]*", r"resume with `activesteer study \S+`"),
-        (("tune", "--trials", "1000"), "*.journal", "the same command resumes it"),
+        pytest.param(("tune", "--trials", "1000"), "*.journal", "the same command resumes it", marks=pytest.mark.slow),
     ],
 )
 def test_ctrl_c_says_how_to_go_on(file, tmp_path, words, made, how):
