@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,12 +15,12 @@ from activesteer.commands import drive as run_command
 from activesteer.commands.terminal import BAD, coloured, painted
 from activesteer.core.metric_table import recorded_metric
 from activesteer.resources import find_vehicle
+from tests.cli.process import ended
 
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.3")
 STEP = ("--set", "settle_s=0.1", "--set", "steer.steering_wheel_deg=30", "--set", "steer.start_s=0.1")
 EVALUATED = (*STEP, "--set", "duration_s=2.4")
 PAPER = ("--set", "duration_s=3")
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_each_controller_makes_a_file_and_a_column(call, tmp_path):
@@ -161,12 +157,7 @@ def test_search_for_the_amplitude_is_the_same_for_all_controllers(call):
 
 
 def test_program_starts_from_a_shell_whose_terminal_lacks_letters(tmp_path):
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii"}
-    done = subprocess.run(
-        [sys.executable, "-c", "import sys; from activesteer.commands.cli import main; sys.exit(main())",
-         "run", "straight_line", *SHORT, "--all"],
-        cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = ended(tmp_path, "run", "straight_line", *SHORT, "--all", changes={"PYTHONIOENCODING": "ascii"})
     assert done.returncode == 0, done.stderr
     assert done.stderr == "straight_line none: runs/straight_line-none.mcap\n"
     assert " m/s? " in done.stdout

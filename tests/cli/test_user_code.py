@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,9 +10,8 @@ from typing import Any
 import pytest
 
 from tests.cli.conftest import Call
+from tests.cli.process import ended
 
-ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.2", "--set", "steer.start_s=0.05")
 PRINTS = """
 if self.steps == 1:
@@ -24,14 +20,6 @@ if self.steps == 1:
     os.write(1, b"written")
 return ActuatorCommand()
 """
-
-
-def process(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-c", MAIN, *words],
-        cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -56,7 +44,7 @@ def test_a_value_or_error_of_user_code_that_ends_the_program_fails_the_run(
 def test_prints_of_user_code_do_not_disturb_json(controller: Callable[..., str], tmp_path: Path) -> None:
     given = controller(PRINTS)
     words = "run", "step_steer", "-c", given, *SHORT, "--json"
-    done = process(tmp_path, *words)
+    done = ended(tmp_path, *words)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["runs"]
     assert "said" in done.stderr
