@@ -36,10 +36,10 @@ CHAIN: Final = np.dtype(
 filter per step, rms of the noise, offset, rms of the drift per sample, quantisation step and limit (0 for none), teeth
 (0 for none), key of its random numbers."""
 
-FILTERED, DRIFT, HELD, STEPS, SAMPLES, PHASE, EDGES, AGE, SPAN, SPEED, LINE = range(11)
+FILTERED, DRIFT, HELD, STEPS, SAMPLES, PHASE, EDGES, SIDE, AGE, SPAN, SPEED, LINE = range(12)
 """Places in a sensor's memory: low-pass filter, drifted offset, last sample, steps and samples so far. For the pulse
-wheel: angle since an edge in teeth, edges since the last sample, time since the last edge, time since the last edge of
-the sample before, last speed. Then the delay line."""
+wheel: angle since an edge in teeth, teeth turned since the last sample, direction of the last edge, time since it, time
+since the last edge of the sample before, last speed. Then the delay line."""
 
 _GOLDEN: Final = np.uint64(0x9E3779B97F4A7C15)
 _FIRST: Final = np.uint64(0xBF58476D1CE4E5B9)
@@ -81,7 +81,11 @@ def _pass_teeth(chain, memory, speed_radps, timestep_s):
     if passed == 0.0:
         memory[at + AGE] += timestep_s
     else:
-        memory[at + EDGES] += passed
+        # A wheel that turns back passes the same edge once more, and has not turned by a tooth in between.
+        direction = math.copysign(1.0, passed)
+        again = direction if memory[at + SIDE] == -direction else 0.0
+        memory[at + EDGES] += passed - again
+        memory[at + SIDE] = direction
         # Edges lie at whole teeth. Forwards, the phase is the angle since the last edge; backwards, the rest to one.
         memory[at + AGE] = (phase if turned > 0.0 else 1.0 - phase) / abs(turned) * timestep_s
 
