@@ -56,6 +56,7 @@ _ROWS: Final = (
     ("mm", "mm", 1e-3, (0, 1, 0, 0), "mm", ""),
     ("cm", "", 1e-2, (0, 1, 0, 0), "cm", ""),
     ("km", "", 1e3, (0, 1, 0, 0), "km", ""),
+    ("m2", "m2", 1.0, (0, 2, 0, 0), "m²", "m²"),
     ("1/m", "1pm", 1.0, (0, -1, 0, 0), "1/m", "rad/m"),
     ("m/s", "mps", 1.0, (0, 1, -1, 0), "km/h", "mps"),
     ("km/h", "kmh", 1.0 / 3.6, (0, 1, -1, 0), "km/h", "kmh,kph"),
@@ -192,8 +193,8 @@ class Quantity(NamedTuple):
         return f"{value * self.factor:z.{self.digits}f}"
 
 
-_FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides"})
-"""Tables that only locate a parameter."""
+_FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides", "factors", "load"})
+"""Tables that only locate or sort a parameter."""
 _PARAMETER_WORDS: Final = {
     "mu": "friction coefficient", "cg": "centre of gravity", "ars": "ARS", "afs": "AFS", "lqr": "LQR", "esc": "ESC",
 }  # fmt: skip

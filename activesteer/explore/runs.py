@@ -104,7 +104,7 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
         with suppress(ParameterError):  # not every manoeuvre has every key
             value = value_of(scenario, key)
             if _is_number(value):
-                yield Slider(key, *_label(key), group, min(low, value), max(high, value), step, value)
+                yield Slider(key, *parameter_label(key), group, min(low, value), max(high, value), step, value)
 
 
 def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
@@ -117,7 +117,7 @@ def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
         with suppress(ParameterError):  # such as the keys of a table that is read from another file
             value = value_of(scenario, key)
             if isinstance(value, float) and value > 0.0:
-                label, unit = _label(key)
+                label, unit = parameter_label(key)
                 high = 1.0 if not unit and value <= 1.0 else 2.0 * value
                 digits = 4 - math.floor(math.log10(high))
                 yield Slider(key, label, unit, group, 0.5 * value, high, round(high / _STEPS, digits), value)
@@ -125,12 +125,6 @@ def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _label(key: str) -> tuple[str, str]:
-    """Return label and unit of a key, without the tables that only sort it."""
-    words, unit = parameter_label(key)
-    return words.removeprefix("factors: ").removeprefix("load: "), unit
 
 
 def _gain(key: str, declared: Declared) -> Slider | None:
@@ -144,7 +138,7 @@ def _gain(key: str, declared: Declared) -> Slider | None:
     top = min(high, _TIMES * abs(value) if value else 1.0)
     bottom = max(low, 0.0 if value >= 0.0 else -top)
     digits = 4 - math.floor(math.log10(max(top - bottom, 1e-9)))
-    label, unit = _label(f"{tables}.{shown}")
+    label, unit = parameter_label(f"{tables}.{shown}")
     group = parameter_words(tables.split(".")[1]) if "." in tables else _UNIT
     label = label.removeprefix(group).removeprefix(":").strip()
     return Slider(
