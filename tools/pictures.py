@@ -33,7 +33,7 @@ from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.runs import CLAIM
 from activesteer.studies.engine.study_file import read_study
-from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops, driver_loops_picture
+from activesteer.studies.linear.driver_loop import driver_loops, driver_loops_picture
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
 from tools.comparison import COMPARED, compare, comparison_figure, comparison_population_figure
@@ -216,11 +216,9 @@ def _stepping() -> dict[str, Figure]:
 
 
 def _driver() -> dict[str, Figure]:
-    """The loop of the typical driver and the compact: Bode diagrams, and damping over speed."""
+    """The loop of the typical driver and the compact: Bode diagrams, a step of the path, and damping over speed."""
     loops = driver_loops()
-    rows = [loop.to_json() for loop in loops]
-    picture = driver_loops_picture(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-    return {"driver_loop": draw(picture)}
+    return {"driver_loop": draw(driver_loops_picture(loops, [loop.to_json() for loop in loops]))}
 
 
 def _rear_steer_gains() -> dict[str, Figure]:
