@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shlex
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,7 +25,7 @@ from activesteer.config import field_in_unit, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
 from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.core.metric_table import Better, recorded_metric
-from activesteer.core.units import parameter_label, parameter_words
+from activesteer.core.units import parameter_label, parameter_words, split_ending
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed
 from activesteer.drawing.panels import EXPLORE
@@ -94,8 +95,8 @@ def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Pa
             if (gain := _gain(key, declared)) is not None:
                 found.append(gain)
     first: dict[str, Slider] = {}
-    for slider in found:
-        first.setdefault(slider.key, slider)
+    for slider in found:  # a file may give a quantity in another unit
+        first.setdefault(split_ending(slider.key)[0], slider)
     return list(first.values())
 
 
@@ -103,7 +104,8 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
     for key, (low, high, step) in ranges.items():
         with suppress(ParameterError):  # not every manoeuvre has every key
             value = value_of(scenario, key)
-            if _is_number(value):
+            # A manoeuvre that begins at rest has its speeds in its phases.
+            if _is_number(value) and not (key == "speed_kmh" and value == 0.0):
                 yield Slider(key, *parameter_label(key), group, min(low, value), max(high, value), step, value)
 
 
@@ -139,8 +141,10 @@ def _gain(key: str, declared: Declared) -> Slider | None:
     bottom = max(low, 0.0 if value >= 0.0 else -top)
     digits = 4 - math.floor(math.log10(max(top - bottom, 1e-9)))
     label, unit = parameter_label(f"{tables}.{shown}")
-    group = parameter_words(tables.split(".")[1]) if "." in tables else _UNIT
-    label = label.removeprefix(group).removeprefix(":").strip()
+    table = tables.split(".")[1] if "." in tables else ""
+    # The table of a user's controller has the name of its class.
+    group = parameter_words(re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", table).lower()) if table else _UNIT
+    label = label.removeprefix(parameter_words(table)).removeprefix(":").strip()
     return Slider(
         f"{tables}.{shown}", label, unit or declared.unit, group, bottom, round(top, digits),
         round((top - bottom) / _STEPS, digits), value,
