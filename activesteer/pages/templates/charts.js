@@ -290,6 +290,7 @@ class Player {
     this.playing = on;
     this.button.textContent = on ? "Pause" : "Play";
     if (!on) return;
+    this.reveal?.();
     this.held = true;
     let exact = +this.slider.value < this.last ? +this.slider.value : 0, before = null;
     const step = (now) => {
@@ -368,6 +369,9 @@ function addPlayer(charts) {
     player.tell(i);
     for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
   });
+  // What moves is in sight, also where tables stand before the curves.
+  const inSight = ({ top, height }) => top + height / 2 > 0 && top + height / 2 < innerHeight;
+  player.reveal = () => { if (!timed.some(({ holder }) => inSight(holder.getBoundingClientRect()))) timed[0].holder.scrollIntoView({ block: "center" }); };
   timed[0].holder.closest("section").before(player.row);
 }
 
