@@ -321,7 +321,7 @@ let legend = null;
 // The panels of a picture with a legend, whose entries hide what they name.
 function drawPicture(box, picture, place) {
   const names = picture.panels.flatMap(({ curves, areas, limits }) => [...curves, ...areas].map(({ label }) => label).concat(limits.map(([, label]) => label))).filter(Boolean);
-  const section = box.closest("section:not(.part)"), shared = legend?.section === section && legend.bar.isConnected && names.some((label) => legend.seen.has(label));
+  const section = box.closest("section"), shared = legend?.section === section && legend.bar.isConnected && names.some((label) => legend.seen.has(label));
   const own = shared ? legend : { section, bar: element("div", { class: "toolbar legend" }), seen: new Set(), hidden: new Set(), charts: [] };
   const { bar, seen, hidden, charts } = own;
   if (names.length) legend = own;

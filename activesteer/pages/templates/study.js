@@ -153,7 +153,6 @@ function replayLine(command) {
 function drawAll() {
   for (const chart of drawn.splice(0)) chart.plot.destroy();
   all.replaceChildren();
-  legend = null;
   drawGroup();
   addContents();
 }

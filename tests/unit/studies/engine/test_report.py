@@ -166,7 +166,6 @@ const element = (name, attributes = {}, ...children) => ({
 const document = { querySelector() { return element("div"); } };
 const NARROW = { matches: false };
 const short = (value) => String(+value.toPrecision(3));
-let legend = null;
 const addContents = () => {};
 const drawPicture = (box, picture, id) => { pictures[id] = picture; };
 """
