@@ -83,8 +83,6 @@ PANELS_OF: Final[Mapping[str, Sequence[Panel]]] = {
     ),
 }  # fmt: skip
 """What shows a manoeuvre better than the general picture: where the car goes straight or stands, that is rounding."""
-MIN_SPAN: Final = 0.1
-"""No axis of these is enlarged further than this, in its unit, so that what stays as it is looks so."""
 
 ENVELOPES: Final = ("slalom", "double_lane_change", "double_lane_change_low_mu")
 """Manoeuvres with a map of speed and line."""
@@ -126,10 +124,6 @@ def _manoeuvre(name: str) -> Figure:
         return _draw(kind, runs)
     figure = over_time.time_figure(runs, PANELS_OF[name])
     for axis in figure.get_axes():
-        low, high = axis.get_ylim()
-        if high - low < MIN_SPAN:
-            middle = 0.5 * (low + high)
-            axis.set_ylim(middle - 0.5 * MIN_SPAN, middle + 0.5 * MIN_SPAN)
         axis.ticklabel_format(useOffset=False)
     return figure
 

@@ -104,7 +104,7 @@ def marks(recording: RecordingLike) -> list[tuple[float, str]]:
     if entry(recording, "maneuver", "brake"):
         with suppress(RecordingError):  # a recording of another program
             pressed = np.flatnonzero(recording["brake_pedal"] > 0.0)
-            return [(time_s, "brake") for time_s in recording.time_s[pressed[:1]].tolist()]
+            return [(float(recording.time_s[first]), "brake") for first in pressed[:1].tolist() if first > 0]
     if entry(recording, "maneuver", "kind") != "sine_with_dwell":
         return [(event.time_s, event.what) for event in events_of(recording.metadata) if event.kind == "phase"]
     try:

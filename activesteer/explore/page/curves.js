@@ -66,7 +66,7 @@ export class Curves {
     if (shown && shown.key === key) { shown.plot.setData(data); return; }
     if (!shown) {
       const values = element("span", { class: "quiet" }), holder = element("div", { role: "img", "aria-label": `${title} over time` });
-      const figure = element("div", {}, element("p", {}, element("b", {}, title), ` ${[panel.unit, panel.note].filter(Boolean).join(", ")} `, values), holder);
+      const figure = element("div", {}, element("p", {}, element("b", {}, title), element("span", { class: "unit" }, [panel.unit, panel.note].filter(Boolean).join(", ")), values), holder);
       this.box.append(figure);
       shown = { figure, holder, values };
       this.plots.set(title, shown);

@@ -396,14 +396,15 @@ def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[st
         if swings:
             (x, y), size = zip(*swings, strict=True), max(3.0, 9.0 - 3.0 * place)
             damping.append(Curve(x, y, "", look.colour, "", marker="o", size=size))
-    lowest, dots = min(0.0, *(row["damping_in_run"] for row in rows)), any(curve.marker for curve in damping)
+    lowest = min(0.0, *(row["damping_in_run"] for row in rows))
+    dots = "; dots: runs" if any(curve.marker for curve in damping) else ""
     below, after = "frequency [rad/s]", "after a step of the path [s]"
     panels = [
         Panel(below, f"gain at {middle:.0f} km/h [-]", gain, log="xy", x_range=x_range, y_range=(0.05, 50.0)),
         Panel(below, "phase [deg]", phase, log="x", x_range=x_range, y_range=(-360.0, -90.0)),
         Panel(after, f"lateral position at {middle:.0f} km/h [m],\ndotted: linear loop", step),
         Panel(
-            "speed [km/h]", "damping of the linear loop [-]" + (",\ndots: runs" if dots else ""), damping,
+            "speed [km/h]", f"damping of the linear loop [-],\ndashed: least asked{dots}", damping,
             y_range=(lowest, 1.1), limits=[(LEAST_DAMPING, "least damping asked")], legend=None,
         ),
     ]  # fmt: skip
