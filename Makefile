@@ -16,12 +16,13 @@ help:  ## what there is
 demo: $(READY)  ## the paper's scenarios with three steering systems: scorecard, MCAP files and figures in demo/
 	$(BIN)/activesteer reproduce --setting paper --setting literature --figures -o demo
 
+# The quick tests run, which finds their type errors; `make lint` and `make test-all` check the types of all tests.
 test: MARK := -m "not slow"
 test:  ## lint, types, module borders, every test that is not slow, and the key metrics against their baseline
 	$(MAKE) --no-print-directory -j2 $(READY_DEV) pictures
-	$(MAKE) --no-print-directory -j2 baseline pytest MARK='$(MARK)'
+	$(MAKE) --no-print-directory -j2 baseline pytest MARK='$(MARK)' TYPED='activesteer tools'
 
-test-all:  ## the same with the slow tests
+test-all:  ## the same with the slow tests and the types of the tests
 	$(MAKE) --no-print-directory -j2 $(READY_DEV) pictures
 	$(MAKE) --no-print-directory -j2 baseline pytest
 
@@ -40,7 +41,7 @@ baseline: lint
 lint: $(READY_DEV)  ## ruff, pyright, import-linter
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/pyright --pythonpath $(BIN)/python $(TYPED)
 	$(BIN)/lint-imports --no-logo
 
 mutants: $(READY_DEV)  ## change 300 lines, one at a time, and see which the quick tests notice; hours, resumes where it was

@@ -86,11 +86,9 @@ class LqrParameters:
 
 
 @dataclass(frozen=True)
-class EscParameters:
-    """Stability control by the brakes (`esc`)."""
+class YawMomentParameters:
+    """Desired yaw rate, and the yaw moment for its error and for the sideslip angle."""
 
-    yaw_rate_band_radps: _Gain
-    """Yaw rate error that causes no action [rad/s]."""
     sideslip_limit_rad: _Limit
     """Sideslip angle that causes no action [rad]."""
     yaw_rate_time_s: _Lag
@@ -101,11 +99,19 @@ class EscParameters:
     reference_length_m: _Length
     """Distance over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction
-    """Fraction of the estimated friction that the desired yaw rate may use [-]."""
+    """Fraction of the estimated friction that the desired yaw rate may use [-]; with `tv` a wheel, too."""
     acceleration_time_s: _Lag
     """T_a: time in which the lateral acceleration follows the desired yaw rate [s]."""
     acceleration_shortfall_mps2: Annotated[float, Range(0.0, 20.0)]
     """D: lateral acceleration that the turn may lack before the desired yaw rate falls [m/s2]."""
+
+
+@dataclass(frozen=True)
+class EscParameters(YawMomentParameters):
+    """Stability control by the brakes (`esc`)."""
+
+    yaw_rate_band_radps: _Gain
+    """Yaw rate error that causes no action [rad/s]."""
     torque_limit_Nm: Annotated[float, Range(0.0, 1e4)]
     """Largest brake torque at a wheel [Nm]."""
     least_speed_mps: Annotated[float, Range(1.0, 20.0)]
@@ -113,26 +119,11 @@ class EscParameters:
 
 
 @dataclass(frozen=True)
-class TorqueVectoringParameters:
+class TorqueVectoringParameters(YawMomentParameters):
     """Torque vectoring by electric axles (`tv`)."""
 
-    yaw_rate_time_s: _Lag
-    """T_r: time in which the moment removes the yaw rate error [s]."""
-    sideslip_limit_rad: _Limit
-    """Sideslip angle that causes no action [rad]."""
-    sideslip_time_s: _Lag
-    """T_b: half the time in which the moment, without damping, turns the car back by the sideslip angle beyond its
-    limit [s]."""
-    reference_length_m: _Length
-    """Distance over which the desired yaw rate follows the driver [m]."""
-    friction_fraction: _Fraction
-    """Fraction of the estimated friction that the desired yaw rate, and a wheel in all directions, may use [-]."""
     least_fraction: _Fraction
     """Fraction of the friction that stays for the torque in a turn at the limit [-]."""
-    acceleration_time_s: _Lag
-    """T_a: time in which the lateral acceleration follows the desired yaw rate [s]."""
-    acceleration_shortfall_mps2: Annotated[float, Range(0.0, 20.0)]
-    """D: lateral acceleration that the turn may lack before the desired yaw rate falls [m/s2]."""
     full_speed_mps: Annotated[float, Range(2.0, 50.0)]
     """Speed from which the controller acts fully [m/s]; below it fades out until walking speed."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from activesteer.controllers.parameters import ControllerSetup, EscParameters, TorqueVectoringParameters
+from activesteer.controllers.parameters import ControllerSetup, YawMomentParameters
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import shared
@@ -80,7 +80,7 @@ class BorneTurnReference(TurnReference):
     def __init__(
         self,
         single_track: SingleTrackParameters,
-        parameters: EscParameters | TorqueVectoringParameters,
+        parameters: YawMomentParameters,
         interval_s: float,
     ) -> None:
         """Compute the constants."""
@@ -91,7 +91,9 @@ class BorneTurnReference(TurnReference):
 
     def borne(self, front_steer_rad: float, speed_mps: float, friction: float, ay_mps2: float) -> float:
         """Return the desired yaw rate for a speed > 0 and a measured lateral acceleration, left positive [rad/s]."""
-        desired_radps = desired_turn(self, front_steer_rad, speed_mps, friction)
+        # The road bears the present acceleration. Where wheels leave snow, the estimated friction comes later.
+        borne = max(friction, abs(ay_mps2) / GRAVITY_MPS2)
+        desired_radps = desired_turn(self, front_steer_rad, speed_mps, borne)
         self._expected_radps += self._fraction * (desired_radps - self._expected_radps)
         side = math.copysign(1.0, self._expected_radps)
         # What has fallen meanwhile, by the friction or by the driver, does not fall twice.

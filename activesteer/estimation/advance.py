@@ -4,6 +4,14 @@ The inertial sensors are late by their delay and low-pass. The filters run at th
 holds angles, wheel speeds and pressures until then. From there the model alone runs to the present, with the later
 angles.
 
+Two things show the friction where the lateral forces alone do not. Errors that the filter does not explain add up until
+the friction is made unknown again (a cumulative sum). And while the brakes slide wheels of both sides, the car uses
+nearly all of its friction.
+
+Sources:
+    Page, Continuous inspection schemes, Biometrika 41, 1954 (cumulative sum).
+    Gustafsson, Slip-based tire-road friction estimation, Automatica 33, 1997 (such a test beside a Kalman filter).
+
 Arguments of the compiled functions of this folder:
 
     known       knowledge of the car and its sensors, a record of `known_of`
@@ -20,8 +28,9 @@ import math
 from typing import Final
 
 from activesteer.core.conventions import GRAVITY_MPS2
-from activesteer.estimation.kalman_filter import begin, correct, predict
+from activesteer.estimation.kalman_filter import begin, correct, predict, reopen, take_in_friction
 from activesteer.estimation.records import (
+    AY_OFFSET,
     FRICTION,
     FRONT_STIFFNESS,
     LATERAL_SPEED,
@@ -44,11 +53,44 @@ from activesteer.native.compilation import compiled, inlined
 _SHORTEST_S: Final = 0.004
 """Shortest time between two steps of the filters, and step of the model on its way to the present [s]."""
 _USED_FRACTION: Final = 0.85
-"""Lower bound of the friction, as a fraction of the acceleration in g. The largest acceleration, forgotten with
-`friction_s`, over this fraction is an upper bound beyond the assumed friction: only forces that need a higher friction
-show one. Without it, front wheels that reach snow before the rear ones were explained by more friction."""
+"""Lower bound of the friction, as a fraction of the acceleration over the largest one that the tyres allow on the road
+of their files. The largest of these, forgotten with `friction_s`, over this fraction is an upper bound beyond the
+assumed friction: only forces that need a higher friction show one. Without it, front wheels that reach snow before the
+rear ones were explained by more friction."""
 _USED_S: Final = 0.2
 """Time constant of this acceleration: a car rocks when it stops [s]."""
+_EXPLAINED: Final = 1.5
+_UNEXPLAINED: Final = 6.0
+"""The squared errors over their covariances, less the first number, are summed up, and the sum is never below 0. Above
+the second number the car has met another road. In ordinary runs these errors are 0.2 to 0.5 on average, since the
+covariances include errors that last; where wheels reach snow they are 2 to 5 for 0.1 s or more."""
+_SHOWING_MPS2: Final = 2.0
+"""Lateral acceleration, measured or expected, below which packed snow bears the car as dry asphalt does [m/s2]."""
+_SLIDING_SLIP: Final = 0.05
+_SLIDING_S: Final = 0.3
+_SLIDING_USED: Final = 0.95
+_SLIDING_MPS2: Final = 1.0
+"""Slip of a wheel at its limit, in the brush model at 3 u / c: 5 % on snow; time for which it counts, a cycle of the
+anti-lock system [s]; fraction of the friction that the car then uses; least deceleration [m/s2]."""
+_ALIKE: Final = 0.6
+"""Ratio of the used friction of both sides below which the road has two frictions, and no number is right for both."""
+
+
+@inlined
+def _slides(memory, duration_s):
+    """Return whether the brakes slide wheels of both sides on one friction, as an anti-lock system does repeatedly."""
+    left, right = 0.0, 0.0
+    for wheel in range(4):
+        slip = 1.0 - memory.by_wheel_mps[wheel] / max(memory.speed_mps, SLOWEST_MPS)
+        if memory.along_N[wheel] < 0.0 and slip > _SLIDING_SLIP:
+            memory.not_slid_s[wheel] = 0.0
+        else:
+            memory.not_slid_s[wheel] += duration_s
+        used = max(-memory.along_N[wheel], 0.0) / max(memory.load_N[wheel], 1.0)
+        left, right = (left + used, right) if wheel % 2 == 0 else (left, right + used)
+    since_s = max(min(memory.not_slid_s[0], memory.not_slid_s[2]), min(memory.not_slid_s[1], memory.not_slid_s[3]))
+    alike = min(left, right) > _ALIKE * max(left, right)
+    return since_s < _SLIDING_S and alike and memory.ax_mps2 < -_SLIDING_MPS2
 
 
 @inlined
@@ -68,6 +110,7 @@ def _start(known, memory, said, line):
     for place in range(len(line)):
         line[place] = said
     begin(known, memory)
+    memory.not_slid_s[:] = _SLIDING_S
     start_speed(known, memory, rolled_mps)
 
 
@@ -86,13 +129,22 @@ def _filter(known, tyres, memory, said, line):
     memory.innovation, memory.rate_innovation = correct(
         known, tyres, memory, said[SAID_RATE], said[SAID_AY], duration_s
     )
-    used = math.hypot(memory.ax_mps2, memory.loading_mps2) / GRAVITY_MPS2
+    ay_mps2 = said[SAID_AY] - GRAVITY_MPS2 * memory.roll_rad - state[AY_OFFSET]
+    memory.unexplained = max(memory.unexplained + memory.innovation - _EXPLAINED, 0.0)
+    if max(abs(ay_mps2), abs(front_N + rear_N) / known.mass_kg) < _SHOWING_MPS2:
+        memory.unexplained = 0.0
+    elif memory.unexplained > _UNEXPLAINED:
+        memory.unexplained = 0.0
+        reopen(known, memory)
+    used = math.hypot(memory.ax_mps2, ay_mps2) / (known.largest_ay_g * GRAVITY_MPS2)
     memory.friction_used += duration_s / (duration_s + _USED_S) * (used - memory.friction_used)
     forgotten = math.exp(-duration_s / known.friction_s)
     memory.friction_borne = max(memory.friction_borne * forgotten, used)
     most = max(known.friction, memory.friction_borne / _USED_FRACTION)
     state[FRICTION] = min(max(state[FRICTION], _USED_FRACTION * memory.friction_used), most)
     memory.left_out = correct_speed(known, memory, duration_s)
+    if _slides(memory, duration_s):
+        take_in_friction(memory, used / _SLIDING_USED, duration_s)
 
 
 @compiled

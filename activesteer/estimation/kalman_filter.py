@@ -21,6 +21,9 @@ lateral acceleration is expected from its values at u and at sqrt(3) standard de
 
     slope = (a+ - a-) / (2 sqrt(3 P)),  mean = a + (a+ + a- - 2 a) / 6,  variance + (a+ + a- - 2 a)^2 / 18
 
+A friction that jumps further than this range would be taken for soft tyres all the same. So a value with a surprising
+error says nothing about the stiffness, and `reopen` makes the friction unknown again (see `advance`).
+
 Sources:
     Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the
     divided-difference filter of second order with h^2 = 3.
@@ -76,6 +79,16 @@ brakes then reduce them by more than `force_fraction`, by a friction circle that
 _LEAST_SLIP_RAD: Final = math.radians(0.3)
 """Slip angle of an axle below which its stiffness is not estimated. On a straight road of class C, bump steer and roll
 make slip angles of 0.05 to 0.10 deg RMS (compact, sedan) that the model does not know; this is three times as much."""
+_SURPRISING: Final = 4.0
+"""Squared error over its expected variance above which a value says nothing about the stiffness: it is then something
+else that has changed."""
+_NEW_RATIO_STD: Final = 0.3
+"""Standard deviation of the friction of the rear tyres relative to that of the front tyres, on a new road: for a tenth
+of a second one axle stands on the old one."""
+_SLIDING_STD: Final = 0.15
+_SLIDING_S: Final = 0.3
+"""Relative standard deviation of the friction that sliding wheels show, and duration of its error [s]: an anti-lock
+system uses 80 to 97 % of the friction, and one of its cycles lasts for 0.1 to 0.3 s."""
 _CREEP_MPS: Final = 0.05
 """Standard deviation of the lateral speed of an almost standing car [m/s]."""
 _CREEP_DENSITY: Final = 0.05
@@ -107,7 +120,8 @@ def _step_of(state, place):
 
 @inlined
 def _is_braked(known, memory):
-    return abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * memory.state[FRICTION] * known.front_load_N
+    plausible = memory.state[FRICTION] + math.sqrt(memory.covariance[FRICTION, FRICTION])
+    return abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * plausible * known.front_load_N
 
 
 @inlined
@@ -248,13 +262,15 @@ def _take_in(state, covariance, row, error, variance):
     A stiffness without a slip angle that shows it has no gain; its uncertainty counts (Schmidt's filter).
     """
     n = len(state)
-    front_hidden, rear_hidden = abs(state[FRONT_SLIP]) < _LEAST_SLIP_RAD, abs(state[REAR_SLIP]) < _LEAST_SLIP_RAD
     spread, expected = np.zeros(n), variance
     for i in range(n):
         for k in range(n):
             spread[i] += covariance[i, k] * row[k]
     for i in range(n):
         expected += row[i] * spread[i]
+    surprising = error * error > _SURPRISING * expected
+    front_hidden = surprising or abs(state[FRONT_SLIP]) < _LEAST_SLIP_RAD
+    rear_hidden = surprising or abs(state[REAR_SLIP]) < _LEAST_SLIP_RAD
     for i in range(n):
         hidden = (i == FRONT_STIFFNESS and front_hidden) or (i == REAR_STIFFNESS and rear_hidden)
         if not hidden:
@@ -315,3 +331,25 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         state[place] = min(max(state[place], LEAST_STIFFNESS), LARGEST_STIFFNESS)
     state[REAR_RATIO] = min(max(state[REAR_RATIO], LEAST_RATIO), LARGEST_RATIO)
     return of_both, of_rate
+
+
+@compiled
+def reopen(known, memory):
+    """Make the friction as unknown as at the start: the car has met another road."""
+    covariance = memory.covariance
+    for place, size in ((FRICTION, known.friction_std), (REAR_RATIO, _NEW_RATIO_STD)):
+        variance = max(covariance[place, place], size * size)
+        covariance[place, :] = covariance[:, place] = 0.0
+        covariance[place, place] = variance
+
+
+@compiled
+def take_in_friction(memory, friction, duration_s):
+    """Correct the friction by the one that sliding wheels show."""
+    covariance, std = memory.covariance, _SLIDING_STD * friction
+    # Its error lasts: during this time all samples count as one measurement.
+    variance = std * std * (1.0 + 2.0 * _SLIDING_S / duration_s)
+    gain = covariance[FRICTION, FRICTION] / (covariance[FRICTION, FRICTION] + variance)
+    memory.state[FRICTION] += gain * (friction - memory.state[FRICTION])
+    covariance[:, FRICTION] *= 1.0 - gain
+    covariance[FRICTION, :] = covariance[:, FRICTION]

@@ -37,10 +37,8 @@ MEMORY: Final = np.dtype(
         [
             ("estimate", np.float64, (14,)),
             ("calls", np.intp),
-            *(
-                (name, np.float64)
-                for name in ("waited_s", "innovation", "rate_innovation", "left_out", "friction_used", "friction_borne")
-            ),
+            *((name, np.float64) for name in ("waited_s", "innovation", "rate_innovation", "unexplained")),
+            *((name, np.float64) for name in ("left_out", "friction_used", "friction_borne")),
             ("last", np.float64, (3,)),
             ("last_spin_radps", np.float64, (4,)),
             *((name, np.float64) for name in ("speed_mps", "ax_offset_mps2")),
@@ -51,18 +49,18 @@ MEMORY: Final = np.dtype(
             *((name, np.float64) for name in ("front_angle_rad", "rear_angle_rad", "ax_mps2")),
             *((name, np.float64) for name in ("front_along_N", "moment_Nm", "loading_mps2", "rolling_mps")),
             *((name, np.float64) for name in ("roll_rad", "roll_rate_radps")),
-            *((name, np.float64, (4,)) for name in ("along_N", "load_N", "by_wheel_mps")),
+            *((name, np.float64, (4,)) for name in ("along_N", "load_N", "by_wheel_mps", "not_slid_s")),
         ],
     )
 )
 """Memory of an estimator.
 
 The estimate and the number of calls. The last step of the filters: time since then, squared error of both measurements
-and of the yaw rate over their expected covariances, wheels left out, smoothed and largest use of the friction, last
-samples. States and covariances of the filters, and the present state. Inputs of the model: steer angles, longitudinal
-acceleration, longitudinal force of the front axle, moment of all longitudinal forces, lateral acceleration that loads
-the wheels, lateral speed of the roll axis relative to v_y, roll; and for each wheel its longitudinal force, its load,
-and the speed of the car by this wheel.
+and of the yaw rate over their expected covariances, sum of what is unexplained in them, wheels left out, smoothed and
+largest use of the friction, last samples. States and covariances of the filters, and the present state. Inputs of the
+model: steer angles, longitudinal acceleration, longitudinal force of the front axle, moment of all longitudinal forces,
+lateral acceleration that loads the wheels, lateral speed of the roll axis relative to v_y, roll; and for each wheel its
+longitudinal force, its load, the speed of the car by this wheel, and the time since it slid.
 """
 
 KNOWN: Final = np.dtype(
@@ -74,7 +72,7 @@ KNOWN: Final = np.dtype(
                 "rear_compliance_radpN", "front_load_N", "rear_load_N", "front_load_kg", "rear_load_kg",
                 "along_load_kg", "front_relaxation_m", "rear_relaxation_m", "angle_step_rad", "front_load_step_N",
                 "rear_load_step_N", "roll_gradient_radpmps2", "roll_speed_radps", "roll_damping", "roll_arm_m",
-                "pitch_gain", "drag_kgpm", "wheel_inertia_kgm2", "steering_ratio",
+                "pitch_gain", "drag_kgpm", "wheel_inertia_kgm2", "steering_ratio", "largest_ay_g",
                 *(one.name for one in fields(EstimatorParameters)),
                 "ay_offset_std_mps2", "ay_offset_s", "rate_offset_std_radps", "rate_walk_rad2ps3",
                 "rate_variance_rad2ps2", "ay_variance_m2ps4", "ax_offset_std_mps2", "ax_offset_density_m2ps5",
@@ -104,11 +102,12 @@ _SHORTEST_WAIT_S: Final = 0.005
 def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> NDArray[Any]:
     """Return the knowledge of an estimator: a record of `KNOWN`, shape (1,).
 
-    Car: for each axle its compliance, wheel load, load transfer per lateral and longitudinal acceleration, relaxation
-    length and steps of the tyre grid; roll of the body, and effect of its pitch on an accelerometer. Uncertainties: the
-    fields of `EstimatorParameters`, with the data sheets. Times: interval between two calls, longest wait of the
-    filters for a new sample, age of an inertial sample; and the number of calls by which other samples are younger.
-    Wheels: position (left positive), rolling radius, fraction of the drive, brake, and slip stiffness per load.
+    Car: largest lateral acceleration by its tyres on the road of their files; for each axle its compliance, wheel load,
+    load transfer per lateral and longitudinal acceleration, relaxation length and steps of the tyre grid; roll of the
+    body, and effect of its pitch on an accelerometer. Uncertainties: the fields of `EstimatorParameters`, with the data
+    sheets. Times: interval between two calls, longest wait of the filters for a new sample, age of an inertial sample;
+    and the number of calls by which other samples are younger. Wheels: position (left positive), rolling radius,
+    fraction of the drive, brake, and slip stiffness per load.
 
     Args:
         setup: The car and its sensors.
@@ -154,6 +153,7 @@ def _car(setup: EstimatorSetup, parameters: EstimatorParameters) -> dict[str, fl
         "drag_kgpm": setup.drag_per_speed2_kgpm,
         "wheel_inertia_kgm2": more.wheel_inertia_kgm2,
         "steering_ratio": setup.steering_ratio,
+        "largest_ay_g": 2.0 * (front.most_N(front_N) + rear.most_N(rear_N)) / (body.mass_kg * GRAVITY_MPS2),
     }
 
 

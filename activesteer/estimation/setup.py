@@ -127,6 +127,11 @@ class KnownTyre:
         loads_N = self.load_step_N * np.arange(len(self.force_N))
         return float(np.interp(load_N, loads_N, np.array(self.force_N)[:, 1])) / self.slip_angle_step_rad
 
+    def most_N(self, load_N: float) -> float:
+        """Return the largest lateral force under a load [N]."""
+        loads_N = self.load_step_N * np.arange(len(self.force_N))
+        return float(np.interp(load_N, loads_N, np.array(self.force_N).max(axis=1)))
+
 
 @dataclass(frozen=True)
 class EstimatorSetup:

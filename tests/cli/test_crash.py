@@ -6,7 +6,6 @@ import importlib.util
 import os
 import struct
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,19 +17,10 @@ from mcap.stream_reader import StreamReader
 
 from activesteer import Recording
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S
+from tests.cli.process import MAIN, ended
 
-ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 LIMITED = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000)); " + MAIN
 STATES = ("/state/vehicle", "/state/control")
-
-
-def activesteer(folder: Path, *words: str, program: str = MAIN) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-c", program, *words],
-        cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
 
 
 def stock_messages(path: Path) -> dict[str, int]:
@@ -71,7 +61,7 @@ def left(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the recording of a killed run."""
     folder = tmp_path_factory.mktemp("killed")
     (folder / "mine.py").write_text(BODY)
-    done = activesteer(folder, "run", "slalom", "-c", "mine.py:Mine", "--set", "settle_s=0", "-o", "run.mcap")
+    done = ended(folder, "run", "slalom", "-c", "mine.py:Mine", "--set", "settle_s=0", "-o", "run.mcap")
     assert done.returncode == -9, done.stderr
     return folder / "run.mcap"
 
@@ -128,9 +118,7 @@ def test_recovered_file_of_a_killed_run_opens_in_readers_that_seek(call, left, t
 @pytest.mark.slow
 def test_disk_that_fills_up_leaves_no_half_file_for_the_viewer(call, tmp_path):
     call("run", "straight_line", "--set", "duration_s=3", "-o", "run.mcap")
-    done = activesteer(
-        tmp_path, "replay", "run.mcap", "--save", "run.rrd", program=LIMITED.replace("1_000_000", "200_000")
-    )
+    done = ended(tmp_path, "replay", "run.mcap", "--save", "run.rrd", code=LIMITED.replace("1_000_000", "200_000"))
     assert done.returncode == 1
     assert done.stderr == "activesteer: cannot write run.rrd: not all of it could be written; is the disk full?\n"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap"]

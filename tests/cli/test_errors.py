@@ -158,21 +158,6 @@ def test_run_that_fails_keeps_what_was_recorded(call, controller, tmp_path, body
     assert "INCOMPLETE: ControllerError" in info.out
 
 
-def test_failing_run_leaves_the_json_of_the_others(call, controller):
-    name = controller("return None if self.steps > 10 else ActuatorCommand()")
-    told = call("run", "straight_line", "-c", "none", "-c", name, *SHORT, "--json")
-    assert told.status == 1
-    errors = [run.get("error") for run in told.json["runs"]]
-    assert errors[0] is None
-    assert "step returned None" in errors[1]
-    assert Recording.open("runs/straight_line-none.mcap").metadata["complete"] is True
-
-
-def test_controller_that_is_wrong_from_the_start_is_answered(call, controller):
-    name = controller("return 0.1")
-    refused(call("run", "straight_line", "-c", name, "-o", "out"), "step returned 0.1", "ActuatorCommand is needed")
-
-
 def test_car_that_diverges_keeps_what_was_recorded(call):
     """Dampers that push in the direction of motion add energy without end."""
     told = call(

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from activesteer import simulate
+from tests.cli.process import ended
 
-ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import sys
 class Refuse:
@@ -32,10 +30,7 @@ sys.exit(status)
 
 def call(folder: Path, refused: set[str], *calls: str) -> subprocess.CompletedProcess[str]:
     """Call commands in sequence in one process where some packages cannot be imported."""
-    return subprocess.run(
-        [sys.executable, "-c", PROGRAM.format(refused=refused, calls=[words.split() for words in calls])],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    return ended(folder, code=PROGRAM.format(refused=refused, calls=[words.split() for words in calls]))
 
 
 @pytest.fixture(scope="module")

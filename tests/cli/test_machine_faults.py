@@ -7,9 +7,7 @@ import hashlib
 import os
 import shutil
 import subprocess
-import sys
 import threading
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +18,8 @@ import pytest
 import activesteer
 from activesteer import Recording
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S
+from tests.cli.process import MAIN, begun, ended, environment
 
-ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 MORE_LIMITS = (100, 5_000, 50_000, 100_000, 200_000, 800_000)
 MORE_STEPS = range(700, 9_700, 1_000)
 SHORT = ("--set", "duration_s=2", "--set", "settle_s=0")
@@ -45,18 +42,12 @@ def program(
     *words: str,
     limit: int | None = None,
     before: tuple[str, ...] = (),
-    environment: Mapping[str, str] | None = None,
 ) -> subprocess.CompletedProcess[str]:
     """Run the program in a folder with a size limit for its files [bytes]."""
-    changed = dict(environment or {})
     # CPython 3.11 keeps byte code that it could write in part only, and is broken by it at the next import.
-    changed |= {} if limit is None else {"PYTHONDONTWRITEBYTECODE": "1"}
+    changed = {} if limit is None else {"PYTHONDONTWRITEBYTECODE": "1"}
     limited = "" if limit is None else f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit},) * 2); "
-    return subprocess.run(
-        [*before, sys.executable, "-c", limited + MAIN, *words],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)} | changed,
-        capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
+    return ended(folder, *words, code=limited + MAIN, before=before, changes=changed)
 
 
 def assert_refused(done: subprocess.CompletedProcess[str]) -> None:
@@ -155,32 +146,26 @@ def unprivileged() -> tuple[str, ...]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "environment",
+    "changes",
     [{"HOME": "", "LANG": "C", "LC_ALL": "C"}, {"HOME": "/nonexistent", "XDG_CACHE_HOME": "/nonexistent"}],
     ids=["no home, language C", "home that does not exist"],
 )
-def test_a_run_and_its_report_need_no_home_and_no_language(tmp_path: Path, environment: dict[str, str]) -> None:
+def test_a_run_and_its_report_need_no_home_and_no_language(tmp_path: Path, changes: dict[str, str]) -> None:
     words = (("run", "step_steer", "-c", "ars", "-o", "run.mcap"), ("report", "run.mcap", "-o", "report.html"))
     both = f"import sys; from activesteer.commands.cli import main; sys.exit(any([main(words) for words in {words}]))"
-    done = subprocess.run(
-        [sys.executable, "-c", both], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)} | environment,
-        capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
+    done = ended(tmp_path, code=both, changes=changes)
     assert done.returncode == 0, done.stderr
     assert "m/s²" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
 def test_two_first_compilations_at_once_both_drive(tmp_path: Path) -> None:
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    words = [sys.executable, "-c", MAIN, "run", "straight_line", *SHORT, "--json", "-o"]
-    both = [
-        subprocess.Popen([*words, name], cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        for name in ("one.mcap", "two.mcap")
-    ]
+    empty = environment(NUMBA_CACHE_DIR=str(tmp_path / "kernels"))
+    words = ("run", "straight_line", *SHORT, "--json", "-o")
+    both = [begun(tmp_path, *words, name, env=empty) for name in ("one.mcap", "two.mcap")]
     for process in both:
         _, errors = process.communicate(timeout=300)
-        assert process.returncode == 0, errors.decode()
+        assert process.returncode == 0, errors
     one, two = (Recording.open(tmp_path / name) for name in ("one.mcap", "two.mcap"))
     np.testing.assert_array_equal(one.values, two.values)
 
@@ -210,9 +195,8 @@ def test_a_killed_run_loses_less_than_two_blocks(call, controller, tmp_path: Pat
 @pytest.mark.slow
 @pytest.mark.parametrize("after_s", np.linspace(0.2, 3.0, 10).round(2).tolist())
 def test_a_run_killed_at_any_moment_leaves_a_recording_or_one_error(call, tmp_path: Path, after_s: float) -> None:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
     words = ("run", "straight_line", "--set", "duration_s=300", "-o", "run.mcap")
-    process = subprocess.Popen([sys.executable, "-c", MAIN, *words], cwd=tmp_path, env=environment)
+    process = begun(tmp_path, *words, stdout=None, stderr=None)
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(after_s)
     process.kill()
@@ -233,10 +217,7 @@ def test_half_an_hour_of_driving_takes_less_than_a_gigabyte(tmp_path: Path) -> N
     code += "print(open('/proc/self/status').read().partition('VmHWM:')[2].split()[0]); raise SystemExit(status)"
     for duration_s in (1, 1800):  # the first run compiles, which takes a quarter of a gigabyte itself
         words = ("run", "straight_line", "--set", f"duration_s={duration_s}", "--json", "-o", f"{duration_s}.mcap")
-        done = subprocess.run(
-            [sys.executable, "-c", code, *words], cwd=tmp_path, capture_output=True, text=True, check=False,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
-        )  # fmt: skip
+        done = ended(tmp_path, *words, code=code)
         assert done.returncode == 0, done.stderr
     assert 1024 * int(done.stdout.split()[-1]) < 1e9
 
@@ -261,10 +242,7 @@ for run in range(1000):
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="needs the C library of GNU/Linux")
 def test_a_thousand_runs_in_one_process_lose_less_than_2_kB_each() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", SHORT_RUNS], capture_output=True, text=True, check=False,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    done = ended(None, code=SHORT_RUNS)
     assert done.returncode == 0, done.stderr
     after_200_MB, *_, after_1000_MB = map(float, done.stdout.split())
     assert after_1000_MB < after_200_MB + 800 * 0.002
@@ -294,8 +272,8 @@ def test_a_run_is_the_same_to_the_last_bit_in_processes_threads_and_after_other_
         thread.join()
     # Another hash seed than this process has, which is random unless it is given.
     seed = "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0"
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONHASHSEED": seed}
-    done = subprocess.run([sys.executable, "-c", HASH], capture_output=True, text=True, check=True, env=environment)
+    done = ended(None, code=HASH, changes={"PYTHONHASHSEED": seed})
+    assert done.returncode == 0, done.stderr
     found.append(done.stdout.strip())
     assert len(found) == 4
     assert len(set(found)) == 1

@@ -6,8 +6,6 @@ import argparse
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -15,9 +13,8 @@ import pytest
 
 from activesteer import Recording
 from activesteer.commands.stopping import StopSignals
+from tests.cli.process import begun
 
-ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 END_S = 5.0
 """What an end may take at most; on a busy machine even one second is no measure."""
 
@@ -87,11 +84,7 @@ def test_command_that_does_not_listen_is_ended_and_leaves_no_half_file(tmp_path,
 
 def stopped(folder: Path, words: tuple[str, ...], number: signal.Signals, when: float | Path) -> None:
     """Send the signal to the whole process group, like a terminal, after a time [s] or when a file exists."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", MAIN, *words],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True, start_new_session=True,
-    )  # fmt: skip
+    process = begun(folder, *words, start_new_session=True)
     try:
         if isinstance(when, Path):
             while not when.exists() and process.poll() is None:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,9 +11,7 @@ import pytest
 
 from activesteer.commands.terminal import Progress
 from activesteer.studies.engine.study import StudyProgress
-
-ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
+from tests.cli.process import begun
 
 STUDY = """
 controllers = ["none"]
@@ -112,14 +107,11 @@ def test_a_metric_pattern_that_matches_nothing_is_said(call, tmp_path):
     ("words", "made", "how"),
     [
         (("study",), "parts/[0-9]*", r"resume with `activesteer study \S+`"),
-        (("tune", "--trials", "1000"), "*.journal", "the same command resumes it"),
+        pytest.param(("tune", "--trials", "1000"), "*.journal", "the same command resumes it", marks=pytest.mark.slow),
     ],
 )
 def test_ctrl_c_says_how_to_go_on(file, tmp_path, words, made, how):
-    command = [sys.executable, "-c", MAIN, words[0], str(file), *words[1:], "-o", str(tmp_path / "out"), "--jobs", "1"]
-    process = subprocess.Popen(
-        command, env=os.environ | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    process = begun(tmp_path, words[0], str(file), *words[1:], "-o", str(tmp_path / "out"), "--jobs", "1")
     try:
         deadline = time.monotonic() + 120.0
         while not list((tmp_path / "out").glob(made)) and time.monotonic() < deadline:

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from activesteer import Recording
 from tests.cli.conftest import Call
+from tests.cli.process import ended
 
-ROOT = Path(__file__).resolve().parents[2]
-MAIN = "import sys; from activesteer.commands.cli import main; sys.exit(main())"
 SHORT = ("--set", "settle_s=0", "--set", "duration_s=0.2", "--set", "steer.start_s=0.05")
 PRINTS = """
 if self.steps == 1:
@@ -25,24 +20,6 @@ if self.steps == 1:
     os.write(1, b"written")
 return ActuatorCommand()
 """
-
-
-def process(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-c", MAIN, *words],
-        cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
-
-
-def test_a_run_that_user_code_ends_has_failed(call: Call, controller: Callable[..., str]) -> None:
-    given = controller("if self.steps > 100:\n    import sys; sys.exit(0)\nreturn ActuatorCommand()\n")
-    told = call("run", "step_steer", "-c", given, *SHORT, "-o", "run.mcap")
-    assert told.status == 1
-    assert "Mine.step raised" in told.err
-    assert "(mine.py, line 10)" in told.err
-    assert "100 steps were made; what was recorded until then is in run.mcap" in told.err
-    assert len(Recording.open(Path("run.mcap"))) == 100
 
 
 @pytest.mark.parametrize(
@@ -64,18 +41,14 @@ def test_a_value_or_error_of_user_code_that_ends_the_program_fails_the_run(
     assert "mine.py" in told.err
 
 
-def test_prints_of_user_code_do_not_disturb_json(call: Call, controller: Callable[..., str], tmp_path: Path) -> None:
+def test_prints_of_user_code_do_not_disturb_json(controller: Callable[..., str], tmp_path: Path) -> None:
     given = controller(PRINTS)
     words = "run", "step_steer", "-c", given, *SHORT, "--json"
-    done = process(tmp_path, *words)
+    done = ended(tmp_path, *words)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["runs"]
     assert "said" in done.stderr
     assert "written" in done.stderr
-    controller('print("said")\nreturn ActuatorCommand()\n')
-    told = call(*words)
-    assert told.json["runs"]
-    assert "said" in told.err
 
 
 def test_prints_of_user_code_are_seen_without_json(call: Call, controller: Callable[..., str]) -> None:

@@ -29,6 +29,10 @@ PUBLIC = (
 )
 
 
+LONG = ("activesteer.studies.engine.study.", "activesteer.vehicle_builder.build.")
+"""Modules with examples that make a study or a car."""
+
+
 def examples() -> dict[str, doctest.DocTest]:
     """Return all examples by the name of their object."""
     finder = doctest.DocTestFinder(exclude_empty=True)
@@ -48,7 +52,9 @@ def test_what_people_use_first_has_an_example(name: str) -> None:
     assert name in EXAMPLES
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name.startswith(LONG) else []) for name in EXAMPLES]
+)
 def test_example_does_what_it_says(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     test = EXAMPLES[name]

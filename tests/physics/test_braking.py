@@ -41,7 +41,7 @@ def _of_sedan(changes: tuple[tuple[str, Any], ...]) -> Recording:
 
 
 @pytest.mark.parametrize("vehicle", ["compact", "sedan"])
-@pytest.mark.parametrize("changes", [{}, SLIPPERY, ICE])
+@pytest.mark.parametrize("changes", [{}, SLIPPERY, pytest.param(ICE, marks=pytest.mark.slow)])
 def test_no_wheel_locks_and_nine_tenths_of_the_friction_are_used(vehicle: str, changes: dict[str, Any]) -> None:
     """Half of the sedan's brake torque acts at the rear wheels, so these reach their limit first."""
     found = stop_from_100(vehicle, changes).metrics

@@ -35,7 +35,7 @@ def assert_within_the_engine(recording: Recording, vehicle: str) -> None:
         assert low - 1e-3 <= total <= high + 1e-3
 
 
-@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+@pytest.mark.parametrize("vehicle", ["compact", pytest.param("sedan", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "maneuver",
     [name if name in AT_THE_LIMIT else pytest.param(name, marks=pytest.mark.slow) for name in list_maneuvers()],

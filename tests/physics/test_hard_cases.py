@@ -105,7 +105,8 @@ def test_rate_of_a_screw_is_what_it_does_on_a_large_demand():
     assert measured == pytest.approx(known, rel=0.05)
 
 
-def test_brakes_hold_a_car_that_leaves_snow_while_the_estimator_does_not_explain_it():
+@pytest.mark.parametrize("seed", [15, pytest.param(1, marks=pytest.mark.slow)])
+def test_brakes_hold_a_car_that_leaves_snow_while_the_estimator_does_not_explain_it(seed: int):
     """The authority over the driver falls with the innovations. With it, the brakes rested and this car spun."""
     pytest.importorskip("daqp")
     changes = {
@@ -114,23 +115,23 @@ def test_brakes_hold_a_car_that_leaves_snow_while_the_estimator_does_not_explain
         "factors.rear_tyre_friction": 0.86, "rear_actuator.preset": "screw_3deg", "road.mu": 0.602,
         "road.patches.0.mu": 0.205, "speed_kmh": 62.5, "duration_s": 12.2,
     }  # fmt: skip
-    for seed in (15, 1):
-        run = simulate("mu_jump", "integrated", "compact_electric", SENSORS | changes | {"sensors.seed": seed})
-        # `esc` keeps 7 to 8 deg, and the car without control spins.
-        assert run.metrics["sideslip_peak_abs_rad"] < math.radians(15.0)
+    run = simulate("mu_jump", "integrated", "compact_electric", SENSORS | changes | {"sensors.seed": seed})
+    # `esc` keeps 7 to 8 deg, and the car without control spins.
+    assert run.metrics["sideslip_peak_abs_rad"] < math.radians(15.0)
 
 
+@pytest.mark.parametrize("start_s", [2.2, pytest.param(2.8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("maneuver", "kind"), [("slalom", "stuck"), ("double_lane_change", "reversed")])
-def test_brakes_do_not_follow_a_yaw_rate_sensor_that_fails(maneuver: str, kind: str):
+def test_brakes_do_not_follow_a_yaw_rate_sensor_that_fails(maneuver: str, kind: str, start_s: float):
     pytest.importorskip("daqp")
-    for start_s in (2.2, 2.8):
-        fault = {"part": "yaw_rate_sensor", "kind": kind, "start_s": start_s}
-        run = simulate(maneuver, "integrated", overrides=SENSORS | {"fault": [fault]})
-        # With brakes that do not fade: 20 and 39 deg (frozen sensor), 84 and 49 deg (wrong sign).
-        assert run.metrics["sideslip_peak_abs_rad"] < math.radians(15.0)
+    fault = {"part": "yaw_rate_sensor", "kind": kind, "start_s": start_s}
+    run = simulate(maneuver, "integrated", overrides=SENSORS | {"fault": [fault]})
+    # With brakes that do not fade: 20 and 39 deg (frozen sensor), 84 and 49 deg (wrong sign).
+    assert run.metrics["sideslip_peak_abs_rad"] < math.radians(15.0)
 
 
-def test_slow_sound_actuators_are_not_taken_for_failed_in_a_lane_change():
+@pytest.mark.parametrize("seed", [10, pytest.param(20, marks=pytest.mark.slow)])
+def test_slow_sound_actuators_are_not_taken_for_failed_in_a_lane_change(seed: int):
     """Both were, at 4.9 s: their angles stayed at 3.0 and 1.9 deg, and the sedan hit 13 cones."""
     pytest.importorskip("daqp")
     changes = {
@@ -140,8 +141,7 @@ def test_slow_sound_actuators_are_not_taken_for_failed_in_a_lane_change():
         "rear_actuator.preset": "screw_3deg", "rear_actuator.supply_voltage_V": 11.55, "road.mu": 0.515,
         "speed_kmh": 70.44, "duration_s": 18.2,
     }  # fmt: skip
-    for seed in (10, 20):
-        overrides = SENSORS | changes | {"sensors.seed": seed}
-        run = simulate("double_lane_change", "integrated", "sedan", overrides, driver="expert")
-        assert run.metrics["lane_overstep_m"] < 0.0
-        assert abs(run["superposition_rad"][-1]) < math.radians(0.5)
+    overrides = SENSORS | changes | {"sensors.seed": seed}
+    run = simulate("double_lane_change", "integrated", "sedan", overrides, driver="expert")
+    assert run.metrics["lane_overstep_m"] < 0.0
+    assert abs(run["superposition_rad"][-1]) < math.radians(0.5)

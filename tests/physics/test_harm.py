@@ -54,7 +54,7 @@ def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(contro
     assert controlled["sideslip_peak_abs_rad"] < none["sideslip_peak_abs_rad"] + math.radians(0.5)
 
 
-@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+@pytest.mark.parametrize("vehicle", ["compact", pytest.param("sedan", marks=pytest.mark.slow)])
 def test_a_superelevated_curve_is_no_ice(vehicle: str):
     """Its tyres carry two thirds of the turn. Taken for ice, `integrated` left the path by 0.77 and 0.85 m."""
     pytest.importorskip("daqp")

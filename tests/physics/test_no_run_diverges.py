@@ -24,6 +24,8 @@ SPEED_KMH: Final = (5.0, 15.0, 30.0, 60.0, 100.0, 160.0, 250.0)
 TIMESTEP_S: Final = (5e-4, 1e-3, 2e-3)
 COURSES: Final = {"lane_change": 180.0, "slalom": 320.0}
 """Kind of manoeuvre -> length of its course, with what follows [m]."""
+QUICK_STEPS: Final = 20_000
+"""Largest number of steps of a run among the quick tests."""
 LEFT_TO_SEARCHES: Final = ("amplitude_factor", "lateral_acceleration_g", "lateral_acceleration_mps2")
 KNOWN: Final = (
     ("straight_line", 30.0, 0.2, 0.1),
@@ -70,6 +72,11 @@ class Case(NamedTuple):
             table["road"] = {"mu_left": self.mu, "mu_right": max(0.05, 0.3 * self.mu), "grade": self.grade}
         return table
 
+    @property
+    def steps(self) -> float:
+        """Return the number of steps of the run."""
+        return self.table()["duration_s"] / self.timestep_s
+
     def drive(self) -> None:
         """Run it and check every recorded number."""
         recording = activesteer.simulate(
@@ -112,7 +119,13 @@ def test_wheels_do_not_spin_up_without_end(
     Case(maneuver, vehicle, "none", speed_kmh, grade, mu, 2e-3).drive()
 
 
-@pytest.mark.parametrize("case", drawn(seed=20121121, count=8), ids=lambda case: "-".join(map(str, case)))
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id="-".join(map(str, case)), marks=[pytest.mark.slow] if case.steps > QUICK_STEPS else [])
+        for case in drawn(seed=20121121, count=8)
+    ],
+)
 def test_no_run_of_a_sample_diverges(case: Case) -> None:
     case.drive()
 

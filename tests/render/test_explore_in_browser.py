@@ -186,40 +186,6 @@ def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, serv
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [(390, 844), (844, 390)])
-def test_choices_fold_away_on_a_phone_while_the_car_drives(
-    browser: Browser, served: tuple[str, Path], size: tuple[int, int]
-) -> None:
-    width, height = size
-    page, problems = opened(browser, served[0], **(PHONE | {"viewport": {"width": width, "height": height}}))
-    page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
-    page.tap("#tab-drive")
-    page.select_option("#drive-controller", "ars")
-    assert page.locator("#drive-vehicle").is_visible()
-    page.tap("#start", timeout=LIMIT_MS)
-    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
-    assert not page.locator("#drive-vehicle").is_visible()
-    assert not page.locator("header").is_visible()
-    assert page.inner_text("#drive-chosen") == "Double lane change · compact · ars"
-    view, pad, throttle = (page.evaluate(BOX, name) for name in ("drive-view", "touch-steer", "touch-throttle"))
-    assert view["height"] > 0.65 * height
-    assert pad["width"] > 220
-    assert pad["height"] > 120
-    assert throttle["right"] <= width
-    assert max(pad["bottom"], page.evaluate(BOX, "touch-brake")["bottom"]) <= height
-    page.tap("#drive-chosen")  # the choices come back while the car drives
-    page.select_option("#drive-controller", "none")
-    page.wait_for_selector("#gauges dd:text-is('none')", state="attached")
-    page.tap("#drive-chosen")
-    page.tap("#end")
-    page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
-    assert page.locator("header").is_visible()
-    assert page.locator("#drive-vehicle").is_visible()
-    assert problems == []
-    page.close()
-
-
-@pytest.mark.slow
 def test_the_ghost_of_the_last_drive_drives_along(browser: Browser, served: tuple[str, Path]) -> None:
     page, problems = opened(browser, served[0], viewport={"width": 600, "height": 500})
     page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)

@@ -179,6 +179,7 @@ def test_a_value_that_rounds_to_zero_has_no_sign(shown, tmp_path):
     assert told == ["0.00", "\N{MINUS SIGN}0.01", "0.00", "\N{EN DASH}", "\N{MINUS SIGN}1235"]
 
 
+@pytest.mark.slow
 def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_path):
     page = shown(every_panel(tmp_path), **DESK)
     figure = page.locator("figure").first
@@ -194,6 +195,7 @@ def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_
     assert figure.locator(".values span").count() == 1
 
 
+@pytest.mark.slow
 def test_pictures_of_a_section_with_the_same_names_share_one_legend(shown, tmp_path):
     x = np.linspace(0.0, 1.0, 20)
 
@@ -226,24 +228,6 @@ def test_one_player_moves_the_curves_of_all_pictures_and_stays_in_sight(shown, t
         box = slider.bounding_box()
         assert box
         assert 0.0 <= box["y"] < page.evaluate("innerHeight")
-
-
-@pytest.mark.slow
-def test_a_slider_and_a_button_move_the_cursor_of_curves_over_time(shown, tmp_path):
-    page = shown(every_panel(tmp_path), **DESK)
-    values = page.locator("figure").first.locator(".values")
-    slider, button = page.locator("input.time"), page.locator("button.play")
-    slider.evaluate("(slider) => { slider.value = slider.max / 2; slider.dispatchEvent(new Event('input')); }")
-    halfway, wave = (float(text.replace("\N{MINUS SIGN}", "-")) for text in values.inner_text().split()[:2])
-    assert halfway == pytest.approx(5.05, abs=0.11)
-    assert wave == pytest.approx(np.sin(halfway), abs=0.2)
-    button.click()
-    page.wait_for_timeout(800)
-    button.click()
-    assert "Play" in button.inner_text()
-    assert halfway + 0.1 < float(values.inner_text().split()[0]) < halfway + 5.0
-    # Charts over other quantities keep their own cursor.
-    assert page.locator("figure").nth(1).locator(".values").inner_text() == ""
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from activesteer.analysis.report import write_report
-from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.core.conventions import RUN_COLOURS
 from tests.conftest import PHONE
 from tests.contrast import contrast
 from tests.unit.analysis.synthetic_files import lane_changes, step_steers
@@ -162,24 +161,6 @@ def test_every_text_can_be_read(open_page, device):
 
 
 @pytest.mark.slow
-def test_dark_pictures_are_dark_and_as_complete_as_light_ones(open_page):
-    page = open_page(**DARK)
-    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(22, 24, 27)"
-    yaw_rate, track = plot(page, "Yaw rate"), plot(page, "Track of the front axle centre", 2)
-    assert all(pixels(yaw_rate, colour, 60) > 100 for colour in RUN_COLOURS_ON_DARK[:3])
-    assert pixels(yaw_rate, "#ffffff") == pixels(track, "#f3ead0") == 0
-    assert pixels(track, "#35301f") > 5000
-
-
-@pytest.mark.slow
-def test_a_curve_below_others_is_seen_through_their_gaps(open_page):
-    page = open_page(**DESK)
-    # Steered by the same table: three curves on one line.
-    steering = plot(page, "Steering wheel angle")
-    assert all(pixels(steering, colour, 130) > 150 for colour in RUN_COLOURS[:3])
-
-
-@pytest.mark.slow
 def test_pointing_at_a_run_makes_the_others_pale(open_page):
     page = open_page(**DESK)
     yaw_rate = plot(page, "Yaw rate")
@@ -192,6 +173,7 @@ def test_pointing_at_a_run_makes_the_others_pale(open_page):
     assert [pixels(yaw_rate, colour) for colour in RUN_COLOURS[:3]] == before
 
 
+@pytest.mark.slow
 def test_nothing_lies_over_anything_else(open_page):
     for device in (DESK, PHONE):
         page = open_page(**device)
@@ -221,19 +203,6 @@ def test_cursor_is_in_all_plots_at_once_and_tells_the_values(open_page):
     assert float(told(other)[1]) == pytest.approx(4.0, abs=0.01)
     assert len(told(plot(page, "Added angle at the wheels"))) == 3  # of the two systems that add one
     assert told(plot(page, "Yaw rate", 2)) == []  # other runs, other time
-
-
-@pytest.mark.slow
-def test_nothing_moves_when_values_are_told(open_page):
-    for device in (DESK, PHONE):
-        page = open_page(**device)
-        figure = plot(page, "Added angle at the wheels")
-        hover(page, figure, 0.5)
-        page.mouse.move(0, 0)
-        before = figure.bounding_box()
-        hover(page, figure, 0.5)
-        assert told(figure)
-        assert figure.bounding_box() == before
 
 
 @pytest.mark.slow
@@ -283,19 +252,6 @@ def test_a_phone_keeps_the_player_in_sight_and_shortens_no_title(open_page):
 
 
 @pytest.mark.slow
-def test_contents_stay_in_view_and_mark_the_manoeuvre_that_is_read(open_page):
-    page = open_page(**DESK)
-    page.locator("#group-2 .plots figure").last.scroll_into_view_if_needed()
-    page.wait_for_selector('.jump a[href="#group-2"][aria-current=true]')
-    box = page.locator(".jump").bounding_box()
-    assert box
-    assert box["y"] == pytest.approx(0.0, abs=1.0)
-    bar = page.locator("#group-2 .toolbar").bounding_box()
-    assert bar
-    assert bar["y"] >= box["y"] + box["height"] - 1.0
-
-
-@pytest.mark.slow
 def test_zoom_holds_for_all_plots_of_a_group_and_can_be_undone(open_page):
     page = open_page(**DESK)
     yaw_rate, other = plot(page, "Yaw rate"), plot(page, "Lateral acceleration")
@@ -310,20 +266,6 @@ def test_zoom_holds_for_all_plots_of_a_group_and_can_be_undone(open_page):
     assert float(told(other)[0]) == pytest.approx(0.5 * DURATION_S, abs=0.03)
 
 
-@pytest.mark.slow
-def test_runs_can_be_hidden(open_page):
-    page = open_page(**DESK)
-    yaw_rate = plot(page, "Yaw rate")
-    before = pixels(yaw_rate, RUN_COLOURS[1])
-    button = page.locator("#group-1 button", has_text="2 active rear steering")
-    button.click()
-    assert button.get_attribute("aria-pressed") == "false"
-    assert pixels(yaw_rate, RUN_COLOURS[1]) == 0
-    button.click()
-    page.mouse.move(0, 0)
-    assert pixels(yaw_rate, RUN_COLOURS[1]) == before
-
-
 def test_phone_shows_everything_within_its_width(open_page):
     page = open_page(**PHONE)
     assert page.evaluate("document.documentElement.scrollWidth") == 390
@@ -332,16 +274,6 @@ def test_phone_shows_everything_within_its_width(open_page):
     for box in boxes:
         assert box["x"] >= 0.0
         assert 300.0 < box["width"] <= 390.0 - box["x"]
-
-
-@pytest.mark.slow
-def test_no_number_of_the_first_screen_is_without_a_name_on_a_phone(open_page):
-    page = open_page(**PHONE)
-    names = page.locator(".contents td:nth-child(3):not(:empty), .results td.number").evaluate_all(
-        "parts => parts.map(part => getComputedStyle(part, '::before').content)"
-    )
-    assert names
-    assert all(re.match(r'attr|"\w', name) for name in names), names
 
 
 @pytest.mark.slow
@@ -377,21 +309,6 @@ def test_fingers_read_values_and_zoom(open_page):
 
 
 @pytest.mark.slow
-def test_plots_follow_the_width_of_the_window(open_page):
-    page = open_page(**DESK)
-    figure = plot(page, "Yaw rate")
-    page.set_viewport_size({"width": 900, "height": 900})
-    # The page's policy allows no code from text, so that the browser cannot be determined to wait: it is asked again.
-    deadline = time.monotonic() + 5.0
-    while (box := figure.locator(".uplot").bounding_box()) and box["width"] >= 450 and time.monotonic() < deadline:
-        page.wait_for_timeout(100)
-    assert box
-    assert box["width"] < 450
-    assert box["x"] + box["width"] <= 900
-    assert pixels(figure, RUN_COLOURS[2]) > 100
-
-
-@pytest.mark.slow
 def test_printed_plots_fit_the_paper(open_page):
     page = open_page(**DESK)
     page.evaluate(TELL_WIDTHS)
@@ -403,17 +320,3 @@ def test_printed_plots_fit_the_paper(open_page):
     box = plot(page, "Yaw rate").locator(".uplot").bounding_box()
     assert box
     assert box["width"] > 400.0  # as before
-
-
-@pytest.mark.slow
-def test_names_of_printed_runs_end_before_their_results(open_page):
-    page = open_page(viewport={"width": 600, "height": 850})  # paper less wide than A4
-    page.emulate_media(media="print")
-    overlaps = page.locator(":is(.contents, .results) tbody th:has(.swatch)").evaluate_all("""cells => {
-      const range = document.createRange();
-      return cells.filter((cell) => {
-        range.selectNodeContents(cell);
-        return range.getBoundingClientRect().right > cell.getBoundingClientRect().right + 0.5;
-      }).map((cell) => cell.textContent);
-    }""")
-    assert overlaps == []

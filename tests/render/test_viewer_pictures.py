@@ -174,22 +174,6 @@ def test_signals_are_plotted_over_the_whole_time(alone: dict[float, Pictures]) -
 
 
 @pytest.mark.slow
-def test_the_names_of_the_curves_stand_beside_the_plots_in_their_colours(alone: dict[float, Pictures]) -> None:
-    names = alone[AT_S][ALONE].pixels
-    for colour in (ARS, (179, 155, 0)):  # the run, and what is desired
-        assert like(names, colour, 30).sum() > 30, colour
-        assert like(alone[AT_S][PLOTS[0]].pixels, colour, 60).any(axis=0).mean() > 0.2, colour
-
-
-@pytest.mark.slow
-def test_the_summary_is_there(alone: dict[float, Pictures]) -> None:
-    pixels = view(alone[AT_S], "Summary")
-    text = pixels.min(axis=-1) > 180
-    assert text.mean() > 0.01
-    assert text.any(axis=1).sum() > 40
-
-
-@pytest.mark.slow
 def test_each_car_is_compared_with_the_ghosts_of_the_others(together: Pictures) -> None:
     for own, others in zip(CARS, ((ARS, AFS), (NONE, AFS), (NONE, ARS)), strict=True):
         pixels = together[own].pixels

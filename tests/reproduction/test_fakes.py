@@ -92,7 +92,10 @@ def test_other_runs_in_place_of_the_systems_prove_nothing(runs: Runs, scenario: 
         assert passed(check(ended), Fake.CUT_SHORT) == []
 
 
-@pytest.mark.parametrize("scenario", _EACH)
+@pytest.mark.parametrize(
+    "scenario",
+    [pytest.param(name, marks=[] if name == "double_lane_change_low_mu" else pytest.mark.slow) for name in SCENARIOS],
+)
 def test_a_system_turned_round_has_none_of_the_effects(runs: Runs, scenario: str) -> None:
     fakes = {system: simulate(scenario, turned_round(system)) for system in ("ars", "afs")}
     assert passed(SCENARIOS[scenario]({"none": runs[scenario]["none"], **fakes}), Fake.REVERSED) == []

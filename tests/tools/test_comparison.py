@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from activesteer.controllers import controller_spec
 from activesteer.errors import ParameterError
 from activesteer.recording import Recording
 from tests.raising import raises
@@ -79,14 +78,3 @@ def test_a_run_without_the_metric_fails_its_target():
     made = made_up(none=(0.1, math.nan, 14.0), lqr=(0.01, 2.1, math.nan))
     assert [target.passed for target in made.targets] == [True, False, False]
     assert "entry speed - km/h, asked for > 50.4 km/h (none)" in made.to_text()
-
-
-def test_the_table_of_seven_controllers_fits_a_terminal():
-    names = ("none", "ars", "afs", "esc", "lqr", "tv", "integrated")
-    made = made_up(**dict.fromkeys(names, (0.1, 2.2, 14.0)))
-    assert max(map(len, made.to_text().splitlines())) <= 100
-
-
-@pytest.mark.parametrize("name", ["ars_sideslip", "lqr", "esc", "integrated", "tv"])
-def test_controllers_of_the_package_are_found_by_name(name):
-    assert controller_spec(name).label == name

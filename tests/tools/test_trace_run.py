@@ -6,9 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 def test_the_documentation_lists_the_modules_that_a_run_passes_through() -> None:
     command = [sys.executable, str(ROOT / "tools/trace_run.py")]
     lines: list[str] = []

@@ -62,7 +62,10 @@ def _run(code: str, sources: Path, **environment: str) -> tuple[str, str]:
     return done.stdout.strip(), done.stderr.strip()
 
 
-@pytest.mark.parametrize("kept_in", ["NUMBA_CACHE_DIR", "source", "XDG_CACHE_HOME"])
+@pytest.mark.parametrize(
+    "kept_in",
+    ["source", *(pytest.param(name, marks=pytest.mark.slow) for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"))],
+)
 def test_an_edit_in_a_file_that_was_compiled_in_counts(package: Path, tmp_path: Path, kept_in: str) -> None:
     if kept_in == "XDG_CACHE_HOME":
         # No folder can be made where a file stands, whoever one is: numba goes on to the user's cache.
@@ -84,6 +87,7 @@ def test_an_edit_in_a_file_that_was_compiled_in_counts(package: Path, tmp_path: 
     assert _run(call, package.parent, **environment)[0] == "16.0"
 
 
+@pytest.mark.slow
 def test_an_edit_in_the_formula_of_a_tyre_counts(tmp_path: Path) -> None:
     shutil.copytree(_PACKAGE, tmp_path / _PACKAGE.name, ignore=shutil.ignore_patterns("__pycache__"))
     # Reading a tyre there would compile everything else that its check needs.
@@ -165,6 +169,7 @@ def test_only_some_states_of_a_function_are_kept(package: Path, tmp_path: Path) 
     assert last - kept[2], "the newest stays"
 
 
+@pytest.mark.slow
 def test_compiling_needs_no_linear_algebra_and_leaves_it_to_those_who_do() -> None:
     code = (
         "import sys\n"
@@ -179,6 +184,7 @@ def test_compiling_needs_no_linear_algebra_and_leaves_it_to_those_who_do() -> No
     assert _run(code, _PACKAGE.parent) == ("True", "")
 
 
+@pytest.mark.slow
 def test_a_run_without_compiled_code_ends_with_one_error() -> None:
     result = subprocess.run(
         [sys.executable, "-c", "from activesteer.commands.cli import main; exit(main(['run', 'straight_line']))"],

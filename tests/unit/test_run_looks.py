@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK, RUN_DASHES, run_looks
+from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK, run_looks
 from tests.contrast import contrast
 
 
@@ -20,16 +20,6 @@ def test_runs_that_are_shown_together_differ_in_colour_and_dashes():
     looks = run_looks(["none", *(f"mine{number}" for number in range(5))]).values()
     assert len({look.colour for look in looks}) == len({look.dashes for look in looks}) == 6
     assert len({look.on_dark for look in looks}) == 6
-
-
-def test_more_runs_than_colours_begin_again():
-    looks = run_looks(f"mine{number}" for number in range(10))
-    assert looks["mine0"].colour == looks["mine6"].colour
-
-
-def test_first_curve_is_full_in_any_selection():
-    assert run_looks(["ars"])["ars"].dashes == ()
-    assert run_looks(["ars", "none"])["ars"].dashes == RUN_DASHES[1]
 
 
 @pytest.mark.parametrize(("colours", "paper"), [(RUN_COLOURS[:5], "#ffffff"), (RUN_COLOURS_ON_DARK, "#16181b")])

@@ -10,7 +10,6 @@ import pytest
 
 from activesteer.analysis import figures
 from activesteer.analysis.figures import (
-    BY_KIND,
     BY_SCENARIO,
     draw_all,
     figure_11,
@@ -36,9 +35,7 @@ from tests.unit.analysis.synthetic import (
 
 pytest.importorskip("matplotlib")
 
-from matplotlib.axes import Axes
 from matplotlib.patches import Ellipse, Polygon, Rectangle
-from matplotlib.text import Text
 
 FIGURE_13 = BY_SCENARIO["sine_with_dwell"]["figure_13_sine_with_dwell"]
 LATERAL_RESPONSE = BY_SCENARIO["slalom"]["figure_21_slalom_response"]
@@ -67,12 +64,6 @@ def test_only_the_figures_that_there_are_runs_for_are_drawn(tmp_path):
 def test_nothing_to_draw_is_an_error(recordings, tmp_path):
     with raises(ParameterError, allowed=tuple(BY_SCENARIO)):
         draw_all(recordings, tmp_path)
-
-
-def test_a_folder_that_cannot_be_made_is_named(tmp_path):
-    (tmp_path / "file").write_text("")
-    with raises(ParameterError, cause=FileExistsError):
-        draw_all({"step_steer": {"none": step_steer()}}, tmp_path / "file")
 
 
 def test_tracks_are_those_of_the_front_axle_with_cones_lanes_and_a_stated_scale():
@@ -117,52 +108,6 @@ def test_curves_are_told_apart_in_grey_by_their_dashes(draw):
     assert len({styles[look.label] for look in run_looks(runs).values()}) == 3
 
 
-@pytest.mark.parametrize(
-    "draw",
-    [
-        lambda: figure_11({"none": step_steer(), "ars": step_steer(rear_rad=-0.01)}),
-        lambda: BY_KIND["sine_with_dwell"](sines()),
-        lambda: tracks.overview(lane_changes()),
-        lambda: tracks.course_figure(lane_changes()),
-        lambda: figures.figure_7(step_steer()),
-        lambda: figures.figure_9(step_steer()),
-    ],
-)
-def test_every_text_is_of_8_points_in_a_figure_as_wide_as_a_column_or_a_page(draw):
-    figure = draw()
-    figure.draw_without_rendering()
-    assert figure.get_figwidth() in (over_time.COLUMN_IN, over_time.PAGE_IN)
-    texts = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
-    assert len(texts) > 10
-    assert min(text.get_fontsize() for text in texts) >= 8.0
-    page = figure.bbox
-    for text in texts:
-        box = text.get_window_extent()
-        # Labels of ticks beyond the limits are not drawn, but they exist.
-        if text.get_figure() and box.width and text not in unseen(figure):
-            assert page.x0 - 1 <= box.x0, text
-            assert box.x1 <= page.x1 + 1, text
-
-
-def unseen(figure):
-    """Return the labels of ticks beyond the limits of their axis."""
-    return {
-        label
-        for axes in figure.findobj(Axes)
-        for axis, (low, high) in ((axes.xaxis, sorted(axes.get_xlim())), (axes.yaxis, sorted(axes.get_ylim())))
-        for tick in axis.get_major_ticks()
-        if not low <= tick.get_loc() <= high
-        for label in (tick.label1, tick.label2)
-    }
-
-
-def test_a_step_fills_the_frame_with_its_transient():
-    axis = figure_11({"none": step_steer(), "ars": step_steer(rear_rad=-0.01)}).get_axes()[0]
-    start, end = axis.get_xlim()
-    assert 0.5 < start < 1.0  # the wheel turns about 1 s
-    assert 1.5 < end < 4.0  # of 7 s
-
-
 def test_a_car_that_spins_is_shown_whole_in_an_inset_and_does_not_set_the_scale():
     runs = sines() | {"none": sine_with_dwell(sideslip_rad=math.radians(60.0))}
     (sideslip,) = [axis for axis in FIGURE_13(runs).get_axes() if "sideslip" in axis.get_ylabel()]
@@ -197,12 +142,6 @@ def test_the_instants_of_the_standard_are_marked_from_the_completion_of_steer():
     lines = [np.asarray(line.get_xdata(), dtype=float) for line in axis.get_lines()]
     marks = sorted(float(x[0]) for x in lines if x.size == 2)
     assert marks == pytest.approx([COMPLETION_S, COMPLETION_S + 1.0, COMPLETION_S + 1.75], abs=0.02)
-
-
-def test_curves_of_long_runs_are_thinned():
-    run = along_path(duration_s=30.0)
-    figure = BY_SCENARIO["double_lane_change_low_mu"]["figure_24_slippery_sideslip"]({"none": run})
-    assert 2000 < np.size(figure.get_axes()[0].get_lines()[0].get_xdata()) <= 5000
 
 
 @pytest.mark.parametrize("kind", ["step_steer", "sine_with_dwell", "lane_change", "slalom", "follow_path", "parking"])

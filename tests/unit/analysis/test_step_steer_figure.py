@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.figures import figure_for
-from activesteer.errors import ParameterError, RecordingError
+from activesteer.errors import ParameterError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import step_steer
 
@@ -42,34 +42,11 @@ def test_figure_is_a_png_of_readable_size_and_pyplot_is_left_alone(tmp_path):
     assert pixels[..., :3].min() < 0.5 < pixels[..., :3].max()
 
 
-def test_five_panels_share_the_time_axis(saved):
-    axes = saved.get_axes()
-    assert len(axes) == 5
-    assert len({axis.get_xlim() for axis in axes}) == 1
-
-
-def test_curves_are_named_and_ordered_as_in_the_paper(saved):
-    legend = [text.get_text() for text in saved.legends[0].get_texts()]
-    assert legend[:3] == ["1 no control", "2 active rear steering", "3 active front steering"]
-    assert legend[3:] == ["desired", "front wheels", "added by a system"]
-
-
 def test_angles_are_in_degrees_and_only_those_that_exist(saved):
     lines = [line for line in saved.get_axes()[1].get_lines() if len(line.get_xdata())]
     ends = sorted(round(float(line.get_ydata()[-1]), 3) for line in lines)
     front = round(float(np.degrees(1.0 / 16.0)), 3)
     assert ends == [pytest.approx(np.degrees(-0.01), abs=1e-3), pytest.approx(np.degrees(0.01), abs=1e-3)] + [front] * 3
-
-
-def test_the_same_run_keeps_its_colour_when_others_are_left_out(figures, tmp_path):
-    step_steer_figure(three(), tmp_path / "a.png")
-    step_steer_figure({"ars": three()["ars"]}, tmp_path / "b.png")
-    assert figures[0].get_axes()[2].get_lines()[1].get_color() == figures[1].get_axes()[2].get_lines()[0].get_color()
-
-
-def test_a_users_controller_is_drawn_under_its_own_name(figures, tmp_path):
-    step_steer_figure({"my_controller.py:Mine": step_steer(rear_rad=-0.02)}, tmp_path / "a.png")
-    assert figures[0].legends[0].get_texts()[0].get_text() == "my_controller.py:Mine"
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
@@ -83,14 +60,3 @@ def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without)
     with raises(ParameterError, cause=ImportError, value="matplotlib", allowed="plot"):
         step_steer_figure(three(), tmp_path / "figure.png")
-
-
-def test_nothing_to_draw_is_an_error(tmp_path):
-    with pytest.raises(ParameterError):
-        step_steer_figure({}, tmp_path / "figure.png")
-
-
-@pytest.mark.parametrize(("name", "cause"), [("missing/figure.png", FileNotFoundError), ("figure.unknown", ValueError)])
-def test_a_file_that_cannot_be_written_is_named(tmp_path, name, cause):
-    with raises(RecordingError, cause=cause, value=tmp_path / name):
-        step_steer_figure(three(), tmp_path / name)

@@ -7,7 +7,6 @@ import pytest
 
 from activesteer.drawing.cars import BodySurface, dressed, without_tail
 from activesteer.recording import Link, Primitive
-from activesteer.resources import models_dir
 from activesteer.road.course import Footprint
 from tests.unit.playback.synthetic import scene
 
@@ -67,12 +66,6 @@ def test_what_the_body_replaces_is_left_out_and_the_rest_stays():
     assert [part for part in kept if isinstance(part, Primitive)] == []
     assert [part for part in kept if isinstance(part, Link)] == [part for part in scene() if isinstance(part, Link)]
     assert dressed(scene(), None) == (tuple(scene()), ())
-
-
-def test_the_files_are_small():
-    files = list((models_dir() / "bodies").glob("*.npz"))
-    assert {file.stem for file in files} == {"hatchback", "saloon", "wheel"}
-    assert sum(file.stat().st_size for file in files) < 300_000
 
 
 def area_m2(panel: BodySurface) -> float:

@@ -8,31 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.analysis.figures.over_time import time_figure
-from activesteer.analysis.report.curves import plots
-from activesteer.analysis.report.groups import groups_of
 from activesteer.core.conventions import CORNERS
 from activesteer.drawing import panels
 from activesteer.drawing.panels import (
-    EXPLORE,
-    FIGURE,
-    FILM,
     PANELS,
     PATH_DISTANCE,
-    REPORT,
     VIEWS,
     Line,
     drawn_values,
     panels_in,
 )
-from activesteer.playback import plots as rerun_plots
-from activesteer.playback import runs_of
 from activesteer.scenario import resolve
 from activesteer.simulation.simulation import Simulation
-from activesteer.video.gauges import READINGS
-from tests.unit.analysis.synthetic import step_steer
-from tests.unit.analysis.synthetic_files import recording_of
-from tests.unit.playback.synthetic import circle
 
 
 def test_every_channel_of_every_panel_is_recorded() -> None:
@@ -54,37 +41,6 @@ def test_every_panel_stands_in_a_view_and_every_view_names_panels() -> None:
         assert len(set(names)) == len(names), view
         for panel in panels_in(view):
             assert panel.extreme is not None or panel.lines_in(view), panel.title
-
-
-@pytest.fixture
-def only_speed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A table in which each view holds nothing but the speed."""
-    monkeypatch.setattr(panels, "VIEWS", {view: ("speed",) for view in VIEWS})
-
-
-@pytest.mark.usefixtures("only_speed")
-def test_report_explore_and_rerun_show_what_the_table_says() -> None:
-    group = groups_of({"none.mcap": recording_of(step_steer())})[0]
-    for view in (REPORT, EXPLORE):
-        assert [panel["title"] for panel in plots(group, view)["panels"]] == ["Speed"]
-    (run,) = runs_of({"none": circle(0.1)})
-    assert {page: [panel.title for panel in shown] for page, shown in rerun_plots.pages(run).items()}["Motion"] == [
-        "Speed"
-    ]
-
-
-def test_figures_have_an_axis_for_each_panel_of_the_table() -> None:
-    pytest.importorskip("matplotlib")
-    figure = time_figure({"none": recording_of(step_steer())})
-    titles = [axis.get_ylabel() for axis in figure.get_axes()]
-    shown = [panel.quantity.axis_title for panel in panels_in(FIGURE)]
-    assert [title for title in shown if title in titles] == titles
-
-
-def test_films_tell_the_values_of_the_table() -> None:
-    assert [reading.channel for reading in READINGS] == [
-        line.channel for panel in panels_in(FILM) for line in panel.lines_in(FILM)
-    ]
 
 
 def test_a_line_without_a_demand_or_without_its_companion_has_no_meaning() -> None:

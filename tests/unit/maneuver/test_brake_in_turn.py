@@ -7,14 +7,11 @@ from typing import Any
 
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.braking import BrakeInTurn
 from activesteer.maneuver.steering_tests import StepSteer
 from tests.raising import raises
-
-SOURCE = Source("my_turn.toml", error=ManeuverError)
+from tests.unit.maneuver.made import made
 
 
 def maneuver(**keys: Any) -> BrakeInTurn:
@@ -25,9 +22,7 @@ def maneuver(**keys: Any) -> BrakeInTurn:
         "turn": {"start_s": 0.5, "rate_degps": 60, "steering_wheel_deg": 48},
         "brake": {"start_s": 6.0, "rise_s": 0.2, "pedal": 0.4},
     }
-    built = build_maneuver(table | keys, SOURCE)
-    assert isinstance(built, BrakeInTurn)
-    return built
+    return made(BrakeInTurn, table | keys)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -72,5 +67,5 @@ def test_aim_asks_for_the_search_of_the_step_steer():
     ],
 )
 def test_wrong_values_are_answered_with_what_is_allowed(keys, key):
-    with raises(ManeuverError, file="my_turn.toml", key=key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         maneuver(**keys)

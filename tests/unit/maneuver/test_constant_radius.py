@@ -7,20 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.follow_path import ConstantRadius
 from tests.raising import raises
-
-SOURCE = Source("mine.toml", error=ManeuverError)
+from tests.unit.maneuver.made import made
 
 
 def circle(**keys: Any) -> ConstantRadius:
     table = {"kind": "constant_radius", "speed_mps": 6.0, "duration_s": 60.0, "circle": keys}
-    built = build_maneuver(table, SOURCE)
-    assert isinstance(built, ConstantRadius)
-    return built
+    return made(ConstantRadius, table)
 
 
 @pytest.mark.parametrize("radius_m", [100.0, -40.0])

@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.follow_path import FollowPath
 from activesteer.resources import find_vehicle
 from activesteer.scenario import describe, resolve
 from tests.raising import raises
+from tests.unit.maneuver.made import made
 
-SOURCE = Source("my_path.toml", error=ManeuverError)
 X = [5.0 * index for index in range(21)]
 Y = [3.0 * math.sin(x / 40.0) ** 2 for x in X]
 TOML = 'kind = "follow_path"\nspeed_kmh = 50\nduration_s = 9.0\n\n[path]\ncsv = "track.csv"\n'
@@ -25,9 +23,7 @@ TOML = 'kind = "follow_path"\nspeed_kmh = 50\nduration_s = 9.0\n\n[path]\ncsv = 
 
 def follow(x: list[float], y: list[float], **keys: object) -> FollowPath:
     table = {"kind": "follow_path", "speed_kmh": 50, "duration_s": 9.0, "path": {"x_m": x, "y_m": y}}
-    built = build_maneuver(table | keys, SOURCE)
-    assert isinstance(built, FollowPath)
-    return built
+    return made(FollowPath, table | keys)
 
 
 @pytest.fixture
@@ -114,10 +110,10 @@ def test_path_that_cannot_be_driven_is_answered_with_its_line(track, text, line,
 
 
 def test_points_in_the_file_are_counted_from_1():
-    with raises(ManeuverError, file="my_path.toml", key="path", value=(60.0, 0.0)) as refused:
+    with raises(ManeuverError, file="mine.toml", key="path", value=(60.0, 0.0)) as refused:
         follow([0.0, 10.0, 60.0, 70.0], [0.0, 0.0, 0.0, 0.0])
     assert refused.value.problem.startswith("point 3: ")
-    with raises(ManeuverError, file="my_path.toml", key="path"):
+    with raises(ManeuverError, file="mine.toml", key="path"):
         follow([0.0, 10.0, 20.0, 30.0], [0.0, 0.0, 0.0])
 
 
@@ -131,7 +127,7 @@ def test_missing_csv_is_answered_with_its_neighbours(track):
 
 
 def test_negative_speed_is_answered():
-    with raises(ManeuverError, file="my_path.toml", key="speed_kmh", value=-20.0):
+    with raises(ManeuverError, file="mine.toml", key="speed_kmh", value=-20.0):
         follow(X, Y, speed_kmh=-20)
 
 

@@ -7,24 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError, ParameterError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.lane_changes import LaneChange
 from activesteer.road.course import Course
 from activesteer.road.native_path import PathSearch
 from activesteer.scenario import resolve
 from tests.raising import raises
+from tests.unit.maneuver.made import made
 
-SOURCE = Source("my_lanes.toml", error=ManeuverError)
 STANDARDS = ("iso_3888_1", "iso_3888_2")
 
 
 def change(lane: dict[str, Any] | None = None, **keys: Any) -> LaneChange:
     table = {"kind": "lane_change", "speed_kmh": 80, "duration_s": 11.0, "vehicle_width_m": 1.8, "lane": lane or {}}
-    built = build_maneuver(table | keys, SOURCE)
-    assert isinstance(built, LaneChange)
-    return built
+    return made(LaneChange, table | keys)
 
 
 def course(lane: dict[str, Any]) -> Course:
@@ -150,7 +146,7 @@ def test_largest_margin_that_is_allowed_can_be_driven(standard):
     ],
 )
 def test_wrong_values_are_answered_with_what_is_allowed(keys, key):
-    with raises(ManeuverError, file="my_lanes.toml", key=key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         change(**keys)
 
 

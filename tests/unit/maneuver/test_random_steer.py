@@ -8,22 +8,18 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.steering_tests import RandomSteer
 from tests.raising import raises
+from tests.unit.maneuver.made import made
 
-SOURCE = Source("mine.toml", error=ManeuverError)
 TIME_S = np.arange(0.0, 60.0, 0.01)
 
 
 def steering(**keys: Any) -> RandomSteer:
     table = {"kind": "random_steer", "speed_kmh": 80, "duration_s": 60.0}
     asked = {"rms_deg": 8.0, "lowest_Hz": 0.2, "highest_Hz": 4.0, "fade_s": 1.0}
-    built = build_maneuver({**table, "random": asked | keys}, SOURCE)
-    assert isinstance(built, RandomSteer)
-    return built
+    return made(RandomSteer, {**table, "random": asked | keys})
 
 
 def angles_deg(maneuver: RandomSteer) -> np.ndarray:

@@ -7,22 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.steering_tests import SineSweep
 from tests.raising import raises
+from tests.unit.maneuver.made import made
 
-SOURCE = Source("mine.toml", error=ManeuverError)
 TIME_S = np.arange(0.0, 30.0, 0.001)
 
 
 def sweep(**keys: Any) -> SineSweep:
     table = {"kind": "sine_sweep", "speed_kmh": 80, "duration_s": 30.0}
     asked = {"start_s": 1.0, "length_s": 28.0, "first_Hz": 0.2, "last_Hz": 4.0, "fade_s": 0.5, "amplitude_deg": 9.0}
-    built = build_maneuver({**table, "sweep": asked | keys}, SOURCE)
-    assert isinstance(built, SineSweep)
-    return built
+    return made(SineSweep, {**table, "sweep": asked | keys})
 
 
 def angles_deg(maneuver: SineSweep) -> np.ndarray:

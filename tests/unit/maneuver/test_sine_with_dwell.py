@@ -8,23 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.config import Source
 from activesteer.core.signals import Setpoint
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.steering_tests import SineWithDwell, SlowlyIncreasingSteer
 from tests.raising import raises
-
-SOURCE = Source("my_dwell.toml", error=ManeuverError)
+from tests.unit.maneuver.made import made
 
 
 def dwell(**keys: Any) -> SineWithDwell:
     steer = {"steering_wheel_deg": 100.0} | keys.pop("steer", {})
     steer = {key: value for key, value in steer.items() if value is not None}
     table = {"kind": "sine_with_dwell", "speed_kmh": 80, "duration_s": 5.5, "steer": steer}
-    built = build_maneuver(table | keys, SOURCE)
-    assert isinstance(built, SineWithDwell)
-    return built
+    return made(SineWithDwell, table | keys)
 
 
 def angles_deg(maneuver: SineWithDwell, times_s: Any) -> list[float]:
@@ -90,7 +85,7 @@ def test_amplitude_by_factor_asks_for_the_ramp_of_fmvss_126():
     ],
 )
 def test_wrong_values_are_answered_with_what_is_allowed(keys, key):
-    with raises(ManeuverError, file="my_dwell.toml", key=key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         dwell(**keys)
 
 

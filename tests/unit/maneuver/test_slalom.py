@@ -8,20 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.lane_changes import Slalom
 from tests.raising import raises
-
-SOURCE = Source("my_cones.toml", error=ManeuverError)
+from tests.unit.maneuver.made import made
 
 
 def slalom(cones: dict[str, Any] | None = None, **keys: Any) -> Slalom:
     table = {"kind": "slalom", "speed_kmh": 100, "duration_s": 12.5, "vehicle_width_m": 1.8, "cones": cones or {}}
-    built = build_maneuver(table | keys, SOURCE)
-    assert isinstance(built, Slalom)
-    return built
+    return made(Slalom, table | keys)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -82,7 +77,7 @@ def test_first_pass_on_the_right_is_the_mirror_image():
     ],
 )
 def test_wrong_values_are_answered_with_what_is_allowed(keys, key):
-    with raises(ManeuverError, file="my_cones.toml", key=key):
+    with raises(ManeuverError, file="mine.toml", key=key):
         slalom(**keys)
 
 

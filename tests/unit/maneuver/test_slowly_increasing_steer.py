@@ -7,20 +7,15 @@ from typing import Any
 
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.steering_tests import SlowlyIncreasingSteer
 from tests.raising import raises
-
-SOURCE = Source("mine.toml", error=ManeuverError)
+from tests.unit.maneuver.made import made
 
 
 def ramp(**steer: Any) -> SlowlyIncreasingSteer:
     table = {"kind": "slowly_increasing_steer", "speed_kmh": 80, "duration_s": 20.0, "steer": steer}
-    built = build_maneuver(table, SOURCE)
-    assert isinstance(built, SlowlyIncreasingSteer)
-    return built
+    return made(SlowlyIncreasingSteer, table)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

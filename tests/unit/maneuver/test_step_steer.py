@@ -8,21 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.steering_tests import StepSteer
 from tests.raising import raises
-
-SOURCE = Source("my_step.toml", error=ManeuverError)
+from tests.unit.maneuver.made import made
 
 
 def step(**keys: Any) -> StepSteer:
     steer = {"steering_wheel_deg": 40.0, "rate_degps": 400.0, "start_s": 0.5} | keys.pop("steer", {})
     steer = {key: value for key, value in steer.items() if value is not None}
-    built = build_maneuver({"kind": "step_steer", "speed_kmh": 80, "duration_s": 3.0, "steer": steer} | keys, SOURCE)
-    assert isinstance(built, StepSteer)
-    return built
+    return made(StepSteer, {"kind": "step_steer", "speed_kmh": 80, "duration_s": 3.0, "steer": steer} | keys)
 
 
 def angle_deg(maneuver: StepSteer, time_s: float) -> float:
@@ -65,10 +60,10 @@ def test_amplitude_found_by_a_search_keeps_the_aim_on_record():
 
 
 def test_step_without_amplitude_and_aim_is_answered():
-    with raises(ManeuverError, file="my_step.toml", key="steer"):
+    with raises(ManeuverError, file="mine.toml", key="steer"):
         step(steer={"steering_wheel_deg": None})
 
 
 def test_step_after_the_end_is_answered():
-    with raises(ManeuverError, file="my_step.toml", key="steer.start_s", value=3.0):
+    with raises(ManeuverError, file="mine.toml", key="steer.start_s", value=3.0):
         step(steer={"start_s": 3.0})

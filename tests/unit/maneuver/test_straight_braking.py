@@ -7,20 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from activesteer.config import Source
 from activesteer.errors import ManeuverError
-from activesteer.maneuver import build_maneuver
 from activesteer.maneuver.braking import StraightBraking
 from tests.raising import raises
-
-SOURCE = Source("my_stop.toml", error=ManeuverError)
+from tests.unit.maneuver.made import made
 
 
 def maneuver(**keys: Any) -> StraightBraking:
     table = {"kind": "straight_braking", "speed_kmh": 100, "duration_s": 6.0, "brake": {"start_s": 0.5, "pedal": 0.8}}
-    built = build_maneuver(table | keys, SOURCE)
-    assert isinstance(built, StraightBraking)
-    return built
+    return made(StraightBraking, table | keys)
 
 
 def test_the_speed_is_held_until_the_brake_is_pressed() -> None:

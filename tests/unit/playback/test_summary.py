@@ -27,13 +27,6 @@ def test_an_incomplete_run_says_so() -> None:
     assert "**Incomplete**: SimulationDiverged: boom" in summary(runs_of({"ars": run}))
 
 
-def test_runs_of_different_manoeuvres_are_all_named() -> None:
-    other = circle(0.1, {"maneuver": {"title": "Another"}})
-    text = summary(runs_of({"ars": circle(0.1), "none": other}))
-    assert "**A circle**" in text
-    assert "**Another**" in text
-
-
 def test_what_came_out_stands_above_the_numbers() -> None:
     text = summary(runs_of({"ars": circle(0.1)}), ["ars: stays in the lanes", "S1 passed: something"])
     lines = text.splitlines()

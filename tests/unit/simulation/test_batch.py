@@ -53,7 +53,7 @@ def driven_by_python(simulation: Simulation) -> Simulation:
     return simulation
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "production"])
+@pytest.mark.parametrize("sensors", [pytest.param("ideal", marks=pytest.mark.slow), "production"])
 def test_the_law_of_lqr_gives_the_same_bits_in_python_and_in_compiled_code(sensors: str) -> None:
     both = {"sensors.preset": sensors, "controllers.bus_delay_s": 0.003 if sensors == "production" else 0.0}
     cars = [{"road.mu": 0.7}, {"road.mu": 0.9, "factors.mass": 1.1}]

@@ -11,8 +11,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from activesteer.core.conventions import run_looks
-from activesteer.drawing.cars import shares_of
 from activesteer.scenario import resolve
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.live_view import FRAME_S, FramePacer, Keys, drive, scene_for
@@ -138,14 +136,6 @@ def test_closing_the_window_ends_the_drive():
     assert driven.simulated_s < 0.1
 
 
-def test_last_picture_shows_the_end_and_the_words_go_with_it():
-    _, viewer, _, _, simulation = watched()
-    assert viewer.shown[0][2].startswith("0.00 s")
-    assert viewer.shown[-1][2].startswith("0.50 s")
-    assert "1 x real time\npause\nrestart" in viewer.shown[-1][2]
-    assert f"{3.6 * simulation.vehicle.measure().speed_mps:.1f} km/h" in viewer.shown[-1][2]
-
-
 def test_camera_follows_and_turns_with_the_car():
     _, viewer, _, _, simulation = watched(duration_s=2.5)
     motion = simulation.vehicle.motion()
@@ -179,13 +169,3 @@ def test_restart_ends_the_drive_and_other_keys_do_nothing():
     assert not driven.finished
     assert driven.pictures == 6
     assert viewer.keys.restart
-
-
-def test_car_has_the_colour_of_its_controller():
-    simulation = ClosedLoop(resolve("straight_line"))
-    colours = []
-    for controller in ("ars", "afs"):
-        model = scene_for(simulation, simulation.maneuver, controller).model
-        colours.append(tuple(model.geom("0/chassis/paint").rgba[:3]))
-    expected = [shares_of(look.on_dark) for look in run_looks(["ars", "afs"]).values()]
-    assert colours == [pytest.approx(colour, abs=1e-6) for colour in expected]

@@ -123,11 +123,11 @@ def test_pictures_are_drawn_into_a_new_folder(tmp_path: Path) -> None:
         assert path.stat().st_size > 10_000
 
 
-def test_a_tyre_with_narrow_ranges_is_drawn(tmp_path: Path) -> None:
+def test_a_tyre_with_narrow_ranges_is_drawn(figures: list[Any], tmp_path: Path) -> None:
     narrow = tyre().with_values(
         FZMIN=4500.0, FZMAX=5000.0, KPUMIN=-0.05, KPUMAX=0.05, ALPMIN=-0.02, ALPMAX=0.02, CAMMIN=-0.01, CAMMAX=0.01
     )
-    assert len(draw(narrow, tmp_path)) == len(PICTURES)
+    assert len(draw(narrow, tmp_path)) == len(figures) == len(PICTURES)
 
 
 def test_a_folder_that_cannot_be_made_is_an_error(tmp_path: Path) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from activesteer.vehicle_builder import build
 
 
-@pytest.fixture(autouse=True)
-def parked(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(autouse=True, scope="module")
+def parked() -> Iterator[None]:
     """Leave the drives of a new car out."""
-    monkeypatch.setattr(build, "_drive", lambda *_: [])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(build, "_drive", lambda *_: [])
+        yield

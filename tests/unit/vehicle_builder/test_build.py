@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import tempfile
 from pathlib import Path
 
 import mujoco
@@ -15,16 +14,21 @@ from activesteer.errors import ModelError, ParameterError, TyreFileError
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.vehicle.statics import mass_properties
-from activesteer.vehicle_builder import build, new_vehicle
+from activesteer.vehicle_builder import NewVehicle, build, new_vehicle
 from tests.raising import raises
 from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed
 
 
-@functools.cache
-def again() -> KcResult:
-    """The compact made from its own hardpoints."""
-    with tempfile.TemporaryDirectory() as folder:
-        return kinematics_compliance(new_vehicle("again", COMPACT, Path(folder) / "again").vehicle_file)
+@pytest.fixture(scope="module")
+def cars(tmp_path_factory: pytest.TempPathFactory) -> dict[str, NewVehicle]:
+    """Return the compact made from its own hardpoints, and a car with wishbones and assumed values."""
+    tables, folder = {"again": COMPACT, "saloon": WISHBONE}, tmp_path_factory.mktemp("cars")
+    return {name: new_vehicle(name, table, folder / name) for name, table in tables.items()}
+
+
+@pytest.fixture(scope="module")
+def again(cars: dict[str, NewVehicle]) -> KcResult:
+    return kinematics_compliance(cars["again"].vehicle_file)
 
 
 @functools.cache
@@ -34,11 +38,11 @@ def compact() -> KcResult:
 
 @pytest.mark.parametrize("sweep", ["parallel_travel", "opposite_travel", "parallel_kinematic", "lateral_in_phase",
                                    "longitudinal_patch", "aligning_in_phase", "steering_rolling"])  # fmt: skip
-def test_the_compacts_hardpoints_give_the_compacts_toe_and_camber(sweep: str) -> None:
+def test_the_compacts_hardpoints_give_the_compacts_toe_and_camber(again: KcResult, sweep: str) -> None:
     """Within 0.01 deg over +-80 mm and full lock: spring forces and wheel angles come from a new trim, not from a
     copy."""
     for angle in ("toe_rad", "camber_rad"):
-        one, two = (getattr(result.curves[sweep], angle) for result in (compact(), again()))
+        one, two = (getattr(result.curves[sweep], angle) for result in (compact(), again))
         assert np.degrees(np.abs(one - two)).max() < 0.01, angle
 
 
@@ -49,12 +53,12 @@ def test_the_compacts_hardpoints_give_the_compacts_toe_and_camber(sweep: str) ->
      ("front", "steering_ratio", 1e-3), ("front", "ackermann", 5e-3), ("car", "body_bounce_frequency", 1e-3),
      ("car", "body_roll_damping", 2e-3), ("rear", "wheel_hop_frequency", 1e-3), ("car", "roll_gradient", 2e-3)],
 )  # fmt: skip
-def test_the_compacts_numbers_come_back(axle: str, name: str, share: float) -> None:
-    assert again()[axle, name] == pytest.approx(compact()[axle, name], rel=share)
+def test_the_compacts_numbers_come_back(again: KcResult, axle: str, name: str, share: float) -> None:
+    assert again[axle, name] == pytest.approx(compact()[axle, name], rel=share)
 
 
-def test_what_is_left_of_the_whole_car_is_the_compacts_chassis(tmp_path: Path) -> None:
-    found = new_vehicle("again", COMPACT, tmp_path / "again").trimmed.chassis
+def test_what_is_left_of_the_whole_car_is_the_compacts_chassis(cars: dict[str, NewVehicle]) -> None:
+    found = cars["again"].trimmed.chassis
     model = mujoco.MjModel.from_xml_path(str(models_dir() / "mjcf" / "compact" / "compact.xml"))
     chassis = model.body("chassis").id
     assert found.mass_kg == pytest.approx(model.body_mass[chassis], abs=1e-3)
@@ -63,9 +67,8 @@ def test_what_is_left_of_the_whole_car_is_the_compacts_chassis(tmp_path: Path) -
     np.testing.assert_allclose(sorted(found.inertia_kgm2), sorted(model.body_inertia[chassis]), atol=0.05)
 
 
-def test_the_whole_car_weighs_what_was_asked_for(tmp_path: Path) -> None:
-    made = new_vehicle("again", COMPACT, tmp_path / "again")
-    body = mass_properties(mujoco.MjModel.from_xml_path(str(made.folder / "again.xml")))
+def test_the_whole_car_weighs_what_was_asked_for(cars: dict[str, NewVehicle]) -> None:
+    body = mass_properties(mujoco.MjModel.from_xml_path(str(cars["again"].folder / "again.xml")))
     assert body.mass_kg == pytest.approx(1430.0, abs=0.01)
     np.testing.assert_allclose(np.diag(body.inertia_kgm2), [530.0, 2100.0, 2200.0], atol=0.05)
 
@@ -172,18 +175,16 @@ def test_front_arm_geometry_is_chronos(tmp_path: Path) -> None:
     assert result["front", "bump_steer"] == pytest.approx(-35.95, abs=0.1)
 
 
-def test_the_keyframe_is_where_the_car_stands(tmp_path: Path) -> None:
-    made = new_vehicle("again", COMPACT, tmp_path / "again")
-    model = mujoco.MjModel.from_xml_path(str(made.folder / "again.xml"))
+def test_the_keyframe_is_where_the_car_stands(cars: dict[str, NewVehicle]) -> None:
+    model = mujoco.MjModel.from_xml_path(str(cars["again"].folder / "again.xml"))
     assert model.key("static_ride").id == 0
     assert model.key_qpos.shape[1] == model.nq
     assert abs(model.key_qpos[0, 2]) < 5e-3
 
 
 @pytest.mark.parametrize("name", ["again", "saloon"])
-def test_the_scene_stands_in_any_viewer(tmp_path: Path, name: str) -> None:
-    made = new_vehicle(name, COMPACT if name == "again" else WISHBONE, tmp_path / name)
-    model = mujoco.MjModel.from_xml_path(str(made.folder / "scene.xml"))
+def test_the_scene_stands_in_any_viewer(cars: dict[str, NewVehicle], name: str) -> None:
+    model = mujoco.MjModel.from_xml_path(str(cars[name].folder / "scene.xml"))
     data = mujoco.MjData(model)
     for _ in range(1000):
         mujoco.mj_step(model, data)
@@ -192,10 +193,9 @@ def test_the_scene_stands_in_any_viewer(tmp_path: Path, name: str) -> None:
     assert np.abs(data.qvel[:6]).max() < 0.05
 
 
-def test_the_readme_names_what_was_assumed_and_only_that(tmp_path: Path) -> None:
-    known = new_vehicle("again", COMPACT, tmp_path / "again")
-    assert not known.assumptions
-    made = new_vehicle("saloon", WISHBONE, tmp_path / "saloon")
+def test_the_readme_names_what_was_assumed_and_only_that(cars: dict[str, NewVehicle]) -> None:
+    assert not cars["again"].assumptions
+    made = cars["saloon"]
     text = (made.folder / "README.md").read_text()
     keys = {item.key for item in made.assumptions}
     assert {"front.links.uca_front", "mass.inertia_kgm2", "rear.knuckle_mass_kg", "brakes"} <= keys
@@ -204,8 +204,8 @@ def test_the_readme_names_what_was_assumed_and_only_that(tmp_path: Path) -> None
         assert f"| `{item.key}` | {item.value} | {item.rule} |" in text
 
 
-def test_the_table_in_the_folder_makes_the_same_car_again(tmp_path: Path) -> None:
-    one = new_vehicle("saloon", WISHBONE, tmp_path / "one")
+def test_the_table_in_the_folder_makes_the_same_car_again(cars: dict[str, NewVehicle], tmp_path: Path) -> None:
+    one = cars["saloon"]
     two = new_vehicle("saloon", one.folder / "table.csv", tmp_path / "two")
     for file in sorted(one.folder.glob("*.xml")):
         assert file.read_text() == (two.folder / file.name).read_text()
@@ -223,10 +223,12 @@ def test_a_tyre_beside_the_table_comes_along(tmp_path: Path) -> None:
 
 
 def test_files_of_an_earlier_car_are_not_replaced_unasked(tmp_path: Path) -> None:
-    new_vehicle("again", COMPACT, tmp_path / "again")
+    (tmp_path / "again").mkdir()
+    (tmp_path / "again" / "again.xml").touch()
     with raises(ParameterError, value=tmp_path / "again"):
         new_vehicle("again", COMPACT, tmp_path / "again")
     new_vehicle("again", COMPACT, tmp_path / "again", overwrite=True)
+    assert (tmp_path / "again" / "again.xml").stat().st_size > 0
 
 
 @pytest.mark.parametrize(

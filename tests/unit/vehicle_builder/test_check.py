@@ -76,12 +76,14 @@ def test_every_line_that_is_not_ok_says_what_to_do(damaged: Damage) -> None:
     assert bad[0].advice in " ".join(report.table().split())
 
 
+@pytest.mark.slow
 def test_a_point_on_the_wrong_side(damaged: Damage) -> None:
     report = damaged("front_axle.xml", (r'("fl_lca_front_inner" pos="-0.015) 0.365', r"\1 -0.365"))
     assert report["points on the side of their wheel"].value == "no: fl_lca_front_inner"
     assert report["right side mirrors the left side"].level == "error"
 
 
+@pytest.mark.slow
 def test_one_side_edited_alone(damaged: Damage) -> None:
     report = damaged("front_axle.xml", (r'("fl_lca_front_inner" pos="-0.015 0.365) 0.2055', r"\1 0.2155"))
     assert report["points on the side of their wheel"].level == "ok"
@@ -89,6 +91,7 @@ def test_one_side_edited_alone(damaged: Damage) -> None:
     assert report["left against right in travel"].level == "error"
 
 
+@pytest.mark.slow
 def test_inner_and_outer_point_exchanged(damaged: Damage) -> None:
     report = damaged(
         "rear_axle.xml",
@@ -129,6 +132,7 @@ def test_two_links_that_do_the_same(damaged: Damage) -> None:
     assert "2 ways to travel" in report["rear links hold the wheel"].advice
 
 
+@pytest.mark.slow
 def test_springs_of_the_wrong_length(damaged: Damage) -> None:
     report = damaged("car.xml", (r'(stiffness="24730" springlength=)"0.160\d*"', r'\1"0.1465"'))
     finding = report["front wheel travel from the design position"]
@@ -147,6 +151,7 @@ def test_a_damper_that_pushes(damaged: Damage) -> None:
     assert report["front damper resists its motion"].level == "error"
 
 
+@pytest.mark.slow
 def test_a_damper_of_absurd_force(damaged: Damage) -> None:
     report = damaged("car.toml", (r"(force_N = \[-1750.* 0(?:\.0)?), 60(?:\.0)?,", r"\1, 6e7,"))
     finding = report["front damper, steepest slope of its curve"]
@@ -165,6 +170,7 @@ def test_bump_steer_of_a_tie_rod_at_the_wrong_height(tmp_path: Path) -> None:
     assert report.count("error") == 0
 
 
+@pytest.mark.slow
 def test_a_tyre_that_is_too_small(damaged: Damage, tmp_path: Path) -> None:
     report = damaged(
         "car.xml",

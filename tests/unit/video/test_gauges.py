@@ -42,12 +42,6 @@ def test_gauges_cover_at_most_a_tenth_of_the_picture(runs, size):
     assert (picture[size[1] // 4 : size[1] // 2] == 100).all()
 
 
-def test_each_run_has_a_row_and_a_plan():
-    one, two = drawn(recording()), drawn(recording(), recording())
-    assert len(changed(one, two)) > 3000
-    assert np.ptp(changed(np.full_like(two, 100), two)[:, 1]) > 1200  # from the left edge to the right one
-
-
 @pytest.mark.parametrize(
     "change", [{"speed_mps": 30.0}, {"steering_wheel_rad": 1.0}, {"sideslip_rad": 0.1}, {"rear_steer_rad": 0.04}]
 )
@@ -95,12 +89,6 @@ def _yellow(pixels: np.ndarray) -> np.ndarray:
     return (pixels[..., 0] > 180) & (pixels[..., 1] > 140) & (pixels[..., 2] < 110)
 
 
-def test_added_angle_that_is_never_used_takes_no_place():
-    without = drawn(recording(steering_wheel_rad=0.0, superposition_rad=1e-6))
-    assert (without == drawn(recording(steering_wheel_rad=0.0))).all()
-    assert len(changed(without, drawn(recording(steering_wheel_rad=0.0, superposition_rad=0.01)))) > 100
-
-
 def test_car_that_stands_has_no_sideslip():
     stands = {"speed_mps": 0.0, "sideslip_rad": 0.1}
     assert (drawn(recording(**stands)) == drawn(recording(**(stands | {"sideslip_rad": 1.5})))).all()
@@ -110,19 +98,6 @@ def test_channels_that_are_missing_or_not_finite_are_no_error():
     bare = Recording([Channel("x_m", "m", "", "vehicle")], [0.0], [[0.0]])
     assert drawn(bare).shape == (720, 1280, 3)
     assert drawn(recording(**dict.fromkeys(NAMES, math.nan))).shape == (720, 1280, 3)
-
-
-def test_long_title_leaves_room_for_the_time():
-    long = drawn(recording(), title="A manoeuvre " * 30)
-    times = [drawn(recording(), title="A manoeuvre " * 30, note=note) for note in ("", "speed x 0.25")]
-    assert len(changed(*times)) > 100
-    assert (long[:20, 1275:] != 100).any()
-
-
-def test_a_title_that_does_not_fit_is_written_smaller_before_it_is_cut():
-    """The longest title of the package in a slow film, in the pane of one of four cars."""
-    titles = (f"Full braking on split friction, 80 km/h, driver keeps the {end}" for end in ("line", "lane"))
-    assert len(changed(*(drawn(recording(), title=title, size=(320, 480), note="speed x 0.25") for title in titles)))
 
 
 @pytest.mark.parametrize("size", [(16, 16), (64, 480), (480, 64), (1920, 1080)])
@@ -145,29 +120,6 @@ def test_steering_wheel_turns_to_the_side_of_the_drivers_angle():
     assert left < middle - 10 < right - 20  # the mark is at the top of the wheel; left is positive
     assert low == pytest.approx(low_too, abs=4)
     assert high < low - 4
-
-
-def test_panes_of_several_runs_have_the_same_gauges():
-    short, long = (Dials(recording(rear_steer_rad=0.05), label, ORANGE) for label in ("no", "2 active rear steering"))
-    empty = np.full((480, 427, 3), 100, np.uint8)
-    columns = [Gauges([own], "", (427, 480), "", [short, long])._columns for own in (short, long)]
-    assert columns[0] == columns[1]
-    assert Gauges([short], "", (427, 480), "", [short, long]).draw(empty, 0.5).shape == empty.shape
-
-
-def test_only_the_first_pane_has_the_title_and_all_panes_have_the_same_plan():
-    dials, empty = [Dials(recording(), "no", ORANGE)], np.full((480, 427, 3), 100, np.uint8)
-    first, second = (Gauges(dials, "Step steer", (427, 480), headed=headed) for headed in (True, False))
-    shown = [gauges.draw(empty, 0.5) for gauges in (first, second)]
-    assert (shown[0][:10, :60] != 100).any()
-    assert (shown[1][:10] == 100).all()
-    assert (shown[0][100:] == shown[1][100:]).all()
-
-
-def test_a_plan_without_room_for_its_words_is_left_out():
-    small, large = (drawn(recording(), size=size) for size in ((320, 240), (640, 480)))
-    assert (small[-60:-20, -40:] == 100).all()
-    assert (large[-60:-20, -40:] != 100).any()
 
 
 def test_large_sideslip_changes_with_the_angle_and_is_left_out_at_rest():

@@ -8,10 +8,8 @@ import pytest
 
 from activesteer.errors import PlaybackError, RecordingError
 from activesteer.recording import Primitive
-from activesteer.road.course import Course, Footprint
-from activesteer.road.road import Road, RoadPatch
+from activesteer.road.course import Course
 from activesteer.video import Film, FilmedCar, RenderScene, Settings
-from activesteer.video.road import Edges
 from activesteer.video.track import Track
 from tests.raising import raises
 from tests.unit.playback.synthetic import circle
@@ -66,20 +64,6 @@ def test_shadow_turns_with_the_car_but_stays_on_the_road():
     assert shadow.xmat.reshape(3, 3)[2] == pytest.approx([0.0, 0.0, 1.0])
 
 
-def test_ghost_is_clearer_than_the_car_and_has_its_own_colour():
-    run = circle()
-    built = stage(
-        FilmedCar(run.scene, run.poses.names, "#ff0000"), FilmedCar(run.scene, run.poses.names, "#0000ff", ghost=True)
-    )
-    shells = []
-    for number in range(2):
-        body = built.model.body(f"{number}/chassis")
-        shells.append(built.model.geom_rgba[int(body.geomadr[0])])
-    assert shells[0] == pytest.approx([1.0, 0.0, 0.0, 1.0])
-    assert shells[1][:3] == pytest.approx([0.0, 0.0, 1.0])
-    assert shells[1][3] < 0.5
-
-
 def test_a_ghost_in_the_place_of_a_car_is_not_drawn():
     run = circle()
     cars = [FilmedCar(run.scene, run.poses.names), FilmedCar(run.scene, run.poses.names, ghost=True)]
@@ -120,20 +104,6 @@ def test_course_has_its_cones_and_lanes():
     assert built.ngeom - bare.ngeom == 6 + 2 + 4 + 26
 
 
-def test_slippery_ground_looks_different():
-    def colour(**road) -> np.ndarray:
-        model = stage(road=Road(**road)).model
-        texture = model.texture("road").id
-        start = model.tex_adr[texture]
-        return model.tex_data[start : start + 3 * 512 * 512].reshape(-1, 3).mean(axis=0)
-
-    assert colour(mu=0.1)[2] > colour(mu=0.9)[2] + 50
-    split = stage(road=Road(0.9, mu_right=0.3, patches=(RoadPatch(20.0, 40.0, 0.2, "left"),))).model
-    added = [split.geom_size[index] for index in range(split.ngeom) if split.geom_bodyid[index] == 0][1:]
-    assert len(added) == 2
-    assert added[1][0] == 10.0
-
-
 @pytest.mark.parametrize(
     ("more", "key"),
     [
@@ -155,24 +125,3 @@ def test_a_car_that_cannot_be_drawn_says_so():
 def test_a_course_without_end_is_drawn_as_far_as_a_picture_can_hold():
     far = {"path": {"x_m": [0.0, 1e6], "y_m": [0.0, 0.0]}, "cones": [[float(x), 0.0] for x in range(5000)]}
     assert stage(course=Course.from_table(far)).model.ngeom < 20000
-
-
-def test_open_tail_is_transparent_and_closes_again():
-    run = circle()
-    built = stage(FilmedCar(run.scene, run.poses.names, "#ff8800", size=Footprint(), tail_opens=True))
-    tail = [index for index in range(built.model.ngeom) if built.model.geom(index).name.endswith("_tail")]
-    assert tail
-    closed = built.model.geom_rgba.copy()
-    built.open_tail(0, 1.0)
-    assert (built.model.geom_rgba[tail, 3] < 0.2).all()
-    others = np.delete(np.arange(built.model.ngeom), tail)
-    assert (built.model.geom_rgba[others] == closed[others]).all()
-    built.open_tail(0, 0.0)
-    assert (built.model.geom_rgba == closed).all()
-
-
-def test_posts_stand_at_both_edges_every_50_m():
-    built = stage(edges=Edges(-10.0, 110.0, 5.0))
-    tall = [pos for pos, size in zip(built.model.geom_pos, built.model.geom_size, strict=True) if size[2] == 0.9]
-    assert {round(place[0]) for place in tall} == {0, 50, 100}
-    assert {round(place[1], 1) for place in tall} == {-5.6, 5.6}

@@ -8,7 +8,6 @@ from activesteer.core.conventions import CORNERS
 from activesteer.core.signals import Channel
 from activesteer.recording import Poses, Recording
 from activesteer.road.course import Footprint
-from activesteer.video.road import edges_beside
 from activesteer.video.track import Traces, Track
 
 SPEED_MPS = 20.0
@@ -56,18 +55,3 @@ def test_tyre_leaves_a_mark_where_it_slides_and_only_there():
     assert skids[:, 0].min() == pytest.approx(SPEED_MPS * 1.0 - 2.6, abs=1.0)
     assert skids[:, 0].max() == pytest.approx(SPEED_MPS * 3.0 - 2.6, abs=1.0)
     assert len(drawn(straight(9.0), 3.0)[1]) == 0
-
-
-def test_wheel_in_the_air_leaves_no_mark():
-    assert len(drawn(straight(1.0, load_N=0.0), 3.0)[1]) == 0
-
-
-def test_edges_hold_all_cars_and_a_circle_has_none():
-    track = np.column_stack([np.linspace(0.0, 100.0, 50), np.linspace(0.0, -8.0, 50)])
-    edges = edges_beside([track, 0.5 * track])
-    assert edges is not None
-    assert edges.half_width_m > 8.0
-    assert edges.start_m < 0.0
-    assert edges.end_m > 100.0
-    assert edges.posts_m().tolist() == [-50.0, 0.0, 50.0, 100.0, 150.0]
-    assert edges_beside([np.column_stack([np.zeros(2), (0.0, 60.0)])]) is None

@@ -35,7 +35,7 @@ def table(tmp_path) -> dict[str, Any]:
     return {"maneuvers": ["step_steer"], "controllers": ["none", f"{path}:Mine"], "overrides": short}
 
 
-@pytest.mark.parametrize("kind", ["grid", "uniform"])
+@pytest.mark.parametrize("kind", ["grid", pytest.param("uniform", marks=pytest.mark.slow)])
 def test_factor_that_changes_no_metric_is_reported(table, tmp_path, kind):
     factors = {GAIN: {kind: [0.0, 0.2]}, UNUSED: {kind: [0.0, 2.0]}}
     design = {"samples": 2, "kind": "random"} if kind == "uniform" else {}

@@ -16,8 +16,8 @@ from tests.raising import raises
 STEP = {"maneuvers": ["step_steer"], "factors": {"road.mu": {"grid": [0.8, 1.0]}}}
 
 
-LARGE = {"around_paper_setting_wide", "comparison", "match_paper", "population"}
-"""Studies of thousands of runs, each of which is checked. `no_harm` is as large; it stays among the quick tests."""
+LARGE = {"around_paper_setting", "around_paper_setting_wide", "comparison", "match_paper", "no_harm", "population"}
+"""Studies of thousands of runs, each of which is checked; `no_harm_uneven` has a part of the factors of `no_harm`."""
 STUDIES = [
     pytest.param(path, id=path.stem, marks=[pytest.mark.slow] if path.stem in LARGE else [])
     for path in sorted(studies_dir().glob("*.toml"))

@@ -35,6 +35,7 @@ from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup
 
 STEP_S, GAIN_1PS = 1e-3, 8.0
+PRESETS = (pytest.param("ideal", marks=pytest.mark.slow), "production")
 
 
 def integrator(delay_s: float = 0.0):
@@ -105,7 +106,7 @@ def test_a_delay_of_both_demands_meets_two_loops_that_do_not_know_of_each_other_
     assert delays_s == pytest.approx([math.pi / 2.0 / GAIN_1PS, math.pi / GAIN_1PS], rel=0.01)
 
 
-@pytest.mark.parametrize("preset", ["ideal", "production"])
+@pytest.mark.parametrize("preset", PRESETS)
 def test_the_bus_may_delay_both_demands_by_less_than_their_margin_in_a_run_and_no_more(preset):
     """`lqr` at 100 km/h after 1 deg of steering wheel: the margin agrees with the behaviour of the full car."""
     sensors = {"sensors.preset": preset}
@@ -119,7 +120,7 @@ def test_the_bus_may_delay_both_demands_by_less_than_their_margin_in_a_run_and_n
     assert swings_rad[0] < math.radians(0.7) < swings_rad[1]
 
 
-@pytest.mark.parametrize("preset", ["ideal", "production"])
+@pytest.mark.parametrize("preset", PRESETS)
 def test_every_loop_of_the_state_feedback_has_the_margin_that_it_was_designed_for(preset):
     found = loop_margins(["lqr"], speeds_kmh=[60.0, 160.0], overrides={"sensors.preset": preset})
     assert len(found) == 2 * 3
