@@ -99,7 +99,7 @@ def draw_pages() -> None:
             shown.goto(page.as_uri())
             if name in FROM:
                 heading = shown.locator(f"h3:has-text('{FROM[name]}')").last
-                heading.evaluate("heading => heading.scrollIntoView()")
+                heading.evaluate("heading => heading.scrollIntoView({ behavior: 'instant' })")
             shown.wait_for_timeout(500)
             pictures[name] = Image.open(io.BytesIO(shown.screenshot())).convert("RGB")
         for name, picture in pictures.items():

@@ -33,7 +33,7 @@ from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.runs import CLAIM
 from activesteer.studies.engine.study_file import read_study
-from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, driver_loops, driver_loops_picture
+from activesteer.studies.linear.driver_loop import driver_loops, driver_loops_picture
 from activesteer.theory.single_track import SingleTrack
 from activesteer.tyre import MagicFormula, load_tir
 from tools.comparison import COMPARED, compare, comparison_figure, comparison_population_figure
@@ -83,8 +83,6 @@ PANELS_OF: Final[Mapping[str, Sequence[Panel]]] = {
     ),
 }  # fmt: skip
 """What shows a manoeuvre better than the general picture: where the car goes straight or stands, that is rounding."""
-MIN_SPAN: Final = 0.1
-"""No axis of these is enlarged further than this, in its unit, so that what stays as it is looks so."""
 
 ENVELOPES: Final = ("slalom", "double_lane_change", "double_lane_change_low_mu")
 """Manoeuvres with a map of speed and line."""
@@ -126,10 +124,6 @@ def _manoeuvre(name: str) -> Figure:
         return _draw(kind, runs)
     figure = over_time.time_figure(runs, PANELS_OF[name])
     for axis in figure.get_axes():
-        low, high = axis.get_ylim()
-        if high - low < MIN_SPAN:
-            middle = 0.5 * (low + high)
-            axis.set_ylim(middle - 0.5 * MIN_SPAN, middle + 0.5 * MIN_SPAN)
         axis.ticklabel_format(useOffset=False)
     return figure
 
@@ -216,11 +210,9 @@ def _stepping() -> dict[str, Figure]:
 
 
 def _driver() -> dict[str, Figure]:
-    """The loop of the typical driver and the compact: Bode diagrams, and damping over speed."""
+    """The loop of the typical driver and the compact: Bode diagrams, a step of the path, and damping over speed."""
     loops = driver_loops()
-    rows = [loop.to_json() for loop in loops]
-    picture = driver_loops_picture(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-    return {"driver_loop": draw(picture)}
+    return {"driver_loop": draw(driver_loops_picture(loops, [loop.to_json() for loop in loops]))}
 
 
 def _rear_steer_gains() -> dict[str, Figure]:

@@ -16,6 +16,7 @@ Source: 49 CFR 571.126 (FMVSS 126), S5.2 and S7.11; UN Regulation 140.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -96,7 +97,14 @@ def steering(recording: RecordingLike) -> Steering:
 
 
 def marks(recording: RecordingLike) -> list[tuple[float, str]]:
-    """Return the times that plots over time mark, with their words: instants of the criterion, or phases that begin."""
+    """Return the times that plots over time mark, with their words.
+
+    They are instants of the criterion, phases that begin, or the beginning of braking.
+    """
+    if entry(recording, "maneuver", "brake"):
+        with suppress(RecordingError):  # a recording of another program
+            pressed = np.flatnonzero(recording["brake_pedal"] > 0.0)
+            return [(float(recording.time_s[first]), "brake") for first in pressed[:1].tolist() if first > 0]
     if entry(recording, "maneuver", "kind") != "sine_with_dwell":
         return [(event.time_s, event.what) for event in events_of(recording.metadata) if event.kind == "phase"]
     try:

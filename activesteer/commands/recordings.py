@@ -107,9 +107,13 @@ def _driver(recorded: Any) -> str:
 def _report(options: argparse.Namespace) -> None:
     from activesteer.analysis.report import open_all, write_report
 
-    if options.output.suffix.lower() not in {".html", ".htm"}:
-        raise ParameterError(f"-o {options.output}: the name of a report ends in .html")
+    _check_page(options.output)
     print(f"report: {write_report(open_all(options.files), options.output)}")
+
+
+def _check_page(file: Path) -> None:
+    if file.suffix.lower() not in {".html", ".htm"}:
+        raise ParameterError(f"-o {file}: the name of a page ends in .html")
 
 
 @command("compare", "compare measured runs with a simulated one",
@@ -144,6 +148,8 @@ def _compare(options: argparse.Namespace) -> bool:
             print(file)
         print(f"next: activesteer fit {options.new} -o {options.new}/page; then replace the lines marked with <-")
         return False
+    if options.output is not None:
+        _check_page(options.output)
     if len(options.files) == 1 and options.files[0].suffix != ".mcap":
         from activesteer.commands.studying import judge
 

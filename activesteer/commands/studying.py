@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 command: Final = arguments.Group("study")
 _SHOWN_FALLS: Final = 8
 """Number of improvements that are printed."""
-_LOCUS_KMH: Final = (40.0, 60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
+_LOCUS_KMH: Final = tuple(range(40, 170, 10))
 """Speeds of the root locus [km/h]."""
 _DRIVER_COLUMNS: Final = {
     "speed_kmh": "km/h",
@@ -35,11 +35,6 @@ _DRIVER_COLUMNS: Final = {
     "crossover_rad_s": "crossover rad/s",
 }
 """Key of a result -> head of its column."""
-_DRIVER_HEADS: Final = (
-    "controller, speed", "damping [-]", "damping after a step of the path", "damping in a run",
-    "largest difference from the run [m]", "phase margin [deg]", "crossover [rad/s]",
-)  # fmt: skip
-"""Heads of the same columns on a page."""
 _CONTROLLER_COLUMNS: Final = {
     "speed_kmh": "km/h",
     "controller": "controller",
@@ -372,7 +367,7 @@ def _modes(options: argparse.Namespace) -> None:
 
 
 def _driver_loop(options: argparse.Namespace) -> None:
-    from activesteer.studies.linear.driver_loop import FREQUENCIES_RADPS, SPEEDS_KMH, driver_loops
+    from activesteer.studies.linear.driver_loop import SPEEDS_KMH, driver_loops
 
     driver = options.driver or DEFAULT_DRIVER
     loops = driver_loops(
@@ -385,17 +380,12 @@ def _driver_loop(options: argparse.Namespace) -> None:
     rows = [loop.to_json() for loop in loops]
     title, figures = f"{driver} in {options.vehicle}", []
     if options.output is not None:
-        from activesteer.pages import Page, Section, Table, write_page
+        from activesteer.pages import write_page
         from activesteer.plotting import draw, save
-        from activesteer.studies.linear.driver_loop import conclusion, driver_loops_picture
+        from activesteer.studies.linear.driver_loop import driver_loops_picture, driver_page
 
-        picture = driver_loops_picture(rows, FREQUENCIES_RADPS, [loop.loop.response for loop in loops])
-        cells = [[f"{name}, {speed} km/h", *(f"{float(cell):#.3g}".rstrip(".") for cell in others)]
-                 for speed, name, *others in terminal.cells(rows, _DRIVER_COLUMNS)]  # fmt: skip
-        table = Table("", _DRIVER_HEADS, cells)
-        sections = [Section(tables=[table], pictures=[picture])]
-        heading = f"Loop of driver and car: {title}"
-        page = Page(f"activesteer linearise: {title}", heading, conclusion(rows), sections)
+        picture = driver_loops_picture(loops, rows)
+        page = driver_page(title, rows, picture)
         figures = [save(draw(picture), options.output / "driver.png"), write_page(page, options.output / "driver.html")]
     terminal.tell(options, rows, [title, *terminal.table_lines(rows, _DRIVER_COLUMNS)], figures)
 

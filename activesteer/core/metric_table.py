@@ -109,7 +109,7 @@ class Metric(NamedTuple):
         return -value if self.better is Better.HIGHER else value
 
 
-_WORDS: Final = {"ay": "lateral acceleration", "tb": "TB"}
+_WORDS: Final = {"ay": "lateral acceleration", "tb": "TB factor"}
 _PERCENT: Final = DisplayUnit("%", 100.0)
 
 

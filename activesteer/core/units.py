@@ -56,6 +56,7 @@ _ROWS: Final = (
     ("mm", "mm", 1e-3, (0, 1, 0, 0), "mm", ""),
     ("cm", "", 1e-2, (0, 1, 0, 0), "cm", ""),
     ("km", "", 1e3, (0, 1, 0, 0), "km", ""),
+    ("m2", "m2", 1.0, (0, 2, 0, 0), "m²", "m²"),
     ("1/m", "1pm", 1.0, (0, -1, 0, 0), "1/m", "rad/m"),
     ("m/s", "mps", 1.0, (0, 1, -1, 0), "km/h", "mps"),
     ("km/h", "kmh", 1.0 / 3.6, (0, 1, -1, 0), "km/h", "kmh,kph"),
@@ -66,6 +67,10 @@ _ROWS: Final = (
     ("ms", "", 1e-3, (0, 0, 1, 0), "ms", ""),
     ("us", "", 1e-6, (0, 0, 1, 0), "us", ""),
     ("s2", "s2", 1.0, (0, 0, 2, 0), "s²", "s²"),
+    ("m2/s3", "m2ps3", 1.0, (0, 2, -3, 0), "m²/s³", "m²/s³"),
+    ("m2/s5", "m2ps5", 1.0, (0, 2, -5, 0), "m²/s⁵", "m²/s⁵"),
+    ("rad2/s3", "rad2ps3", 1.0, (0, 0, -3, 2), "rad²/s³", "rad²/s³"),
+    ("rad s2/m", "s2radpm", 1.0, (0, -1, 2, 1), "rad s²/m", "rad s²/m"),
     ("kg", "kg", 1.0, (1, 0, 0, 0), "kg", ""),
     ("kg m2", "kgm2", 1.0, (1, 2, 0, 0), "kg m²", "kg m²"),
     ("N", "N", 1.0, (1, 1, -2, 0), "N", ""),
@@ -192,10 +197,11 @@ class Quantity(NamedTuple):
         return f"{value * self.factor:z.{self.digits}f}"
 
 
-_FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides"})
-"""Tables that only locate a parameter."""
+_FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides", "factors", "load"})
+"""Tables that only locate or sort a parameter."""
 _PARAMETER_WORDS: Final = {
     "mu": "friction coefficient", "cg": "centre of gravity", "ars": "ARS", "afs": "AFS", "lqr": "LQR", "esc": "ESC",
+    "tv": "torque vectoring",
 }  # fmt: skip
 
 
@@ -205,7 +211,7 @@ def parameter_label(key: str) -> tuple[str, str]:
     *tables, name = stem.split(".")
     within = " ".join(parameter_words(table) for table in tables if table not in _FILES)
     what = parameter_words(name)
-    return f"{within}: {what}" if within else what, _POWER.sub("²", unit.name)
+    return f"{within}: {what}" if within else what, _POWER.sub(lambda power: "²³⁴⁵"[int(power[0]) - 2], unit.name)
 
 
 def parameter_words(name: str) -> str:
@@ -219,7 +225,7 @@ def parameter_title(key: str) -> str:
     return f"{words} [{unit}]" if unit else words
 
 
-_POWER: Final = re.compile(r"(?<=[a-z])2\b")
+_POWER: Final = re.compile(r"(?<=[a-z])[2-5]\b")
 _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 

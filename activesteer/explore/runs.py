@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shlex
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,7 +25,7 @@ from activesteer.config import field_in_unit, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
 from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.core.metric_table import Better, recorded_metric
-from activesteer.core.units import parameter_label, parameter_words
+from activesteer.core.units import parameter_label, parameter_words, split_ending
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed
 from activesteer.drawing.panels import EXPLORE
@@ -94,8 +95,8 @@ def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Pa
             if (gain := _gain(key, declared)) is not None:
                 found.append(gain)
     first: dict[str, Slider] = {}
-    for slider in found:
-        first.setdefault(slider.key, slider)
+    for slider in found:  # a file may give a quantity in another unit
+        first.setdefault(split_ending(slider.key)[0], slider)
     return list(first.values())
 
 
@@ -103,8 +104,9 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
     for key, (low, high, step) in ranges.items():
         with suppress(ParameterError):  # not every manoeuvre has every key
             value = value_of(scenario, key)
-            if _is_number(value):
-                yield Slider(key, *_label(key), group, min(low, value), max(high, value), step, value)
+            # A manoeuvre that begins at rest has its speeds in its phases.
+            if _is_number(value) and not (key == "speed_kmh" and value == 0.0):
+                yield Slider(key, *parameter_label(key), group, min(low, value), max(high, value), step, value)
 
 
 def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
@@ -117,7 +119,7 @@ def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
         with suppress(ParameterError):  # such as the keys of a table that is read from another file
             value = value_of(scenario, key)
             if isinstance(value, float) and value > 0.0:
-                label, unit = _label(key)
+                label, unit = parameter_label(key)
                 high = 1.0 if not unit and value <= 1.0 else 2.0 * value
                 digits = 4 - math.floor(math.log10(high))
                 yield Slider(key, label, unit, group, 0.5 * value, high, round(high / _STEPS, digits), value)
@@ -125,12 +127,6 @@ def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _label(key: str) -> tuple[str, str]:
-    """Return label and unit of a key, without the tables that only sort it."""
-    words, unit = parameter_label(key)
-    return words.removeprefix("factors: ").removeprefix("load: "), unit
 
 
 def _gain(key: str, declared: Declared) -> Slider | None:
@@ -144,9 +140,11 @@ def _gain(key: str, declared: Declared) -> Slider | None:
     top = min(high, _TIMES * abs(value) if value else 1.0)
     bottom = max(low, 0.0 if value >= 0.0 else -top)
     digits = 4 - math.floor(math.log10(max(top - bottom, 1e-9)))
-    label, unit = _label(f"{tables}.{shown}")
-    group = parameter_words(tables.split(".")[1]) if "." in tables else _UNIT
-    label = label.removeprefix(group).removeprefix(":").strip()
+    label, unit = parameter_label(f"{tables}.{shown}")
+    table = tables.split(".")[1] if "." in tables else ""
+    # The table of a user's controller has the name of its class.
+    group = parameter_words(re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", table).lower()) if table else _UNIT
+    label = label.removeprefix(parameter_words(table)).removeprefix(":").strip()
     return Slider(
         f"{tables}.{shown}", label, unit or declared.unit, group, bottom, round(top, digits),
         round((top - bottom) / _STEPS, digits), value,

@@ -28,6 +28,8 @@ from activesteer.plotting import Area, Curve, Panel, Picture
 
 _EDGE: Final = "#9bbbd4"
 _START: Final = "#888888"
+_WIDE: Final = 3.2
+"""Width of a simulated curve, beside which a measured one that coincides with it can be seen [pt]."""
 _SAME_TIME_S: Final = 0.05e-3
 """Shifts below it are 0.0 ms."""
 
@@ -84,9 +86,10 @@ def picture(
             more = [*more, Area(found.x, shown.factor * low, shown.factor * high, label)]
         return Panel(x_label, "", curves, title, more)
 
+    simulated = line(found.simulated, "simulated, nearest point" if across else "simulated", RUN_COLOURS[2])
     overlay = [
-        line(found.simulated, "simulated, nearest point" if across else "simulated", RUN_COLOURS[2]),
-        line(found.measured, "measured" if runs == 1 else f"measured, mean of {runs}", RUN_COLOURS[1], "--"),
+        simulated._replace(width=_WIDE),
+        line(found.measured, "measured" if runs == 1 else f"measured, mean of {runs}", RUN_COLOURS[1]),
     ]
     residual = [line(found.residual)]
     if start is not None:

@@ -142,14 +142,13 @@ def _draw_curves(axis: Axes, panel: Panel) -> None:
 
 def _set_axes(axis: Axes, panel: Panel) -> None:
     if panel.log:
-        from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter  # noqa: PLC0415 - an extra
+        from matplotlib.ticker import LogLocator, NullFormatter  # noqa: PLC0415 - an extra
 
-        axis.set_xscale("log")
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.xaxis.set_major_formatter(ScalarFormatter())
-        axis.xaxis.set_minor_formatter(NullFormatter())
-        if panel.log == "xy":
-            axis.set_yscale("log")
+        axis.set(**{f"{letter}scale": "log" for letter in panel.log})
+        for of in (axis.xaxis, axis.yaxis)[: len(panel.log)]:
+            of.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            of.set_major_formatter("{x:g}")
+            of.set_minor_formatter(NullFormatter())
     if panel.names:
         axis.set_yticks(range(len(panel.names)), panel.names)
         axis.invert_yaxis()

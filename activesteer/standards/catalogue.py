@@ -20,8 +20,6 @@ class Standard:
     implemented: tuple[str, ...]  # the implemented parts, a sentence each
     left_out: tuple[str, ...]  # the parts that are not implemented, or are implemented differently
     driver: str = DEFAULT_DRIVER
-    # Whether the page lays the pictures of the controllers over each other; they must have the same panels
-    overlaid: bool = False
     name: str = ""  # its name on the command line
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +16,7 @@ from activesteer.core.files import file_word
 from activesteer.core.units import parameter_title, typeset
 from activesteer.drawing.cars import bytes_of
 from activesteer.pages import Page, Section, Table, Text, failed, passed
-from activesteer.plotting import Panel, Picture
+from activesteer.plotting import Curve, Heat, Panel, Picture
 from activesteer.scenario import FileOrTable, check_gains, check_parts, read_by, resolve
 from activesteer.standards import braking, fmvss126, iso3888_2, iso4138, iso7401, iso13674, r79_circle
 from activesteer.standards.catalogue import Standard, standard_of
@@ -113,8 +113,9 @@ def examine(
     return Examination(standard, label_of(vehicle), label_of(driver), given, found, versions(), today)
 
 
-_WIDE, _THIN = 3.6, 1.0
-"""Widths of the first and of the second curve of a controller [pt]. The two sides of a car may coincide."""
+_WIDE, _THIN, _LINE = 3.6, 1.0, 1.4
+"""Widths of the first and of the second curve of a controller, and of a single one [pt]. Both sides may coincide."""
+_SIDES: Final = 2
 _PALE: Final = 0.55
 """Share of white in the colour of the wide curve."""
 
@@ -130,13 +131,14 @@ def examination_page(result: Examination) -> Page:
     lead.append(Markup('<span class="quiet">{}</span>').format(versions))
     rows = [(name, _verdict(found), found.error or found.summary) for name, found in result.findings.items()]
     sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])]
-    together = _together(result.findings) if standard.overlaid else []
+    together = _together(result.findings)
+    if together:
+        sections.append(Section("All controllers", pictures=list(together.values())))
     for name, found in result.findings.items():
         mark = ":" if found.error or found.passed is None else ""  # none after a chip
         words = Markup("{}{} {}.").format(_verdict(found), mark, found.error or typeset(found.summary))
-        sections.append(Section(name, [words], found.tables, pictures=[] if together else found.pictures))
-    if together:
-        sections.append(Section("All controllers", pictures=together))
+        own = [picture for picture in found.pictures if picture.title not in together]
+        sections.append(Section(name, [words], found.tables, pictures=own))
     sections += [
         Section("Scope of this implementation", [standard.edition]),
         Section("Implemented", points=standard.implemented, level=3),
@@ -145,32 +147,49 @@ def examination_page(result: Examination) -> Page:
     return Page(f"{standard.name}: {result.vehicle}", standard.title, lead, sections)
 
 
-def _together(findings: Mapping[str, Findings]) -> list[Picture]:
-    """Return the pictures of several controllers laid over each other, or empty for a single one.
+def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:
+    """Return the pictures of several controllers laid over each other, by title; of a single one none.
 
-    A controller has one colour. The first curve of each panel, the turn to the left, is wide and pale, the second thin.
+    A controller has one colour. Of two curves of a panel, such as the turns to the left and to the right, the first is
+    wide and pale, the second thin. Pictures with more curves stay with their controller.
     """
     looks = run_looks(findings)
-    shown = {name: found.pictures for name, found in findings.items() if found.pictures}
-    if len(shown) < 2:
-        return []
-    pictures = []
-    for alike in zip(*shown.values(), strict=True):
-        panels = []
-        for parts in zip(*(picture.panels for picture in alike), strict=True):
-            curves = [
-                curve._replace(label=f"{name}, {curve.label}", colour=colour, dashes="-", width=width)
-                for name, panel in zip(shown, parts, strict=True)
-                for curve, colour, width in zip(
-                    panel.curves if isinstance(panel, Panel) else (),
-                    (_pale(looks[name].colour), looks[name].colour),
-                    (_WIDE, _THIN),
-                    strict=False,
-                )
-            ]
-            panels.append(parts[0]._replace(curves=curves))
-        pictures.append(alike[0]._replace(panels=panels))
-    return pictures
+    shown = {name: {picture.title: picture for picture in found.pictures} for name, found in findings.items()}
+    shown = {name: pictures for name, pictures in shown.items() if pictures}
+    first = next(iter(shown.values()), {})
+    found = {}
+    for title in first if len(shown) > 1 else ():
+        alike = [pictures[title] for pictures in shown.values() if title in pictures]
+        rows = list(zip(*(picture.panels for picture in alike), strict=False))
+        if len(alike) < len(shown) or not all(map(_overlays, rows)):
+            continue
+        panels = [
+            parts[0]._replace(curves=[curve for name, panel in zip(shown, parts, strict=True)
+                                      for curve in _in_one_colour(panel, name, looks[name].colour)])
+            for parts in rows
+        ]  # fmt: skip
+        found[title] = first[title]._replace(panels=panels)
+    return found
+
+
+def _overlays(parts: Sequence[Panel | Heat]) -> bool:
+    """Return whether panels of several controllers can be told apart in one."""
+    return all(
+        isinstance(panel, Panel)
+        and len(panel.curves) <= _SIDES
+        and panel.names == parts[0].names
+        and all(curve.shade is None for curve in panel.curves)
+        and len({curve.dashes == "" for curve in panel.curves}) <= 1  # points beside lines, such as cones
+        for panel in parts
+        if isinstance(parts[0], Panel)
+    )
+
+
+def _in_one_colour(panel: Panel, name: str, colour: str) -> Iterator[Curve]:
+    looks = ((colour, _LINE),) if len(panel.curves) == 1 else ((_pale(colour), _WIDE), (colour, _THIN))
+    for curve, (own, width) in zip(panel.curves, looks, strict=False):
+        label = f"{name}, {curve.label}" if curve.label else name
+        yield curve._replace(label=label, colour=own, dashes=curve.dashes and "-", width=width)
 
 
 def _pale(colour: str) -> str:

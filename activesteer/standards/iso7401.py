@@ -82,8 +82,8 @@ def examine(runner: StandardRunner) -> Findings:
     bandwidth_Hz = sweep.metric("yaw_rate_bandwidth_Hz")
     summary = (
         f"step of {STEP_MPS2:g} m/s²: yaw rate response time {left.metric('yaw_rate_response_time_s'):.3f} s, "
-        f"overshoot {100.0 * left.metric('yaw_rate_overshoot'):.1f} %, TB {math.degrees(left.metric('tb_srad')):.2f} "
-        "s deg; yaw rate bandwidth "
+        f"overshoot {100.0 * left.metric('yaw_rate_overshoot'):.1f} %, "
+        f"TB factor {math.degrees(left.metric('tb_srad')):.2f} s deg; yaw rate bandwidth "
         + (f"above {HIGHEST_Hz:g} Hz" if math.isnan(bandwidth_Hz) else f"{bandwidth_Hz:.2f} Hz")
         + "".join(
             f"; coherence below {COHERENCE:g}: {_NAMES[name]}, {kind}, {words}"

@@ -113,7 +113,7 @@ def test_what_was_fitted_is_printed_and_drives_the_car(call, truth, tmp_path):
     )
     told = call("fit", "fit.toml", "-o", "found", "--jobs", "1")
     assert told.status == 0
-    assert re.search(r"factors: tyre cornering +\d.\d+ ± \d", told.out)
+    assert re.search(r"tyre cornering stiffness, +\d.\d+ ± \d", told.out)
     assert "the remaining difference is" in told.out
     driven = call("run", "a.mcap", "--overrides", "found/overrides.toml", "--set", "settle_s=0.5", "-o", "b.mcap")
     assert driven.status == 0
@@ -140,3 +140,9 @@ def test_an_import_that_fails_while_writing_leaves_the_old_recording(call, tmp_p
     assert "cannot write run.mcap: No space left on device" in told.err
     assert (tmp_path / "run.mcap").read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.csv", "run.mcap"]
+
+
+def test_a_page_has_the_name_of_a_page(call):
+    told = call("compare", "a.mcap", "b.mcap", "-o", "cmp")
+    assert told.status == 1
+    assert "-o cmp: the name of a page ends in .html" in told.err

@@ -146,7 +146,14 @@ def test_both_tabs_have_their_parts_in_sight(browser: Browser, served: tuple[str
     assert view["top"] == pytest.approx(gauges["bottom"], abs=1.0)
     end = page.evaluate(BOX, "touch")["top"] if phone else stage["bottom"]
     assert view["bottom"] == pytest.approx(end, abs=2.0)
-    assert page.evaluate(BOX, "waiting")["bottom"] < stage["top"] + 0.5 * stage["height"]  # the car is free
+    # The car and the gates are free.
+    assert page.evaluate(BOX, "start")["bottom"] < view["top"] + 0.3 * view["height"]
+    hint = page.locator(".thumbs" if phone else ".keys").bounding_box()
+    assert hint
+    if phone:
+        assert hint["y"] > view["top"] + 0.75 * view["height"]
+    else:
+        assert hint["y"] + hint["height"] < view["top"] + 0.3 * view["height"]
     assert page.locator("#touch-throttle").is_visible() == page.locator(".thumbs").is_visible() == phone
     assert problems == []
     page.close()
@@ -174,6 +181,27 @@ def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, serv
     recording = activesteer.Recording.open(served[1] / file)
     assert recording["y_m"][-1] > 1.0
     assert recording["speed_mps"].max() > 65.0 / 3.6
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
+def test_the_ghost_of_the_last_drive_drives_along(browser: Browser, served: tuple[str, Path]) -> None:
+    page, problems = opened(browser, served[0], viewport={"width": 600, "height": 500})
+    page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
+    page.click("#tab-drive")
+    # A drive with another control cannot be compared.
+    for control, cars in (("none", ["you"]), ("none", ["you", "ghost"]), ("ars", ["you"])):
+        page.select_option("#drive-controller", control)
+        page.click("#start", timeout=LIMIT_MS)
+        page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
+        page.wait_for_timeout(1500)
+        assert page.evaluate("[...activesteerDrive.scene.cars.keys()]") == cars
+        page.click("#end")
+        page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
+    xs = page.evaluate("[...activesteerDrive.ghosts.values()][0].frames.map((frame) => frame.poses[0])")
+    assert page.evaluate("activesteerDrive.ghosts.size") == 2
+    assert xs[-1] - xs[0] > 10.0
     assert problems == []
     page.close()
 

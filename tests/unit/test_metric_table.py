@@ -17,7 +17,7 @@ from tests.raising import raises
     [
         ("yaw_rate_peak_radps", "yaw rate peak", "deg/s", 180.0 / math.pi),
         ("roll_peak_rad", "roll peak", "deg", 180.0 / math.pi),
-        ("tb_srad", "TB", "s deg", 180.0 / math.pi),
+        ("tb_srad", "TB factor", "s deg", 180.0 / math.pi),
         ("ay_steady_state_mps2", "lateral acceleration steady state", "m/s²", 1.0),
         ("speed_end_mps", "speed end", "km/h", 3.6),
         ("yaw_rate_response_time_s", "yaw rate response time", "s", 1.0),

@@ -47,7 +47,7 @@ def test_values_are_written_with_the_digits_of_their_quantity(channel, value, te
         ("maneuver.speed_kmh", "speed [km/h]"),
         ("road.mu", "road: friction coefficient"),
         ("vehicle.controllers.ars.corrector.deadband_end_degps", "ARS corrector: deadband end [deg/s]"),
-        ("load.cg_height_change_m", "load: centre of gravity height change [m]"),
+        ("load.cg_height_change_m", "centre of gravity height change [m]"),
         ("sensors.preset", "sensors: preset"),
         ("steer.lateral_acceleration_mps2", "steer: lateral acceleration [m/s²]"),
         ("controllers.ars.corrector.derivative_gain_s2", "ARS corrector: derivative gain [s²]"),

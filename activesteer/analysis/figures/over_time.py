@@ -187,9 +187,18 @@ def fill_panels(axes: Sequence[Axes], drawn: Sequence[DrawnRun], panels: Sequenc
             label = curve.look.label if row == 0 else ""
             draw_panel(axis, curve, panel, label)
         plain(axis, panel.quantity.axis_title)
+        keep_span(axis, panel.quantity)
     finish_time(axes, drawn)
     for axis, panel in zip(axes, panels, strict=True):
         show_lost_beside(axis, drawn, panel)
+
+
+def keep_span(axis: Axes, shown: Quantity) -> None:
+    """Keep a nearly constant signal flat, so that its rounding is not seen."""
+    low, high = axis.get_ylim()
+    if high - low < shown.min_span:
+        middle = 0.5 * (low + high)
+        axis.set_ylim(middle - 0.5 * shown.min_span, middle + 0.5 * shown.min_span)
 
 
 def finish_time(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:

@@ -51,13 +51,22 @@ export class Curves {
     }
   }
 
+  // Mark an instant on all curves, which share their cursor.
+  at(time) {
+    const plot = this.plots.values().next().value?.plot;
+    if (!plot) return;
+    this.marking = true;
+    plot.setCursor({ left: plot.valToPos(time, "x"), top: 1 }, true, true);
+    this.marking = false;
+  }
+
   panel(title, panel, lines, data) {
     const key = JSON.stringify(lines);
     let shown = this.plots.get(title);
     if (shown && shown.key === key) { shown.plot.setData(data); return; }
     if (!shown) {
       const values = element("span", { class: "quiet" }), holder = element("div", { role: "img", "aria-label": `${title} over time` });
-      const figure = element("div", {}, element("p", {}, element("b", {}, title), ` ${[panel.unit, panel.note].filter(Boolean).join(", ")} `, values), holder);
+      const figure = element("div", {}, element("p", {}, element("b", {}, title), element("span", { class: "unit" }, [panel.unit, panel.note].filter(Boolean).join(", ")), values), holder);
       this.box.append(figure);
       shown = { figure, holder, values };
       this.plots.set(title, shown);
@@ -72,8 +81,8 @@ export class Curves {
       series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
       hooks: { setCursor: [(u) => {
         const i = u.cursor.idx;
-        shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost || line.dotted ? [] : [element("span", { style: `color:${runColour(line.place)}` }, `${number(u.data[k + 1][i])} `)]))]));
-        if (i != null && u.cursor.event) this.pointed(u.data[0][i]);
+        shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost || line.dotted ? [] : [element("span", { style: `border-bottom: 2px solid ${runColour(line.place)}` }, number(u.data[k + 1][i])), " "]))]));
+        if (i != null && u.cursor.event && !this.marking) this.pointed(u.data[0][i]);
       }] },
     }, data, shown.holder);
   }

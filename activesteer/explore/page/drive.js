@@ -18,7 +18,7 @@ export class Drive {
     this.number = this.asked = 0;
     this.sent = new Map();
     this.last = "";
-    this.ghosts = new Map(); // course -> {frames, lap_s} of the last drive, preferably of a complete one
+    this.ghosts = new Map(); // setting -> {frames, lap_s} of the last drive, preferably of a complete one
     this.touch = { steer: 0, throttle: 0, brake: 0 };
     $("course").replaceChildren(...Object.entries(courses).map(([name, { title }]) => option(name, title)));
     $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
@@ -76,6 +76,8 @@ export class Drive {
     else this.end();
   }
 
+  settings() { return JSON.stringify([...["course", "drive-vehicle", "drive-controller", "drive-mu"].map((id) => $(id).value), this.start_kmh]); }
+
   // Speed and friction of the course, until they are moved.
   ofCourse() {
     const course = courses[$("course").value];
@@ -105,13 +107,14 @@ export class Drive {
   begin(header, arrays) {
     if (header.id !== this.asked) return;
     this.ready = true;
-    this.course = $("course").value;
+    // Only drives of the same course with the same car, control, speed and friction can be compared.
+    this.setting = this.settings();
     this.timed = header.cones.length > 0 || header.radius_m > 0;
     this.way = header.radius_m > 0 ? "Last lap" : "First to last gate";
     this.scene.setShape(header.shape, arrays);
     this.scene.car("you", 2);
     this.scene.setCourse(header.cones, header.lanes, header.radius_m);
-    this.ghost = this.ghosts.get(this.course);
+    this.ghost = this.ghosts.get(this.setting);
     if (this.ghost) this.scene.car("ghost", 0, 0.35);
     this.frames = [];
     this.struck = this.passed = 0;
@@ -186,7 +189,7 @@ export class Drive {
     scene.place("you", poses);
     if (this.ghost) scene.place("ghost", this.running ? this.before(time_s) : poses);
     const dt = this.previous ? time_s - this.previous.time_s : 0;
-    scene.follow("you", dt || 1, dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [1, 0]);
+    scene.follow(["you"], dt || 1, dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [1, 0]);
     this.previous = { time_s, x: poses[0], y: poses[1] };
     this.gauges(header);
     if (!this.running) return;
@@ -236,15 +239,16 @@ export class Drive {
     this.sent.clear();
     this.last = "";
     $("end").hidden = true;
-    const before = this.ghosts.get(this.course)?.lap_s, lap = this.lap_s;
+    const same = this.settings() === this.setting, before = same ? this.ghost?.lap_s : null, lap = this.lap_s;
     $("drive-speed").value = this.start_kmh; // the pedals have moved it
     this.values();
-    if (this.frames.length && (lap || !before)) this.ghosts.set(this.course, { frames: this.frames, lap_s: lap });
+    if (same && this.frames.length && (lap || !before)) this.ghosts.set(this.setting, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
+    const cones = this.scene.cones.length ? ` ${["No cone", "1 cone"][this.struck] ?? `${this.struck} cones`} hit.` : "";
     const timed = lap ? ` ${this.way}: ${number(lap, 2)} s${faster}.` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
     const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
-    $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${latency} Saved as ${header.file} in ${header.folder}.`;
+    $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${cones}${latency} Saved as ${header.file} in ${header.folder}.`;
     if (this.shown && this.ready) this.prepare();
     if (header.error) this.say(header.error);
   }

@@ -7,6 +7,7 @@ import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
 const $ = (id) => document.getElementById(id);
+const TOLD_MS = 100; // time between two readings of the curves while they play
 const FIRST = { maneuver: "sine_with_dwell", vehicle: "compact", driver: "typical", controllers: ["none", "ars", "afs"] };
 
 export function say(text) {
@@ -15,7 +16,7 @@ export function say(text) {
 }
 
 const narrow = matchMedia("(max-width: 760px)").matches;
-const curves = new Curves($("curves"), (time) => { player.show(time); player.pause(); });
+const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); });
 const track = new Track($("track"));
 const scene = new Scene($("view"));
 const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0 };
@@ -214,13 +215,15 @@ function showGroup() {
   }
 }
 
+// Units whose values have many digits -> factor and unit in which a slider shows them.
+const BIGGER = { Pa: [1e-6, "MPa"], "N/m": [1e-3, "kN/m"] };
 const wayOf = (event) => ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 })[event.key];
 
 function sliderOf(slider) {
-  const digits = Math.max(0, -Math.floor(Math.log10(slider.step)));
   const shown = element("output", {}), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": `${slider.group}: ${slider.label}`, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
   const box = element("div", { class: "slider" }, element("span", {}, slider.label), shown, input);
-  const write = () => { shown.textContent = `${number(+input.value, digits)} ${slider.unit}`; box.classList.toggle("changed", slider.key in state.values); };
+  const [factor, unit] = BIGGER[slider.unit] ?? [1, slider.unit], digits = Math.max(0, -Math.floor(Math.log10(slider.step * factor)));
+  const write = () => { shown.textContent = `${number(+input.value * factor, digits)} ${unit}`; box.classList.toggle("changed", slider.key in state.values); };
   const moved = (dragging) => {
     const value = Math.min(slider.high, Math.max(slider.low, slider.low + Math.round((input.value - slider.low) / slider.step) * slider.step));
     if (Math.abs(value - slider.value) < 1e-9) delete state.values[slider.key];
@@ -247,30 +250,32 @@ function sliderOf(slider) {
 
 // Time on the pictures: it plays, or follows the slider or the pointer on a curve.
 const player = {
-  time: 0, end: 1, playing: true, last: null,
+  time: 0, end: 1, playing: true, last: null, told: 0,
   length() {
     this.end = Math.max(...[...state.runs.values()].filter((run) => run.plots).map((run) => run.plots.step_s * (run.plots.samples - 1)), 0.1);
     $("time").max = this.end;
     this.show(Math.min(this.time, this.end));
   },
-  show(time) {
+  show(time, pointed = false) {
     const dt = Math.abs(time - this.time);
     if (time < this.time) scene.heading = null;
     this.time = time;
     $("time").value = time;
     $("clock").textContent = `${number(time, 2)} s`;
     track.at(time);
-    let first = true;
+    const now = performance.now();
+    if (!pointed && (!this.playing || now - this.told > TOLD_MS)) { this.told = now; curves.at(time); }
+    const names = [], velocity = [0, 0];
     for (const run of state.runs.values()) {
       if (!run.poses || !scene.cars.has(run.name)) continue;
       const size = 7 * scene.shape.bodies.length, rows = run.poses.length / size, exact = Math.min(time / run.pose_step_s, rows - 1), row = Math.floor(exact);
       scene.place(run.name, run.poses, row, exact - row);
       scene.trail(run.name, run.poses, row + 1);
-      if (!first) continue;
-      first = false;
       const a = Math.max(0, row - 1) * size, b = Math.min(row + 1, rows - 1) * size, s = Math.max((b - a) / size, 1) * run.pose_step_s;
-      scene.follow(run.name, dt || 10, [(run.poses[b] - run.poses[a]) / s, (run.poses[b + 1] - run.poses[a + 1]) / s]);
+      names.push(run.name);
+      for (const k of [0, 1]) velocity[k] += (run.poses[b + k] - run.poses[a + k]) / s;
     }
+    scene.follow(names, dt || 10, velocity);
   },
   pause() { this.playing = false; $("play").textContent = "Play"; },
   tick(now) {

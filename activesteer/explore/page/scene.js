@@ -3,6 +3,7 @@ import * as THREE from "./three.module.min.js";
 import { onTheme, paint, runColour } from "./look.js";
 
 const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, TURN_S = 0.35, SLOW_MPS = 1;
+const SPREAD_BACK = 2, SPREAD_UP = 0.7; // Way of the camera backwards and upwards for each metre between the cars and their middle.
 const BEHIND = 1e5; // Depth by which a car is drawn behind the one before it, so that the first is whole where they overlap; about 2 m.
 const SLOW_MS = 50, LEAST_RATIO = 0.5;
 const TRAIL_APART_M = 0.4, TRAIL_POINTS = 1500, ROAD_M = 1200, TILE_M = 10;
@@ -231,17 +232,20 @@ export class Scene {
     cone.position.z = 0.12;
   }
 
-  // Follow the velocity of a car, not its heading: a car that slides then turns in the picture.
-  follow(name, dt, velocity) {
-    const car = this.cars.get(name);
-    if (!car) return;
-    const at = car.bodies[0].position, speed = Math.hypot(...velocity);
+  // Follow the velocity of cars, not their heading: a car that slides then turns in the picture. All of them stay in it.
+  follow(names, dt, velocity) {
+    const places = names.map((name) => this.cars.get(name)?.bodies[0].position).filter(Boolean);
+    if (!places.length) return;
+    const middle = (key) => (Math.min(...places.map((place) => place[key])) + Math.max(...places.map((place) => place[key]))) / 2;
+    const at = { x: middle("x"), y: middle("y") }, spread = Math.max(...places.map(({ x, y }) => Math.hypot(x - at.x, y - at.y)));
+    const speed = Math.hypot(...velocity);
     const wanted = speed > SLOW_MPS ? Math.atan2(velocity[1], velocity[0]) : this.heading ?? 0;
     if (this.heading == null) this.heading = wanted;
     const turn = Math.atan2(Math.sin(wanted - this.heading), Math.cos(wanted - this.heading));
     this.heading += turn * (1 - Math.exp(-dt / TURN_S));
     const cos = Math.cos(this.heading), sin = Math.sin(this.heading);
-    this.camera.position.set(at.x - 1.3 - CAMERA_BACK * cos, at.y - CAMERA_BACK * sin, CAMERA_UP);
+    const back = CAMERA_BACK + SPREAD_BACK * spread;
+    this.camera.position.set(at.x - 1.3 - back * cos, at.y - back * sin, CAMERA_UP + SPREAD_UP * spread);
     this.camera.lookAt(at.x + AHEAD * cos, at.y + AHEAD * sin, 0.6);
     this.ground.position.set(TILE_M * Math.round(at.x / TILE_M), TILE_M * Math.round(at.y / TILE_M), -0.02);
     this.stale = true;

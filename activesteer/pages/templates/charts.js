@@ -2,7 +2,7 @@
 "use strict";
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 // Colours of the stylesheet, light or dark; read again when the scheme changes.
-const PAINTS = ["quiet", "grid", "lane", "cone", "struck", "path", "failed", "ink", "link", ...Array.from({ length: 6 }, (_, i) => `run-${i}`)];
+const PAINTS = ["paper", "quiet", "grid", "lane", "cone", "struck", "path", "failed", "ink", "link", ...Array.from({ length: 6 }, (_, i) => `run-${i}`)];
 const paint = {};
 const mix = () => { const style = getComputedStyle(document.documentElement); for (const name of PAINTS) paint[name] = style.getPropertyValue(`--${name}`).trim(); };
 mix();
@@ -23,6 +23,11 @@ const element = (name, attributes = {}, ...children) => {
 };
 // Axis labels with a real minus sign and without rounding errors.
 const labels = (unit) => (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit));
+// Distance between labels that leaves room for the longest one [px].
+const labelRoom = (_, __, low, high, width) => {
+  const step = (60 * (high - low)) / width, digits = Math.max(0, Math.min(9, Math.ceil(-Math.log10(step))));
+  return 22 + 7 * Math.max(...[low, high].map((end) => `${+end.toFixed(digits)}`.length));
+};
 const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
 // A number with a real minus sign, and none before zero.
 const shown = (number) => {
@@ -118,7 +123,7 @@ class Chart {
     const named = panel.title ? [element("b", {}, panel.title), element("span", { class: "quiet" }, panel.y)] : [element("b", {}, panel.y)];
     this.holder = element("div", { role: "img", "aria-label": `${panel.title} ${panel.y} over ${panel.x}` });
     const below = element("p", { class: "abscissa quiet" }, panel.x + (panel.above ? `; above: ${panel.above.label}` : ""));
-    box.append(element("figure", { class: `plot${panel.names.length || picture.panels.length === 1 && !panel.equal ? " wide" : ""}` }, element("figcaption", {}, ...named, this.values), this.holder, below));
+    box.append(element("figure", { class: `plot${picture.panels.length === 1 && !panel.equal ? " wide" : ""}` }, element("figcaption", {}, ...named, this.values), this.holder, below));
     this.limits = { x: this.ends("x"), y: this.ends("y") };
     this.make();
     drawn.push(this);
@@ -138,13 +143,14 @@ class Chart {
     let low = Infinity, high = -Infinity;
     for (const value of all) if (value != null && (!logged || value > 0)) { low = Math.min(low, value); high = Math.max(high, value); }
     if (!(low <= high)) [low, high] = [0, 1];
-    const room = logged || key === "x" && this.panel.zero ? 0 : 0.05 * (high - low) || 0.1 * Math.abs(high) || 1;
+    if (logged) { const room = key === "y" ? (high / low) ** 0.06 : 1; return [given[0] ?? low / room, given[1] ?? high * room]; }
+    const room = key === "x" && this.panel.zero ? 0 : 0.05 * (high - low) || 0.1 * Math.abs(high) || 1;
     return [given[0] ?? low - room, given[1] ?? high + room];
   }
 
   make() {
     const { panel } = this, log = (key) => (panel.log.includes(key) ? { distr: 3 } : {});
-    const plain = axis(26), side = { ...axis(52), size: (u, ticks) => Math.max(34, 12 + 7 * Math.max(0, ...(ticks || []).map((tick) => `${tick}`.length))) };
+    const plain = { ...axis(26), space: labelRoom }, side = { ...axis(52), size: (u, ticks) => Math.max(34, 12 + 7 * Math.max(0, ...(ticks || []).map((tick) => `${tick}`.length))) };
     // Names stand above their rows, where there is room for them at any width.
     if (panel.names.length) Object.assign(side, { size: 8, values: () => [], splits: () => panel.names.map((_, i) => i) });
     for (const [axis, levels, room] of [[plain, panel.x_levels, 60], [side, panel.y_levels, 14]]) {
@@ -155,7 +161,9 @@ class Chart {
     // uPlot names powers of ten only; a short axis needs more.
     for (const [key, axis] of [["x", plain], ["y", side]]) {
       const [low, high] = this.limits[key];
-      if (panel.log.includes(key) && high / low < 300) axis.filter = (_, ticks) => ticks.map((tick) => (/^[125]e/.test((+tick.toPrecision(6)).toExponential()) ? tick : null));
+      const named = high / low < 12 ? /^[123457]e/ : /^[125]e/;
+      if (panel.log.includes(key)) delete axis.space;
+      if (panel.log.includes(key) && high / low < 300) axis.filter = (_, ticks) => ticks.map((tick) => (named.test((+tick.toPrecision(6)).toExponential()) ? tick : null));
     }
     const axes = [plain, side];
     if (panel.above) axes.push({ ...axis(26), side: 0, scale: "x", grid: { show: false }, values: (_, ticks) => labels("")(_, ticks.map((tick) => +between(tick, panel.above.first, panel.above.second).toPrecision(2))) });
@@ -239,7 +247,9 @@ class Chart {
     for (const [x, y, text, colour] of panel.notes) { ctx.fillStyle = colour || paint.ink; ctx.fillText(text, px(x), py(y) + 3 * dpr); }
     ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
-    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 6 * dpr, bbox.width - 8 * dpr));
+    // Lines that cross a name leave it legible.
+    ctx.strokeStyle = paint.paper; ctx.lineWidth = 4 * dpr; ctx.setLineDash([]);
+    for (const ink of ["strokeText", "fillText"]) panel.names.forEach((name, i) => ctx[ink](name, bbox.left + 4 * dpr, py(i) - 6 * dpr, bbox.width - 8 * dpr));
     ctx.restore();
   }
 
@@ -280,6 +290,7 @@ class Player {
     this.playing = on;
     this.button.textContent = on ? "Pause" : "Play";
     if (!on) return;
+    this.reveal?.();
     this.held = true;
     let exact = +this.slider.value < this.last ? +this.slider.value : 0, before = null;
     const step = (now) => {
@@ -358,7 +369,32 @@ function addPlayer(charts) {
     player.tell(i);
     for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
   });
+  // What moves is in sight, also where tables stand before the curves.
+  const inSight = ({ top, height }) => top + height / 2 > 0 && top + height / 2 < innerHeight;
+  player.reveal = () => { if (!timed.some(({ holder }) => inSight(holder.getBoundingClientRect()))) timed[0].holder.scrollIntoView({ block: "center" }); };
   timed[0].holder.closest("section").before(player.row);
+}
+
+// Links to the sections of a long page. They stay in sight and mark the section that is read.
+const LEAST_SECTIONS = 3;
+let reading = null;
+function addContents() {
+  document.querySelector(".jump")?.remove();
+  reading?.disconnect();
+  const sections = [...document.querySelectorAll("main section:has(> h2)")];
+  if (sections.length < LEAST_SECTIONS) return;
+  sections.forEach((section, i) => { section.id ||= `part-${i + 1}`; });
+  const links = sections.map((section) => element("a", { href: `#${section.id}` }, section.querySelector("h2").textContent));
+  const bar = element("nav", { class: "jump", "aria-label": "Contents" }, element("a", { href: "#contents" }, "Contents"), ...links);
+  document.querySelector("#contents").after(bar);
+  reading = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) {
+      const link = links[sections.indexOf(target)];
+      link.setAttribute("aria-current", isIntersecting);
+      if (isIntersecting) bar.scrollTo({ left: link.offsetLeft - bar.offsetLeft - 40 });
+    }
+  }, { rootMargin: "-15% 0px -84% 0px" });
+  for (const section of sections) reading.observe(section);
 }
 
 const repaintAll = () => { mix(); for (const each of drawn) each.repaint(); };
@@ -375,3 +411,4 @@ addEventListener("afterprint", () => { document.documentElement.classList.remove
 if (NARROW.matches) for (const details of document.querySelectorAll("details.rows")) details.open = false;
 const DATA = JSON.parse(document.getElementById("data")?.textContent ?? "{}");
 addPlayer((DATA.pictures ?? []).flatMap((picture, place) => drawPicture(document.querySelector(`.plots[data-picture="${place}"]`), picture, place)));
+addContents();

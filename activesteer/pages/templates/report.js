@@ -329,9 +329,4 @@
   }
 
   drawn.push(...DATA.groups.map((data) => new Group(data)));
-  // The contents mark the manoeuvre that is read.
-  const seen = new IntersectionObserver((entries) => {
-    for (const { target, isIntersecting } of entries) document.querySelector(`.jump a[href="#${target.id}"]`)?.setAttribute("aria-current", isIntersecting);
-  }, { rootMargin: "-15% 0px -84% 0px" });
-  for (const section of document.querySelectorAll("section[id]")) seen.observe(section);
 })();

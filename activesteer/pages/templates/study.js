@@ -1,7 +1,8 @@
 "use strict";
 // The page of a study: tables, and panels by `charts.js`, of the chosen manoeuvre and metric.
-const body = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
-const SHOWN_RUNS = 600, FIELDS = 8;
+const all = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
+const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.42;
+let body = all;
 const PANEL = { x: "", y: "", title: "", curves: [], areas: [], limits: [], names: [], notes: [], log: "", x_range: null, y_range: null, zero: false, equal: false, legend: null, above: null };
 const panelOf = (x, y, parts) => ({ ...PANEL, x, y, ...parts });
 const colourOf = (controller) => `run-${DATA.places[controller]}`;
@@ -12,7 +13,7 @@ const number = (value) => (value == null ? "-" : short(value));
 const endsOf = (values) => { let low = Infinity, high = -Infinity; for (const v of values) if (v != null) { low = Math.min(low, v); high = Math.max(high, v); } return [low, high]; };
 const constantIn = (low, high) => !(high - low > 1e-3 * Math.max(Math.abs(low), Math.abs(high)));
 
-function begin(title, ...texts) { body.append(element("h2", {}, title), ...texts.filter(Boolean).map((text) => element("p", {}, text))); }
+function begin(title, ...texts) { body = all.appendChild(element("section", { class: "part" })); body.append(element("h2", {}, title), ...texts.filter(Boolean).map((text) => element("p", {}, text))); }
 
 function show(id, panels, scale = null) {
   const box = body.appendChild(element("div", { class: "plots", "data-picture": id }));
@@ -35,12 +36,14 @@ const placeOf = (factor, value) => (value == null || factor.numeric ? value : fa
 // The factors that vary in some rows; others belong to other manoeuvres.
 const varied = (rows) => DATA.factors.filter(({ key }) => rows.some((i) => DATA.rows.factors[key][i] != null));
 
+// Points of controllers stand side by side where the levels of a factor would put them on one line.
 function scatter(factor, label, rows, valueOf) {
+  const beside = (c) => (factor.numeric ? 0 : APART * (c - (DATA.controllers.length - 1) / 2));
   const curves = DATA.controllers.map((_, c) => {
     const own = rows.filter((i) => DATA.rows.controller[i] === c && valueOf(i) != null && DATA.rows.factors[factor.key][i] != null);
-    return curveOf(c, own.map((i) => placeOf(factor, DATA.rows.factors[factor.key][i])), own.map(valueOf), { alpha: 0.6, told: own.map((i) => `${short(valueOf(i))} (run ${DATA.rows.run[i]})`) });
+    return curveOf(c, own.map((i) => placeOf(factor, DATA.rows.factors[factor.key][i]) + beside(c)), own.map(valueOf), { alpha: 0.6, told: own.map((i) => `${short(valueOf(i))} (run ${DATA.rows.run[i]})`) });
   });
-  return panelOf(axisOf(factor), label, { curves: curves.filter((curve) => curve.x.length), x_levels: factor.numeric ? null : factor.levels });
+  return panelOf(axisOf(factor), label, { title: factor.label, curves: curves.filter((curve) => curve.x.length), x_levels: factor.numeric ? null : factor.levels });
 }
 
 // The mean in fields of the first two numeric factors, for designs without grids.
@@ -102,30 +105,35 @@ function sensitivity(metric, found) {
   show("indices", [panelOf(label, "", { curves, names, row_px, y_range: [null, names.length - 1 + (9 / row_px) * (lines + 1)] })]);
 }
 
-// Every run as a line through its factors and the metric, each between its least and its greatest value.
+// Every run as a line through its factors and the metric, each between its least and its greatest value, in the colour
+// of its metric. Controllers drive the same samples, so each has a panel. The lines stop above each name.
 function parallel(metric, rows) {
   const values = DATA.rows.metrics[metric.name];
   const axes = [...varied(rows).map((factor) => ({ factor, of: (i) => placeOf(factor, DATA.rows.factors[factor.key][i]) })), { factor: { ...metric, numeric: true }, of: (i) => values[i] }]
     .map((axis) => ({ ...axis, ends: axis.factor.numeric ? endsOf(rows.map(axis.of)) : [0, axis.factor.levels.length - 1] }));
   const names = axes.map(({ factor, ends }) => `${axisOf(factor)}: ${factor.numeric ? ends.map(number).join(" to ") : factor.levels.join(", ")}`);
   const along = ({ of, ends: [low, high] }, i) => (of(i) == null ? null : high > low ? (of(i) - low) / (high - low) : 0.5);
-  const every = Math.ceil(rows.length / SHOWN_RUNS), all = rows.filter((_, place) => place % every === 0);
-  const curves = DATA.controllers.map((_, c) => {
-    const own = all.filter((i) => DATA.rows.controller[i] === c);
-    return curveOf(c, own.flatMap((i) => [...axes.map((axis) => along(axis, i)), null]), own.flatMap(() => [...axes.keys(), null]), { dashes: [], marker: "", alpha: 0.35 });
+  const every = Math.ceil(rows.length / SHOWN_RUNS), drawnRows = rows.filter((i, place) => place % every === 0 && values[i] != null);
+  const shadeOf = (i) => Math.round(SHADES * along(axes.at(-1), i)) / SHADES, shades = [...new Set(drawnRows.map(shadeOf))].sort((a, b) => a - b);
+  const panels = DATA.controllers.map((title, c) => {
+    const curves = shades.map((shade) => {
+      const own = drawnRows.filter((i) => DATA.rows.controller[i] === c && shadeOf(i) === shade);
+      const x = own.flatMap((i) => axes.flatMap((axis) => [along(axis, i), null, along(axis, i)]).slice(2).concat(null));
+      return curveOf(c, x, own.flatMap(() => [...axes.keys()].flatMap((row) => [row - NAME_ROOM, null, row]).slice(2).concat(null)), { label: "", shade, dashes: [], marker: "", alpha: 0.7 });
+    });
+    return panelOf("", "", { title, curves, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], y_range: [-NAME_ROOM, names.length - 0.85], row_px: 80 });
   });
-  show("parallel", [panelOf("", "", { curves, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], row_px: 64 })]);
+  show("parallel", panels, [`${axisOf(metric)}:`, ...axes.at(-1).ends]);
 }
 
 // Numbers are aligned to the right, and a long table can be folded, as on every page.
 const NUMBER = /^[+−]?\d[\d.]*(e[+-]?\d+)?$|^-$/;
-function tableOf(header, lines) {
+function tableOf(header, lines, folded = lines.length > 15 && NARROW.matches) {
   const sides = header.map((_, i) => (i && lines.every((line) => NUMBER.test(line[i])) ? "number" : ""));
   const rows = lines.map((line) => element("tr", {}, ...line.map((cell, i) => element(i ? "td" : "th", { class: sides[i], "data-title": header[i] }, cell))));
   const head = element("tr", {}, ...header.map((text, i) => element("th", { class: sides[i] }, text)));
   const box = element("div", { class: "scrolling", tabindex: 0 }, element("table", { class: "findings cards" }, element("thead", {}, head), element("tbody", {}, ...rows)));
-  const many = lines.length > 15;
-  body.append(many ? element("details", NARROW.matches ? { class: "rows" } : { class: "rows", open: "" }, element("summary", {}, `${lines.length} rows`), box) : box);
+  body.append(folded ? element("details", { class: "rows" }, element("summary", {}, `${lines.length} rows`), box) : box);
 }
 
 function replayLine(command) {
@@ -144,7 +152,12 @@ function replayLine(command) {
 
 function drawAll() {
   for (const chart of drawn.splice(0)) chart.plot.destroy();
-  body.replaceChildren();
+  all.replaceChildren();
+  drawGroup();
+  addContents();
+}
+
+function drawGroup() {
   const group = Number(chosenGroup.value), metric = DATA.metrics.find((each) => each.name === chosenMetric.value);
   const found = DATA.by_group[group][metric.name];
   begin("Distribution", found ? "" : "No run of this manoeuvre has this metric.");
@@ -158,10 +171,10 @@ function drawAll() {
   if (found.paired.some((pair) => pair)) {
     const base = new Map(rows.filter((i) => DATA.rows.controller[i] === 0).map((i) => [DATA.rows.sample[i], values[i]]));
     const pairs = rows.filter((i) => DATA.rows.controller[i] > 0 && values[i] != null && base.get(DATA.rows.sample[i]) != null);
-    begin("Difference from the first controller in the same sample");
+    begin(`Difference from ${first}`, "Both drive the same sample.");
     tableOf([`difference from ${first}`, ...quantiles, "smaller in magnitude [%]"],
       found.paired.map((pair, n) => [DATA.controllers[n + 1], ...(pair ? [...pair.quantiles.map(number), short(100 * pair.smaller)] : ["-", "-", "-", "-"])]));
-    show("paired", varied(pairs).map((factor) => scatter(factor, `difference from ${first}: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]))));
+    show("paired", varied(pairs).map((factor) => scatter(factor, `difference: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]))));
   }
   const map = found.heat || binned(rows, values);
   if (map) { begin("Mean over two factors"); heat(metric, map); }
@@ -173,15 +186,17 @@ function drawAll() {
   parallel(metric, rows);
   begin("Largest and smallest magnitudes");
   tableOf(["controller", "run", axisOf(metric), "command to drive and replay it"],
-    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), replayLine(command)])));
+    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), replayLine(command)])), true);
   const constant = [], others = [];
   for (const other of DATA.metrics) {
     if (!DATA.by_group[group][other.name]) continue;
-    const all = rows.map((i) => DATA.rows.metrics[other.name][i]).filter((value) => value != null);
-    if (constantIn(...endsOf(all))) constant.push(`${other.label} ${all.length ? short(all[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
+    const known = rows.map((i) => DATA.rows.metrics[other.name][i]).filter((value) => value != null);
+    if (constantIn(...endsOf(known))) constant.push(`${other.label} ${known.length ? short(known[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
     else others.push({ ...histogram(other, DATA.by_group[group][other.name].histogram), title: other.label });
   }
   begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
+  body = body.appendChild(element("details", { class: "rows" }, element("summary", {}, `${others.length} metrics`)));
+  body.open = !NARROW.matches;
   show("all", others);
 }
 
@@ -195,7 +210,7 @@ function choose() {
 }
 
 document.querySelector("#study > .drawn").replaceChildren(
-  element("p", { class: "choices" }, element("label", {}, "manoeuvre, vehicle ", chosenGroup), element("label", {}, "metric ", chosenMetric)), body);
+  element("p", { class: "choices" }, element("label", {}, "manoeuvre, vehicle ", chosenGroup), element("label", {}, "metric ", chosenMetric)), all);
 DATA.groups.forEach((text, place) => chosenGroup.append(element("option", { value: place }, text)));
 for (const metric of DATA.metrics) chosenMetric.append(element("option", { value: metric.name }, metric.label));
 if (DATA.metrics.length) {

@@ -29,7 +29,7 @@ from activesteer.core.conventions import DEFAULT_TIMESTEP_S, RUN_COLOURS, Array,
 from activesteer.driver import DriverParameters
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
 from activesteer.errors import DriverError, StudyError
-from activesteer.pages import Text, failed, passed
+from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.scenario import FileOrTable, check_gains, resolve
@@ -316,6 +316,9 @@ def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
         ("damping", "damping ratio of the linear loop", "", LEAST_DAMPING, 2, " at 80 and 100 km/h"),
         ("damping_in_run", "damping ratio in a run", "", LEAST_DAMPING, 2, " at 80 and 100 km/h"),
     ):
+        if key == "damping_in_run" and all(row[key] == 1.0 for row in rows):
+            found.append(passed("After a small step of the path, every run reaches the path without crossing it."))
+            continue
         judged = [row for row in rows if math.isfinite(row[key])]
         if not judged:
             continue
@@ -327,43 +330,82 @@ def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
     return found
 
 
-def driver_loops_picture(
-    rows: Sequence[Mapping[str, Any]],
-    frequency_radps: NDArray[np.float64],
-    responses: Sequence[NDArray[np.complexfloating]],
-) -> Picture:
-    """Return Bode diagrams of the open loop of driver and car at the middle speed, and its damping over speed."""
+_HEADS: Final = {
+    "damping": "damping [-]",
+    "damping_in_step": "damping after a step of the path [-]",
+    "damping_in_run": "damping in a run [-]",
+    "step_difference_m": "largest difference from the run [m]",
+    "phase_margin_deg": "phase margin [deg]",
+    "crossover_rad_s": "crossover [rad/s]",
+}
+"""Key of a result -> head of its column on a page."""
+_FROM_RUNS: Final = ("damping_in_step", "damping_in_run")
+
+
+def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture) -> Page:
+    """Return the page of a loop. Columns in which nothing oscillates are left out."""
+    heads = {key: head for key, head in _HEADS.items() if key not in _FROM_RUNS or any(row[key] < 1.0 for row in rows)}
+    cells = [
+        [
+            f"{row['controller']}, {row['speed_kmh']:.3g} km/h",
+            *(
+                "\N{EN DASH}" if key in _FROM_RUNS and row[key] == 1.0 else f"{row[key]:#.3g}".rstrip(".")
+                for key in heads
+            ),
+        ]
+        for row in rows
+    ]
+    note = "\N{EN DASH}: the car reaches the path without crossing it." if set(heads) & set(_FROM_RUNS) else ""
+    sections = [
+        Section(pictures=[picture]),
+        Section("Numbers", tables=[Table("", ["loop", *heads.values()], cells, note=note)]),
+    ]
+    return Page(f"activesteer linearise: {title}", f"Loop of driver and car: {title}", conclusion(rows), sections)
+
+
+def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[str, Any]]) -> Picture:
+    """Return Bode diagrams and a step of the path at the middle speed, and the damping over speed."""
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))
-    gain = [Curve([frequency_radps[0], 20.0], [1.0, 1.0], "", RUN_COLOURS[0], "-", 0.6)]
-    phase = [Curve([frequency_radps[0], 20.0], [-180.0, -180.0], "", RUN_COLOURS[0], "-", 0.6)]
-    damping = []
+    x_range = (FREQUENCIES_RADPS[0], 20.0)
+    gain, phase = ([Curve(x_range, [level] * 2, "", RUN_COLOURS[0], "-", 0.6)] for level in (1.0, -180.0))
+    damping, step = [], []
     for place, (controller, look) in enumerate(run_looks(controllers).items()):
         own = [row for row in rows if row["controller"] == controller]
-        shown, response = next(
-            (row, response)
-            for row, response in zip(rows, responses, strict=True)
+        shown, loop = next(
+            (row, loop)
+            for row, loop in zip(rows, loops, strict=True)
             if (row["controller"], row["speed_kmh"]) == (controller, middle)
         )
+        response = loop.loop.response
         crossover_radps, margin_deg = shown["crossover_rad_s"], shown["phase_margin_deg"]
         label = f"{controller}: {crossover_radps:.1f} rad/s, margin {margin_deg:.0f} deg"
         angle = np.degrees(np.unwrap(np.angle(response)))
         angle -= 360.0 * round((angle[0] + 180.0) / 360.0)
-        for curves, values, text, low, high in (
-            (gain, np.abs(response), label, 0.05, 50.0), (phase, angle, "", -360.0, -90.0),
-        ):  # fmt: skip
-            curves.append(Curve(frequency_radps, values, text, look.colour, "-", 1.5))
+        for curves, values, low, high in ((gain, np.abs(response), 0.05, 50.0), (phase, angle, -360.0, -90.0)):
+            curves.append(Curve(FREQUENCIES_RADPS, values, label, look.colour, "-", 1.5))
             curves.append(Curve([crossover_radps, crossover_radps], [low, high], "", look.colour, ":", 0.8))
-        speed_kmh = [row["speed_kmh"] for row in own]
-        in_runs, size = [row["damping_in_run"] for row in own], max(3.0, 9.0 - 3.0 * place)
-        damping.append(Curve(speed_kmh, [row["damping"] for row in own], "", look.colour, "-", 1.5))
-        damping.append(Curve(speed_kmh, in_runs, "", look.colour, "", marker="o", size=size))
+        step.append(Curve(loop.run.time_s, loop.run["y_m"], label, look.colour, "-", 1.5))
+        step.append(Curve(*loop.loop.step(), "", look.colour, ":", 1.2))
+        damping.append(
+            Curve([row["speed_kmh"] for row in own], [row["damping"] for row in own], label, look.colour, "-", 1.5)
+        )
+        # A run that does not cross the path does not oscillate and has no dot. Dots at one place lie in each other.
+        swings = [(row["speed_kmh"], row["damping_in_run"]) for row in own if row["damping_in_run"] < 1.0]
+        if swings:
+            (x, y), size = zip(*swings, strict=True), max(3.0, 9.0 - 3.0 * place)
+            damping.append(Curve(x, y, "", look.colour, "", marker="o", size=size))
     lowest = min(0.0, *(row["damping_in_run"] for row in rows))
-    x_range = (frequency_radps[0], 20.0)
+    dots = "; dots: runs" if any(curve.marker for curve in damping) else ""
+    below, after = "frequency [rad/s]", "after a step of the path [s]"
     panels = [
-        Panel("", f"gain at {middle:.0f} km/h [-]", gain, log="xy", x_range=x_range, y_range=(0.05, 50.0)),
-        Panel("frequency [rad/s]", "phase [deg]", phase, log="x", x_range=x_range, y_range=(-360.0, -90.0)),
-        Panel("speed [km/h]", "damping [-]\nlines linear, dots runs", damping, y_range=(lowest, 1.1)),
-    ]
-    return Picture("", panels, columns=1, width_in=7.5, height_in=8.0)
+        Panel(below, f"gain at {middle:.0f} km/h [-]", gain, log="xy", x_range=x_range, y_range=(0.05, 50.0)),
+        Panel(below, "phase [deg]", phase, log="x", x_range=x_range, y_range=(-360.0, -90.0)),
+        Panel(after, f"lateral position at {middle:.0f} km/h [m],\ndotted: linear loop", step),
+        Panel(
+            "speed [km/h]", f"damping of the linear loop [-],\ndashed: least asked{dots}", damping,
+            y_range=(lowest, 1.1), limits=[(LEAST_DAMPING, "least damping asked")], legend=None,
+        ),
+    ]  # fmt: skip
+    return Picture("", panels, columns=2, width_in=9.0, height_in=7.0)

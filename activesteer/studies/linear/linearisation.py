@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
@@ -376,9 +377,13 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
     rows = [[cell.replace("+-", "\N{PLUS-MINUS SIGN}") for cell in row] for row in _mode_rows(modes, CUT_OFF_HZ)]
     table = Table("", _MODE_COLUMNS, rows)
     sections = [
-        Section("Modes", tables=[table]),
         Section("From the steering wheel to the motion", pictures=[bode._replace(title="")]),
-        Section("Poles over speed", ["Rays are damping ratios, arcs natural frequencies."], pictures=[locus]),
+        Section(
+            "Poles over speed",
+            ["Dots are poles. Grey lines join them by speed. Rays are damping ratios, arcs natural frequencies."],
+            pictures=[locus],
+        ),
+        Section("Modes", tables=[table]),
     ]
     return Page(f"activesteer linearise: {title}", f"Linear car: {title}", _conclusion(modes), sections)
 
@@ -408,6 +413,8 @@ LOCUS_LIMIT_Hz: Final = 4.5
 DAMPING_RAYS: Final = (0.2, 0.4, 0.6, 0.8)
 """Damping ratios drawn as rays into a root locus."""
 
+_LONGEST_STEP_1PS: Final = 12.0
+"""Longest way of a pole from one speed to the next [1/s]."""
 _GREY: Final = "#cccccc"
 _GAIN_UNITS: Final = {
     "yaw_rate_radps": "1/s", "ay_mps2": "m/s² per rad", "roll_rad": "rad/rad", "sideslip_rad": "rad/rad",
@@ -431,7 +438,7 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
 
 
 def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequence[float]) -> Picture:
-    """Return the poles of a car over its speed, with rays of equal damping."""
+    """Return the named poles of a car over its speed, with rays of equal damping. The systems are in modal form."""
     limit, angle = 2.0 * math.pi * LOCUS_LIMIT_Hz, np.linspace(math.pi / 2.0, math.pi, 60)
     curves, notes = [], []
     for frequency_Hz in range(1, math.ceil(LOCUS_LIMIT_Hz)):
@@ -443,13 +450,57 @@ def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequen
         curves.append(Curve([0.0, x], [0.0, y], "", _GREY, "-", 0.7))
         notes.append((x, y, f"{damping:g}"))
     slowest, fastest = 3.6 * min(speeds_mps), 3.6 * max(speeds_mps)
-    for system, speed_mps in zip(systems, speeds_mps, strict=True):
-        poles = np.array(system.poles(), dtype=np.complex128)
-        poles = poles[(poles.imag >= -1e-9) & (np.abs(poles) <= limit)]
+    found = [[pole for pole in _named_poles(system) if abs(pole[1]) <= limit] for system in systems]
+    branches = _branches(found)
+    curves += [Curve(np.real(poles), np.imag(poles), "", "#888888", "-", 0.8) for _, poles in branches]
+    notes += [(poles[-1].real, poles[-1].imag, name) for name, poles in branches]
+    for named, speed_mps in zip(found, speeds_mps, strict=True):
+        poles = np.array([pole for _, pole in named], dtype=np.complex128)
         shade = (3.6 * speed_mps - slowest) / max(fastest - slowest, 1e-9)
         curves.append(Curve(poles.real, poles.imag, dashes="", marker="o", size=3.5, shade=shade))
     panel = Panel(
-        "real part [1/s]", "imaginary part [1/s]", curves, notes=notes, y_range=(-1.0, 1.05 * limit), equal=True
+        "real part [1/s]",
+        "imaginary part [1/s]",
+        curves,
+        notes=notes,
+        x_range=(-1.2 * limit, 0.1 * limit),
+        y_range=(-0.1 * limit, 1.05 * limit),
+        equal=True,
     )
     scale = ("speed [km/h]", slowest, fastest)
     return Picture("", [panel], width_in=7.5, height_in=5.5, scale=scale)
+
+
+def _named_poles(system: control.StateSpace) -> Iterator[tuple[str, complex]]:
+    """Yield the name of each mode and its pole, of a conjugate pair the upper one."""
+    a = np.asarray(system.A)
+    for row, name in enumerate(system.state_labels):
+        if not name.endswith("_im"):
+            imaginary = abs(a[row, row + 1]) if name.endswith("_re") else 0.0
+            words = re.sub(r"(_parallel|_opposite)?(_\d+)?(_re)?$", "", name).replace("_", " ")
+            yield words.replace("yaw sideslip", "yaw/sideslip"), complex(a[row, row], imaginary)
+
+
+def _branches(found: Sequence[Sequence[tuple[str, complex]]]) -> list[tuple[str, list[complex]]]:
+    """Return paths of poles from one speed to the next, each with the commonest name that no longer path has."""
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - slow to import
+
+    paths: list[list[tuple[str, complex]]] = []
+    ends: list[list[tuple[str, complex]]] = []
+    for named in found:
+        apart = np.array([[abs(pole - path[-1][1]) for _, pole in named] for path in ends]).reshape(
+            len(ends), len(named)
+        )
+        paired = zip(*linear_sum_assignment(apart), strict=True)
+        before = {int(pole): ends[path] for path, pole in paired if apart[path, pole] < _LONGEST_STEP_1PS}
+        ends = [before.get(place, []) for place in range(len(named))]
+        for path, pole in zip(ends, named, strict=True):
+            if not path:
+                paths.append(path)
+            path.append(pole)
+    branches: dict[str, list[complex]] = {}
+    for path in sorted(paths, key=len, reverse=True):
+        names = [name for name, _ in Counter(name for name, _ in path).most_common()]
+        name = next((name for name in names if name not in branches), names[0])
+        branches.setdefault(name, [pole for _, pole in path])
+    return list(branches.items())

@@ -414,7 +414,8 @@ def _table(loops: Sequence[LoopMargins]) -> Table:
     for each in loops:
         margins = each.margins
         values = (margins.gain_dB, math.degrees(margins.phase_rad), 1e3 * margins.delay_s, margins.disk)
-        numbers = [f"{value:.3g}" if math.isfinite(value) else "none" for value in values]
+        numbers = [f"{value:.{digits}f}" if math.isfinite(value) else "none"
+                   for value, digits in zip(values, (1, 1, 1, 2), strict=True)]  # fmt: skip
         changed = ", ".join(f"{key} = {value}" for key, value in each.factors.items())
         rows.append([f"{_name(each)}, {each.speed_kmh:g} km/h", *numbers, changed][: len(heads)])
     outside = frozenset(number for number, each in enumerate(loops) if each.margins.disk < ASKED_DISK)

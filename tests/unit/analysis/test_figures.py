@@ -251,6 +251,24 @@ def test_phases_have_borders_and_names():
     assert texts == ["straight", "turn", "brake"]
 
 
+def test_the_beginning_of_braking_has_a_border():
+    run = step_steer()
+    run.metadata["maneuver"]["brake"] = {"pedal": 0.4}
+    run.channels["brake_pedal"] = np.where(run.time_s >= 2.0, 0.4, 0.0)
+    axis = over_time.time_figure({"none": run}).get_axes()[0]
+    (border,) = [line for line in axis.get_lines() if np.ptp(np.asarray(line.get_xdata())) == 0.0]
+    assert float(np.asarray(border.get_xdata())[0]) == pytest.approx(2.0, abs=0.011)
+    assert [text.get_text() for text in axis.texts] == ["brake"]
+
+
+def test_rounding_noise_does_not_fill_a_panel():
+    run = step_steer()
+    run.channels["roll_rad"] = 1e-14 * np.sin(50.0 * run.time_s)
+    (roll,) = [axis for axis in over_time.time_figure({"none": run}).get_axes() if "roll" in axis.get_ylabel()]
+    low, high = roll.get_ylim()
+    assert high - low == pytest.approx(over_time.PANELS["roll"].quantity.min_span)
+
+
 def test_another_friction_on_the_way_is_shaded_and_named():
     run = step_steer()
     for corner in ("fl", "fr", "rl", "rr"):

@@ -20,9 +20,9 @@ Object.assign(globalThis, {
 export const sent = [];
 export let hear;
 export class Socket { constructor(heard) { hear = heard; } send(message) { sent.push(structuredClone(message)); } }
-export class Curves { show() {} }
+export class Curves { show() {} at() {} }
 export class Track { show() {} at() {} }
-export class Scene { cars = new Map(); setShape() {} draw() {} }
+export class Scene { cars = new Map(); setShape() {} draw() {} follow() {} }
 export class Drive { offer() {} going() {} failed() {} draw() {} show() {} }
 export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4;
 export const element = (name, attributes = {}, ...children) => {

@@ -82,9 +82,10 @@ def test_a_controller_beyond_the_limit_is_unticked_and_named(
 
 
 def test_numbers_are_whole_where_they_count_and_zero_has_no_sign(tmp_path: Path) -> None:
-    values = "[[0, 0], [-0.04, 1], [-0.06, 1], [2.5], [-123.45], [null]]"
+    values = "[[0, 0], [-0.04, 1], [-0.06, 1], [2.5], [-123.45], [null], [7000000, 0], [1234.5, 1]]"
     texts = script(tmp_path, f"console.log(JSON.stringify({values}.map(([value, digits]) => number(value, digits))));")
-    assert texts == ["0", "0.0", "\N{MINUS SIGN}0.1", "2.50", "\N{MINUS SIGN}123.5", "\N{EN DASH}"]
+    assert texts == ["0", "0.0", "\N{MINUS SIGN}0.1", "2.50", "\N{MINUS SIGN}123.5", "\N{EN DASH}",
+                     "7\N{NARROW NO-BREAK SPACE}000\N{NARROW NO-BREAK SPACE}000", "1234.5"]  # fmt: skip
 
 
 def test_the_page_drives_the_newest_value_once_the_runs_in_progress_are_shown(tmp_path: Path) -> None:

@@ -13,7 +13,9 @@ import activesteer
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Describe, RunRequest
 from activesteer.explore.runs import Runs
+from activesteer.resources import find_maneuver
 
+OWN = (Path(__file__).parents[3] / "examples" / "own_controller.py").read_text("utf-8")
 CHOICE: dict[str, Any] = {"maneuver": "step_steer", "controllers": ("none", "ars")}
 
 
@@ -79,3 +81,18 @@ def test_a_count_has_no_decimals_and_groups_of_gains_are_named_in_words(tmp_path
     # The heading of the group is not repeated in each label.
     assert sliders["controllers.ars.corrector.proportional_gain_s"]["label"] == "corrector: proportional gain"
     assert sliders["controllers.ars.prediction_gain"]["label"] == "prediction gain"
+
+
+def test_a_quantity_has_one_slider_and_a_standing_start_none(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text(find_maneuver("step_steer").read_text("utf-8"))
+    (tmp_path / "damper.py").write_text(OWN)
+    runs = Runs(Folder(tmp_path))
+    choice = Describe(maneuver="own.toml", controllers=("damper.py:YawDamper",))
+    sliders = {slider["key"]: slider for slider in runs.describe(choice).header["sliders"]}
+    assert [key for key in sliders if "lateral_acceleration" in key and key.startswith("steer")] == [
+        "steer.lateral_acceleration_mps2"
+    ]
+    assert sliders["controllers.YawDamper.gain_s"]["group"] == "yaw damper"
+    assert sliders["controllers.YawDamper.gain_s"]["label"] == "gain"
+    standing = runs.describe(Describe(maneuver="start_stop", controllers=("none",))).header["sliders"]
+    assert "speed_kmh" not in {slider["key"] for slider in standing}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
+from dataclasses import replace
 
 from activesteer.pages import Table, render_page
 from activesteer.plotting import Curve, Panel, Picture
@@ -51,11 +52,28 @@ def test_overlaid_controllers_share_their_pictures_and_sides_differ_in_width():
         return Findings({}, "", (), [Picture("Circle", [Panel("x", "y", curves)])])
 
     found = {"none": findings(1.0), "ars": findings(2.0)}
-    (picture,) = _together(found)
+    (picture,) = _together(found).values()
     (panel,) = picture.panels
     assert isinstance(panel, Panel)
     assert [curve.label for curve in panel.curves] == ["none, left", "none, right", "ars, left", "ars, right"]
     assert len({curve.colour for curve in panel.curves}) == 4
     wide, thin = (panel.curves[place::2] for place in (0, 1))
     assert min(curve.width for curve in wide) > 2.0 * max(curve.width for curve in thin)
-    assert _together({"none": findings(1.0)}) == []
+    assert _together({"none": findings(1.0)}) == {}
+
+
+def test_a_picture_whose_curves_could_not_be_told_apart_stays_with_its_controller():
+    line = Curve([0.0, 1.0], [0.0, 1.0])
+    single, many = Picture("One", [Panel("x", "y", [line])]), Picture("Many", [Panel("x", "y", [line] * 3)])
+    cones = Picture("Cones", [Panel("x", "y", [line, line._replace(dashes="", marker="o")])])
+    found = {name: Findings({}, "", (), [single, many, cones]) for name in ("none", "ars")}
+    together = _together(found)
+    assert list(together) == ["One"]
+    (panel,) = together["One"].panels
+    assert isinstance(panel, Panel)
+    assert [curve.label for curve in panel.curves] == ["none", "ars"]
+    example = examination("word")
+    page = examination_page(replace(example, findings=found))
+    assert [[picture.title for picture in section.pictures] for section in page.sections[:4]] == [
+        [], ["One"], ["Many", "Cones"], ["Many", "Cones"]
+    ]  # fmt: skip

@@ -166,6 +166,7 @@ const element = (name, attributes = {}, ...children) => ({
 const document = { querySelector() { return element("div"); } };
 const NARROW = { matches: false };
 const short = (value) => String(+value.toPrecision(3));
+const addContents = () => {};
 const drawPicture = (box, picture, id) => { pictures[id] = picture; };
 """
 """What the script of the page finds in a browser; `drawPicture` keeps what it is given."""
@@ -178,7 +179,8 @@ def drawn(data, folder, metric="yaw_rate_peak_radps"):
         pytest.skip("node is not installed: apt-get install nodejs")
     draws = (resources.files("activesteer.pages") / "templates" / "study.js").read_text("utf-8").partition("\n")[2]
     choice = f'chosenMetric.value = {json.dumps(metric)}; chosenGroup.value = "0"; delete pictures.heat; drawAll();'
-    paragraphs = 'body.children.filter(({ name }) => name === "p").flatMap(({ children }) => children)'
+    parts = "all.children.flatMap(({ children }) => children)"
+    paragraphs = f'{parts}.filter(({{ name }}) => name === "p").flatMap(({{ children }}) => children)'
     told = f"console.log(JSON.stringify([pictures, {paragraphs}]));"
     (folder / "page.js").write_text("\n".join((f"const DATA = {json.dumps(data)};", FAKE, draws, choice, told)))
     done = subprocess.run([node, folder / "page.js"], capture_output=True, text=True, timeout=60, check=True)
@@ -199,9 +201,11 @@ def test_a_metric_is_drawn_over_each_factor_by_value_or_by_level(page, tmp_path)
         assert peak_degps == pytest.approx(np.degrees(row["yaw_rate_peak_radps"]), rel=1e-4)
         assert f"run {row['run']}" in told
     assert [curve["label"] for curve in pictures["paired"]["panels"][1]["curves"]] == data["controllers"][1:]
-    assert [name.partition(":")[0] for name in pictures["parallel"]["panels"][0]["names"]][
-        -1
-    ] == "yaw rate peak [deg/s]"
+    assert [round(curve["x"][0] - words["curves"][0]["x"][0], 2) for curve in words["curves"]] == [0.0, 0.16, 0.32]
+    parallel = pictures["parallel"]["panels"]
+    assert [panel["title"] for panel in parallel] == data["controllers"]
+    assert parallel[0]["names"][-1].partition(":")[0] == "yaw rate peak [deg/s]"
+    assert parallel[0]["y_range"][0] < 0.0, "the first name has room above its axis"
 
 
 def test_a_heat_map_has_a_scale_of_its_colours_unless_all_fields_are_the_same(page, tmp_path):

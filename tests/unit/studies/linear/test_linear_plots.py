@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import control
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from markupsafe import Markup
 
 from activesteer.analysis.figures import figure_2
 from activesteer.pages import render_page
-from activesteer.plotting import draw
+from activesteer.plotting import Panel, draw
 from activesteer.studies.linear.driver_loop import conclusion
 from activesteer.studies.linear.linearisation import bode_picture, modes_page, root_locus_picture
 from activesteer.vehicle.linear_state import Mode
@@ -19,11 +21,16 @@ OUTPUTS = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 
 
 def system(speed_mps: float = 20.0) -> control.StateSpace:
-    """A synthetic oscillator whose damping falls with speed; all outputs are its position."""
-    a = np.array([[0.0, 1.0], [-81.0, -200.0 / speed_mps]])
+    """A synthetic oscillator in modal form, whose damping falls with speed."""
+    real, turn = -100.0 / speed_mps, 81.0 - (100.0 / speed_mps) ** 2
+    if turn < 0.0:  # two real poles
+        poles = real + math.sqrt(-turn), real - math.sqrt(-turn)
+        a, names = np.diag(poles), ["roll", "roll_2"]
+    else:
+        a, names = np.array([[real, -math.sqrt(turn)], [math.sqrt(turn), real]]), ["roll_re", "roll_im"]
     return control.StateSpace(
         a, [[0.0], [81.0]], np.tile([1.0, 0.0], (4, 1)), np.zeros((4, 1)),
-        inputs=["steering_wheel_rad"], outputs=list(OUTPUTS),
+        inputs=["steering_wheel_rad"], outputs=list(OUTPUTS), states=names,
     )  # fmt: skip
 
 
@@ -47,8 +54,18 @@ def test_root_locus_has_the_poles_of_every_speed():
         for pole in system(speed).poles():
             if pole.imag > 0 and speed > 10.0:
                 assert np.abs(shown - pole).min() < 1e-9
+    assert "roll" in [text.get_text() for text in axes[0].texts]
     low, high = axes[1].get_ylim()
     assert (low, high) == pytest.approx((36.0, 144.0))
+
+
+def test_poles_are_joined_to_the_nearest_ones_of_the_next_speed():
+    speeds = [20.0, 25.0, 40.0]
+    panel = root_locus_picture([system(speed) for speed in speeds], speeds).panels[0]
+    assert isinstance(panel, Panel)
+    (path,) = [curve for curve in panel.curves if curve.colour == "#888888"]
+    expected = [complex(max(system(speed).poles(), key=np.imag)) for speed in speeds]
+    assert np.asarray(path.x) + 1j * np.asarray(path.y) == pytest.approx(expected)
 
 
 def test_page_has_a_row_for_each_mode_and_all_panels():
@@ -59,7 +76,7 @@ def test_page_has_a_row_for_each_mode_and_all_panels():
     ]
     pictures = bode_picture("a", system()), root_locus_picture([system()], [20.0])
     page = modes_page("car", modes, *pictures)
-    assert page.sections[0].tables[0].rows == [
+    assert page.sections[-1].tables[0].rows == [
         ["yaw/sideslip", "0.80", "0.60", "-3.00 \N{PLUS-MINUS SIGN} 4.00i", "yaw 99%"]
     ]
     assert render_page(page).count('class="plots"') == 2
@@ -84,6 +101,8 @@ def test_the_loop_of_the_driver_is_judged_by_what_is_asked():
     assert margin == f"{least}; the typical driver must reach 30 deg."
     assert "\N{CHECK MARK} 0.40" in linear
     assert "\N{BALLOT X} 0.24 with afs" in in_run
+    *_, in_run = conclusion([row | {"damping_in_run": 1.0} for row in rows])
+    assert "every run reaches the path without crossing it" in in_run
 
 
 def test_figure_2_draws_a_model_only_where_it_has_the_channel(figures, tmp_path):
