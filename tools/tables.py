@@ -205,13 +205,14 @@ that read the files.
 
 
 def keys_page() -> str:
-    """The keys_page as it should be."""
+    """Return the page as it should be."""
     common = {field.name for field in dataclasses.fields(Maneuver)}
     parts = [_KEYS_HEAD, "## All kinds\n", *_key_table(Maneuver)]
     for kind, cls in KINDS.items():
         first = (inspect.getdoc(cls) or "").splitlines()[0]
         parts += [f"\n## {kind}\n", f"{first}\n", *_key_table(cls, without=common)]
-    return "\n".join(parts) + "\n"
+    page = "\n".join(parts) + "\n"
+    return page.replace("[m/s2]", "[m/s²]").replace("[m3]", "[m³]")
 
 
 def _key_table(cls: type, without: set[str] | None = None) -> list[str]:
