@@ -37,6 +37,7 @@ _KEPT: Final = 4
 """Compiled states kept per function: enough for some branches and versions used in turn."""
 _IMPORT: Final = re.compile(r"^\s*(?:from\s+([\w.]+)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+([\w.]+))", re.MULTILINE)
 _LOGGER: Final = logging.getLogger("activesteer")
+_PACKAGE: Final = Path(__file__).parents[1]
 
 
 def _import_array_functions() -> None:
@@ -220,7 +221,7 @@ def _sources_key(source: Path) -> str:
             left.extend(_imported(file, package))
     digest = hashlib.sha256()
     for file in sorted(found):
-        digest.update(f"\n{file.relative_to(package)}\n".encode())
+        digest.update(f"\n{file.relative_to(package if file.is_relative_to(package) else _PACKAGE)}\n".encode())
         digest.update(_content(file))
     return digest.hexdigest()
 
@@ -258,9 +259,11 @@ def _imported(file: Path, package: Path) -> tuple[Path, ...]:
 def _imports(text: str, package: Path) -> Iterator[Path]:
     for origin, names, whole in _IMPORT.findall(text):
         parts = (origin or whole).split(".")
-        if parts[0] != package.name:
+        # Code outside this package, such as a user's, contains the functions that it imports from it.
+        root = next((root for root in (package, _PACKAGE) if root.name == parts[0]), None)
+        if root is None:
             continue
-        place = package.joinpath(*parts[1:])
+        place = root.joinpath(*parts[1:])
         for name in re.findall(r"(\w+)(?:\s+as\s+\w+)?", names) or [""]:
             # A name is a module of its own, or something in the module that it is imported from.
             module = (place / f"{name}.py", place / name / "__init__.py")

@@ -132,6 +132,17 @@ def test_a_table_beside_a_source_counts(tmp_path: Path) -> None:
     assert len({*keys}) == 3
 
 
+def test_what_a_users_code_imports_from_the_package_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its compiled functions contain the package's own; old ones read the memory of new ones at wrong places."""
+    source, edited = tmp_path / "own.py", _PACKAGE / "tyre" / "kernels" / "slip.py"
+    source.write_text("from activesteer.tyre.kernels.slip import cornering_stiffness\n")
+    before, content = compilation.content_key(source), compilation._content
+    compilation._sources_key.cache_clear()
+    monkeypatch.setattr(compilation, "_content", lambda file: content(file) + b"#" * (file == edited))
+    assert compilation.content_key(source) != before
+    compilation._sources_key.cache_clear()
+
+
 def test_without_a_folder_that_can_be_written_it_runs_and_says_so_once(package: Path, tmp_path: Path) -> None:
     for folder in (package, package / "inner"):
         (folder / "__pycache__").write_text("")
