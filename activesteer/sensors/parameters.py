@@ -66,7 +66,7 @@ class WheelSpeedSensor(RateSensor):
 
     With teeth, the sensor counts the edges of a pulse wheel that pass between two samples and measures their time. If
     no edge passes, the reading is at most the speed that the time since the last edge allows. The sign of rotation is
-    known.
+    known, and an edge that passes again in the other direction is no tooth.
     """
 
     teeth: Annotated[int, Range(0, 1000)] | None = None
