@@ -80,15 +80,17 @@ _LEAST_SLIP_RAD: Final = math.radians(0.3)
 """Slip angle of an axle below which its stiffness is not estimated. On a straight road of class C, bump steer and roll
 make slip angles of 0.05 to 0.10 deg RMS (compact, sedan) that the model does not know; this is three times as much."""
 _SURPRISING: Final = 4.0
-"""Squared error over its expected variance above which a value says nothing about the stiffness: it is then something
-else that has changed."""
+"""Squared error over its expected variance above which a value says nothing about the stiffness: two standard
+deviations. Something else has then changed."""
 _NEW_RATIO_STD: Final = 0.3
 """Standard deviation of the friction of the rear tyres relative to that of the front tyres, on a new road: for a tenth
-of a second one axle stands on the old one."""
+of a second one axle stands on the old one. Of 0.1, 0.2 and 0.3, chosen by the error of the sideslip angle."""
+SLIDING_S: Final = 0.3
+"""Time for which a wheel that has slid counts as sliding, and duration of the error of the friction that it shows [s]:
+three cycles of the anti-lock system."""
 _SLIDING_STD: Final = 0.15
-_SLIDING_S: Final = 0.3
-"""Relative standard deviation of the friction that sliding wheels show, and duration of its error [s]: an anti-lock
-system uses 80 to 97 % of the friction, and one of its cycles lasts for 0.1 to 0.3 s."""
+"""Relative standard deviation of this friction. In braked turns with an anti-lock system, the wheels of two cars used
+83 to 101 % of theirs (median over a run)."""
 _CREEP_MPS: Final = 0.05
 """Standard deviation of the lateral speed of an almost standing car [m/s]."""
 _CREEP_DENSITY: Final = 0.05
@@ -348,7 +350,7 @@ def take_in_friction(memory, friction, duration_s):
     """Correct the friction by the one that sliding wheels show."""
     covariance, std = memory.covariance, _SLIDING_STD * friction
     # Its error lasts: during this time all samples count as one measurement.
-    variance = std * std * (1.0 + 2.0 * _SLIDING_S / duration_s)
+    variance = std * std * (1.0 + 2.0 * SLIDING_S / duration_s)
     gain = covariance[FRICTION, FRICTION] / (covariance[FRICTION, FRICTION] + variance)
     memory.state[FRICTION] += gain * (friction - memory.state[FRICTION])
     covariance[:, FRICTION] *= 1.0 - gain

@@ -9,7 +9,10 @@ import pytest
 from activesteer.controllers import ControllerParameters, FrontSuperposition, NoControl, RearSteer
 from activesteer.controllers.parameters import CorrectorParameters, FrontSuperpositionParameters, RearSteerParameters
 from activesteer.core.signals import ActuatorCommand
+from activesteer.theory.tolerance import tolerance
 from tests.unit.controllers.cars import held, measured, setup, steering
+
+LIMIT_RAD = math.radians(3.0)
 
 
 def gains(**corrector: float) -> ControllerParameters:
@@ -39,6 +42,15 @@ def test_superposition_turns_the_front_wheels_by_the_decision_table(front, yaw_r
     assert steer.rear_steer_demand_rad == steer.prediction_rad == 0.0
 
 
+def test_superposed_angle_is_gain_times_tolerated_error():
+    block = controller(proportional_gain_s=0.1, deadband_start_radps=0.01, deadband_end_radps=0.06)
+    for count in range(200):
+        steer = block.step(steering(0.01 * math.sin(0.02 * count)), measured(0.03))
+        error = steer.yaw_rate_desired_radps - 0.03
+        assert steer.superposition_demand_rad == pytest.approx(0.1 * error * tolerance(error, 0.01, 0.06), rel=1e-12)
+        assert steer.correction_rad == steer.superposition_demand_rad
+
+
 def test_front_and_rear_answer_the_same_error_with_opposite_angles(rng):
     made = setup(gains=gains(integral_gain=0.2, derivative_gain_s2=0.001))
     front, rear = FrontSuperposition(made), RearSteer(made)
@@ -50,6 +62,25 @@ def test_front_and_rear_answer_the_same_error_with_opposite_angles(rng):
         assert ahead.saturated == behind.saturated
         saturated += ahead.saturated
     assert 0 < saturated < 500
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_angle_stops_at_the_limit_and_says_so(side):
+    block = controller(proportional_gain_s=1.0)
+    steer = block.step(steering(0.0), measured(side * 0.5))
+    assert steer.superposition_demand_rad == -side * LIMIT_RAD
+    assert steer.saturated is True
+    assert block.step(steering(0.0), measured(side * 0.04)).saturated is False
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_integral_does_not_wind_up_while_the_limit_is_active(side):
+    block = controller(proportional_gain_s=0.0, integral_gain=1.0)
+    steer = held(block, steering(0.0), measured(side * 0.3), steps=5000)
+    assert steer.saturated
+    assert abs(steer.correction_rad) < LIMIT_RAD + 0.3 * 0.001 + 1e-12
+    steer = held(block, steering(0.0), measured(-side * 0.3), steps=2)
+    assert not steer.saturated
 
 
 def test_superposition_rests_below_three_metres_per_second():

@@ -119,7 +119,7 @@ def test_pulse_wheel_that_swings_over_an_edge_never_says_more_than_it_swings():
 
 @pytest.mark.parametrize("frequency_Hz", [7.0, 13.0, 31.0])
 def test_locked_wheel_that_swings_on_its_tyre_stands_for_the_pulse_wheel(frequency_Hz):
-    """It passes one edge to and fro. Counted as a tooth each time, this was taken for up to 16 rad/s."""
+    """It passes one edge to and fro. In a run, this was read as up to 20 rad/s when each passage counted as a tooth."""
     to_an_edge = np.full(10, 0.5 * 2.0 * math.pi / 48 / 0.010)
     truth = np.concatenate([to_an_edge, 1.3 * np.cos(2.0 * math.pi * frequency_Hz * np.arange(2000) * 0.001)])
     said = said_of("wheel_speed", truth, teeth=48, sample_time_s=0.005)
