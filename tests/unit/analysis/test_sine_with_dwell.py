@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.metrics import metrics
-from activesteer.analysis.sine_with_dwell import integrated_displacement, steering
+from activesteer.analysis.sine_with_dwell import integrated_displacement, marks, steering
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import COMPLETION_S, REVERSAL_S, SINE_BEGIN_S, SyntheticRun, sine_with_dwell
@@ -155,3 +155,11 @@ def changed(steering_wheel) -> SyntheticRun:
 def test_what_is_no_sine_with_dwell_is_refused(change, angle_rad):
     with raises(RecordingError, value=pytest.approx(angle_rad, rel=0.02)):
         metrics(changed(change))
+
+
+@pytest.mark.parametrize(("start_s", "marked"), [(2.0, [(2.0, "brake")]), (0.0, []), (9.0, [])])
+def test_the_beginning_of_braking_is_marked_but_no_pedal_that_is_held_from_the_start(start_s, marked):
+    time_s = np.arange(0.0, 5.0, 0.5)
+    run = SyntheticRun(time_s, {"brake_pedal": np.where(time_s >= start_s, 0.4, 0.0)}, "brake_in_turn")
+    run.metadata["maneuver"]["brake"] = {"pedal": 0.4}
+    assert marks(run) == marked
