@@ -28,7 +28,7 @@ from activesteer.controllers.linear_form import LinearController, linear_control
 from activesteer.core.conventions import DEFAULT_TIMESTEP_S, RUN_COLOURS, Array, run_looks
 from activesteer.driver import DriverParameters
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains, steering_gains
-from activesteer.errors import DriverError, StudyError
+from activesteer.errors import DriverError
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.resources import DEFAULT_DRIVER
@@ -40,8 +40,8 @@ from activesteer.theory.single_track import SingleTrack
 STEP_M: Final = 0.5
 """Offset of the path beside the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear, and
 moves the steering wheel further than the friction of the rack can hide."""
-_CLOSE: Final = 0.1
-"""Fraction of the step that may remain at the end; the friction of the rack hides some."""
+_CLOSE_M: Final = 0.1 * STEP_M
+"""Distance from the path that may remain at the end [m]; the friction of the rack hides some."""
 DURATION_S: Final = 7.0
 """Length of the run [s]."""
 _SPACING_M: Final = 15.0
@@ -73,17 +73,14 @@ def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
     """Return damping ratio and natural frequency of the oscillation about the path, after its first crossing.
 
     They belong to the decaying oscillation that fits best by least squares. This equals the logarithmic decrement if
-    all decrements are alike; the friction of the rack makes those of small amplitudes smaller.
+    all decrements are alike; the friction of the rack makes those of small amplitudes smaller. The damping ratio is 1
+    if the car does not cross the path, also if it stops short of the path.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
     off = np.asarray(y_m, dtype=np.float64) / STEP_M - 1.0
     beyond = np.flatnonzero(off > 0.0)
     if not beyond.size:
-        if off[-1] < -_CLOSE:
-            raise StudyError(
-                f"the driver does not come to a path {STEP_M} m beside him within the run; is he slower than that?"
-            )
         return 1.0, math.nan
     every = max(1, round(_FIT_INTERVAL_S / float(time_s[1] - time_s[0])))
     time_s, off = np.asarray(time_s, dtype=np.float64)[beyond[0] :: every], off[beyond[0] :: every]
@@ -278,6 +275,7 @@ class LoopAtSpeed:
             "damping_in_step": damping_of(*self.loop.step())[0],
             "damping_in_run": self.damping_in_run,
             "step_difference_m": self.step_difference_m,
+            "rest_in_run_m": abs(STEP_M - float(self.run["y_m"][-1])),
         }
 
 
@@ -317,7 +315,10 @@ def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
         ("damping_in_run", "damping ratio in a run", "", LEAST_DAMPING, 2, " at 80 and 100 km/h"),
     ):
         if key == "damping_in_run" and all(row[key] == 1.0 for row in rows):
-            found.append(passed("After a small step of the path, every run reaches the path without crossing it."))
+            rest_m = max(row["rest_in_run_m"] for row in rows)
+            far = f"at most {rest_m:.2f} m from it after {DURATION_S:g} s"
+            kept = f"After a step of the path by {STEP_M:g} m, no run crosses the path. The cars end "
+            found.append(Markup("{}{}.").format(kept, (passed if rest_m <= _CLOSE_M else failed)(far)))
             continue
         judged = [row for row in rows if math.isfinite(row[key])]
         if not judged:
@@ -335,6 +336,7 @@ _HEADS: Final = {
     "damping_in_step": "damping after a step of the path [-]",
     "damping_in_run": "damping in a run [-]",
     "step_difference_m": "largest difference from the run [m]",
+    "rest_in_run_m": "distance from the path at the end of the run [m]",
     "phase_margin_deg": "phase margin [deg]",
     "crossover_rad_s": "crossover [rad/s]",
 }
@@ -355,7 +357,7 @@ def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture)
         ]
         for row in rows
     ]
-    note = "\N{EN DASH}: the car reaches the path without crossing it." if set(heads) & set(_FROM_RUNS) else ""
+    note = "\N{EN DASH}: the car does not cross the path." if set(heads) & set(_FROM_RUNS) else ""
     sections = [
         Section(pictures=[picture]),
         Section("Numbers", tables=[Table("", ["loop", *heads.values()], cells, note=note)]),

@@ -13,9 +13,17 @@ from activesteer.core.signals import ActuatorCommand
 from activesteer.driver.path_preview import PREVIEW_INTERVAL_S, SteeringGains
 from activesteer.errors import ControllerError, DriverError
 from activesteer.scenario import resolve
-from activesteer.studies.linear.driver_loop import DriverLoop, driver_loop, driver_loops
+from activesteer.studies.linear.driver_loop import (
+    DURATION_S,
+    STEP_M,
+    DriverLoop,
+    LoopAtSpeed,
+    driver_loop,
+    driver_loops,
+)
 from activesteer.studies.linear.linearisation import INPUTS, OUTPUTS, LinearCar
 from tests.raising import raises
+from tests.unit.analysis.synthetic import SyntheticRun
 from tests.unit.controllers.cars import measured, setup, steering
 from tests.unit.driver.drives import parameters
 
@@ -106,6 +114,18 @@ def test_controllers_do_beyond_their_band_what_their_linear_form_says(controller
         state = form.a @ state + form.b @ (front_rad, yaw_rate_radps)
     assert getattr(command, output) == pytest.approx(demand[0 if controller == "ars" else 1], rel=1e-9)
     assert abs(demand).max() > 1e-3
+
+
+def test_damping_and_remaining_distance_belong_to_the_curve_of_the_run():
+    time_s = np.arange(0.0, DURATION_S, 0.01)
+    swing = np.cos(2.0 * time_s) + 0.4 * np.sin(2.0 * time_s)
+    for y_m, damping, rest_m in (
+        (0.4 * (1.0 - np.exp(-2.0 * time_s)), 1.0, 0.1),  # stops short of the path
+        (STEP_M * (1.0 - np.exp(-0.8 * time_s) * swing), 0.8 / math.hypot(0.8, 2.0), 0.0),
+    ):
+        row = LoopAtSpeed(72.0, "none", loop(), SyntheticRun(time_s, {"y_m": y_m})).to_json()
+        assert row["damping_in_run"] == pytest.approx(damping, abs=1e-3)
+        assert row["rest_in_run_m"] == pytest.approx(rest_m, abs=3e-3)
 
 
 def test_what_has_no_linear_form_is_answered():
