@@ -79,7 +79,7 @@ def open_page(browser: Browser, report: Path) -> Iterator[Callable[..., Page]]:
     wrong: list[str] = []
     contexts: list[Any] = []
 
-    def open_page(**device: Any) -> Page:
+    def open_page(*, opened: bool = True, **device: Any) -> Page:
         context = browser.new_context(**device)
         contexts.append(context)
         page = context.new_page()
@@ -87,7 +87,10 @@ def open_page(browser: Browser, report: Path) -> Iterator[Callable[..., Page]]:
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("request", lambda request: wrong.extend({request.url} - {report.as_uri()}))
         page.goto(report.as_uri())
-        page.wait_for_selector(".uplot canvas")
+        page.wait_for_selector(".uplot canvas", state="attached")
+        if opened:
+            for summary in page.locator("details.narrow > summary:visible").all():
+                summary.click()
         return page
 
     yield open_page
@@ -255,13 +258,23 @@ def test_a_phone_keeps_the_player_in_sight_and_shortens_no_title(open_page):
 def test_zoom_holds_for_all_plots_of_a_group_and_can_be_undone(open_page):
     page = open_page(**DESK)
     yaw_rate, other = plot(page, "Yaw rate"), plot(page, "Lateral acceleration")
+    whole = page.locator("#group-1 input.time").get_attribute("max") or ""
     hover(page, yaw_rate, 0.2)
     page.mouse.down()
     hover(page, yaw_rate, 0.4)
     page.mouse.up()
     hover(page, other, 0.5)
     assert float(told(other)[0]) == pytest.approx(0.3 * DURATION_S, abs=0.03)
+    # The player plays what is seen.
+    slider = page.locator("#group-1 input.time")
+    ends = [float(slider.get_attribute(end) or 0) / float(whole) * DURATION_S for end in ("min", "max")]
+    assert ends == pytest.approx([0.2 * DURATION_S, 0.4 * DURATION_S], abs=0.05)
+    page.locator("#group-1 button.play").click()
+    page.wait_for_timeout(300)
+    assert 0.2 * DURATION_S < float(page.locator("#group-1 output").inner_text().split()[0]) < 0.4 * DURATION_S
+    page.locator("#group-1 button.play").click()
     page.locator("#group-1 button.reset").click()
+    assert slider.get_attribute("max") == whole
     hover(page, other, 0.5)
     assert float(told(other)[0]) == pytest.approx(0.5 * DURATION_S, abs=0.03)
 
@@ -274,6 +287,18 @@ def test_phone_shows_everything_within_its_width(open_page):
     for box in boxes:
         assert box["x"] >= 0.0
         assert 300.0 < box["width"] <= 390.0 - box["x"]
+
+
+@pytest.mark.slow
+def test_a_phone_shows_the_results_of_all_manoeuvres_before_anything_is_opened(open_page):
+    page = open_page(opened=False, **PHONE)
+    assert page.locator(".contents .chip.failed").first.is_visible()
+    assert not page.locator("figure").first.is_visible()
+    assert page.evaluate("document.body.scrollHeight") < 5000
+    page.locator("#group-1 summary", has_text="plots").click()
+    box = plot(page, "Yaw rate").locator("canvas").bounding_box()
+    assert box
+    assert box["width"] > 300.0
 
 
 @pytest.mark.slow

@@ -28,8 +28,6 @@ PANELS_BELOW_TRACK: Final = ("steering_wheel", "yaw_rate", "added", "lateral", "
 LANE_COLOUR: Final = "#f0e6c8"
 CONE_COLOUR: Final = "#e69f00"
 STRUCK_COLOUR: Final = "#b3261e"
-CARS: Final = 12
-"""Most outlines of a car along the course."""
 COURSE_ASPECT: Final = 0.2
 TRACK_ASPECT: Final = 0.35
 """Approximate height over width of the axes of courses and of tracks."""
@@ -91,24 +89,18 @@ def _draw_tracks(axis: Axes, drawn: Sequence[DrawnRun], course: Course) -> None:
     _draw_course(axis, course, TRACK_ASPECT, struck)
     _draw_friction(axis, drawn[0])
     for curve in drawn:
-        _draw_cars(axis, curve)
+        _shade_body(axis, curve)
 
 
-def _draw_cars(axis: Axes, curve: DrawnRun) -> None:
-    """Draw the outline of the car in its size at places along the course."""
-    from matplotlib.patches import Polygon  # noqa: PLC0415 - an extra, and slow to import
-
+def _shade_body(axis: Axes, curve: DrawnRun) -> None:
+    """Shade the road that the front of the body covers: a car on a stretched map is a sliver."""
     try:
-        front_left, front_right, rear_left, rear_right = lanes.corners(curve.recording, read_footprint(curve.recording))
+        left, right, *_ = lanes.corners(curve.recording, read_footprint(curve.recording))
     except RecordingError:
         return
-    x, _ = lanes.front_axle(curve.recording)
-    left, right = axis.get_xlim()
-    for place in np.linspace(left, right, CARS, endpoint=False)[1:]:
-        row = lanes.first_at(curve.recording, float(place))
-        if row is not None and np.isfinite(x[row]):
-            outline = [(float(xs[row]), float(ys[row])) for xs, ys in (front_left, front_right, rear_right, rear_left)]
-            axis.add_patch(Polygon(outline, closed=True, fill=False, edgecolor=curve.look.colour, linewidth=0.6))
+    edges = zip(map(over_time.thinned, left), map(over_time.thinned, right), strict=True)
+    x, y = (np.concatenate([one, other[::-1]]) for one, other in edges)
+    axis.fill(x, y, color=curve.look.colour, alpha=0.12, linewidth=0.0)
 
 
 def _draw_friction(axis: Axes, curve: DrawnRun) -> None:

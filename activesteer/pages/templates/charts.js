@@ -9,6 +9,8 @@ mix();
 const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
 // Least size of a cone [px], otherwise cones and cars have their true size; distance between drawn cars [px].
 const LEAST_CONE = 2, CARS_APART = 110;
+// Least height of a track to one scale [px]; stretch beyond which no car is drawn along it.
+const LEAST_TRACK_HEIGHT = 120, MOST_STRETCH = 2.5;
 // Instants of the slider.
 const INSTANTS = 1000;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
@@ -135,7 +137,7 @@ class Chart {
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
     const { curves, areas, limits, names, log } = this.panel, given = this.panel[`${key}_range`] || [null, null];
-    if (key === "y" && names.length) return [-1, given[1] ?? names.length - 0.3];
+    if (key === "y" && names.length) return [given[0] ?? -0.7, given[1] ?? names.length - 0.3];
     const levels = this.panel[`${key}_levels`];
     if (levels) return [given[0] ?? -0.5, given[1] ?? levels.length - 0.5];
     const all = [...curves.flatMap((curve) => curve[key]), ...(key === "x" ? areas.flatMap((area) => area.x) : [...areas.flatMap((area) => [...area.low, ...area.high]), ...limits.map(([value]) => value)])];
@@ -188,9 +190,11 @@ class Chart {
   whole() { this.plot.batch(() => { for (const key of ["x", "y"]) { const [min, max] = this.range(this.plot, key); this.plot.setScale(key, { min, max }); } }); }
 
   fit(width = null) {
-    const columns = this.holder.parentElement.classList.contains("wide") ? 1 : 2;
-    const room = width == null ? this.holder.clientWidth : columns === 1 ? width : (width - PRINTED_GAP) / 2;
-    if (room > 0 && (room !== this.plot.width || width != null)) { this.plot.setSize({ width: room, height: width == null ? this.height : Math.round(0.65 * this.height) }); this.whole(); }
+    const columns = this.holder.parentElement.classList.contains("wide") ? 1 : this.picture.panels.length === 3 ? 3 : 2;
+    const room = width == null ? this.holder.clientWidth : (width - (columns - 1) * PRINTED_GAP) / columns;
+    // Rows with names keep their height on paper, where their texts have their size too.
+    const share = width == null || this.panel.names.length ? 1 : 0.65;
+    if (room > 0 && (room !== this.plot.width || width != null)) { this.plot.setSize({ width: room, height: Math.round(share * this.height) }); this.whole(); }
   }
 
   repaint() { this.plot.redraw(false, true); }
@@ -247,9 +251,7 @@ class Chart {
     for (const [x, y, text, colour] of panel.notes) { ctx.fillStyle = colour || paint.ink; ctx.fillText(text, px(x), py(y) + 3 * dpr); }
     ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
-    // Lines that cross a name leave it legible.
-    ctx.strokeStyle = paint.paper; ctx.lineWidth = 4 * dpr; ctx.setLineDash([]);
-    for (const ink of ["strokeText", "fillText"]) panel.names.forEach((name, i) => ctx[ink](name, bbox.left + 4 * dpr, py(i) - 6 * dpr, bbox.width - 8 * dpr));
+    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 6 * dpr, bbox.width - 8 * dpr));
     ctx.restore();
   }
 
@@ -277,7 +279,7 @@ class Chart {
 // A button that plays curves over time, and a slider for the instant. `show` gets its number, 0 to `last`.
 class Player {
   constructor(last, step_s, start_s, show) {
-    Object.assign(this, { last, step_s, start_s, show, playing: false, held: false });
+    Object.assign(this, { first: 0, last, step_s, start_s, show, playing: false, held: false });
     this.button = element("button", { type: "button", class: "play" }, "Play");
     this.slider = element("input", { type: "range", class: "time", min: 0, max: last, value: 0, "aria-label": "Time" });
     this.clock = element("output", { class: "quiet" });
@@ -292,7 +294,7 @@ class Player {
     if (!on) return;
     this.reveal?.();
     this.held = true;
-    let exact = +this.slider.value < this.last ? +this.slider.value : 0, before = null;
+    let exact = +this.slider.value < this.last ? Math.max(this.first, +this.slider.value) : this.first, before = null;
     const step = (now) => {
       if (!this.playing) return;
       if (before != null) exact += (now - before) / 1000 / this.step_s;
@@ -301,6 +303,12 @@ class Player {
       if (exact >= this.last) this.play(false); else requestAnimationFrame(step);
     };
     requestAnimationFrame(step);
+  }
+
+  // Play the instants that a zoom shows.
+  limit(first, last) {
+    Object.assign(this, { first, last });
+    Object.assign(this.slider, { min: first, max: last });
   }
 
   tell(i) { this.slider.value = i; this.clock.textContent = `${(this.start_s + i * this.step_s).toFixed(2)} s`; }
@@ -367,7 +375,10 @@ function addPlayer(charts) {
   const step_s = (end_s - start_s) / INSTANTS;
   const player = new Player(INSTANTS, step_s, start_s, (i) => {
     player.tell(i);
-    for (const { plot } of timed) plot.setCursor({ left: plot.valToPos(start_s + i * step_s, "x"), top: 1 }, true, false);
+    for (const { plot } of timed) {
+      const left = plot.valToPos(start_s + i * step_s, "x");
+      plot.setCursor({ left: left > plot.over.clientWidth ? -10 : left, top: 1 }, true, false); // zoomed in elsewhere, it reads nothing
+    }
   });
   // What moves is in sight, also where tables stand before the curves.
   const inSight = ({ top, height }) => top + height / 2 > 0 && top + height / 2 < innerHeight;

@@ -10,7 +10,7 @@
       this.time = Array.from({ length: data.samples }, (_, i) => data.start_s + i * data.step_s);
       this.box = element("div", { class: "plots" });
       const bar = element("div", { class: "toolbar" });
-      document.querySelector(`#${data.anchor} > .drawn`).replaceChildren(bar, this.box);
+      document.querySelector(`#${data.anchor} .drawn`).replaceChildren(bar, this.box);
       this.toolbar(bar);
       if (data.track) this.track = new Track(this, data.track);
       for (const panel of data.panels) this.plots.push(this.panel(panel));
@@ -76,13 +76,14 @@
         width: series.dotted ? 1.2 : lineWidth(series.run), dash: series.dotted ? [1.5, 3] : dashed(runs[series.run], 1.5), cap: "butt",
       }));
       const plot = new uPlot({
-        width: holder.clientWidth, height: PLOT_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false }, pxAlign: 0,
+        width: holder.clientWidth || 360, height: PLOT_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false }, pxAlign: 0,
         cursor: { y: false, sync: { key: this.data.anchor }, drag: { x: true, y: false }, points: { size: 7 } },
         scales: { x: { time: false, range: (_, min, max) => [min, max] }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
         axes: [axis(26, " s"), axis(46)],
         series: [{}, ...lines],
         hooks: {
           draw: [(u) => this.marks(u)],
+          setScale: [(u, key) => { if (key === "x" && u === this.plots[0]) this.limit(u.scales.x); }],
           setCursor: [(u) => this.read(u, panel, values)],
         },
       }, [this.time, ...panel.series.map((series) => series.values)], holder);
@@ -113,14 +114,16 @@
       ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
       ctx.font = FONT.replace("12px", `${11 * devicePixelRatio}px`);
       ctx.textBaseline = "top"; ctx.textAlign = "left";
-      let free = bbox.left;
-      for (const mark of this.data.marks) {
-        const x = u.valToPos(mark.time_s, "x", true);
-        ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
-        // A text that would overlap the one before it is left out.
-        if (u.panel !== this.data.panels[0] || x < free) continue;
-        ctx.fillText(mark.text, x + 3 * devicePixelRatio, bbox.top);
-        free = x + ctx.measureText(mark.text).width + 6 * devicePixelRatio;
+      const places = this.data.marks.map((mark) => u.valToPos(mark.time_s, "x", true)), free = [], gap = 3 * devicePixelRatio;
+      for (const x of places) { ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke(); }
+      ctx.strokeStyle = paint.paper; ctx.lineWidth = gap; ctx.setLineDash([]);
+      for (const [k, { text }] of u.panel === this.data.panels[0] ? this.data.marks.entries() : []) {
+        // Near the right end a text stands before its mark; one that would overlap another moves a line down.
+        const width = ctx.measureText(text).width, after = places[k] + gap, left = after + width > bbox.left + bbox.width ? places[k] - gap - width : after;
+        let row = 0;
+        while (left < free[row]) row++;
+        free[row] = left + width + 2 * gap;
+        for (const ink of ["strokeText", "fillText"]) ctx[ink](text, left, bbox.top + 14 * devicePixelRatio * row);
       }
       ctx.restore();
     }
@@ -128,6 +131,11 @@
     zoom(range) {
       const whole = { min: this.time[0], max: this.time[this.time.length - 1] || 1 };
       for (const plot of this.plots) plot.setScale("x", range || whole);
+    }
+
+    limit({ min, max }) {
+      const place = (time_s) => Math.min(Math.max((time_s - this.data.start_s) / (this.data.step_s || 1), 0), this.data.samples - 1);
+      this.player.limit(Math.ceil(place(min) - 1e-6), Math.floor(place(max) + 1e-6));
     }
 
     pointAt(i) {
@@ -163,7 +171,7 @@
       const [holder] = group.figure(title, this.tall ? "tall" : "wide", "Tracks from above, with lanes, cones and cars");
       const { x, y } = this.limits;
       this.plot = new uPlot({
-        width: holder.clientWidth, height: this.height(), padding: [6, 18, 0, 0], legend: { show: false },
+        width: holder.clientWidth || 360, height: this.height(holder.clientWidth || 360), padding: [6, 18, 0, 0], legend: { show: false },
         cursor: { drag: { x: true, y: true, uni: 20 }, points: { show: false }, x: false, y: false },
         scales: { x: { time: false, range: (u) => this.range(u, "x") }, y: { range: (u) => this.range(u, "y") } },
         axes: [axis(26, " m"), axis(46, " m")],
@@ -186,8 +194,12 @@
       touchable(this.plot, (range) => (range ? this.plot.setScale("x", range) : this.whole()));
     }
 
-    height(printed = false) {
-      return printed ? PRINTED_TRACK_HEIGHT : this.tall ? 2 * PLOT_HEIGHT + PLOT_HEAD + PLOT_GAP : TRACK_HEIGHT;
+    // A track to one scale is no higher than it fills, unless it stands beside plots.
+    height(width, printed = false) {
+      const tall = 2 * PLOT_HEIGHT + PLOT_HEAD + PLOT_GAP, most = printed ? PRINTED_TRACK_HEIGHT : this.tall ? tall : TRACK_HEIGHT;
+      if (this.data.view || (this.tall && !printed && !NARROW.matches)) return most;
+      const { x, y } = this.limits;
+      return Math.min(most, Math.max(LEAST_TRACK_HEIGHT, 32 + ((width - 64) * (y[1] - y[0])) / (x[1] - x[0])));
     }
 
     ends(values) {
@@ -221,16 +233,19 @@
 
     fit(width) {
       const room = width == null ? this.plot.root.parentElement.clientWidth : width;
-      if (room > 0 && room !== this.plot.width) { this.plot.setSize({ width: room, height: this.height(width != null) }); this.whole(); }
+      if (room > 0 && room !== this.plot.width) { this.plot.setSize({ width: room, height: this.height(room, width != null) }); this.whole(); }
     }
 
     draw(u) {
       const { ctx, bbox } = u, dpr = devicePixelRatio;
       const px = (x) => u.valToPos(x, "x", true), py = (y) => u.valToPos(y, "y", true);
       const metre = (px(1) - px(0)), stretch = (py(0) - py(1)) / metre;
+      // Stretched to a sliver, a car says less than the road that its body covers.
+      const covers = stretch > MOST_STRETCH;
       const factors = this.data.tracks.find((track) => track.steer)?.car.factors;
       this.note.textContent = [
         ...(stretch > 1.05 || stretch < 0.95 ? [`lateral positions stretched ${stretch.toFixed(1)} times`] : []),
+        ...(covers ? ["shaded: width of the bodies"] : []),
         ...(factors ? [`wheels turned ${[...new Set(factors)].join(" and ")} times as far`] : []),
       ].join(", ");
       ctx.save();
@@ -254,6 +269,14 @@
         if (!this.group.visible[run]) continue;
         const colour = this.group.colour(run), look = this.group.data.runs[run];
         line({ x, y }, colour, lineWidth(run), dashed(look, 1.5));
+        if (covers && track.car) {
+          const edge = (left) => x.flatMap((at, i) => (track.yaw[i] == null ? [] : [[at - left * Math.sin(track.yaw[i]), y[i] + left * Math.cos(track.yaw[i])]]));
+          const half = track.car.width / 2;
+          ctx.fillStyle = paint[`run-${look.place}`]; ctx.globalAlpha = 0.12;
+          ctx.fill(new Path2D(this.outline([[...edge(half), ...edge(-half).reverse()]], true)));
+          ctx.globalAlpha = 1;
+          continue;
+        }
         this.along({ x, y }, (i) => {
           if (!track.car || track.yaw[i] == null) return;
           ctx.setLineDash([]); ctx.lineWidth = dpr; ctx.strokeStyle = colour;

@@ -1,7 +1,7 @@
 "use strict";
 // The page of a study: tables, and panels by `charts.js`, of the chosen manoeuvre and metric.
 const all = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
-const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.42;
+const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3;
 let body = all;
 const PANEL = { x: "", y: "", title: "", curves: [], areas: [], limits: [], names: [], notes: [], log: "", x_range: null, y_range: null, zero: false, equal: false, legend: null, above: null };
 const panelOf = (x, y, parts) => ({ ...PANEL, x, y, ...parts });
@@ -46,42 +46,48 @@ function scatter(factor, label, rows, valueOf) {
   return panelOf(axisOf(factor), label, { title: factor.label, curves: curves.filter((curve) => curve.x.length), x_levels: factor.numeric ? null : factor.levels });
 }
 
-// The mean in fields of the first two numeric factors, for designs without grids.
+// The mean in fields of the first two numeric factors, for designs without two grids: by value if a factor has few values
+// that return, else in equal stretches of its range.
 function binned(rows, values) {
   const pair = varied(rows).filter((factor) => factor.numeric).slice(0, 2), runs = rows.length / DATA.controllers.length;
   if (pair.length < 2 || runs < 4) return null;
   const count = Math.min(FIELDS, Math.max(2, Math.round(Math.sqrt(runs / 3))));
-  const ends = pair.map(({ key }) => endsOf(rows.map((i) => DATA.rows.factors[key][i])));
-  if (ends.some(([low, high]) => !(high > low))) return null;
-  const place = (k, v) => Math.min(count - 1, Math.floor(((v - ends[k][0]) / (ends[k][1] - ends[k][0])) * count));
-  const sums = DATA.controllers.map(() => Array.from({ length: count }, () => Array.from({ length: count }, () => [0, 0])));
+  const axes = pair.map(({ key }) => {
+    const of = (i) => DATA.rows.factors[key][i], driven = [...new Set(rows.map(of))].filter((v) => v != null).sort((a, b) => a - b);
+    if (driven.length <= FIELDS && 2 * driven.length <= runs) return { key, levels: driven, place: (i) => driven.indexOf(of(i)) };
+    const [low, high] = [driven[0], driven.at(-1)], edges = Array.from({ length: count + 1 }, (_, i) => low + (i / count) * (high - low));
+    return { key, edges, place: (i) => (of(i) == null ? -1 : Math.min(count - 1, Math.floor(((of(i) - low) / (high - low)) * count))) };
+  });
+  const [columns, lines] = axes.map(({ levels, edges }) => levels?.length ?? edges.length - 1);
+  if (columns < 2 || lines < 2) return null;
+  const sums = DATA.controllers.map(() => Array.from({ length: columns }, () => Array.from({ length: lines }, () => [0, 0])));
   for (const i of rows) {
-    const [a, b] = pair.map(({ key }) => DATA.rows.factors[key][i]);
-    if (a == null || b == null || values[i] == null) continue;
-    const field = sums[DATA.rows.controller[i]][place(0, a)][place(1, b)];
+    const field = sums[DATA.rows.controller[i]][axes[0].place(i)]?.[axes[1].place(i)];
+    if (!field || values[i] == null) continue;
     field[0] += values[i]; field[1]++;
   }
-  const levels = ends.map(([low, high]) => Array.from({ length: count }, (_, i) => low + ((i + 0.5) / count) * (high - low)));
-  return { keys: pair.map(({ key }) => key), levels, maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
+  return { axes, maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
 }
 
-function heat(metric, { keys, levels, maps }) {
+function heat(metric, { axes, maps }) {
   const [low, high] = endsOf(maps.flat(2));
   if (constantIn(low, high)) {
     body.append(element("p", {}, low <= high ? `${axisOf(metric)} is ${short(low)} in every field, within 0.1 %.` : `${axisOf(metric)} has no value in any field.`));
     return;
   }
-  const [x, y] = keys.map((key) => axisOf(DATA.factors.find((factor) => factor.key === key)));
-  const [x_levels, y_levels] = levels.map((each) => each.map((level) => (typeof level === "number" ? short(level) : String(level))));
+  const [x, y] = axes.map(({ key }) => axisOf(DATA.factors.find((factor) => factor.key === key)));
+  const [x_levels, y_levels] = axes.map(({ levels }) => levels?.map((level) => (typeof level === "number" ? short(level) : String(level))) ?? null);
+  const [x_range, y_range] = axes.map(({ edges }) => (edges ? [edges[0], edges.at(-1)] : null));
+  const endsAt = (axis, i) => (axis.edges ? [axis.edges[i], axis.edges[i + 1]] : [i - 0.5, i + 0.5]);
   const panels = maps.map((map, c) => {
     const areas = [], notes = [];
     map.forEach((line, i) => line.forEach((value, j) => {
       if (value === null) return;
-      const shade = (value - low) / (high - low);
-      areas.push({ x: [i - 0.5, i + 0.5], low: [j - 0.5, j - 0.5], high: [j + 0.5, j + 0.5], label: "", colour: "", alpha: 1, edge: "", shade });
-      if (map.length <= FIELDS) notes.push([i, j + 0.2, short(value), shade > 0.6 ? "#000000" : "#ffffff"]);
+      const shade = (value - low) / (high - low), [left, right] = endsAt(axes[0], i), [below, above] = endsAt(axes[1], j);
+      areas.push({ x: [left, right], low: [below, below], high: [above, above], label: "", colour: "", alpha: 1, edge: "", shade });
+      if (map.length <= FIELDS) notes.push([(left + right) / 2, below + 0.7 * (above - below), short(value), shade > 0.6 ? "#000000" : "#ffffff"]);
     }));
-    return panelOf(x, y, { title: DATA.controllers[c], areas, notes, x_levels, y_levels });
+    return panelOf(x, y, { title: DATA.controllers[c], areas, notes, x_levels, y_levels, x_range, y_range });
   });
   show("heat", panels, [`${axisOf(metric)}, mean:`, low, high]);
 }
@@ -106,7 +112,8 @@ function sensitivity(metric, found) {
 }
 
 // Every run as a line through its factors and the metric, each between its least and its greatest value, in the colour
-// of its metric. Controllers drive the same samples, so each has a panel. The lines stop above each name.
+// of its metric. Controllers drive the same samples, so each has a panel. An axis is a strip that holds its name: a line
+// enters and leaves it at the same place.
 function parallel(metric, rows) {
   const values = DATA.rows.metrics[metric.name];
   const axes = [...varied(rows).map((factor) => ({ factor, of: (i) => placeOf(factor, DATA.rows.factors[factor.key][i]) })), { factor: { ...metric, numeric: true }, of: (i) => values[i] }]
@@ -121,7 +128,8 @@ function parallel(metric, rows) {
       const x = own.flatMap((i) => axes.flatMap((axis) => [along(axis, i), null, along(axis, i)]).slice(2).concat(null));
       return curveOf(c, x, own.flatMap(() => [...axes.keys()].flatMap((row) => [row - NAME_ROOM, null, row]).slice(2).concat(null)), { label: "", shade, dashes: [], marker: "", alpha: 0.7 });
     });
-    return panelOf("", "", { title, curves, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], y_range: [-NAME_ROOM, names.length - 0.85], row_px: 80 });
+    const areas = names.map((_, row) => ({ x: [-0.05, 1.05], low: [row - NAME_ROOM, row - NAME_ROOM], high: [row, row], label: "", colour: "#888888", alpha: 0.2, edge: "", shade: null }));
+    return panelOf("", "", { title, curves, areas, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], y_range: [-NAME_ROOM, names.length - 0.95], row_px: 80 });
   });
   show("parallel", panels, [`${axisOf(metric)}:`, ...axes.at(-1).ends]);
 }

@@ -247,7 +247,7 @@ def _heat(study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequ
         np.add.at(count, where, 1)
         with np.errstate(invalid="ignore"):
             maps.append([_json(row) for row in total / count])
-    return {"keys": [factor.key for factor in grids], "levels": [list(f.values) for f in grids], "maps": maps}
+    return {"axes": [{"key": factor.key, "levels": list(factor.values)} for factor in grids], "maps": maps}
 
 
 def _indices(study: StudyFile, points: Sequence[Mapping[str, Any]], parts: Sequence[Array]) -> list[list[Any]]:

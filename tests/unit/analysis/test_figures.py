@@ -87,15 +87,15 @@ def test_tracks_are_those_of_the_front_axle_with_cones_lanes_and_a_stated_scale(
     assert f"stretched {axis.get_aspect():.0f} times" in axis.get_ylabel()
 
 
-def test_cars_stand_on_their_tracks_in_their_size_and_cones_they_hit_are_crossed_out():
+def test_bodies_cover_the_road_in_their_width_along_their_tracks_and_cones_they_hit_are_crossed_out():
     runs = {"none": along_path(cones=((45.0, 0.5), (45.0, 3.0)))}
     axis = tracks.track_figure(runs).get_axes()[0]
-    outlines = [patch.get_xy()[:4] for patch in axis.patches if isinstance(patch, Polygon)]
-    assert len(outlines) > 5
-    for corners in outlines:
-        front, rear = 0.5 * (corners[0] + corners[1]), 0.5 * (corners[2] + corners[3])
-        assert np.linalg.norm(front - rear) == pytest.approx(2.6 + 0.85 + 0.75)
-        assert np.linalg.norm(corners[0] - corners[1]) == pytest.approx(1.8)
+    (covered,) = [patch.get_xy()[:-1] for patch in axis.patches if isinstance(patch, Polygon)]
+    left, right = covered[: len(covered) // 2], covered[: len(covered) // 2 - 1 : -1]
+    assert np.linalg.norm(left - right, axis=1) == pytest.approx(1.8)
+    # The front of the body is 0.85 m ahead of the front axle, whose centre runs along the track.
+    track = np.asarray(axis.get_lines()[0].get_xydata())
+    assert np.linalg.norm(0.5 * (left + right) - track, axis=1) == pytest.approx(0.85)
     (struck,) = [line for line in axis.get_lines() if line.get_marker() == "x"]
     assert np.asarray(struck.get_xydata()).tolist() == [[45.0, 0.5]]
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from activesteer.core.files import json_text
+from activesteer.plotting import Panel
 from activesteer.standards import r79_circle
 from activesteer.standards.examination import examine
 from activesteer.standards.r79_circle import EFFORTS, FIGURES, RIM_RADIUS_M
@@ -109,3 +110,14 @@ def test_the_compact_is_steered_alike_to_both_sides_and_corrected_in_both_circle
     for row in (left, right):
         assert row["lateral_offset_1s_m"] < -0.1
         assert math.radians(3.0) < row["steering_correction_rad"] < math.radians(20.0)
+
+
+def test_every_plot_of_the_faults_names_its_rows_and_no_dot_covers_another():
+    figures = dict.fromkeys(FIGURES, 0.0)
+    faults = [{"fault": name, "direction": side, **figures} for name in ("one", "two") for side in ("left", "right")]
+    for panel in r79_circle._dots(faults).panels:
+        assert isinstance(panel, Panel)
+        assert panel.names == ["one", "two"]
+        places = np.concatenate([curve.y for curve in panel.curves])
+        assert len(set(places)) == len(faults)
+        assert (np.floor(places).tolist(), [curve.label for curve in panel.curves]) == ([0, 1, 0, 1], ["left", "right"])

@@ -90,7 +90,7 @@ def test_a_heat_map_of_three_grids_shows_driven_values_of_two_and_means_over_the
     found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
     assert found is not None
     heat = json.loads(found[1])["by_group"][0]["yaw_rate_peak_radps"]["heat"]
-    assert heat["levels"] == [[0.8, 1.0], [70.0, 80.0]]
+    assert [axis["levels"] for axis in heat["axes"]] == [[0.8, 1.0], [70.0, 80.0]]
     peaks = [row["yaw_rate_peak_radps"] for row in rows if (row[RATIO], row["speed_kmh"]) == (1.0, 70.0)]
     assert heat["maps"][0][1][0] == pytest.approx(np.degrees(np.mean(peaks)), rel=1e-4)
 
@@ -205,7 +205,32 @@ def test_a_metric_is_drawn_over_each_factor_by_value_or_by_level(page, tmp_path)
     parallel = pictures["parallel"]["panels"]
     assert [panel["title"] for panel in parallel] == data["controllers"]
     assert parallel[0]["names"][-1].partition(":")[0] == "yaw rate peak [deg/s]"
-    assert parallel[0]["y_range"][0] < 0.0, "the first name has room above its axis"
+    # A line enters the strip of an axis where it leaves it, with no room between the strip and the line.
+    panel, line = parallel[0], parallel[0]["curves"][0]
+    assert panel["y_range"][0] == panel["areas"][0]["low"][0]
+    x, y = line["x"][: line["x"].index(None) + 2], line["y"][: line["y"].index(None) + 2]
+    edges = [edge for area in panel["areas"] for edge in (area["low"][0], area["high"][0])]
+    assert (y[0], y[1]) == (edges[1], edges[2])
+    assert (x[1], y[-1]) == (x[-1], edges[3])
+
+
+def test_fields_of_driven_values_are_named_by_them_and_fields_of_a_range_have_its_ends(page, tmp_path):
+    data = copy.deepcopy(page[1])
+    first, second = (factor["key"] for factor in data["factors"])
+    speeds, mus, controllers = [70.0, 90.0] * 8, np.linspace(0.8, 1.0, 16).tolist(), data["controllers"]
+    places = [place for place in range(16) for _ in controllers]
+    data["rows"] = {
+        "group": [0] * len(places), "controller": [*range(len(controllers))] * 16, "sample": places, "run": places,
+        "factors": {first: [speeds[i] for i in places], second: [mus[i] for i in places]},
+        "metrics": {name: [float(i) for i in places] for name in data["rows"]["metrics"]},
+    }  # fmt: skip
+    data["by_group"][0]["yaw_rate_peak_radps"] |= {"heat": None, "paired": [None] * (len(controllers) - 1)}
+    panel = drawn(data, tmp_path)[0]["heat"]["panels"][0]
+    assert (panel["x_levels"], panel["y_levels"]) == (["70", "90"], None)
+    assert panel["y_range"] == pytest.approx([0.8, 1.0])
+    assert panel["areas"][0]["high"] == pytest.approx([0.9, 0.9])
+    # The fields at 70 km/h hold the even places, those at 90 km/h the odd ones.
+    assert [note[2] for note in panel["notes"]] == ["3", "11", "4", "12"]
 
 
 def test_a_heat_map_has_a_scale_of_its_colours_unless_all_fields_are_the_same(page, tmp_path):
