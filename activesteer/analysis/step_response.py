@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from activesteer.analysis import handling
-from activesteer.analysis.series import Array, crossing_time, largest_rate, low_pass, step_response, timestep
+from activesteer.analysis.series import Array, crossing_time, largest_rate, low_pass, peak, step_response, timestep
 from activesteer.analysis.sine_with_dwell import MOTION_CUT_OFF_Hz, STEERING_CUT_OFF_Hz
 from activesteer.analysis.source import RecordingLike
 from activesteer.core.conventions import GRAVITY_MPS2
@@ -40,8 +40,9 @@ def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
 
     For yaw rate, lateral acceleration (`ay`), roll and sideslip: `<name>_steady_state_<unit>`, `<name>_response_time_s`
     (90 %), `<name>_peak_<unit>` and `<name>_peak_time_s` in the direction of the steady-state value, and
-    `<name>_overshoot`. `tb_srad` is the peak response time of the yaw rate times the magnitude of the steady-state
-    sideslip. For the steering: `step_time_s`, the largest rate, and steady-state angles. Also `speed_end_mps`.
+    `<name>_overshoot`. `sideslip_peak_abs_rad` is the largest sideslip angle to either side. `tb_srad` is the peak
+    response time of the yaw rate times the magnitude of the steady-state sideslip. For the steering: `step_time_s`, the
+    largest rate, and steady-state angles. Also `speed_end_mps`.
 
     Args:
         recording: A run with one step of the steering wheel, to either side, and at least two seconds after it.
@@ -62,6 +63,7 @@ def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
         name, _, unit = channel.rpartition("_")
         for key, value in step_response(time_s, recording[channel], step_time_s, STEADY_WINDOW_S, minimum).items():
             values[f"{name}_{key}" + (f"_{unit}" if key in ("steady_state", "peak") else "")] = value
+    values |= peak(recording, "sideslip_rad")
     values["tb_srad"] = values["yaw_rate_peak_time_s"] * abs(values["sideslip_steady_state_rad"])
 
     settled = time_s >= time_s[-1] - STEADY_WINDOW_S

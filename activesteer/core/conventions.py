@@ -76,7 +76,8 @@ def run_looks(names: Iterable[str]) -> dict[str, RunLook]:
 
     Returns:
         Looks by name, in drawing order: the systems in the paper's order, always in the same colours, then the others.
-        Another run takes a system's colour only if all others are used up and that system is not shown.
+        Another run takes a system's colour only if all others are used up and that system is not shown. Beside other
+        runs, the systems have their short names too.
     """
     given = list(dict.fromkeys(names))
     known = [name for name in SYSTEM_LABELS if name in given]
@@ -85,7 +86,8 @@ def run_looks(names: Iterable[str]) -> dict[str, RunLook]:
     spare = [*range(len(places), len(RUN_COLOURS)), *(places[name] for name in SYSTEM_LABELS if name not in given)]
     places |= dict(zip(others, cycle(spare), strict=False))
     dashes = dict(zip(known + others, cycle(RUN_DASHES), strict=False))
-    return {name: RunLook(SYSTEM_LABELS.get(name, name), places[name], dashes[name]) for name in known + others}
+    labels = {} if others else SYSTEM_LABELS
+    return {name: RunLook(labels.get(name, name), places[name], dashes[name]) for name in known + others}
 
 
 def yaw_of(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

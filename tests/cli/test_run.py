@@ -37,9 +37,9 @@ def test_each_controller_makes_a_file_and_a_column(call, tmp_path):
         assert value == pytest.approx(math.degrees(metrics["yaw_rate_peak_radps"]), abs=6e-4)
     names = KEY_METRICS["step_steer"]
     assert [" ".join(line.split("  ")[:1]) for line in lines[1:11]] == [recorded_metric(name).label for name in names]
-    assert lines[11:] == ["10 of 28 metrics; --all prints all"]
+    assert lines[11:] == ["10 of 29 metrics; --all prints all"]
     again = call("run", "step_steer", "-c", "none", *PAPER, "-o", "out", "--all").out.splitlines()
-    assert len(again) == 29
+    assert len(again) == 30
     assert not [line for line in [*lines, *again] if len(line) > 80]
     for name in ("none", "ars", "afs"):
         assert f"step_steer {name}: out/step_steer-{name}.mcap" in told.err

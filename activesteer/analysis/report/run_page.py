@@ -225,6 +225,9 @@ def parameter_table(title: str, found: Sequence[Row], names: Sequence[str], *, f
     return Table(title, ["Parameter", *columns], rows, outside, kind="parameters", folded=folded)
 
 
+_THINNED: Final = "The curves are thinned to 200 values per second; the metrics use every recorded value."
+
+
 def _vehicle(groups: Sequence[Group], names: Sequence[str]) -> Section:
     recordings = [run.recording for group in groups for run in group.runs]
     vehicle = parameters(recordings, "vehicle")
@@ -233,10 +236,13 @@ def _vehicle(groups: Sequence[Group], names: Sequence[str]) -> Section:
     tables += [
         parameter_table("Vehicle: parameters of all runs", alike, names, folded=True),
         Table("Files", *file_rows(groups), kind="files"),
-        parameter_table("Versions", parameters(recordings, "versions"), names),
     ]
-    thinned = "The curves are thinned to 200 values per second; the metrics use every recorded value."
-    return Section("Vehicle and versions", [thinned], tables)
+    versions, texts = parameters(recordings, "versions"), [_THINNED]
+    if any(row.differs for row in versions):
+        tables.append(parameter_table("Versions", versions, names))
+    else:
+        texts.append(f"Versions: {', '.join(f'{row.key} {row.values[0]}' for row in versions)}.")
+    return Section("Vehicle and versions", texts, tables)
 
 
 def _events(group: Group) -> list[str]:

@@ -14,7 +14,7 @@ const LEAST_TRACK_HEIGHT = 120, MOST_STRETCH = 2.5;
 // Instants of the slider.
 const INSTANTS = 1000;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
-const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 106, PRINTED_TRACK_HEIGHT = 170;
+const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 100, PRINTED_TRACK_HEIGHT = 170, PRINTED_MOST = 920;
 
 const SVG = "http://www.w3.org/2000/svg";
 const element = (name, attributes = {}, ...children) => {
@@ -137,7 +137,7 @@ class Chart {
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
     const { curves, areas, limits, names, log } = this.panel, given = this.panel[`${key}_range`] || [null, null];
-    if (key === "y" && names.length) return [given[0] ?? -0.7, given[1] ?? names.length - 0.3];
+    if (key === "y" && names.length) return [given[0] ?? -0.9, given[1] ?? names.length - 0.3];
     const levels = this.panel[`${key}_levels`];
     if (levels) return [given[0] ?? -0.5, given[1] ?? levels.length - 0.5];
     const all = [...curves.flatMap((curve) => curve[key]), ...(key === "x" ? areas.flatMap((area) => area.x) : [...areas.flatMap((area) => [...area.low, ...area.high]), ...limits.map(([value]) => value)])];
@@ -192,9 +192,9 @@ class Chart {
   fit(width = null) {
     const columns = this.holder.parentElement.classList.contains("wide") ? 1 : this.picture.panels.length === 3 ? 3 : 2;
     const room = width == null ? this.holder.clientWidth : (width - (columns - 1) * PRINTED_GAP) / columns;
-    // Rows with names keep their height on paper, where their texts have their size too.
-    const share = width == null || this.panel.names.length ? 1 : 0.65;
-    if (room > 0 && (room !== this.plot.width || width != null)) { this.plot.setSize({ width: room, height: Math.round(share * this.height) }); this.whole(); }
+    // Rows with names keep their height on paper, as far as it goes, because their texts have their size there too.
+    const height = width == null ? this.height : this.panel.names.length ? Math.min(this.height, PRINTED_MOST) : Math.round(0.5 * this.height);
+    if (room > 0 && (room !== this.plot.width || width != null)) { this.plot.setSize({ width: room, height }); this.whole(); }
   }
 
   repaint() { this.plot.redraw(false, true); }
@@ -398,6 +398,8 @@ function addContents() {
   const links = sections.map((section) => element("a", { href: `#${section.id}` }, section.querySelector("h2").textContent));
   const bar = element("nav", { class: "jump", "aria-label": "Contents" }, element("a", { href: "#contents" }, "Contents"), ...links);
   document.querySelector("#contents").after(bar);
+  // On a wide screen the links take as many lines as they need; what stays in sight below them follows.
+  new ResizeObserver(() => document.querySelector("main").style.setProperty("--jump", `${bar.offsetHeight}px`)).observe(bar);
   reading = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) {
       const link = links[sections.indexOf(target)];

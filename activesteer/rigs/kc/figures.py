@@ -234,20 +234,20 @@ def _steering(result: KcResult) -> Picture:
     left = sweep.x >= 0.0
     inner, outer = steer[left, 0], steer[left, 1]
     ackermann = [
-        Curve(inner, inner - outer, "this car", _LEFT, "-", 1.8),
-        Curve(inner, inner - _ideal_outer_deg(axle, inner), "pure rolling", _GREY, "-", 0.9),
+        Curve(inner, inner - outer, "Ackermann, this car", _THIRD, "-", 1.8),
+        Curve(inner, inner - _ideal_outer_deg(axle, inner), "Ackermann, pure rolling", _THIRD, "--", 0.9),
     ]
     near = np.abs(sweep.x) <= math.radians(100.0)
     parking = [
         Curve(_DEG * sweep.x[near], _DEG * mean_steer_rad(axle, name)[near], label, colour, "-", 1.5)
         for name, label, colour in (
             ("steering_rolling", "no friction", _GREY),
-            ("steering_at_rest_left", "at rest, dry, turning left", _LEFT),
-            ("steering_at_rest_right", "turning right", _RIGHT),
+            ("steering_at_rest_left", "at rest, dry, turning left", "#cc79a7"),
+            ("steering_at_rest_right", "at rest, dry, turning right", "#e69f00"),
         )
     ]
     angles = _wheels(_DEG * sweep.x, _DEG * sweep.steer_rad[:, :2])
-    ratio = [Curve(_DEG * mean, local, "", _LEFT, "-", 1.8)]
+    ratio = [Curve(_DEG * mean, local, "", _GREY, "-", 1.8)]
     panels = [
         Panel("steering wheel [deg] (+ left)", "steer angle [deg]", angles, zero=True),
         Panel("mean steer angle [deg]", "overall steering ratio", ratio, zero=True),
@@ -302,7 +302,7 @@ def _targets(result: KcResult) -> Picture:
         for number, entry in enumerate(rows)
     ]  # fmt: skip
     x_label = "place in the target band: 0 lowest, 1 highest"
-    band = Area([0.0, 1.0], -0.7, len(rows) - 0.3, "", "#d5ead9")
+    band = Area([0.0, 1.0], -0.9, len(rows) - 0.3, "", "#d5ead9")
     names = [_row_name(entry) for entry in rows]
     panel = Panel(x_label, "", curves, areas=[band], names=names, x_range=(-0.7, 1.7))
     return Picture("target bands", [panel], width_in=8.5, height_in=1.2 + 0.24 * len(rows))

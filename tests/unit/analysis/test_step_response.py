@@ -50,6 +50,14 @@ def test_values_are_those_of_the_formulas():
     assert values["speed_end_mps"] == pytest.approx(22.0)
 
 
+def test_the_peak_of_the_sideslip_angle_is_found_on_either_side():
+    run = step_steer(sideslip_rad=0.001)
+    run.channels["sideslip_rad"] -= 0.003 * np.exp(-(((run.time_s - STEP_S - 0.3) / 0.05) ** 2))
+    values = step_response_metrics(run)
+    assert values["sideslip_peak_abs_rad"] == pytest.approx(0.0024, abs=5e-4)
+    assert values["sideslip_peak_rad"] == pytest.approx(0.001, abs=1e-4)
+
+
 def test_a_turn_to_the_right_is_the_mirror_image():
     left, right = (step_response_metrics(step_steer(side=side, rear_rad=-0.01)) for side in (1.0, -1.0))
     for name, value in left.items():

@@ -93,6 +93,7 @@ def test_the_offset_of_a_sensor_is_said_and_can_be_a_parameter(truth, tmp_path, 
     (note,) = (note for note in fit({**study, "factors": factors}, jobs=1).notes if "constant offset" in note)
     assert "roll angle in a" in note
     assert "zero_until_s of roll_rad" in note
+    assert note.endswith("make sensor_offset.roll_deg a factor")  # the unit of the residual
     assert float(note.partition("simulated is ")[2].split()[0]) == pytest.approx(-0.5, abs=0.1)
 
     found = fit({**study, "factors": {"sensor_offset.roll_deg": {"uniform": [-2.0, 2.0]}}}, jobs=1)
