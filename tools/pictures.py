@@ -46,7 +46,7 @@ DOCS: Final = Path(__file__).resolve().parents[1] / "docs"
 DOTS_PER_INCH: Final = 100
 COLUMN_DOTS_PER_INCH: Final = 150
 """Of a picture that is as narrow as a column. It comes out narrower than the others, with larger text."""
-COLOURS: Final = 64
+COLOURS: Final = 128
 """A plot has few colours and their shades: a palette makes the file a third as large."""
 SYSTEMS: Final = ("none", "ars", "afs")
 CORNER_WORDS: Final = {"fl": "front left", "rl": "rear left"}
