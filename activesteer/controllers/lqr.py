@@ -18,8 +18,8 @@ force:
 
 In a steady turn, snow looks like dry road with soft tyres, and a car of soft front tyres turns less. Steering it to the
 turn of new tyres would take the friction that nobody knows, and the rear axle with it. So as far as the friction is
-unknown, the turn is that of the estimated stiffnesses, where this is less, and both axles get the slip angles that
-these need. For the driver's angle both axles then turn by the same angle, which removes the sideslip and nothing else.
+unknown, a car that understeers more by its estimated stiffnesses keeps its own turn: the front wheels get the
+additional slip angle, and for the driver's angle both axles turn by the same angle, which does not change the turn.
 
 u* are the angles of the turn at the time when the present demand takes effect, a lag T_a and a call ahead. The law is
 
@@ -296,8 +296,10 @@ def fed_back(
     if speed < MIN_SPEED_MPS:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     assumed = friction + block._friction_deviations * now[_FRICTION_STD]
-    softness = _softness(block, now, certain)
-    desired = desired_turn(block._reference, driver_rad / _understeer(block, speed, softness), speed, assumed)
+    understeer = _understeer(block, now, certain)
+    # For the same turn, the front wheels of this car are steered so many times further.
+    further = 1.0 + understeer * speed * yaw_rate_gain(block._reference._single_track, speed)
+    desired = desired_turn(block._reference, driver_rad / further, speed, assumed)
     # The tyres follow the angles over their relaxation length.
     fraction = -math.expm1(-block._interval_s * speed / block._relaxation_length_m)
     block._front_rad += fraction * (driver_rad + superposition_rad - block._front_rad)
@@ -310,10 +312,10 @@ def fed_back(
         _gain(rows, start, part, 0), _gain(rows, start, part, 1), _gain(rows, start, part, 2),
         _gain(rows, start, part, 3), _gain(rows, start, part, 4), _gain(rows, start, part, 5),
     )  # fmt: skip
-    front, rear, sideslip = _steady(block, turning, speed, friction, given, desired, softness)
+    front, rear, sideslip = _steady(block, turning, speed, friction, given, desired, understeer)
     # The present demand takes effect a call and a lag later.
     coming = desired_ahead(block._reference, block._lag_s + block._interval_s)
-    next_front, next_rear, _ = _steady(block, turning, speed, friction, given, coming, softness)
+    next_front, next_rear, _ = _steady(block, turning, speed, friction, given, coming, understeer)
     brake_front, brake_rear = 0.0, 0.0
     if brake_pedal > 0.0 and both:
         moment_Nm = 0.0
@@ -352,21 +354,15 @@ def fed_back(
 
 
 @shared
-def _softness(block: Lqr, now: Estimate, certain: float) -> tuple[float, float]:
-    """Return the slip angles per lateral acceleration beyond those of new tyres, front and rear [s2 rad/m].
+def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
+    """Return the slip angle of soft front tyres beyond that of soft rear tyres, per lateral acceleration [s2 rad/m].
 
-    They count as far as the friction is not `certain`.
+    It is at least 0, and counts as far as the friction is not `certain`.
     """
     front = 1.0 + (1.0 - certain) * min(now[_FRONT_STIFFNESS] - 1.0, 0.0)
     rear = 1.0 + (1.0 - certain) * min(now[_REAR_STIFFNESS] - 1.0, 0.0)
-    return block._front_slip_s2radpm * (1.0 / front - 1.0), block._rear_slip_s2radpm * (1.0 / rear - 1.0)
-
-
-@shared
-def _understeer(block: Lqr, speed_mps: float, softness_s2radpm: tuple[float, float]) -> float:
-    """Return how many times the front angle of new tyres a car with soft front tyres needs for a turn, at least 1."""
-    more_s2radpm = max(softness_s2radpm[0] - softness_s2radpm[1], 0.0)
-    return 1.0 + more_s2radpm * speed_mps * yaw_rate_gain(block._reference._single_track, speed_mps)
+    more = block._front_slip_s2radpm * (1.0 / front - 1.0) - block._rear_slip_s2radpm * (1.0 / rear - 1.0)
+    return more if more > 0.0 else 0.0
 
 
 @shared
@@ -395,13 +391,12 @@ def _steady(
     friction: float,
     given_rad: float,
     yaw_rate_radps: float,
-    softness_s2radpm: tuple[float, float],
+    understeer_s2radpm: float,
 ) -> tuple[float, float, float]:
     """Return front angle, rear angle and sideslip of a steady turn, from their gains in the schedule [rad]."""
     ay_mps2 = speed_mps * yaw_rate_radps
     front_more, rear_more = excess(block._curves, ay_mps2, friction)
-    front_more += softness_s2radpm[0] * ay_mps2
-    rear_more += softness_s2radpm[1] * ay_mps2
+    front_more += understeer_s2radpm * ay_mps2
     # An axle with a given angle gets its additional slip angle from the sideslip, and the other axle follows.
     less = 0.0
     if not (block._superposition_works and block._rear_works):
