@@ -155,7 +155,7 @@ VIEWS: Final = {
         "wheel_load",
     ),
     EXPLORE: ("steering_wheel", "yaw_rate", "sideslip", "lateral", "added", "path_distance", "roll", "speed"),
-    FILM: ("speed", "sideslip", "added"),
+    FILM: ("speed", "sideslip", "added", "steering_wheel"),
     MOTION: ("yaw_rate", "sideslip", "added"),
     DRIVING: ("steering_wheel", "speed"),
     BODY: ("lateral", "roll", "longitudinal"),
