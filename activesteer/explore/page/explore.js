@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme } from "./look.js";
+import { dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme, small } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -15,7 +15,6 @@ export function say(text) {
   $("message").hidden = !text;
 }
 
-const narrow = matchMedia("(max-width: 760px)").matches;
 const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); });
 const track = new Track($("track"));
 const scene = new Scene($("view"));
@@ -76,10 +75,12 @@ function addBox(name) {
 }
 
 const asking = new Asking((dragging) => {
+  if (!chosen().length) { asking.stop(); say("Choose at least one controller."); return; }
   if (!dragging || !state.dragged) keepGhosts();
   state.dragged = dragging;
   state.released = false;
   state.asked = performance.now();
+  $("saved").textContent = ""; // other runs
   state.first = null;
   writeAddress();
   $("state").textContent = "driving …";
@@ -182,7 +183,7 @@ function showColours() {
 function showFigures() {
   showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), narrow ? shortName(run) : run.label)));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), small.matches ? shortName(run) : run.label)));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
@@ -204,7 +205,7 @@ function showSliders() {
   const before = $("group").value;
   $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, group[0].toUpperCase() + group.slice(1))));
   if (groups.includes(before)) $("group").value = before;
-  if (narrow) showGroup();
+  if (small.matches) showGroup();
 }
 
 // A phone has room for one group of sliders above the results.
@@ -288,7 +289,9 @@ const player = {
   },
 };
 
-$("choice").open = !narrow;
+const fit = () => { $("choice").open = !small.matches; showSliders(); };
+small.addEventListener("change", fit);
+fit();
 addEventListener("hashchange", readAddress);
 for (const id of NAMED) $(id).addEventListener("change", () => describe());
 $("group").addEventListener("change", showGroup);
