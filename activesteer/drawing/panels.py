@@ -116,7 +116,7 @@ PANELS: Final = {
             views=(REPORT, EXPLORE, *_RERUN),
         ),
         _also(MEASURED, "yaw_rate_radps"),
-        note="dotted: desired by the controller", in_rerun="yaw rate, desired one thin",
+        note="dotted: desired", in_rerun="yaw rate, desired one thin",
     ),
     "sideslip": panel_of("sideslip_rad", _also(ESTIMATED, "sideslip_rad")),
     "lateral": panel_of("ay_mps2", _also(MEASURED, "ay_mps2")),

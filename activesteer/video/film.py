@@ -33,19 +33,28 @@ CUTAWAY: Final = 0.12
 """Opacity of a shell that lets the suspension be seen."""
 _SHELL_OPACITY: Final = {"chase": 1.0, "top": 0.25, "wheel": CUTAWAY}
 """Camera -> opacity of the shell of a car."""
+_MOST_SPREAD_M, _BACK_PER_SPREAD = 25.0, 1.8
+"""Largest distance of the camera's target from the first car [m], and way of the camera backwards for each metre."""
 _SIDE_LIMIT: Final = 8192
 """Most pixels of a side of a film."""
 
 
-def aim(camera: mujoco.MjvCamera, name: str, track: Track, time_s: float, corner: str = CORNERS[0]) -> None:
-    """Aim a camera at an instant [s]. It does not roll or heave with the car."""
+def aim(camera: mujoco.MjvCamera, name: str, tracks: Sequence[Track], time_s: float, corner: str = CORNERS[0]) -> None:
+    """Aim a camera at the cars at an instant [s]. It does not roll or heave with the first car, which it follows."""
+    track = tracks[0]
+    places = np.array([each.middle(time_s) for each in tracks])
+    # All cars stay in the picture, unless they are so far apart that the first one could hardly be seen.
+    aside = 0.5 * (places.min(axis=0) + places.max(axis=0)) - places[0]
+    spread_m = float(np.linalg.norm(aside))
+    aside *= min(1.0, _MOST_SPREAD_M / max(spread_m, 1e-9))
+    back_m = _BACK_PER_SPREAD * min(spread_m, _MOST_SPREAD_M)
     if name == "chase":  # in the direction of motion, so that a car that slides turns in the picture
         direction = track.direction(time_s)
-        camera.lookat = track.middle(time_s) + np.array([0.9 * math.cos(direction), 0.9 * math.sin(direction), 0.15])
-        camera.distance, camera.elevation, camera.azimuth = 8.3, -20.0, math.degrees(direction)
+        camera.lookat = places[0] + aside + (0.9 * math.cos(direction), 0.9 * math.sin(direction), 0.15)
+        camera.distance, camera.elevation, camera.azimuth = 8.3 + back_m, -20.0, math.degrees(direction)
     elif name == "top":  # x to the right and y up, as in the plots
-        camera.lookat = track.middle(time_s)
-        camera.distance, camera.elevation, camera.azimuth = 15.0, -90.0, 90.0
+        camera.lookat = places[0] + aside
+        camera.distance, camera.elevation, camera.azimuth = 15.0 + back_m, -90.0, 90.0
     else:  # inboard of the wheel, where its links are
         side, end = (1.0 if corner[1] == "l" else -1.0), (1.0 if corner[0] == "f" else -1.0)
         camera.lookat = track.wheel_centre(corner, time_s) + np.array([0.0, 0.0, 0.05])
@@ -183,7 +192,7 @@ class _Pane:
         for number, track in enumerate(self._tracks):
             self.scene.place(number, *track.poses(time_s))
         self.scene.update()
-        aim(self._camera, self._settings.camera, self._tracks[0], time_s, self._settings.corner)
+        aim(self._camera, self._settings.camera, self._tracks, time_s, self._settings.corner)
         scene = canvas.prepare(self.scene.data, self._camera)
         for add in self._marks:
             add(scene, time_s)

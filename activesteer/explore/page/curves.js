@@ -161,6 +161,6 @@ export class Track {
     }
     pen.fillStyle = paint("quiet");
     const stretch = zoomY / zoomX;
-    pen.fillText(`from above, ${Math.round(right - left)} m${stretch > 1.05 ? `, ${stretch.toFixed(1)} times wider than true` : ""}`, 10, height - 7);
+    pen.fillText(`from above, ${Math.round(right - left)} m${stretch > 1.05 ? `, ${stretch.toFixed(1)} times wider than true, but not the cars` : ""}`, 10, height - 7);
   }
 }

@@ -10,8 +10,9 @@ const $ = (id) => document.getElementById(id);
 const TOLD_MS = 100; // time between two readings of the curves while they play
 const FIRST = { maneuver: "sine_with_dwell", vehicle: "compact", driver: "typical", controllers: ["none", "ars", "afs"] };
 
-export function say(text) {
+export function say(text, hint = false) {
   $("message").textContent = text;
+  $("message").classList.toggle("hint", hint);
   $("message").hidden = !text;
 }
 
@@ -32,8 +33,8 @@ const choice = () => ({ ...Object.fromEntries(NAMED.map((id) => [id, $(id).value
 
 function describe(ticked) {
   const unticked = untickBeyond(mostControllers, boxes(), ticked);
-  if (!chosen().length) { say("Choose at least one controller."); return; }
-  say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "");
+  if (!chosen().length) { say("Choose at least one controller.", true); return; }
+  say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "", true);
   if (unticked.includes(ticked?.value)) return;
   asking.stop();
   // Another controller leaves the sliders where they are; they apply where the new choice has them.
@@ -75,7 +76,7 @@ function addBox(name) {
 }
 
 const asking = new Asking((dragging) => {
-  if (!chosen().length) { asking.stop(); say("Choose at least one controller."); return; }
+  if (!chosen().length) { asking.stop(); say("Choose at least one controller.", true); return; }
   if (!dragging || !state.dragged) keepGhosts();
   state.dragged = dragging;
   state.released = false;
@@ -195,10 +196,10 @@ function showFigures() {
 
 function showSliders() {
   const groups = [...new Set(state.sliders.map((slider) => slider.group))];
-  const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group));
+  const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group)), known = new Set([...$("group").options].map(({ value }) => value));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
-    box.open = open.size ? open.has(group) : i === 0 || (i !== 1 && i < 4);
+    box.open = open.size ? open.has(group) || !known.has(group) : i === 0 || (i !== 1 && i < 4);
     for (const slider of state.sliders.filter((other) => other.group === group)) box.append(sliderOf(slider));
     return box;
   }));
@@ -302,7 +303,7 @@ $("save").addEventListener("click", () => { $("saved").textContent = "saving …
 $("report").addEventListener("click", () => socket.send({ kind: "report" }));
 for (const what of ["command", "python"]) $(`copy-${what}`).addEventListener("click", () => navigator.clipboard.writeText($(what).textContent));
 $("theme").addEventListener("click", () => setTheme(!dark()));
-onTheme(() => { scene.stale = true; showFigures(); });
+onTheme(showFigures);
 for (const name of ["explore", "drive"]) {
   $(`tab-${name}`).addEventListener("click", () => {
     for (const other of ["explore", "drive"]) { $(other).hidden = other !== name; $(`tab-${other}`).setAttribute("aria-selected", String(other === name)); }

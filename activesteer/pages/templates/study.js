@@ -53,16 +53,20 @@ function binned(rows, values) {
   const count = Math.min(FIELDS, Math.max(2, Math.round(Math.sqrt(runs / 3))));
   const ends = pair.map(({ key }) => endsOf(rows.map((i) => DATA.rows.factors[key][i])));
   if (ends.some(([low, high]) => !(high > low))) return null;
-  const place = (k, v) => Math.min(count - 1, Math.floor(((v - ends[k][0]) / (ends[k][1] - ends[k][0])) * count));
-  const sums = DATA.controllers.map(() => Array.from({ length: count }, () => Array.from({ length: count }, () => [0, 0])));
+  // A factor whose values the study lists has a field for each value, another one has fields of equal width.
+  const axes = pair.map(({ levels, listed }, k) => {
+    const [low, high] = ends[k], width = (high - low) / count;
+    if (listed && levels.length) return { levels, place: (v) => levels.findIndex((level) => Math.abs(level - v) < 1e-4 * (high - low)) };
+    return { levels: Array.from({ length: count }, (_, i) => low + (i + 0.5) * width), place: (v) => Math.min(count - 1, Math.floor((v - low) / width)) };
+  });
+  const sums = DATA.controllers.map(() => axes[0].levels.map(() => axes[1].levels.map(() => [0, 0])));
   for (const i of rows) {
     const [a, b] = pair.map(({ key }) => DATA.rows.factors[key][i]);
     if (a == null || b == null || values[i] == null) continue;
-    const field = sums[DATA.rows.controller[i]][place(0, a)][place(1, b)];
+    const field = sums[DATA.rows.controller[i]][axes[0].place(a)][axes[1].place(b)];
     field[0] += values[i]; field[1]++;
   }
-  const levels = ends.map(([low, high]) => Array.from({ length: count }, (_, i) => low + ((i + 0.5) / count) * (high - low)));
-  return { keys: pair.map(({ key }) => key), levels, maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
+  return { keys: pair.map(({ key }) => key), levels: axes.map(({ levels }) => levels), maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
 }
 
 function heat(metric, { keys, levels, maps }) {

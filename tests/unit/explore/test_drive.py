@@ -129,12 +129,13 @@ def test_a_drive_past_a_gate_has_no_time(tmp_path: Path) -> None:
 
 def test_a_drive_through_all_gates_has_a_time(tmp_path: Path) -> None:
     car = drive("lane_change", tmp_path, speed_kmh=30.0)
-    path = car._simulation.scenario.maneuver.course.path
+    course = car._simulation.scenario.maneuver.course
+    assert course is not None
     while (header := car.frame().header)["last_lap_s"] is None:
         assert not header["missed"]
         truth, motion = car._simulation.truth, car._simulation.motion
         ahead_m = 0.7 * motion.speed_mps
-        wanted_m = np.interp(truth["front_axle_x_m"] + ahead_m, path.x_m, path.y_m)
+        wanted_m = np.interp(truth["front_axle_x_m"] + ahead_m, course.path.x_m, course.path.y_m)
         aside_rad = math.atan2(wanted_m - truth["front_axle_y_m"], ahead_m) - motion.yaw_rad
         car.act(Act(steer=max(-1.0, min(1.0, 1.5 * aside_rad))))
     assert header["last_lap_s"] > 10.0
