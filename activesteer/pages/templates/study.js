@@ -110,7 +110,7 @@ function sensitivity(metric, found) {
 }
 
 // Every run as a line through its factors and the metric, each between its least and its greatest value, in the colour
-// of its metric. Controllers drive the same samples, so each has a panel. The lines stop above each name.
+// of its metric. Controllers drive the same samples, so each has a panel. An axis is a band for its name, which no line crosses.
 function parallel(metric, rows) {
   const values = DATA.rows.metrics[metric.name];
   const axes = [...varied(rows).map((factor) => ({ factor, of: (i) => placeOf(factor, DATA.rows.factors[factor.key][i]) })), { factor: { ...metric, numeric: true }, of: (i) => values[i] }]
@@ -125,7 +125,8 @@ function parallel(metric, rows) {
       const x = own.flatMap((i) => axes.flatMap((axis) => [along(axis, i), null, along(axis, i)]).slice(2).concat(null));
       return curveOf(c, x, own.flatMap(() => [...axes.keys()].flatMap((row) => [row - NAME_ROOM, null, row]).slice(2).concat(null)), { label: "", shade, dashes: [], marker: "", alpha: 0.7 });
     });
-    return panelOf("", "", { title, curves, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], y_range: [-NAME_ROOM, names.length - 0.85], row_px: 80 });
+    const areas = names.map((_, row) => ({ x: [-0.05, 1.05], low: [row - NAME_ROOM, row - NAME_ROOM], high: [row, row], label: "", colour: "run-0", alpha: 0.06, edge: "run-0", shade: null }));
+    return panelOf("", "", { title, curves, areas, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], y_range: [-NAME_ROOM - 0.05, names.length - 0.95], row_px: 80 });
   });
   show("parallel", panels, [`${axisOf(metric)}:`, ...axes.at(-1).ends]);
 }
