@@ -33,8 +33,9 @@ CUTAWAY: Final = 0.12
 """Opacity of a shell that lets the suspension be seen."""
 _SHELL_OPACITY: Final = {"chase": 1.0, "top": 0.25, "wheel": CUTAWAY}
 """Camera -> opacity of the shell of a car."""
-_MOST_SPREAD_M, _BACK_PER_SPREAD = 25.0, 1.8
-"""Largest distance of the camera's target from the first car [m], and way of the camera backwards for each metre."""
+_NEAR_M, _MOST_ASIDE_M, _BACK_PER_ASIDE = 1.5, 25.0, 2.2
+"""Half distance of cars up to which the camera stays with the first one [m], most that its target moves beside that
+car [m], and way of the camera backwards for each metre of it."""
 _SIDE_LIMIT: Final = 8192
 """Most pixels of a side of a film."""
 
@@ -45,9 +46,10 @@ def aim(camera: mujoco.MjvCamera, name: str, tracks: Sequence[Track], time_s: fl
     places = np.array([each.middle(time_s) for each in tracks])
     # All cars stay in the picture, unless they are so far apart that the first one could hardly be seen.
     aside = 0.5 * (places.min(axis=0) + places.max(axis=0)) - places[0]
-    spread_m = float(np.linalg.norm(aside))
-    aside *= min(1.0, _MOST_SPREAD_M / max(spread_m, 1e-9))
-    back_m = _BACK_PER_SPREAD * min(spread_m, _MOST_SPREAD_M)
+    half_m = float(np.linalg.norm(aside))
+    aside_m = min(max(half_m - _NEAR_M, 0.0), _MOST_ASIDE_M)
+    aside *= aside_m / max(half_m, _NEAR_M)
+    back_m = _BACK_PER_ASIDE * aside_m
     if name == "chase":  # in the direction of motion, so that a car that slides turns in the picture
         direction = track.direction(time_s)
         camera.lookat = places[0] + aside + (0.9 * math.cos(direction), 0.9 * math.sin(direction), 0.15)
