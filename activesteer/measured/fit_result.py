@@ -209,7 +209,7 @@ class Fit(NamedTuple):
                 offset = f"{-each.noise * mean * shown.unit.factor:.3g} {shown.unit.name}"
                 advice = f"set zero_until_s of {each.channel} in the map"
                 if each.channel in SensorOffsetTable.__dataclass_fields__:
-                    advice += f", or make sensor_offset.{each.channel} a factor"
+                    advice += f", or make sensor_offset.{each.channel.replace('_rad', '_deg')} a factor"
                 found.append(
                     f"the residual of the {where} is a constant offset: measured less simulated is {offset}; {advice}"
                 )

@@ -214,12 +214,11 @@ def _dots(faults: list[dict[str, Any]]) -> Picture:
 
     def panel(figure: str, label: str) -> Panel:
         curves = []
-        for side in SIDES:
+        for side, apart in zip(SIDES, (0.0, 0.18), strict=True):
             rows = [row for row in faults if row["direction"] == side]
-            places = [float(names.index(row["fault"])) for row in rows]
-            curves.append(Curve([_shown(row, figure) for row in rows], places, side, dashes="", marker="o"))
-        shown = names if figure == FIGURES[0] else [""] * len(names)
-        return Panel(label, "", curves, names=shown)
+            places = [names.index(row["fault"]) + apart for row in rows]
+            curves.append(Curve([_shown(row, figure) for row in rows], places, side, dashes="", marker="o", size=6.0))
+        return Panel(label, "", curves, names=names)
 
     panels = [
         panel("yaw_rate_change_radps", "yaw rate, change,\nhands fixed [deg/s]"),

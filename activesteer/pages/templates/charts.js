@@ -135,7 +135,7 @@ class Chart {
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
     const { curves, areas, limits, names, log } = this.panel, given = this.panel[`${key}_range`] || [null, null];
-    if (key === "y" && names.length) return [-1, given[1] ?? names.length - 0.3];
+    if (key === "y" && names.length) return [given[0] ?? -1, given[1] ?? names.length - 0.3];
     const levels = this.panel[`${key}_levels`];
     if (levels) return [given[0] ?? -0.5, given[1] ?? levels.length - 0.5];
     const all = [...curves.flatMap((curve) => curve[key]), ...(key === "x" ? areas.flatMap((area) => area.x) : [...areas.flatMap((area) => [...area.low, ...area.high]), ...limits.map(([value]) => value)])];

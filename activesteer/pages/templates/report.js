@@ -63,6 +63,7 @@
     }
 
     show(i) {
+      this.instant = i;
       this.player.tell(i);
       if (this.track) this.track.at(i);
     }
@@ -92,9 +93,10 @@
     }
 
     read(u, panel, values) {
-      const i = u.cursor.idx;
+      // While it plays, the clock may be beyond what is zoomed to.
+      const { playing } = this.player, i = playing ? this.instant : u.cursor.idx;
       values.replaceChildren();
-      if (i == null || u.cursor.left < 0) { if (this.track && !this.player.held) this.track.at(null); return; }
+      if (i == null || (!playing && u.cursor.left < 0)) { if (this.track && !this.player.held) this.track.at(null); return; }
       values.append(`${this.time[i].toFixed(2)} s`);
       panel.series.forEach((series, k) => {
         // The value of the first curve of each run; desired values are not shown.
@@ -102,7 +104,7 @@
         values.append(" ", element("span", { style: `--run: var(--run-${this.data.runs[series.run].place})` }, shown(series.values[i])));
       });
       // While it plays, the places of the cars come from the clock.
-      if (!this.player.playing) this.show(i);
+      if (!playing) this.show(i);
     }
 
     marks(u) {

@@ -53,16 +53,20 @@ function binned(rows, values) {
   const count = Math.min(FIELDS, Math.max(2, Math.round(Math.sqrt(runs / 3))));
   const ends = pair.map(({ key }) => endsOf(rows.map((i) => DATA.rows.factors[key][i])));
   if (ends.some(([low, high]) => !(high > low))) return null;
-  const place = (k, v) => Math.min(count - 1, Math.floor(((v - ends[k][0]) / (ends[k][1] - ends[k][0])) * count));
-  const sums = DATA.controllers.map(() => Array.from({ length: count }, () => Array.from({ length: count }, () => [0, 0])));
+  // A factor whose values the study lists has a field for each value, another one has fields of equal width.
+  const axes = pair.map(({ levels, listed }, k) => {
+    const [low, high] = ends[k], width = (high - low) / count;
+    if (listed && levels.length) return { levels, place: (v) => levels.findIndex((level) => Math.abs(level - v) < 1e-4 * (high - low)) };
+    return { levels: Array.from({ length: count }, (_, i) => low + (i + 0.5) * width), place: (v) => Math.min(count - 1, Math.floor((v - low) / width)) };
+  });
+  const sums = DATA.controllers.map(() => axes[0].levels.map(() => axes[1].levels.map(() => [0, 0])));
   for (const i of rows) {
     const [a, b] = pair.map(({ key }) => DATA.rows.factors[key][i]);
     if (a == null || b == null || values[i] == null) continue;
-    const field = sums[DATA.rows.controller[i]][place(0, a)][place(1, b)];
+    const field = sums[DATA.rows.controller[i]][axes[0].place(a)][axes[1].place(b)];
     field[0] += values[i]; field[1]++;
   }
-  const levels = ends.map(([low, high]) => Array.from({ length: count }, (_, i) => low + ((i + 0.5) / count) * (high - low)));
-  return { keys: pair.map(({ key }) => key), levels, maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
+  return { keys: pair.map(({ key }) => key), levels: axes.map(({ levels }) => levels), maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
 }
 
 function heat(metric, { keys, levels, maps }) {
@@ -106,7 +110,7 @@ function sensitivity(metric, found) {
 }
 
 // Every run as a line through its factors and the metric, each between its least and its greatest value, in the colour
-// of its metric. Controllers drive the same samples, so each has a panel. The lines stop above each name.
+// of its metric. Controllers drive the same samples, so each has a panel. An axis is a band for its name, which no line crosses.
 function parallel(metric, rows) {
   const values = DATA.rows.metrics[metric.name];
   const axes = [...varied(rows).map((factor) => ({ factor, of: (i) => placeOf(factor, DATA.rows.factors[factor.key][i]) })), { factor: { ...metric, numeric: true }, of: (i) => values[i] }]
@@ -121,7 +125,8 @@ function parallel(metric, rows) {
       const x = own.flatMap((i) => axes.flatMap((axis) => [along(axis, i), null, along(axis, i)]).slice(2).concat(null));
       return curveOf(c, x, own.flatMap(() => [...axes.keys()].flatMap((row) => [row - NAME_ROOM, null, row]).slice(2).concat(null)), { label: "", shade, dashes: [], marker: "", alpha: 0.7 });
     });
-    return panelOf("", "", { title, curves, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], y_range: [-NAME_ROOM, names.length - 0.85], row_px: 80 });
+    const areas = names.map((_, row) => ({ x: [-0.05, 1.05], low: [row - NAME_ROOM, row - NAME_ROOM], high: [row, row], label: "", colour: "run-0", alpha: 0.06, edge: "run-0", shade: null }));
+    return panelOf("", "", { title, curves, areas, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], y_range: [-NAME_ROOM - 0.05, names.length - 0.95], row_px: 80 });
   });
   show("parallel", panels, [`${axisOf(metric)}:`, ...axes.at(-1).ends]);
 }

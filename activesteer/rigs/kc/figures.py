@@ -234,16 +234,16 @@ def _steering(result: KcResult) -> Picture:
     left = sweep.x >= 0.0
     inner, outer = steer[left, 0], steer[left, 1]
     ackermann = [
-        Curve(inner, inner - outer, "this car", _LEFT, "-", 1.8),
-        Curve(inner, inner - _ideal_outer_deg(axle, inner), "pure rolling", _GREY, "-", 0.9),
+        Curve(inner, inner - outer, "this car", _THIRD, "-", 1.8),
+        Curve(inner, inner - _ideal_outer_deg(axle, inner), "pure rolling", _GREY, "--", 0.9),
     ]
     near = np.abs(sweep.x) <= math.radians(100.0)
     parking = [
         Curve(_DEG * sweep.x[near], _DEG * mean_steer_rad(axle, name)[near], label, colour, "-", 1.5)
         for name, label, colour in (
             ("steering_rolling", "no friction", _GREY),
-            ("steering_at_rest_left", "at rest, dry, turning left", _LEFT),
-            ("steering_at_rest_right", "turning right", _RIGHT),
+            ("steering_at_rest_left", "at rest, dry, turning left", "#cc79a7"),
+            ("steering_at_rest_right", "at rest, dry, turning right", "#e69f00"),
         )
     ]
     angles = _wheels(_DEG * sweep.x, _DEG * sweep.steer_rad[:, :2])

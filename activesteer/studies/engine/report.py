@@ -147,10 +147,11 @@ def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, An
     levels = column.drop_null().unique().to_pylist()
     few = len(levels) <= _BINS
     ordered = (sorted(levels) if numeric else [str(level) for level in levels]) if few or not numeric else []
-    relative = next((factor.nominal for factor in study.factors if factor.key == key), None)
+    given = [factor for factor in study.factors if factor.key == key]
+    relative, listed = given[0].nominal if given else None, any(factor.kind in ("grid", "choice") for factor in given)
     words, unit = _label(study, key)
     told = {"label": f"{words}{_RELATIVE.get(relative or '', '')}", "unit": "" if relative == "times" else unit}
-    return {"key": key, **told, "numeric": numeric, "levels": ordered}
+    return {"key": key, **told, "numeric": numeric, "listed": listed, "levels": ordered}
 
 
 def _label(study: StudyFile, key: str) -> tuple[str, str]:

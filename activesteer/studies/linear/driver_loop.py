@@ -317,7 +317,7 @@ def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
         ("damping_in_run", "damping ratio in a run", "", LEAST_DAMPING, 2, " at 80 and 100 km/h"),
     ):
         if key == "damping_in_run" and all(row[key] == 1.0 for row in rows):
-            found.append(passed("After a small step of the path, every run reaches the path without crossing it."))
+            found.append(passed("After a small step of the path, no run crosses the path."))
             continue
         judged = [row for row in rows if math.isfinite(row[key])]
         if not judged:
@@ -355,7 +355,7 @@ def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture)
         ]
         for row in rows
     ]
-    note = "\N{EN DASH}: the car reaches the path without crossing it." if set(heads) & set(_FROM_RUNS) else ""
+    note = "\N{EN DASH}: the car does not cross the path." if set(heads) & set(_FROM_RUNS) else ""
     sections = [
         Section(pictures=[picture]),
         Section("Numbers", tables=[Table("", ["loop", *heads.values()], cells, note=note)]),
