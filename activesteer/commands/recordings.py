@@ -237,7 +237,7 @@ def _size(text: str) -> tuple[int, int]:
 
 @command("video", "make a film of a recording",
     arguments.RECORDING,
-    arguments.output("OUT.mp4|gif", "the film (default: FILE.mp4 beside the recording)"),
+    arguments.output("OUT.mp4", "the film (default: FILE.mp4 beside the recording)"),
     arguments.option("--camera", ("chase", "top", "wheel"), "camera position", "chase"),
     arguments.option("--corner", _CORNERS, "wheel for the camera `wheel` (default: fl)"),
     arguments.option("--compare", "OTHER.mcap",
@@ -247,10 +247,10 @@ def _size(text: str) -> tuple[int, int]:
         "overlay"),
     arguments.option("--gauges", ("full", "sideslip"), "all gauges, or one large sideslip angle for each car", "full"),
     arguments.option("--size", "WxH", "pixels", "1280x720", type=_size),
-    arguments.option("--fps", "FPS", "pictures per second (default: 30, GIF: 20)", type=float),
+    arguments.option("--fps", "FPS", "frames per second", 30.0),
     arguments.option("--speed", "FACTOR", "pace: 0.25 is slow motion, 4 is fast", 1.0),
     _CUTAWAY,
-    description="Draw a recording without a window, and write an MP4 or a GIF.",
+    description="Draw a recording without a window, and write an MP4.",
 )  # fmt: skip
 def _video(options: argparse.Namespace) -> None:
     from activesteer.video import Settings, make_film
@@ -261,12 +261,11 @@ def _video(options: argparse.Namespace) -> None:
         raise ParameterError("--layout side-by-side needs --compare OTHER.mcap")
     named = _named([options.file, *(options.compare or ())])
     output = options.output or options.file.with_suffix(".mp4")
-    rate = options.fps if options.fps is not None else 20.0 if output.suffix.lower() == ".gif" else 30.0
     settings = Settings(
         options.camera,
         options.corner or _CORNERS[0],
         options.size,
-        rate,
+        options.fps,
         options.speed,
         options.layout,
         gauges=options.gauges,
@@ -274,11 +273,10 @@ def _video(options: argparse.Namespace) -> None:
     )
     started = time.monotonic()
     with terminal.Progress(f"{output}", quiet=False) as progress:
-        made = make_film(named, output, settings, progress)
+        frames = make_film(named, output, settings, progress)
     took = time.monotonic() - started
     print(
-        f"{output}: {made.pictures} pictures, {made.pictures / made.rate_hz:.1f} s at {made.rate_hz:g} a second, "
-        f"made in {took:.1f} s",
+        f"{output}: {frames} frames, {frames / options.fps:.1f} s at {options.fps:g} a second, made in {took:.1f} s",
         file=sys.stderr,
     )
 

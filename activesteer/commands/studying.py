@@ -180,7 +180,7 @@ def _lines(found: Tuning) -> Iterator[str]:
         fails = [name for name in trial.margins if name not in trial.holding]
         about = f"{len(trial.holding)} of {len(trial.margins)} hold, implausibility {trial.implausibility:.2f}"
         about += f", set {trial.number}{'; fails: ' * bool(fails)}{' '.join(fails)}"
-        yield "  ".join(f"{name} {value:.6g}" for name, value in trial.objectives.items()) or about
+        yield "  ".join(f"{name} {value:.3g}" for name, value in trial.objectives.items()) or about
         if found.plausibility is None or trial is found.front[0]:
             yield from _values(trial)
     if pairs := found.never_together:
@@ -206,7 +206,8 @@ def _worst(found: Tuning) -> Iterator[str]:
 
 
 def _values(trial: Trial, indent: str = "  ") -> Iterator[str]:
-    yield from (f"{indent}{key} = {value!r}" for key, value in trial.values.items())
+    for key, value in trial.values.items():
+        yield f"{indent}{key} = {f'{value:.3g}' if isinstance(value, float) else repr(value)}"
 
 
 @command("fit", "fit parameters of a car to recordings, with intervals",

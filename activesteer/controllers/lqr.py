@@ -16,6 +16,11 @@ force:
 
     f* - M / (l C_V),  g* + M / (l C_H)
 
+In a steady turn, snow looks like dry road with soft tyres, and a car of soft front tyres turns less. Steering it to the
+turn of new tyres would take the friction that nobody knows, and the rear axle with it. So as far as the friction is
+unknown, a car that understeers more by its estimated stiffnesses keeps its own turn: the front wheels get the
+additional slip angle, and for the driver's angle both axles turn by the same angle, which does not change the turn.
+
 u* are the angles of the turn at the time when the present demand takes effect, a lag T_a and a call ahead. The law is
 
     u = u* - K(v) (x - x*),        x = (r, beta, f, g, a, delta_H, u before)
@@ -58,7 +63,7 @@ from activesteer.controllers.turn_reference import (
     desired_ahead,
     desired_turn,
 )
-from activesteer.core.conventions import Array
+from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.core.signals import (
     NO_BRAKES,
     ActuatorCommand,
@@ -71,7 +76,7 @@ from activesteer.core.signals import (
 from activesteer.estimation.estimator import Estimator
 from activesteer.native.records import NativeBlock, Table, table
 from activesteer.native.shared_laws import shared
-from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
+from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, yaw_rate_gain
 
 SPEED_STEP_MPS: Final = 5.0
 SPEEDS_MPS: Final = tuple(SPEED_STEP_MPS * (number + 1) for number in range(14))
@@ -85,8 +90,9 @@ _STEADY: Final = 6
 """Number of values of the steady turn in a row of the schedule, before the rows of K."""
 _ROW: Final = _STEADY + 2 * len(STATES)
 """Number of values in a row of the schedule."""
-_SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD = map(
-    Estimate._fields.index, ("speed_mps", "sideslip_rad", "yaw_rate_radps", "friction", "friction_std")
+_SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD, _FRONT_STIFFNESS, _REAR_STIFFNESS = map(
+    Estimate._fields.index,
+    ("speed_mps", "sideslip_rad", "yaw_rate_radps", "friction", "friction_std", "front_stiffness", "rear_stiffness"),
 )
 _SAME_RAD: Final = 1e-6
 """Difference of an angle from its demand that is no limit [rad]."""
@@ -145,6 +151,8 @@ class Lqr(NativeBlock):
     _driver_before_rad: float
     _torque_per_pressure_NmpPa: PerWheel
     _moment_per_torque: PerWheel
+    _front_slip_s2radpm: float
+    _rear_slip_s2radpm: float
     _front_compensation_radpNm: float
     _rear_compensation_radpNm: float
     _front_rad: float
@@ -174,7 +182,13 @@ class Lqr(NativeBlock):
         assert known is not None  # an estimator exists
         self._torque_per_pressure_NmpPa = known.brake_torque_per_pressure_NmpPa
         self._moment_per_torque = 1.0 / front, -1.0 / front, 1.0 / rear, -1.0 / rear
-        wheelbase_m = self._car.wheelbase_m
+        wheelbase_m, wheel_N = self._car.wheelbase_m, self._car.wheel_loads_N
+        self._front_slip_s2radpm, self._rear_slip_s2radpm = (
+            2.0 * load_N / GRAVITY_MPS2 / stiffness_Nprad
+            for load_N, stiffness_Nprad in zip(
+                wheel_N, (self._car.front_stiffness_Nprad, self._car.rear_stiffness_Nprad), strict=True
+            )
+        )
         self._front_compensation_radpNm = -1.0 / (wheelbase_m * self._car.front_stiffness_Nprad)
         self._rear_compensation_radpNm = 1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad)
 
@@ -282,7 +296,10 @@ def fed_back(
     if speed < MIN_SPEED_MPS:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     assumed = friction + block._friction_deviations * now[_FRICTION_STD]
-    desired = desired_turn(block._reference, driver_rad, speed, assumed)
+    understeer = _understeer(block, now, certain)
+    # For the same turn, the front wheels of this car are steered so many times further.
+    further = 1.0 + understeer * speed * yaw_rate_gain(block._reference._single_track, speed)
+    desired = desired_turn(block._reference, driver_rad / further, speed, assumed)
     # The tyres follow the angles over their relaxation length.
     fraction = -math.expm1(-block._interval_s * speed / block._relaxation_length_m)
     block._front_rad += fraction * (driver_rad + superposition_rad - block._front_rad)
@@ -295,10 +312,10 @@ def fed_back(
         _gain(rows, start, part, 0), _gain(rows, start, part, 1), _gain(rows, start, part, 2),
         _gain(rows, start, part, 3), _gain(rows, start, part, 4), _gain(rows, start, part, 5),
     )  # fmt: skip
-    front, rear, sideslip = _steady(block, turning, speed, friction, given, desired)
+    front, rear, sideslip = _steady(block, turning, speed, friction, given, desired, understeer)
     # The present demand takes effect a call and a lag later.
     coming = desired_ahead(block._reference, block._lag_s + block._interval_s)
-    next_front, next_rear, _ = _steady(block, turning, speed, friction, given, coming)
+    next_front, next_rear, _ = _steady(block, turning, speed, friction, given, coming, understeer)
     brake_front, brake_rear = 0.0, 0.0
     if brake_pedal > 0.0 and both:
         moment_Nm = 0.0
@@ -337,6 +354,18 @@ def fed_back(
 
 
 @shared
+def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
+    """Return the slip angle of soft front tyres beyond that of soft rear tyres, per lateral acceleration [s2 rad/m].
+
+    It is at least 0, and counts as far as the friction is not `certain`.
+    """
+    front = 1.0 + (1.0 - certain) * min(now[_FRONT_STIFFNESS] - 1.0, 0.0)
+    rear = 1.0 + (1.0 - certain) * min(now[_REAR_STIFFNESS] - 1.0, 0.0)
+    more = block._front_slip_s2radpm * (1.0 / front - 1.0) - block._rear_slip_s2radpm * (1.0 / rear - 1.0)
+    return more if more > 0.0 else 0.0
+
+
+@shared
 def _patience(block: Lqr, driver_rad: float) -> float:
     """Return the part of the superposition that may still be held against the driver.
 
@@ -356,10 +385,18 @@ def _patience(block: Lqr, driver_rad: float) -> float:
 
 @shared
 def _steady(
-    block: Lqr, gains: tuple[float, ...], speed_mps: float, friction: float, given_rad: float, yaw_rate_radps: float
+    block: Lqr,
+    gains: tuple[float, ...],
+    speed_mps: float,
+    friction: float,
+    given_rad: float,
+    yaw_rate_radps: float,
+    understeer_s2radpm: float,
 ) -> tuple[float, float, float]:
     """Return front angle, rear angle and sideslip of a steady turn, from their gains in the schedule [rad]."""
-    front_more, rear_more = excess(block._curves, speed_mps * yaw_rate_radps, friction)
+    ay_mps2 = speed_mps * yaw_rate_radps
+    front_more, rear_more = excess(block._curves, ay_mps2, friction)
+    front_more += understeer_s2radpm * ay_mps2
     # An axle with a given angle gets its additional slip angle from the sideslip, and the other axle follows.
     less = 0.0
     if not (block._superposition_works and block._rear_works):

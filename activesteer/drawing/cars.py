@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -96,8 +95,6 @@ SEE_THROUGH: Final = 0.5
 """Opacity below which a solid of a model is part of its shell."""
 _SALOON_FROM_M: Final = 2.72
 """Least wheelbase of a car that is drawn as a saloon [m]. Others are hatchbacks."""
-_TAIL_M: Final = 0.42, 0.76
-"""Foremost place of the tail of a body, ahead of the rear axle, and its height [m]."""
 _DRAWN: Final = {"hatchback": (2.637, 1.8), "saloon": (2.85, 1.86)}
 """Wheelbase and width of the surfaces [m]."""
 _COLOURS: Final = {
@@ -127,42 +124,6 @@ class BodySurface(NamedTuple):
     def shell(self) -> bool:
         """True if the surface belongs to the body, which hides the parts below it, and not to a wheel."""
         return not self.body.endswith("_wheel")
-
-
-def without_tail(panel: BodySurface, size: Footprint) -> tuple[BodySurface, BodySurface]:
-    """Return a panel of a body without its tail, which hides the rear wheels from behind, and the tail."""
-    corners = np.concatenate([panel.vertices_m, panel.normals], axis=1)[panel.faces]
-    ahead, behind = _cut(corners, 0, -size.wheelbase_m + _TAIL_M[0])
-    above, tail = _cut(behind, 2, _TAIL_M[1])
-    return _panel_of(panel, np.concatenate([ahead, above])), _panel_of(panel, tail)
-
-
-def _panel_of(panel: BodySurface, corners: Array) -> BodySurface:
-    points = corners.reshape(-1, 6)
-    faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
-    return panel._replace(vertices_m=points[:, :3], normals=points[:, 3:], faces=faces)
-
-
-def _cut(triangles: Array, axis: int, at_m: float) -> tuple[Array, Array]:
-    """Cut triangles with normals, shape (n, 3, 6), at a coordinate. Return those above and those below."""
-    side = triangles[:, :, axis] - at_m
-    made = []
-    for sign in (1.0, -1.0):
-        inside = sign * side
-        found = list(triangles[(inside >= 0.0).all(axis=1)])
-        for triangle, depth in (
-            (triangles[row], inside[row]) for row in np.flatnonzero((inside.min(1) < 0.0) & (inside.max(1) > 0.0))
-        ):
-            polygon = []
-            for one, next_one in ((0, 1), (1, 2), (2, 0)):
-                if depth[one] >= 0.0:
-                    polygon.append(triangle[one])
-                if depth[one] * depth[next_one] < 0.0:
-                    fraction = depth[one] / (depth[one] - depth[next_one])
-                    polygon.append(triangle[one] + fraction * (triangle[next_one] - triangle[one]))
-            found += [np.stack([polygon[0], *pair]) for pair in pairwise(polygon[1:])]
-        made.append(np.reshape(found, (-1, 3, 6)))
-    return made[0], made[1]
 
 
 def dressed(

@@ -68,6 +68,9 @@ share of the samples with the true friction inside two deviations, on 112 record
 _SHOWING_MPS2: Final = 2.0
 """Lateral acceleration, measured or expected, below which packed snow bears the car as dry asphalt does [m/s2].
 With 1 m/s2 a curve with a bank of 4 deg was taken for snow."""
+_SHOWING_USED: Final = 0.5
+"""Fraction of the assumed friction from which errors show that it is wrong, where this is less: a filter that was sure
+of ice stayed lost for a second. The first value that was tried."""
 _SLIDING_SLIP: Final = 0.05
 _SLIDING_USED: Final = 0.95
 _SLIDING_MPS2: Final = 1.0
@@ -132,7 +135,8 @@ def _filter(known, tyres, memory, said, line):
     )
     ay_mps2 = said[SAID_AY] - GRAVITY_MPS2 * memory.roll_rad - state[AY_OFFSET]
     memory.unexplained = max(memory.unexplained + memory.innovation - _EXPLAINED, 0.0)
-    if max(abs(ay_mps2), abs(front_N + rear_N) / known.mass_kg) < _SHOWING_MPS2:
+    showing_mps2 = min(_SHOWING_MPS2, _SHOWING_USED * GRAVITY_MPS2 * state[FRICTION])
+    if max(abs(ay_mps2), abs(front_N + rear_N) / known.mass_kg) < showing_mps2:
         memory.unexplained = 0.0
     elif memory.unexplained > _UNEXPLAINED:
         memory.unexplained = 0.0

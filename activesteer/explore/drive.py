@@ -20,7 +20,7 @@ from activesteer.errors import ActiveSteerError
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Act, Start
 from activesteer.explore.runs import BODIES, Reply, free_path, shape_of
-from activesteer.road.course import CONE_RADIUS_M, Footprint
+from activesteer.road.course import CONE_RADIUS_M, Course, Footprint
 from activesteer.scenario import resolve
 from activesteer.simulation.live_view import FramePacer
 from activesteer.simulation.simulation import Simulation
@@ -126,6 +126,7 @@ class DriveSession:
         self._standing = np.ones(len(self._cones()), bool)
         self._pacer, self._lap_s, self._turned_rad, self._last_lap_s = pacer or FramePacer(), 0.0, 0.0, None
         self._bearing_rad, self._gate_s, self._seen = self._bearing(), None, 0
+        self._front_x_m, self._missed = -math.inf, False
         self._longest_s = self._busy_s = 0.0
 
     def _take(self, setup: DriverSetup) -> HandDriver:
@@ -202,7 +203,7 @@ class DriveSession:
             "superposition_deg": math.degrees(loop.measurement.superposition_rad),
             "friction_use": max(truth[f"{corner}_friction_utilisation"] for corner in CORNERS),
             "sliding": [truth[f"{corner}_friction_utilisation"] > 0.98 for corner in CORNERS],
-            "cones": fallen, "lap_s": self._lap_s, "last_lap_s": self._last_lap_s,
+            "cones": fallen, "lap_s": self._lap_s, "last_lap_s": self._last_lap_s, "missed": self._missed,
             "controller": self._names["controller"],
             "hold_kmh": None if self._driver.hold_mps is None else 3.6 * self._driver.hold_mps,
             "seen": self._seen, "behind_s": self._pacer.lost_s, "busy_ms": 1e3 * self._busy_s,
@@ -243,12 +244,22 @@ class DriveSession:
             self._lap_s = now_s - self._gate_s
         elif course is not None and course.last_gate_x_m is not None and self._last_lap_s is None:
             x_m = self._simulation.motion.x_m
+            self._look_for_missed_gates(course)
             if self._gate_s is None and x_m >= course.first_gate_x_m:
                 self._gate_s = now_s
             if self._gate_s is not None:
                 self._lap_s = now_s - self._gate_s
-                if x_m >= course.last_gate_x_m:
+                if x_m >= course.last_gate_x_m and not self._missed:
                     self._last_lap_s = self._lap_s
+
+    def _look_for_missed_gates(self, course: Course) -> None:
+        """Note if the car has passed a cone that stands on the other side of the course's path."""
+        x_m, y_m = (self._simulation.truth[f"front_axle_{axis}_m"] for axis in "xy")
+        cones = self._cones()
+        passed_x_m, passed_y_m = cones[(self._front_x_m < cones[:, 0]) & (cones[:, 0] <= x_m)].T
+        path_y_m = np.interp(passed_x_m, course.path.x_m, course.path.y_m)
+        self._missed |= bool(((passed_y_m - path_y_m) * (passed_y_m - y_m) <= 0.0).any())
+        self._front_x_m = x_m
 
     def end(self) -> Reply:
         """Complete the recording of a drive."""

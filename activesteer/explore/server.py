@@ -157,6 +157,7 @@ class ExploreServer:
         await page.accept()
         if self._page is not None:
             await self._tell(self._page, "this page was opened in another window")
+            self._hand_on(End())  # a drive of that page
         self._page = page
         if self._ready is not None:
             header, arrays = self._ready

@@ -22,7 +22,6 @@ from activesteer.road.course import Footprint
 from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.video import FilmedCar, RenderScene
 from activesteer.video.film import CUTAWAY
-from activesteer.video.gauges import MIN_SPEED_MPS
 
 FRAME_S: Final = 0.016
 """Minimum time between two pictures [s]: a screen shows 60 per second."""
@@ -222,7 +221,7 @@ def _texts(simulation: ClosedLoop, time_s: float, speed: float, *, paused: bool)
     """Return names and values, one line each, and the keys."""
     vehicle = simulation.vehicle
     measured, motion = vehicle.measure(), vehicle.motion()
-    moving = motion.speed_mps > MIN_SPEED_MPS
+    moving = motion.speed_mps > SLOWEST_MPS
     sideslip = math.atan2(motion.lateral_speed_mps, motion.speed_mps) if moving else 0.0
     values = {
         "time_s": time_s,

@@ -1,4 +1,4 @@
-"""Films of recordings: cameras behind the car, above it or beside a wheel, and files as MP4 or GIF."""
+"""Films of recordings: cameras behind the car, above it or beside a wheel, and files as MP4."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ import math
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, Self
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.core.files import atomic_write
@@ -25,54 +24,45 @@ from activesteer.recording import Recording
 from activesteer.road.course import Footprint, course_of, footprint_of
 from activesteer.road.drawn import surface_in
 from activesteer.road.road import road_of
-from activesteer.video.gauges import Dials, Gauges, LargeSideslip, used
+from activesteer.video.gauges import Dials, Gauges, LargeSideslip
 from activesteer.video.offscreen import Offscreen
 from activesteer.video.render_scene import FilmedCar, RenderScene
-from activesteer.video.road import edges_beside
 from activesteer.video.track import Markings, Traces, Track
 
-CAMERAS: Final = ("chase", "top", "wheel")
-"""Names of the cameras."""
 CUTAWAY: Final = 0.12
 """Opacity of a shell that lets the suspension be seen."""
+_SHELL_OPACITY: Final = {"chase": 1.0, "top": 0.25, "wheel": CUTAWAY}
+"""Camera -> opacity of the shell of a car."""
+_NEAR_M, _MOST_ASIDE_M, _BACK_PER_ASIDE = 1.5, 25.0, 2.2
+"""Half distance of cars up to which the camera stays with the first one [m], most that its target moves beside that
+car [m], and way of the camera backwards for each metre of it."""
+_SIDE_LIMIT: Final = 8192
+"""Most pixels of a side of a film."""
 
-_WHEELS_SEEN: Final = 0.25
-"""Opacity of a shell that lets the wheels be seen from above."""
 
-
-_SHELL_OPACITY: Final = {"top": _WHEELS_SEEN, "wheel": CUTAWAY}
-"""Camera -> opacity of the shell of a car, if it is not opaque."""
-
-
-def aim(camera: mujoco.MjvCamera, name: str, track: Track, time_s: float, corner: str = CORNERS[0]) -> None:
-    """Aim a camera at an instant [s].
-
-    `chase` is behind and above the car, in its direction of motion, so that a car that slides turns in the picture.
-    `top` is above the car, x to the right and y up as in the plots. `wheel` is inboard of a wheel, where its links are,
-    and follows the chassis without roll and heave.
-    """
-    if name == "chase":
+def aim(camera: mujoco.MjvCamera, name: str, tracks: Sequence[Track], time_s: float, corner: str = CORNERS[0]) -> None:
+    """Aim a camera at the cars at an instant [s]. It does not roll or heave with the first car, which it follows."""
+    track = tracks[0]
+    places = np.array([each.middle(time_s) for each in tracks])
+    # All cars stay in the picture, unless they are so far apart that the first one could hardly be seen.
+    aside = 0.5 * (places.min(axis=0) + places.max(axis=0)) - places[0]
+    half_m = float(np.linalg.norm(aside))
+    aside_m = min(max(half_m - _NEAR_M, 0.0), _MOST_ASIDE_M)
+    aside *= aside_m / max(half_m, _NEAR_M)
+    back_m = _BACK_PER_ASIDE * aside_m
+    if name == "chase":  # in the direction of motion, so that a car that slides turns in the picture
         direction = track.direction(time_s)
-        camera.lookat = track.middle(time_s) + np.array([0.9 * math.cos(direction), 0.9 * math.sin(direction), 0.15])
-        camera.distance, camera.elevation, camera.azimuth = 8.3, -20.0, math.degrees(direction)
-    elif name == "top":
-        camera.lookat = track.middle(time_s)
-        camera.distance, camera.elevation, camera.azimuth = 15.0, -90.0, 90.0
-    else:
+        camera.lookat = places[0] + aside + (0.9 * math.cos(direction), 0.9 * math.sin(direction), 0.15)
+        camera.distance, camera.elevation, camera.azimuth = 8.3 + back_m, -20.0, math.degrees(direction)
+    elif name == "top":  # x to the right and y up, as in the plots
+        camera.lookat = places[0] + aside
+        camera.distance, camera.elevation, camera.azimuth = 15.0 + back_m, -90.0, 90.0
+    else:  # inboard of the wheel, where its links are
         side, end = (1.0 if corner[1] == "l" else -1.0), (1.0 if corner[0] == "f" else -1.0)
         camera.lookat = track.wheel_centre(corner, time_s) + np.array([0.0, 0.0, 0.05])
         # Look from the end of the car towards its middle, and outwards by 28 degrees.
         azimuth = math.degrees(track.heading(time_s)) + side * (90.0 + 62.0 * end)
         camera.distance, camera.elevation, camera.azimuth = 1.9, -10.0, azimuth
-
-
-LAYOUTS: Final = ("overlay", "side-by-side")
-"""Layouts of several cars: one view with all but the first car transparent, or a pane for each car."""
-GAUGES: Final = ("full", "sideslip")
-"""Kinds of gauges over the frames."""
-_TAIL_OPENS_RAD: Final = tuple(np.radians((0.3, 0.8)))
-"""Rear steer angles from which the tail of a body lets the rear wheels be seen, and at which it is open [rad]."""
-_SAMPLES: Final = 6
 
 
 @dataclass(frozen=True)
@@ -99,10 +89,10 @@ class Settings:
     def __post_init__(self) -> None:
         """Check the settings."""
         for kind, name, names in (
-            ("camera", self.camera, CAMERAS),
+            ("camera", self.camera, tuple(_SHELL_OPACITY)),
             ("corner", self.corner, CORNERS),
-            ("layout", self.layout, LAYOUTS),
-            ("kind of gauges", self.gauges, GAUGES),
+            ("layout", self.layout, ("overlay", "side-by-side")),
+            ("kind of gauges", self.gauges, ("full", "sideslip")),
         ):
             if name not in names:
                 raise ParameterError(f"there is no {kind} {name!r}; {nearest_names(name, names)}", value=name)
@@ -123,19 +113,24 @@ class Film:
             raise ParameterError("there is no recording to make a film of, at least one is needed")
         self.settings = settings
         looks = run_looks(recordings)
-        runs = [
-            _Run(Track(recording, name), Dials(recording, looks[name].label, looks[name].on_dark))
-            for name, recording in recordings.items()
-        ]
-        self._tracks = [run.track for run in runs]
-        maneuver = runs[0].dials.recording.metadata.get("maneuver", {})
-        title = str(maneuver.get("title") or maneuver.get("name") or "")
-        groups = [[run] for run in runs] if settings.layout == "side-by-side" else [runs]
-        edges = np.linspace(0, settings.size[0], len(groups) + 1).astype(int)
+        self._tracks = [Track(recording, name) for name, recording in recordings.items()]
+        dials = [Dials(run, looks[name].label, looks[name].on_dark) for name, run in recordings.items()]
+        runs = list(zip(self._tracks, dials, strict=True))
+        panes = [[run] for run in runs] if settings.layout == "side-by-side" else [runs]
+        edges = np.linspace(0, settings.size[0], len(panes) + 1).astype(int)
+        paths = [track.path()[1] for track in self._tracks]
         self._panes = [
-            _Pane(group, runs, settings, (int(width), settings.size[1]), title, headed=number == 0)
-            for number, (group, width) in enumerate(zip(groups, np.diff(edges), strict=True))
+            _Pane(pane, settings, (int(width), settings.size[1]), paths, list(recordings.values()))
+            for pane, width in zip(panes, np.diff(edges), strict=True)
         ]
+        shown = [[dial for _, dial in pane] for pane in panes]
+        if settings.gauges == "sideslip":
+            self._gauges = LargeSideslip(shown, settings.size)
+        else:
+            maneuver = dials[0].recording.metadata.get("maneuver", {})
+            title = str(maneuver.get("title") or maneuver.get("name") or "")
+            pace = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
+            self._gauges = Gauges(shown, title, settings.size, ", ".join(pace + self._panes[0].notes))
         self._canvases: list[Offscreen] = []
 
     def __enter__(self) -> Self:
@@ -148,130 +143,78 @@ class Film:
         for canvas in self._canvases:
             canvas.close()
 
-    def times(self, rate_hz: float) -> NDArray[np.float64]:
+    def times(self) -> NDArray[np.float64]:
         """Return the instants of the frames [s], from the first pose of any car to the last."""
         start = min(track.start_s for track in self._tracks)
         end = max(track.end_s for track in self._tracks)
-        step = self.settings.speed / rate_hz
-        count = int((end - start) / step + 1e-9) + 1
-        return np.asarray(start + step * np.arange(count), np.float64)
+        step = self.settings.speed / self.settings.rate_hz
+        return np.asarray(start + step * np.arange(int((end - start) / step + 1e-9) + 1), np.float64)
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
         """Return the frame of an instant, shape (height, width, 3)."""
         drawn = [pane.picture(canvas, time_s) for pane, canvas in zip(self._panes, self._canvases, strict=True)]
-        return drawn[0] if len(drawn) == 1 else np.hstack(drawn)
-
-
-class _Run(NamedTuple):
-    """A run in a film."""
-
-    track: Track
-    dials: Dials
+        return self._gauges.draw(np.hstack(drawn), time_s)
 
 
 class _Pane:
-    """A pane of the frame with a scene and a camera of its own."""
+    """A pane of the frame with its own scene and camera."""
 
     def __init__(
         self,
-        runs: Sequence[_Run],
-        every: Sequence[_Run],
+        runs: Sequence[tuple[Track, Dials]],
         settings: Settings,
         size: tuple[int, int],
-        title: str,
-        *,
-        headed: bool,
+        paths: Sequence[NDArray[np.float64]],
+        recordings: Sequence[Recording],
     ) -> None:
-        self.size = size
-        self._settings = settings
-        self._tracks, self._dials = [run.track for run in runs], [run.dials for run in runs]
-        first = self._dials[0].recording
+        """Build the scene of some runs, with edges and scales that suit the recordings of all panes."""
+        self.size, self._settings = size, settings
+        self._tracks = [track for track, _ in runs]
+        first = runs[0][1].recording
         course, drawn = course_of(first.metadata), surface_in(first.metadata)
-        edges = edges_beside([run.track.path()[1] for run in every]) if course is None and drawn is None else None
-        opacity = CUTAWAY if settings.cutaway else _SHELL_OPACITY.get(settings.camera, 1.0)
+        opacity = CUTAWAY if settings.cutaway else _SHELL_OPACITY[settings.camera]
         cars, self._marks = [], []
-        for number, (track, dials) in enumerate(runs):
-            recording, footprint = dials.recording, footprint_of(dials.recording.metadata)
-            opens = number == 0 and opacity == 1.0 and used(recording, "rear_steer_rad")
-            cars.append(
-                FilmedCar(recording.scene, track.bodies, dials.colour, opacity, number > 0, footprint, tail_opens=opens)
-            )
-            trace = Traces(recording, track, footprint or Footprint(), dials.colour, number, uneven=drawn is not None)
+        for number, (track, (recording, _, colour)) in enumerate(runs):
+            footprint = footprint_of(recording.metadata) or Footprint()
+            cars.append(FilmedCar(recording.scene, track.bodies, colour, opacity, number > 0, footprint))
+            trace = Traces(recording, track, footprint, colour, number, uneven=drawn is not None)
             self._marks.append(trace.add)
-        self.scene = RenderScene(cars, course, road_of(first.metadata), size, drawn, edges)
-        notes = [f"speed x {settings.speed:g}"] if settings.speed != 1.0 else []
-        notes += ["road heights to scale"] if drawn is not None else []
+        straight = paths if course is None and drawn is None else ()
+        self.scene = RenderScene(cars, course, road_of(first.metadata), size, drawn, straight)
+        self.notes = ["road heights to scale"] if drawn is not None else []
         if settings.camera != "wheel" and settings.gauges == "full":
-            recordings = [run.dials.recording for run in every]
-            markings = Markings(first, self._tracks[0], self._dials[0].colour, recordings)
+            markings = Markings(first, self._tracks[0], runs[0][1].colour, recordings)
             self._marks.append(markings.add)
-            notes += [markings.note] if markings.note else []
-        if settings.gauges == "sideslip":
-            self._gauges = LargeSideslip(self._dials, size)
-        else:
-            shown_with = [run.dials for run in every]
-            self._gauges = Gauges(self._dials, title, size, ", ".join(notes), shown_with, headed=headed)
+            self.notes += markings.notes
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
 
     def picture(self, canvas: Offscreen, time_s: float) -> NDArray[np.uint8]:
+        """Return the picture of an instant without gauges."""
         for number, track in enumerate(self._tracks):
             self.scene.place(number, *track.poses(time_s))
-        rear_steer = abs(self._dials[0].value("rear_steer_rad", time_s))
-        self.scene.open_tail(0, float(np.interp(rear_steer, _TAIL_OPENS_RAD, (0.0, 1.0))))
         self.scene.update()
-        aim(self._camera, self._settings.camera, self._tracks[0], time_s, self._settings.corner)
+        aim(self._camera, self._settings.camera, self._tracks, time_s, self._settings.corner)
         scene = canvas.prepare(self.scene.data, self._camera)
         for add in self._marks:
             add(scene, time_s)
-        return self._gauges.draw(canvas.draw(), time_s)
-
-
-Pixels = NDArray[np.uint8]
-
-FORMATS: Final = (".mp4", ".gif")
-"""Suffixes of the files that can be written."""
-
-_GIF_TICKS_HZ: Final = 100.0
-_COLOURS: Final = 128
-_SIDE_LIMIT: Final = 8192
-
-
-def frame_rate(path: Path, wanted_hz: float) -> float:
-    """Return the nearest frame rate that a format can have: a GIF shows each frame for whole hundredths of a second."""
-    if path.suffix.lower() != ".gif":
-        return wanted_hz
-    return _GIF_TICKS_HZ / max(2, round(_GIF_TICKS_HZ / wanted_hz))  # browsers show less than two hundredths as ten
+        return canvas.draw()
 
 
 def check(path: Path, size: tuple[int, int]) -> None:
     """Check the conditions for writing before anything is drawn."""
-    if path.suffix.lower() not in FORMATS:
-        raise ParameterError(f"a video's name must end in {' or '.join(FORMATS)}", file=str(path), allowed=FORMATS)
-    if min(size) < 16 or max(size) > _SIDE_LIMIT:
+    if path.suffix.lower() != ".mp4":
+        hint = "; `ffmpeg -i FILM.mp4 FILM.gif` converts it" if path.suffix.lower() == ".gif" else ""
+        raise ParameterError(f"the name of a film must end in .mp4{hint}", file=str(path), allowed=(".mp4",))
+    if min(size) < 16 or max(size) > _SIDE_LIMIT or size[0] % 2 or size[1] % 2:
         raise ParameterError(
-            f"a picture of {size[0]} x {size[1]} pixels cannot be made; each side must be 16 to {_SIDE_LIMIT}",
+            f"a film of {size[0]} x {size[1]} pixels cannot be made; each side must be even and 16 to {_SIDE_LIMIT}",
             value=size,
             allowed=(16, _SIDE_LIMIT),
         )
     if not path.parent.is_dir():
         raise PlaybackError(f"cannot write {path}: there is no folder {path.parent}", value=path.parent)
-    if path.suffix.lower() == ".mp4":
-        if size[0] % 2 or size[1] % 2:
-            raise ParameterError(f"{size[0]} x {size[1]} pixels: an MP4 needs an even width and height", value=size)
-        ffmpeg()
-
-
-def encoder(
-    path: Path, size: tuple[int, int], rate_hz: float, samples: Iterable[Pixels]
-) -> AbstractContextManager[Callable[[Pixels], None]]:
-    """Context that yields a function to append a frame of shape (height, width, 3).
-
-    The file appears when the context ends without an error. Otherwise nothing is left.
-    """
-    if path.suffix.lower() == ".gif":
-        return _gif(path, rate_hz, samples)
-    return _mp4(path, size, rate_hz)
+    ffmpeg()
 
 
 def ffmpeg() -> str:
@@ -280,12 +223,13 @@ def ffmpeg() -> str:
         return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     if found := shutil.which("ffmpeg"):
         return found
-    what = "no program ffmpeg is found (apt-get install ffmpeg; a .gif needs none): an MP4"
+    what = "no program ffmpeg is found (apt-get install ffmpeg): a film"
     raise not_installed(PlaybackError, what, "imageio-ffmpeg", "video")
 
 
 @contextmanager
-def _mp4(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Callable[[Pixels], None]]:
+def encoder(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
+    """Yield a function that appends a frame. The file appears when the context ends without an error."""
     with atomic_write(path, PlaybackError) as part, tempfile.TemporaryFile() as log:
         part.open("wb").close()  # a folder that cannot be written is an error before anything is drawn
         command = [
@@ -304,7 +248,7 @@ def _mp4(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Callable
             said = (log.read().decode(errors="replace").strip().splitlines() or ["nothing"])[-1]
             return PlaybackError(f"cannot write {path}: ffmpeg says: {said}", value=said)
 
-        def write(pixels: Pixels) -> None:
+        def write(pixels: NDArray[np.uint8]) -> None:
             try:
                 process.stdin.write(np.ascontiguousarray(pixels).data)
             except OSError:
@@ -324,44 +268,19 @@ def _mp4(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Callable
             raise failure()
 
 
-@contextmanager
-def _gif(path: Path, rate_hz: float, samples: Iterable[Pixels]) -> Iterator[Callable[[Pixels], None]]:
-    # All frames share one palette; with a palette for each frame, the colours of still objects would flicker.
-    palette = Image.fromarray(np.concatenate(list(samples))).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
-    pictures: list[Image.Image] = []
-    with atomic_write(path, PlaybackError) as part:
-        part.open("wb").close()  # a folder that cannot be written is an error before anything is drawn
-        yield lambda pixels: pictures.append(
-            Image.fromarray(np.ascontiguousarray(pixels)).quantize(palette=palette, dither=Image.Dither.NONE)
-        )
-        first, *others = pictures
-        duration_ms = round(1000.0 / rate_hz)
-        first.save(part, "GIF", save_all=True, append_images=others, duration=duration_ms, loop=0, optimize=False)
-
-
-class FilmInfo(NamedTuple):
-    """Number of frames and frame rate of a film that was written."""
-
-    pictures: int
-    rate_hz: float
-
-
 def make_film(
     recordings: Mapping[str, Recording],
     path: Path,
     settings: Settings | None = None,
     progress: Callable[[float], Any] | None = None,
-) -> FilmInfo:
-    """Draw a film of recordings and write it to a file."""
+) -> int:
+    """Draw a film of recordings and write it to a file. Return the number of its frames."""
     settings = settings or Settings()
     check(path, settings.size)
-    rate = frame_rate(path, settings.rate_hz)
-    with Film(recordings, settings) as film:
-        times = film.times(rate)
-        samples = (film.picture(time_s) for time_s in times[:: max(1, len(times) // _SAMPLES)])
-        with encoder(path, settings.size, rate, samples) as write:
-            for number, time_s in enumerate(times, start=1):
-                write(film.picture(time_s))
-                if progress is not None:
-                    progress(number / len(times))
-    return FilmInfo(len(times), rate)
+    with Film(recordings, settings) as film, encoder(path, settings.size, settings.rate_hz) as write:
+        times = film.times()
+        for number, time_s in enumerate(times, start=1):
+            write(film.picture(time_s))
+            if progress is not None:
+                progress(number / len(times))
+    return len(times)

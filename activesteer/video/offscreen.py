@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from ctypes.util import find_library
 from typing import Any, Final
 
 import mujoco
@@ -24,7 +22,7 @@ BACKENDS: Final = {
 }
 """Offscreen backends and the apt packages that they need. The backend that can use a graphics card comes first."""
 
-_LIBRARIES: Final = {"egl": ("libEGL.so.1",), "osmesa": ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")}
+_LIBRARIES: Final = {"egl": "EGL", "osmesa": "OSMesa"}
 _MAX_GEOMS: Final = 20000
 _TRY: Final = "import sys, importlib as i; i.import_module('mujoco.' + sys.argv[1]).GLContext(16, 16).make_current()"
 _TRY_TIMEOUT_S: Final = 60.0
@@ -54,10 +52,7 @@ def backend() -> str:
 
 def _problem_with(name: str) -> str | None:
     """Return the reason why a backend does not work here, or None if it works."""
-    environment = {**os.environ, "MUJOCO_GL": name}
-    environment.pop("PYOPENGL_PLATFORM", None)
-    if (platform := _platform_in_use()) not in (None, name):
-        return f"this process already uses OpenGL through {platform}"
+    environment = {key: value for key, value in os.environ.items() if key != "PYOPENGL_PLATFORM"} | {"MUJOCO_GL": name}
     try:
         tried = subprocess.run(
             [sys.executable, "-c", _TRY, name],
@@ -70,23 +65,10 @@ def _problem_with(name: str) -> str | None:
     if tried.returncode == 0:
         return None
     # PyOpenGL's own message about a missing library does not help: "'NoneType' object has no attribute ...".
-    if name in _LIBRARIES and not any(_loads(library) for library in _LIBRARIES[name]):
-        return f"{_LIBRARIES[name][0]} is missing"
+    if name in _LIBRARIES and find_library(_LIBRARIES[name]) is None:
+        return f"lib{_LIBRARIES[name]}.so is missing"
     lines = [line for line in tried.stderr.splitlines() if "Error" in line and not line.startswith(" ")]
     return lines[0].rstrip(".") if lines else f"ended with status {tried.returncode}"
-
-
-def _loads(library: str) -> bool:
-    try:
-        ctypes.CDLL(library)
-    except OSError:
-        return False
-    return True
-
-
-def _platform_in_use() -> str | None:
-    """Backend that this process's PyOpenGL has loaded. It cannot be changed any more."""
-    return os.environ.get("PYOPENGL_PLATFORM", "").lower() or None if "OpenGL" in sys.modules else None
 
 
 class Offscreen:
@@ -94,7 +76,7 @@ class Offscreen:
 
     def __init__(self, model: mujoco.MjModel, size: tuple[int, int]) -> None:
         """Open the canvas."""
-        self._name = backend()
+        name = backend()
         self._rect = mujoco.MjrRect(0, 0, *size)
         self._pixels = np.empty((size[1], size[0], 3), np.uint8)
         self._scene = mujoco.MjvScene(model, _MAX_GEOMS)
@@ -102,15 +84,19 @@ class Offscreen:
             self._scene.flags[flag] = 0
         self._look = mujoco.MjvOption()
         self._model = model
-        with _library(self._name):
-            try:
-                self._context: Any = importlib.import_module(f"mujoco.{self._name}").GLContext(*size)
-                self._context.make_current()
-                self._drawer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-            except (ImportError, RuntimeError, mujoco.FatalError) as reason:
-                raise PlaybackError(
-                    f"no pictures of {size[0]} x {size[1]} can be drawn here with {self._name}: {reason}"
-                ) from reason
+        before = os.environ.get("MUJOCO_GL")
+        os.environ["MUJOCO_GL"] = name  # MuJoCo reads it when it looks up its OpenGL functions
+        try:
+            self._context: Any = importlib.import_module(f"mujoco.{name}").GLContext(*size)
+            self._context.make_current()
+            self._drawer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        except (ImportError, RuntimeError, mujoco.FatalError) as reason:
+            msg = f"no pictures of {size[0]} x {size[1]} can be drawn here with {name}: {reason}"
+            raise PlaybackError(msg) from reason
+        finally:
+            del os.environ["MUJOCO_GL"]
+            if before is not None:
+                os.environ["MUJOCO_GL"] = before  # for a viewer that may be started later
         if self._drawer.offWidth < size[0] or self._drawer.offHeight < size[1]:
             maximum = f"{self._drawer.offWidth} x {self._drawer.offHeight}"
             self.close()
@@ -135,17 +121,3 @@ class Offscreen:
         self._context.make_current()
         self._drawer.free()
         self._context.free()
-
-
-@contextmanager
-def _library(name: str) -> Iterator[None]:
-    """Set MUJOCO_GL while MuJoCo looks up its OpenGL functions. Restore it for a viewer that may be started later."""
-    before = os.environ.get("MUJOCO_GL")
-    os.environ["MUJOCO_GL"] = name
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["MUJOCO_GL"]
-        else:
-            os.environ["MUJOCO_GL"] = before

@@ -13,26 +13,19 @@ import mujoco
 import numpy as np
 
 from activesteer.core.conventions import Array, yaw_of
-from activesteer.drawing.cars import CHASSIS, SEE_THROUGH, BodySurface, dressed, share_seen, shares_of, without_tail
+from activesteer.drawing.cars import CHASSIS, BodySurface, dressed, share_seen, shares_of
 from activesteer.errors import PlaybackError
 from activesteer.recording import Primitive, ScenePart
 from activesteer.road.course import Course, Footprint
 from activesteer.road.drawn import DrawnSurface
 from activesteer.road.road import Road
-from activesteer.video.road import Edges, add_areas, add_course, add_edges, add_road
+from activesteer.video.road import add_areas, add_course, add_edges, add_road
 
-_PAINT: Final = (0.23, 0.46, 0.72)
-"""Colour of a car without a colour of its own."""
 _SHADED_BELOW: Final = 0.2
 _CUTAWAY_SHADE: Final = 0.3
 """Opacity of a shell below which it is darker, and its brightness then: a bright one would tint the tyres behind it."""
-_TAIL: Final = "_tail"
-_OPEN_TAIL: Final = np.array((*(3 * (_CUTAWAY_SHADE,)), 0.12))
-"""Brightness and opacity of the tail of a body that lets the steered rear wheels be seen."""
 _GHOST_OPACITY: Final = 0.35
 """Opacity of a ghost's solid relative to the same solid of an opaque car."""
-_GLASS: Final = (0.1, 0.13, 0.17)
-_GLASS_OPACITY: Final = 0.85
 _SHADOW: Final = "shadow"
 _SHADOW_OPACITY: Final = 0.62
 _SHADOW_SIZE: Final = 1.15
@@ -71,21 +64,14 @@ class FilmedCar(NamedTuple):
 
     parts: tuple[ScenePart, ...]  # parts of the car
     bodies: tuple[str, ...]  # names of its bodies, in the order of the poses
-    colour: str = ""  # colour of its shell, `#rrggbb`; empty for the colour of the model
+    colour: str = "#3b75b8"  # colour of its shell, `#rrggbb`
     shell_opacity: float = 1.0  # opacity of its shell, 0 to 1
     ghost: bool = False  # whether all of the car is transparent
-    # Size of the car, which determines its bodywork and wheels; if unknown, the model's solids are drawn
-    size: Footprint | None = None
-    tail_opens: bool = False  # whether `open_tail` can make the tail of its body transparent
+    size: Footprint = Footprint()  # determines its bodywork and wheels
 
 
 class RenderScene:
-    """Scene of road, course and cars.
-
-    Attributes:
-        model: The model, for a renderer or a viewer.
-        data: State of the model.
-    """
+    """Scene of road, course and cars, as `model` and `data` for a renderer or a viewer."""
 
     def __init__(
         self,
@@ -94,17 +80,17 @@ class RenderScene:
         road: Road | None = None,
         size: tuple[int, int] = (640, 480),
         drawn: DrawnSurface | None = None,
-        edges: Edges | None = None,
+        paths: Sequence[Array] = (),
     ) -> None:
-        """Build the scene."""
+        """Build the scene. A straight road has edges beside the paths of the cars [m]."""
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
             add_road(spec, road or Road(), drawn)
             add_areas(spec, road or Road())
             if course is not None:
                 add_course(spec, course)
-            if edges is not None:
-                add_edges(spec, edges)
+            if paths:
+                add_edges(spec, paths)
             _add_shadow_material(spec)
             for number, car in enumerate(cars):
                 _add_car(spec, car, f"{number}/")
@@ -118,11 +104,6 @@ class RenderScene:
         self._chassis = [car.bodies.index(CHASSIS) for car in cars]
         self._shadow = [self._mocap_id(f"{number}/{_SHADOW}") for number in range(len(cars))]
         self._opacity = self.model.geom_rgba[:, 3].copy(), self.model.tendon_rgba[:, 3].copy()
-        self._tails = [
-            [index for index in self._drawn(number)[0] if self.model.geom(index).name.endswith(_TAIL)]
-            for number in range(len(cars))
-        ]
-        self._tail_rgba = [self.model.geom_rgba[tail].copy() for tail in self._tails]
         self._ghosts = [(number, *self._drawn(number)) for number, car in enumerate(cars) if car.ghost]
         mujoco.mj_forward(self.model, self.data)
 
@@ -144,10 +125,6 @@ class RenderScene:
         data.mocap_pos[self._shadow[car]] = positions_m[chassis, 0], positions_m[chassis, 1], 0.0
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 
-    def open_tail(self, car: int, share: float) -> None:
-        """Make the tail of a body transparent, so that the rear wheels are seen from behind."""
-        self.model.geom_rgba[self._tails[car]] = self._tail_rgba[car] * (1.0 - share * (1.0 - _OPEN_TAIL))
-
     def update(self) -> None:
         """Update everything that is attached to the bodies; a ghost fades out near the car that it accompanies."""
         chassis = [self.data.mocap_pos[mocap[index]] for mocap, index in zip(self._mocap, self._chassis, strict=True)]
@@ -167,13 +144,8 @@ def _add_car(spec: mujoco.MjSpec, car: FilmedCar, prefix: str) -> None:
     solids = [part for part in car.parts if isinstance(part, Primitive) and part.body in bodies]
     parts, panels = dressed(car.parts, car.size)
     for panel in panels:
-        if panel.body not in bodies:
-            continue
-        shown = ((panel, ""),)
-        if panel.shell and car.size is not None and car.tail_opens:
-            shown = zip(without_tail(panel, car.size), ("", _TAIL), strict=True)
-        for surface, end in shown:
-            _add_panel(spec, bodies[panel.body], surface, car, f"{prefix}{panel.body}/{panel.name}{end}")
+        if panel.body in bodies:
+            _add_panel(spec, bodies[panel.body], panel, car, f"{prefix}{panel.body}/{panel.name}")
     for part in parts:
         if isinstance(part, Primitive):
             if part.body in bodies:
@@ -194,12 +166,10 @@ def _opacity(car: FilmedCar) -> float:
 
 
 def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: BodySurface, car: FilmedCar, name: str) -> None:
-    if not len(panel.faces):
-        return
     mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
     mesh.uservert, mesh.userface = panel.vertices_m.ravel(), panel.faces.ravel()
     mesh.usernormal, mesh.userfacenormal = panel.normals.ravel(), panel.faces.ravel()
-    rgb = panel.rgb or (shares_of(car.colour) if car.colour else _PAINT)
+    rgb = panel.rgb or shares_of(car.colour)
     if panel.shell and car.shell_opacity < _SHADED_BELOW:
         rgb = tuple(_CUTAWAY_SHADE * value for value in rgb)
     opacity = (car.shell_opacity if panel.shell else 1.0) * _opacity(car)
@@ -207,24 +177,18 @@ def _add_panel(spec: mujoco.MjSpec, body: mujoco.MjsBody, panel: BodySurface, ca
 
 
 def _add_solid(body: mujoco.MjsBody, solid: Primitive, car: FilmedCar) -> None:
-    """Add a solid of the model. A shell in it is the body of a car of unknown size; the round one is its greenhouse."""
     kinds = {
         "box": mujoco.mjtGeom.mjGEOM_BOX,
         "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
         "sphere": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
     }
     half = np.multiply(solid.size_m, 0.5)
-    *rgb, opacity = solid.rgba
-    if opacity < SEE_THROUGH:
-        glass = solid.kind == "sphere"
-        rgb = _GLASS if glass else shares_of(car.colour) if car.colour else rgb
-        opacity = car.shell_opacity * (_GLASS_OPACITY if glass else 1.0)
     body.add_geom(
         type=kinds[solid.kind],
         size=(half[0], half[2], 0.0) if solid.kind == "cylinder" else half,
         pos=solid.position_m,
         quat=solid.quaternion,
-        rgba=(*rgb, opacity * _opacity(car)),
+        rgba=(*solid.rgba[:3], solid.rgba[3] * _opacity(car)),
     )
 
 

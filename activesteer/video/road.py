@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -45,8 +45,7 @@ _LEAST_HALF_WIDTH_M, _MOST_HALF_WIDTH_M = 3.75, 25.0
 _BESIDE_CAR_M, _BEYOND_M = 2.5, 60.0
 """Room between the middle of a car and the edge, and length of the edges ahead and behind [m]."""
 _MARKS_M, _POSTS_M, _POST_M, _POST_HEIGHT_M = 10.0, 50.0, 0.6, 0.9
-"""Spacing of marks and of posts, distance of a post from its edge, and its height [m]."""
-_MAX_POSTS: Final = 200
+"""Spacing of marks and of posts, length of a mark and distance of a post from its edge, and its height [m]."""
 _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 """Largest numbers of pieces of patches, lanes, cones and dashes drawn: a scene holds a limited number of solids."""
 
@@ -127,41 +126,24 @@ def add_course(spec: mujoco.MjSpec, course: Course) -> None:
         _add_cones(spec, course.cones_m[:_MAX_CONES])
 
 
-class Edges(NamedTuple):
-    """Edges of a straight road along x."""
-
-    start_m: float  # where the edges start, world x [m]
-    end_m: float  # where they end [m]
-    half_width_m: float  # distance of an edge from the x axis [m]
-
-    def posts_m(self) -> Array:
-        """Return world x of the posts [m]."""
-        return (
-            np.arange(np.ceil(self.start_m / _POSTS_M), np.floor(self.end_m / _POSTS_M) + 1.0)[:_MAX_POSTS] * _POSTS_M
-        )
-
-
-def edges_beside(paths: Sequence[Array]) -> Edges | None:
-    """Return edges that all cars stay between, or None if a car turns too far for a straight road."""
-    points = np.concatenate([path[:, :2] for path in paths])
-    half = max(_LEAST_HALF_WIDTH_M, float(np.abs(points[:, 1]).max()) + _BESIDE_CAR_M)
-    if half > _MOST_HALF_WIDTH_M:
-        return None
-    return Edges(float(points[:, 0].min()) - _BEYOND_M, float(points[:, 0].max()) + _BEYOND_M, half)
-
-
-def add_edges(spec: mujoco.MjSpec, edges: Edges) -> None:
-    """Add the edges of a straight road, a mark every 10 m and a post every 50 m."""
+def add_edges(spec: mujoco.MjSpec, paths: Sequence[Array]) -> None:
+    """Add edges that all cars stay between, a mark every 10 m and a post every 50 m, unless a car turns too far."""
+    x_m, y_m = np.concatenate([path[:, :2] for path in paths]).T
+    half_m = max(_LEAST_HALF_WIDTH_M, float(np.abs(y_m).max()) + _BESIDE_CAR_M)
+    if half_m > _MOST_HALF_WIDTH_M:
+        return
+    start, end = float(x_m.min()) - _BEYOND_M, float(x_m.max()) + _BEYOND_M
     half = 0.5 * _LINE_M
+    marks, posts = (
+        np.arange(np.ceil(start / every_m), np.floor(end / every_m) + 1.0)[:_MAX_LANES] * every_m
+        for every_m in (_MARKS_M, _POSTS_M)
+    )
     for side in (-1.0, 1.0):
-        y = side * edges.half_width_m
-        _box(spec, (edges.start_m, edges.end_m), (y - half, y + half), 0.012, _LANE)
-        first = np.ceil(edges.start_m / _MARKS_M) * _MARKS_M
-        for x in np.arange(first, edges.end_m, _MARKS_M)[:_MAX_LANES]:
-            near, far = sorted((y, y - side * 0.6))
-            _box(spec, (x - half, x + half), (near, far), 0.012, _LANE)
-        for x in edges.posts_m():
-            beside = y + side * _POST_M
+        y, beside = side * half_m, side * (half_m + _POST_M)
+        _box(spec, (start, end), (y - half, y + half), 0.012, _LANE)
+        for x in marks:
+            _box(spec, (x - half, x + half), (min(y, y - side * _POST_M), max(y, y - side * _POST_M)), 0.012, _LANE)
+        for x in posts:
             _box(spec, (x - half, x + half), (beside - half, beside + half), _POST_HEIGHT_M, _LANE)
 
 

@@ -97,10 +97,7 @@ class Track:
         return self.chassis(time_s) + self.turn(time_s) @ (self._middle_m, 0.0, 0.0)
 
     def path(self) -> tuple[Array, Array]:
-        """Return all instants [s], shape (k,), and the midpoints of the axles at the height of the chassis [m].
-
-        The points have the shape (k, 3). The origin of the chassis lies on the road in the design position.
-        """
+        """Return all instants [s], and the midpoints of the axles at the height of the chassis [m], shape (k, 3)."""
         return self._time_s, self._middles_m
 
     def wheel_centre(self, corner: str, time_s: float) -> Array:
@@ -174,18 +171,20 @@ def _strip(scene: mujoco.MjvScene, start: Array, stop: Array, width_m: float, rg
 
 
 class Markings:
-    """The markings of one car; `note` gives the scale of the arrows in words and is empty without arrows."""
+    """Wheel angles and tyre forces of one car. `notes` give their scales in words."""
 
     def __init__(self, recording: Recording, track: Track, colour: str, shown_with: Sequence[Recording]) -> None:
         """Prepare the markings."""
         self._recording, self._track, self._rgb = recording, track, shares_of(colour)
         self._tips = wheel_angles.tips_beside(footprint_of(recording.metadata) or Footprint())
         self._factors = wheel_angles.factors(shown_with)
-        self._arrows, self.note = None, ""
+        front, rear = self._factors[0], self._factors[-1]
+        self.notes = [f"wheel angles x {front}" if front == rear else f"wheel angles front x {front}, rear x {rear}"]
+        self._arrows = None
         if all(name in recording for name in tyre_forces.CHANNELS):
             scale_NpM = tyre_forces.force_scale(shown_with)
             self._arrows = tyre_forces.force_arrows(recording, scale_NpM)
-            self.note = f"force arrows: 1 m = {scale_NpM / 1000.0:.2g} kN"
+            self.notes.append(f"force arrows: 1 m = {scale_NpM / 1000.0:.2g} kN")
 
     def add(self, scene: mujoco.MjvScene, time_s: float) -> None:
         """Add the markings at an instant [s] to a scene."""

@@ -163,6 +163,16 @@ def test_a_flood_of_messages_stops_neither_server_nor_worker(url: str) -> None:
         assert page.hear("driven")["error"] == ""
 
 
+def test_a_second_page_takes_the_place_of_the_first_and_of_its_drive(url: str) -> None:
+    with Page(url) as first:
+        first.say("start", maneuver="plane")
+        first.hear("drive")
+        with Page(url) as second:
+            assert "opened in another window" in first.hear("error")["text"]
+            second.say("run", id=5, maneuver="step_steer")
+            assert second.hear("finished")["id"] == 5
+
+
 def test_a_dead_worker_is_replaced(url: str) -> None:
     with Page(url) as page:
         page.hear("ready")

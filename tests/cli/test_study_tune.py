@@ -66,7 +66,7 @@ def test_a_search_goes_on_where_it_was(file, tmp_path, call):
     assert "road.mu = " in told.out
     # Sets that differ by little can be told apart.
     best = call("tune", str(file), "-o", folder, "--jobs", "1", "--json").json["front"][0]["objectives"]
-    assert told.out.splitlines()[1] == "  ".join(f"{name} {value:.6g}" for name, value in best.items())
+    assert told.out.splitlines()[1] == "  ".join(f"{name} {value:.3g}" for name, value in best.items())
 
 
 GRID = """

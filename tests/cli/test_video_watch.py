@@ -26,12 +26,12 @@ def file(tmp_path):
 @pytest.mark.parametrize(
     ("words", "texts"),
     [
-        (["-o", "a.avi"], ["a.avi: a video's name must end in .mp4 or .gif"]),
-        (["-o", "nowhere/a.gif"], ["cannot write nowhere/a.gif: there is no folder nowhere"]),
-        (["-o", "a.gif", "--fps", "0"], ["pictures a second: is 0, must be 1 to 240"]),
-        (["-o", "a.gif", "--speed", "-1"], ["speed: is -1, must be 0.01 to 100"]),
-        (["-o", "a.gif", "--compare", "none.mcap"], ["cannot read none.mcap"]),
-        (["-o", "a.gif", "--size", "4x4"], ["4 x 4 pixels", "16 to 8192"]),
+        (["-o", "a.avi"], ["a.avi: the name of a film must end in .mp4"]),
+        (["-o", "nowhere/a.mp4"], ["cannot write nowhere/a.mp4: there is no folder nowhere"]),
+        (["-o", "a.mp4", "--fps", "0"], ["pictures a second: is 0, must be 1 to 240"]),
+        (["-o", "a.mp4", "--speed", "-1"], ["speed: is -1, must be 0.01 to 100"]),
+        (["-o", "a.mp4", "--compare", "none.mcap"], ["cannot read none.mcap"]),
+        (["-o", "a.mp4", "--size", "4x4"], ["4 x 4 pixels", "16 to 8192"]),
     ],
 )
 def test_video_that_cannot_be_made_is_refused_in_one_message(call, file, words, texts):
@@ -39,13 +39,13 @@ def test_video_that_cannot_be_made_is_refused_in_one_message(call, file, words, 
 
 
 def test_video_compared_with_itself_is_refused(call, file):
-    refused(call("video", file, "--compare", file, "-o", "a.gif"), "is named twice")
+    refused(call("video", file, "--compare", file, "-o", "a.mp4"), "is named twice")
 
 
 def test_recording_without_a_car_is_no_film(call, file, tmp_path):
     run = circle(0.3)
     type(run)(run.channels, run.time_s, run.values).save(file)
-    refused(call("video", file, "-o", tmp_path / "a.gif"), "has no poses of a car")
+    refused(call("video", file, "-o", tmp_path / "a.mp4"), "has no poses of a car")
 
 
 def test_size_is_width_and_height():

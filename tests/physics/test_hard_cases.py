@@ -63,6 +63,25 @@ def test_superposition_does_not_stay_against_a_driver_who_steers_more_after_snow
     assert np.mean(deviations_m) < 2.87
 
 
+def test_a_car_of_soft_front_tyres_is_not_steered_over_the_limit_of_a_turn_on_snow():
+    """The turn of new tyres would take all of the friction that nobody knows, before the driver brakes."""
+    pytest.importorskip("daqp")
+    changes = {
+        "load.payload_kg": 130.0, "load.payload_forward_change_m": 0.83, "load.roof_kg": 47.0,
+        "factors.front_cornering_stiffness": 0.83, "factors.rear_cornering_stiffness": 1.06,
+        "factors.rear_tyre_friction": 0.73, "rear_actuator.preset": "screw_10deg",
+    }  # fmt: skip
+    turn = {"road.mu": 0.36, "turn.lateral_acceleration_mps2": 2.2, "brake.pedal": 0.57}
+    none, controlled = (
+        simulate("brake_in_turn", name, overrides=SENSORS | changes | turn, driver="expert")
+        for name in ("none", "integrated")
+    )
+    growth_m = controlled.metrics["path_deviation_after_1000ms_m"] - none.metrics["path_deviation_after_1000ms_m"]
+    assert growth_m < 0.1
+    before = controlled.time_s < controlled.metrics["braking_begin_time_s"]
+    assert np.abs(controlled["sideslip_rad"][before]).max() < math.radians(1.0)
+
+
 @pytest.mark.parametrize(
     ("controller", "changes", "told"),
     [

@@ -2,7 +2,7 @@
 import { element, number, onTheme, paint, runColour } from "./look.js";
 
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-const HEIGHT = 170, CAR_PX = 24, GHOST = "59";
+const HEIGHT = 170, CAR_PX = 36, LEAST_CAR_PX = 24, GHOST = "59";
 
 function padded(low, high, least) {
   if (low == null) return [0, least];
@@ -122,12 +122,15 @@ export class Track {
     const tracks = [...this.ghosts.values(), ...this.runs.values()].map((run) => run.plots?.track).filter(Boolean);
     if (!tracks.length) return;
     const points = tracks.flatMap((track) => track.tracks.flatMap(({ x, y }) => x.map((v, i) => [v, y[i]]).filter(([a, b]) => a != null && b != null)));
-    const course = tracks.at(-1), ends = [...points, ...course.cones.map((cone) => [cone[0], cone[1]])];
+    const course = tracks.at(-1), all = [...points, ...course.cones.map((cone) => [cone[0], cone[1]])];
     let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
-    for (const [x, y] of ends) { left = Math.min(left, x); right = Math.max(right, x); low = Math.min(low, y); high = Math.max(high, y); }
+    for (const [x, y] of all) { left = Math.min(left, x); right = Math.max(right, x); low = Math.min(low, y); high = Math.max(high, y); }
     [left, right, low, high] = [left - 3, right + 6, low - 3, high + 3];
-    const zoomX = (width - 20) / (right - left), zoomY = Math.min((height - 34) / (high - low), 12 * zoomX);
-    const place = (x, y) => [10 + (x - left) * zoomX, height - 24 - (y - low) * zoomY];
+    // A car has its shape. Widths have the scale of the cars, so that their distances from cones and lanes are true.
+    const ends = tracks.flatMap((track) => track.tracks).find(({ car }) => car)?.car.ends ?? [0, 4], length = ends[1] - ends[0];
+    const fit = (height - 34) / (high - low), zoomX = Math.min((width - 20) / (right - left), fit), zoomY = Math.min(fit, Math.max(zoomX, CAR_PX / length));
+    const zoom = Math.max(zoomY, LEAST_CAR_PX / length);
+    const place = (x, y) => [width / 2 + (x - (left + right) / 2) * zoomX, (height - 14) / 2 - (y - (low + high) / 2) * zoomY];
     const line = (xs, ys) => { pen.beginPath(); xs.forEach((x, i) => { if (x != null && ys[i] != null) pen.lineTo(...place(x, ys[i])); }); pen.stroke(); };
     pen.font = FONT;
     pen.fillStyle = paint("lane");
@@ -146,11 +149,11 @@ export class Track {
         line(track.x, track.y);
       }
     }
-    // As in three dimensions, the first car is on top. A car is not stretched: it has its shape, along its direction on the map.
+    // As in three dimensions, the first car is on top. Each is along its direction on the map.
     for (const run of [...this.runs.values()].reverse()) for (const track of run.plots?.track?.tracks ?? []) {
       const i = Math.min(Math.round((this.time - run.plots.start_s) / run.plots.step_s), track.x.length - 1);
       if (!track.yaw || track.x[i] == null) continue;
-      const zoom = Math.max(zoomX, CAR_PX / (track.car.ends[1] - track.car.ends[0])), [x, y] = place(track.x[i], track.y[i]);
+      const [x, y] = place(track.x[i], track.y[i]);
       const yaw = Math.atan2(Math.sin(track.yaw[i]) * zoomY, Math.cos(track.yaw[i]) * zoomX);
       carFromAbove({ ...track, x: { [i]: 0 }, y: { [i]: 0 }, yaw: { [i]: yaw } }, i).forEach((polygon, part) => {
         pen.fillStyle = part ? paint("ink") : runColour(run.place);
@@ -161,6 +164,6 @@ export class Track {
     }
     pen.fillStyle = paint("quiet");
     const stretch = zoomY / zoomX;
-    pen.fillText(`from above, ${Math.round(right - left)} m${stretch > 1.05 ? `, ${stretch.toFixed(1)} times wider than true` : ""}`, 10, height - 7);
+    pen.fillText(`from above, ${Math.round(right - left)} m${stretch > 1.05 ? `; cars and widths are ${stretch.toFixed(1)} times larger` : ""}`, 10, height - 7);
   }
 }

@@ -1,12 +1,12 @@
 // The tab Drive: keys, gamepad and touch in; the car, its ghost, gauges and cones out.
-import { courses, element, inWords, number, option } from "./look.js";
+import { courses, element, inWords, number, option, small } from "./look.js";
 import { Scene } from "./scene.js";
 
 const $ = (id) => document.getElementById(id);
 const KEYS = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "throttle", w: "throttle", ArrowDown: "brake", s: "brake", " ": "brake" };
 const SWITCH = ["none", "ars", "afs", "lqr", "esc"], DEAD = 0.06;
 const PAD_REACH = 0.4; // distance of the thumb from the middle of the pad for full steering, as a share of its width
-const small = matchMedia("(max-width: 760px), (max-height: 500px)");
+const short = matchMedia("(max-height: 450px)");
 const PLAIN = ["speed", "sideslip", "grip used", "time", "cones hit"]; // gauges that a phone shows
 
 export class Drive {
@@ -50,6 +50,7 @@ export class Drive {
       for (const end of ["pointerup", "pointerleave", "pointercancel"]) button.addEventListener(end, press(0));
     }
     small.addEventListener("change", () => this.fold());
+    this.fold();
     this.ofCourse();
     window.activesteerDrive = this; // for tests and the curious
   }
@@ -62,10 +63,10 @@ export class Drive {
     this.values();
   }
 
-  // On a small screen, the choices fold away while the car drives.
+  // On a small screen, the choices fold away while the car drives; a short one has no room for them before.
   fold() {
     document.body.classList.toggle("driving", this.running);
-    $("drive-setup").open = !(this.running && small.matches);
+    $("drive-setup").open = !(short.matches || (this.running && small.matches));
   }
 
   show(shown) {
@@ -97,6 +98,7 @@ export class Drive {
     this.say("");
     this.values();
     this.ready = false;
+    $("driven").textContent = ""; // of the last drive, perhaps of another course
     $("start").disabled = true;
     $("start").textContent = "Getting the car ready …";
     this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: +$("drive-speed").value, mu: +$("drive-mu").value });
@@ -196,6 +198,7 @@ export class Drive {
     scene.grow("you");
     this.frames.push({ time_s, poses });
     this.lap_s = header.last_lap_s;
+    this.missed = header.missed;
     for (const cone of header.cones) { this.struck += 1; scene.knock(cone, header.yaw_rate_degps < 0 ? -1.2 : 1.2); }
     if (header.hold_kmh != null && !this.held) { $("drive-speed").value = header.hold_kmh; this.values(header.hold_kmh); }
     if (this.sent.has(header.seen)) { this.answered = this.sent.get(header.seen); this.sent.clear(); }
@@ -212,7 +215,7 @@ export class Drive {
     const lap = header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
     const rows = {
       speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
-      time: this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": this.scene.cones.length ? `${this.struck}` : "–",
+      time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": this.scene.cones.length ? `${this.struck}` : "–",
       "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear wheels": `${number(header.rear_deg, 1)}°`,
       "added in front": `${number(header.superposition_deg, 1)}°`, control: header.controller,
     };
@@ -220,7 +223,7 @@ export class Drive {
       $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
-    $("gauges").title = this.timed ? "time: of this lap, or since the first gate; behind the stroke, that of the ghost" : "";
+    $("gauges").title = this.timed ? "time: of this lap, or since the first gate; behind the stroke, that of the ghost; missed: a gate was missed" : "";
     $("wheel").firstElementChild.setAttribute("transform", `rotate(${-header.steering_wheel_deg})`);
   }
 
@@ -245,11 +248,13 @@ export class Drive {
     if (same && this.frames.length && (lap || !before)) this.ghosts.set(this.setting, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
     const cones = this.scene.cones.length ? ` ${["No cone", "1 cone"][this.struck] ?? `${this.struck} cones`} hit.` : "";
-    const timed = lap ? ` ${this.way}: ${number(lap, 2)} s${faster}.` : "";
+    const timed = lap ? ` ${this.way}: ${number(lap, 2)} s${faster}.` : this.missed ? " No time: a gate was missed." : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
     const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
-    $("driven").textContent = `${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${cones}${latency} Saved as ${header.file} in ${header.folder}.`;
     if (this.shown && this.ready) this.prepare();
+    // A small screen has no room for what few want to know.
+    $("driven").replaceChildren(`${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${cones}`, element("span", { class: "more" }, latency),
+      ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
     if (header.error) this.say(header.error);
   }
 }

@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme } from "./look.js";
+import { dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme, small } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -10,12 +10,12 @@ const $ = (id) => document.getElementById(id);
 const TOLD_MS = 100; // time between two readings of the curves while they play
 const FIRST = { maneuver: "sine_with_dwell", vehicle: "compact", driver: "typical", controllers: ["none", "ars", "afs"] };
 
-export function say(text) {
+export function say(text, hint = false) {
   $("message").textContent = text;
+  $("message").classList.toggle("hint", hint);
   $("message").hidden = !text;
 }
 
-const narrow = matchMedia("(max-width: 760px)").matches;
 const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); });
 const track = new Track($("track"));
 const scene = new Scene($("view"));
@@ -33,8 +33,8 @@ const choice = () => ({ ...Object.fromEntries(NAMED.map((id) => [id, $(id).value
 
 function describe(ticked) {
   const unticked = untickBeyond(mostControllers, boxes(), ticked);
-  if (!chosen().length) { say("Choose at least one controller."); return; }
-  say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "");
+  if (!chosen().length) { say("Choose at least one controller.", true); return; }
+  say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "", true);
   if (unticked.includes(ticked?.value)) return;
   asking.stop();
   // Another controller leaves the sliders where they are; they apply where the new choice has them.
@@ -76,10 +76,12 @@ function addBox(name) {
 }
 
 const asking = new Asking((dragging) => {
+  if (!chosen().length) { asking.stop(); say("Choose at least one controller.", true); return; }
   if (!dragging || !state.dragged) keepGhosts();
   state.dragged = dragging;
   state.released = false;
   state.asked = performance.now();
+  $("saved").textContent = ""; // other runs
   state.first = null;
   writeAddress();
   $("state").textContent = "driving …";
@@ -182,7 +184,7 @@ function showColours() {
 function showFigures() {
   showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), narrow ? shortName(run) : run.label)));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), small.matches ? shortName(run) : run.label)));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
@@ -194,17 +196,17 @@ function showFigures() {
 
 function showSliders() {
   const groups = [...new Set(state.sliders.map((slider) => slider.group))];
-  const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group));
+  const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group)), known = new Set([...$("group").options].map(({ value }) => value));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
-    box.open = open.size ? open.has(group) : i === 0 || (i !== 1 && i < 4);
+    box.open = open.size ? open.has(group) || !known.has(group) : i === 0 || (i !== 1 && i < 4);
     for (const slider of state.sliders.filter((other) => other.group === group)) box.append(sliderOf(slider));
     return box;
   }));
   const before = $("group").value;
   $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, group[0].toUpperCase() + group.slice(1))));
   if (groups.includes(before)) $("group").value = before;
-  if (narrow) showGroup();
+  if (small.matches) showGroup();
 }
 
 // A phone has room for one group of sliders above the results.
@@ -288,7 +290,9 @@ const player = {
   },
 };
 
-$("choice").open = !narrow;
+const fit = () => { $("choice").open = !small.matches; showSliders(); };
+small.addEventListener("change", fit);
+fit();
 addEventListener("hashchange", readAddress);
 for (const id of NAMED) $(id).addEventListener("change", () => describe());
 $("group").addEventListener("change", showGroup);
@@ -299,7 +303,7 @@ $("save").addEventListener("click", () => { $("saved").textContent = "saving …
 $("report").addEventListener("click", () => socket.send({ kind: "report" }));
 for (const what of ["command", "python"]) $(`copy-${what}`).addEventListener("click", () => navigator.clipboard.writeText($(what).textContent));
 $("theme").addEventListener("click", () => setTheme(!dark()));
-onTheme(() => { scene.stale = true; showFigures(); });
+onTheme(showFigures);
 for (const name of ["explore", "drive"]) {
   $(`tab-${name}`).addEventListener("click", () => {
     for (const other of ["explore", "drive"]) { $(other).hidden = other !== name; $(`tab-${other}`).setAttribute("aria-selected", String(other === name)); }

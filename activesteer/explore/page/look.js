@@ -4,6 +4,7 @@ const root = document.documentElement;
 const watchers = [];
 
 export const courses = data.courses, mostControllers = data.mostControllers;
+export const small = matchMedia("(max-width: 760px), (max-height: 450px)"); // a telephone, upright or on its side
 export const onTheme = (watcher) => watchers.push(watcher);
 export const dark = () => root.classList.contains("dark");
 export const paint = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();

@@ -65,6 +65,7 @@ export class Scene {
   }
 
   colours() {
+    this.stale = true;
     const sky = new THREE.Color(paint("sky"));
     this.scene.background = sky;
     this.scene.fog = new THREE.Fog(sky, 60, 420);

@@ -204,6 +204,42 @@ def test_superposition_is_not_held_against_a_driver_who_does_not_steer_back(know
     assert max(other) > math.radians(0.9)
 
 
+@pytest.mark.parametrize("stiffness", [(0.7, 0.85), (0.85, 0.7), (1.2, 1.1)])
+def test_while_the_friction_is_unknown_a_car_of_soft_front_tyres_keeps_its_own_turn(known, stiffness):
+    """Else it is steered to the turn of new tyres on what may be snow."""
+    car, speed_mps, driver_rad = known.single_track, 25.0, 0.002
+    soft = replace(
+        car,
+        front_stiffness_Nprad=min(stiffness[0], 1.0) * car.front_stiffness_Nprad,
+        rear_stiffness_Nprad=min(stiffness[1], 1.0) * car.rear_stiffness_Nprad,
+        characteristic_speed_mps=None,
+    )
+
+    def turn(friction_std):
+        controller = Lqr(known)
+
+        class Known:
+            innovation = 0.0
+
+            def step(self, _measurement):
+                now = Estimate(speed_mps, 0.0, 0.0, 0.0, 0.9, *[0.001] * 5, *stiffness)
+                return now._replace(friction_std=friction_std)
+
+        controller._estimator = Known()  # pyright: ignore[reportAttributeAccessIssue]
+        return [controller.turn(steering(driver_rad), measured(0.0)) for _ in range(400)][-1]
+
+    of_new_tyres, unknown = turn(0.0001), turn(known.gains.estimator.friction_std)
+    assert of_new_tyres.desired_radps == pytest.approx(SingleTrack(car).yaw_rate_gain(speed_mps) * driver_rad, rel=1e-3)
+    if stiffness[0] < stiffness[1]:
+        gain = SingleTrack(soft).yaw_rate_gain(speed_mps)
+        assert gain < 0.95 * SingleTrack(car).yaw_rate_gain(speed_mps)
+        assert unknown.desired_radps == pytest.approx(gain * driver_rad, rel=0.01)
+        # Both axles turn by the same angle, so the car turns as it does by itself, and without sideslip.
+        assert unknown.steady_rad[0] == pytest.approx(unknown.steady_rad[1], rel=0.05)
+    else:
+        assert unknown.desired_radps == pytest.approx(of_new_tyres.desired_radps, rel=1e-3)
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_superposition_does_not_turn_a_car_further_from_the_desired_yaw_rate(known, side):
     def turn(yaw_rate_radps, friction_std=0.001):

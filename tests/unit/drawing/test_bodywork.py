@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from activesteer.drawing.cars import BodySurface, dressed, without_tail
+from activesteer.drawing.cars import BodySurface, dressed
 from activesteer.recording import Link, Primitive
 from activesteer.road.course import Footprint
 from tests.unit.playback.synthetic import scene
@@ -66,22 +66,3 @@ def test_what_the_body_replaces_is_left_out_and_the_rest_stays():
     assert [part for part in kept if isinstance(part, Primitive)] == []
     assert [part for part in kept if isinstance(part, Link)] == [part for part in scene() if isinstance(part, Link)]
     assert dressed(scene(), None) == (tuple(scene()), ())
-
-
-def area_m2(panel: BodySurface) -> float:
-    corners = panel.vertices_m[panel.faces]
-    return 0.5 * float(
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-    )
-
-
-@pytest.mark.parametrize("size", [COMPACT, SALOON])
-def test_tail_and_the_rest_are_the_whole_body_and_the_tail_is_at_the_rear_wheels(size):
-    paint = panels_of(size)["chassis", "paint"]
-    rest, tail = without_tail(paint, size)
-    assert area_m2(rest) + area_m2(tail) == pytest.approx(area_m2(paint), rel=1e-9)
-    assert tail.vertices_m[:, 0].max() <= -size.wheelbase_m + 0.5
-    assert tail.vertices_m[:, 2].max() <= 0.8
-    assert tail.vertices_m[:, 0].min() == pytest.approx(paint.vertices_m[:, 0].min())
-    lamp = panels_of(size)["chassis", "lamp"]
-    assert len(without_tail(lamp, size)[1].faces) == 0

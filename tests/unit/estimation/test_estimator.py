@@ -12,6 +12,7 @@ from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import Measurement
 from activesteer.errors import ControllerError
 from activesteer.estimation import EstimatorParameters
+from activesteer.estimation.records import FRICTION
 from activesteer.rigs.kc import kinematics_compliance
 from activesteer.scenario import resolve
 from activesteer.tyre.evaluation import MagicFormula
@@ -184,6 +185,20 @@ def test_a_friction_that_jumps_is_not_taken_for_soft_tyres(vehicle):
     for axle in ("front", "rear"):
         assert np.abs(run[f"estimated_{axle}_stiffness"] - 1.0).max() < 0.4
     assert np.abs(run["estimated_sideslip_rad"] - run["sideslip_rad"])[snow].max() < math.radians(1.0)
+
+
+def test_a_filter_that_is_sure_of_ice_finds_itself_wrong_in_a_gentle_turn(make):
+    """Below 2 m/s2 its errors did not count, so it stayed sure of a friction of 0.2, on dry road."""
+    run = drive("step_steer", "compact", **{"steer.steering_wheel_deg": 14.0, "duration_s": 3.5})
+    assert 1.0 < run.recording["ay_mps2"].max() < 2.0
+    estimator, turned = make(), len(run.said) - 500
+    estimates(estimator, run.said[:turned])
+    memory = estimator._memory[0]
+    memory["state"][FRICTION], memory["covariance"][FRICTION, :], memory["covariance"][:, FRICTION] = 0.08, 0.0, 0.0
+    memory["covariance"][FRICTION, FRICTION] = 0.02**2
+    later = estimates(estimator, run.said[turned:])
+    assert (later["friction"] + 2.0 * later["friction_std"])[150:].min() > 0.45
+    assert np.abs(later["sideslip_rad"] - run.recording["sideslip_rad"][-500:])[150:].max() < math.radians(0.2)
 
 
 @pytest.mark.parametrize(("vehicle", "mu"), [("compact", 0.4), ("sedan", 0.6)])

@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import activesteer
@@ -113,6 +114,31 @@ def test_a_car_that_drives_straight_on_hits_cones_once_and_leaves_the_others(tmp
         fallen += header["cones"]
     assert 0 < len(fallen) == len(set(fallen)) <= len(cones)
     assert header["lap_s"] > 1.0
+    car.end()
+
+
+def test_a_drive_past_a_gate_has_no_time(tmp_path: Path) -> None:
+    car = drive("lane_change", tmp_path)  # straight on, beside the lane in the middle
+    while (header := car.frame().header)["time_s"] < 8.0:
+        pass
+    assert header["lap_s"] > 5.0
+    assert header["missed"]
+    assert header["last_lap_s"] is None
+    car.end()
+
+
+def test_a_drive_through_all_gates_has_a_time(tmp_path: Path) -> None:
+    car = drive("lane_change", tmp_path, speed_kmh=30.0)
+    course = car._simulation.scenario.maneuver.course
+    assert course is not None
+    while (header := car.frame().header)["last_lap_s"] is None:
+        assert not header["missed"]
+        truth, motion = car._simulation.truth, car._simulation.motion
+        ahead_m = 0.7 * motion.speed_mps
+        wanted_m = np.interp(truth["front_axle_x_m"] + ahead_m, course.path.x_m, course.path.y_m)
+        aside_rad = math.atan2(wanted_m - truth["front_axle_y_m"], ahead_m) - motion.yaw_rad
+        car.act(Act(steer=max(-1.0, min(1.0, 1.5 * aside_rad))))
+    assert header["last_lap_s"] > 10.0
     car.end()
 
 

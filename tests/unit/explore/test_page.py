@@ -110,6 +110,13 @@ def test_four_controllers_are_asked_for_and_a_fifth_is_unticked_with_a_message(t
     assert page["message"].startswith("esc is not driven")
 
 
+def test_without_a_controller_nothing_is_driven_and_the_page_says_why(tmp_path: Path) -> None:
+    untick = " ".join(f"tick('{name}', false);" for name in ("ars", "afs", "none"))
+    page = used(tmp_path, f"{untick} sent.length = 0; drag(90); slider().fire('change');")
+    assert page["sent"] == []
+    assert page["message"] == "Choose at least one controller."
+
+
 def test_another_controller_leaves_the_sliders_where_they_are(tmp_path: Path) -> None:
     page = used(tmp_path, "drag(120); finish(); tick('lqr', true); describe();")
     assert page["runs"] == [[120, True], [120, False]]
