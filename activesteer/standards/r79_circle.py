@@ -208,17 +208,13 @@ def _shown(row: Mapping[str, Any], name: str) -> float:
     return display_unit(name).factor * row[name]
 
 
-_BELOW: Final = 0.2
-"""Distance of the dots of the two circles, of the distance of two rows."""
-
-
 def _dots(faults: list[dict[str, Any]]) -> Picture:
     """Return the effects of the faults, a row for each fault: the right circle stands below the left one."""
     names = list(dict.fromkeys(row["fault"] for row in faults))
 
     def panel(figure: str, label: str) -> Panel:
         curves = []
-        for below, (side, marker) in zip((0.0, _BELOW), zip(SIDES, "oD", strict=True), strict=True):
+        for side, below, marker in zip(SIDES, (0.0, 0.2), "oD", strict=True):  # in rows
             own = [row for row in faults if row["direction"] == side]
             x, y = [_shown(row, figure) for row in own], [names.index(row["fault"]) + below for row in own]
             curves.append(Curve(x, y, side, dashes="", marker=marker, size=6.0))
