@@ -32,6 +32,8 @@ _FASTEST_MPS2: Final = 11.0
 """Lateral acceleration of a full turn by key [m/s2], a little more than dry tyres transmit."""
 _PEDAL_PER_S: Final = 4.0
 """Rate of the pedals [1/s]: a foot needs a quarter of a second for the whole way."""
+_LINE_EVERY: Final = 4
+"""Steps of 0.5 m of a course's path between two points of the line that is painted on the road."""
 _PLANE: Final = "straight_line"
 
 
@@ -142,10 +144,13 @@ class DriveSession:
         course = self._simulation.scenario.maneuver.course
         header, arrays = shape_of(self._simulation.loop.vehicle)
         lanes = [] if course is None else [lane._asdict() for lane in course.lanes]
+        # Cones alone do not say where to go.
+        line = [] if course is None or lanes else np.column_stack([course.path.x_m, course.path.y_m])[::_LINE_EVERY]
         yield Reply(
             {
                 "kind": "drive", "shape": header, "cones": self._cones().tolist(), "lanes": lanes,
-                "radius_m": self._course.radius_m, "speed_kmh": self._speed_kmh, "mu": self._mu,
+                "line": [*map(list, line)], "radius_m": self._course.radius_m, "speed_kmh": self._speed_kmh,
+                "mu": self._mu,
             },
             tuple(arrays),
         )  # fmt: skip

@@ -19,6 +19,7 @@ from activesteer.drawing.panels import PATH_DISTANCE, REPORT, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M, Course
+from activesteer.road.road import road_of
 
 RATE_HZ: Final = 200.0
 """Most samples of a signal per second. The car's own motion ends below 20 Hz."""
@@ -28,6 +29,8 @@ MAX_STEP_S: Final = 0.02
 """Longest interval between samples that still represent the signal [s]: they show up to 25 Hz."""
 OFF_COURSE_M: Final = 6.0
 """Distance beside the course to which the picture shows a car that leaves it [m]."""
+BESIDE_M: Final = 15.0
+"""Distance beside the tracks to which places of another friction are drawn [m]."""
 DIGITS: Final = 4
 """Digits after the first digit of a signal's range. More cannot be seen."""
 
@@ -158,7 +161,19 @@ def _track(group: Group, grid: Array) -> dict[str, Any] | None:
         with suppress(RecordingError):  # an open-loop manoeuvre has no course
             course = course or read_course(run.recording)
     table = {"lanes": [], "cones": [], "path": None, "view": None} if course is None else _course(course, group)
-    return {"tracks": tracks, **table}
+    return {"tracks": tracks, "patches": _patches(group, tracks), **table}
+
+
+def _patches(group: Group, tracks: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the places of the road with another friction near the tracks: corners [m] and friction."""
+    ends = []
+    for key in ("x", "y"):
+        seen = [value for track in tracks for value in track[key] if value is not None]
+        ends += [min(seen, default=0.0) - BESIDE_M, max(seen, default=0.0) + BESIDE_M]
+    return [
+        {"corners": np.round(piece.corners_m, 2).tolist(), "mu": round(piece.mu, 3)}
+        for piece in road_of(group.runs[0].recording.metadata).pieces(*ends)
+    ]
 
 
 def _course(course: Course, group: Group) -> dict[str, Any]:

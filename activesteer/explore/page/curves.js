@@ -60,6 +60,23 @@ export class Curves {
     this.marking = false;
   }
 
+  // Borders of phases, and instants of a standard.
+  marks(u) {
+    const { ctx, bbox } = u, marks = [...this.runs.values()].find((run) => run.plots)?.plots.marks ?? [];
+    ctx.save();
+    ctx.strokeStyle = ctx.fillStyle = paint("quiet");
+    ctx.lineWidth = devicePixelRatio;
+    ctx.font = FONT.replace("12px", `${11 * devicePixelRatio}px`);
+    ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
+    const first = u === this.plots.values().next().value?.plot;
+    for (const { time_s, text } of marks) {
+      const x = u.valToPos(time_s, "x", true);
+      ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
+      if (first) ctx.fillText(text, x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
+    }
+    ctx.restore();
+  }
+
   panel(title, panel, lines, data) {
     const key = JSON.stringify(lines);
     let shown = this.plots.get(title);
@@ -79,7 +96,7 @@ export class Curves {
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
       axes: [axis(26, " s"), axis(44)],
       series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
-      hooks: { setCursor: [(u) => {
+      hooks: { drawAxes: [(u) => this.marks(u)], setCursor: [(u) => {
         const i = u.cursor.idx;
         shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost || line.dotted ? [] : [element("span", { style: `border-bottom: 2px solid ${runColour(line.place)}` }, number(u.data[k + 1][i])), " "]))]));
         if (i != null && u.cursor.event && !this.marking) this.pointed(u.data[0][i]);
@@ -125,7 +142,7 @@ export class Track {
     const course = tracks.at(-1), all = [...points, ...course.cones.map((cone) => [cone[0], cone[1]])];
     let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
     for (const [x, y] of all) { left = Math.min(left, x); right = Math.max(right, x); low = Math.min(low, y); high = Math.max(high, y); }
-    [left, right, low, high] = [left - 3, right + 6, low - 3, high + 3];
+    [left, right, low, high] = [left - 6, right + 6, low - 3, high + 3];
     // A car has its shape. Widths have the scale of the cars, so that their distances from cones and lanes are true.
     const ends = tracks.flatMap((track) => track.tracks).find(({ car }) => car)?.car.ends ?? [0, 4], length = ends[1] - ends[0];
     const fit = (height - 34) / (high - low), zoomX = Math.min((width - 20) / (right - left), fit), zoomY = Math.min(fit, Math.max(zoomX, CAR_PX / length));
@@ -133,6 +150,8 @@ export class Track {
     const place = (x, y) => [width / 2 + (x - (left + right) / 2) * zoomX, (height - 14) / 2 - (y - (low + high) / 2) * zoomY];
     const line = (xs, ys) => { pen.beginPath(); xs.forEach((x, i) => { if (x != null && ys[i] != null) pen.lineTo(...place(x, ys[i])); }); pen.stroke(); };
     pen.font = FONT;
+    pen.fillStyle = paint("patch");
+    for (const { corners } of course.patches) { pen.beginPath(); for (const [x, y] of corners) pen.lineTo(...place(x, y)); pen.fill(); }
     pen.fillStyle = paint("lane");
     for (const lane of course.lanes) {
       const [start, end] = lane.x, [below, above] = lane.y;
@@ -164,6 +183,7 @@ export class Track {
     }
     pen.fillStyle = paint("quiet");
     const stretch = zoomY / zoomX;
-    pen.fillText(`from above, ${Math.round(right - left)} m${stretch > 1.05 ? `; cars and widths are ${stretch.toFixed(1)} times larger` : ""}`, 10, height - 7);
+    const frictions = [...new Set(course.patches.map(({ mu }) => mu))].slice(0, 3);
+    pen.fillText(`from above, ${Math.round(right - left)} m${frictions.length ? `; blue: friction ${frictions.join(", ")}` : ""}${stretch > 1.05 ? `; cars and widths are ${stretch.toFixed(1)} times larger` : ""}`, 10, height - 7);
   }
 }

@@ -104,7 +104,7 @@ export class Drive {
     this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: +$("drive-speed").value, mu: +$("drive-mu").value });
   }
 
-  failed() { $("start").textContent = "This car cannot drive"; }
+  failed() { $("start").textContent = "Cannot drive: choose another control or car"; }
 
   begin(header, arrays) {
     if (header.id !== this.asked) return;
@@ -115,7 +115,7 @@ export class Drive {
     this.way = header.radius_m > 0 ? "Last lap" : "First to last gate";
     this.scene.setShape(header.shape, arrays);
     this.scene.car("you", 2);
-    this.scene.setCourse(header.cones, header.lanes, header.radius_m);
+    this.scene.setCourse({ ...header, radius: header.radius_m });
     this.ghost = this.ghosts.get(this.setting);
     if (this.ghost) this.scene.car("ghost", 0, 0.35);
     this.frames = [];
@@ -191,7 +191,7 @@ export class Drive {
     scene.place("you", poses);
     if (this.ghost) scene.place("ghost", this.running ? this.before(time_s) : poses);
     const dt = this.previous ? time_s - this.previous.time_s : 0;
-    scene.follow(["you"], dt || 1, dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [1, 0]);
+    scene.follow(["you"], dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [0, 0]);
     this.previous = { time_s, x: poses[0], y: poses[1] };
     this.gauges(header);
     if (!this.running) return;

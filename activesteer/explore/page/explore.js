@@ -162,7 +162,8 @@ function redraw() {
   const course = drawn[0]?.plots.track;
   if (course && state.course !== state.id) {
     state.course = state.id;
-    scene.setCourse(course.cones, course.lanes.map((lane) => ({ start_x_m: lane.x[0], end_x_m: lane.x[1], right_y_m: lane.y[0], left_y_m: lane.y[1] })));
+    const lanes = course.lanes.map((lane) => ({ start_x_m: lane.x[0], end_x_m: lane.x[1], right_y_m: lane.y[0], left_y_m: lane.y[1] }));
+    scene.setCourse({ cones: course.cones, lanes, patches: course.patches });
   }
   player.length();
   showFigures();
@@ -183,7 +184,7 @@ function showColours() {
 
 function showFigures() {
   showColours();
-  const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.map((figure) => [figure.title, figure])));
+  const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value }) => value != null).map((figure) => [figure.title, figure])));
   const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), small.matches ? shortName(run) : run.label)));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
@@ -259,7 +260,6 @@ const player = {
     this.show(Math.min(this.time, this.end));
   },
   show(time, pointed = false) {
-    const dt = Math.abs(time - this.time);
     if (time < this.time) scene.heading = null;
     this.time = time;
     $("time").value = time;
@@ -277,7 +277,7 @@ const player = {
       names.push(run.name);
       for (const k of [0, 1]) velocity[k] += (run.poses[b + k] - run.poses[a + k]) / s;
     }
-    scene.follow(names, dt || 10, velocity);
+    scene.follow(names, velocity);
   },
   pause() { this.playing = false; $("play").textContent = "Play"; },
   tick(now) {

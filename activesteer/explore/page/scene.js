@@ -2,7 +2,7 @@
 import * as THREE from "./three.module.min.js";
 import { onTheme, paint, runColour } from "./look.js";
 
-const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, TURN_S = 0.35, SLOW_MPS = 1;
+const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, SLOW_MPS = 1;
 const SPREAD_BACK = 2, SPREAD_UP = 0.7; // Way of the camera backwards and upwards for each metre between the cars and their middle.
 const BEHIND = 1e5; // Depth by which a car is drawn behind the one before it, so that the first is whole where they overlap; about 2 m.
 const SLOW_MS = 50, LEAST_RATIO = 0.5;
@@ -198,7 +198,7 @@ export class Scene {
     car.trail.geometry.setDrawRange(0, car.points);
   }
 
-  setCourse(cones, lanes, radius = 0) {
+  setCourse({ cones, lanes, radius = 0, line = [], patches = [] }) {
     this.course.clear();
     this.cones = cones.map(([x, y]) => {
       const cone = new THREE.Mesh(new THREE.ConeGeometry(0.145, 0.5, 16), new THREE.MeshLambertMaterial({ color: 0xf07d00 }));
@@ -209,12 +209,27 @@ export class Scene {
       this.course.add(cone, shadow);
       return cone;
     });
+    for (const { corners } of patches) {
+      const shape = new THREE.Shape(corners.map(([x, y]) => new THREE.Vector2(x, y)));
+      const patch = new THREE.Mesh(new THREE.ShapeGeometry(shape), new THREE.MeshBasicMaterial({ color: 0xa9cdf0, transparent: true, opacity: 0.5, depthWrite: false, side: THREE.DoubleSide }));
+      patch.renderOrder = -3;
+      patch.position.z = -0.01;
+      this.course.add(patch);
+    }
     for (const lane of lanes) {
       const length = lane.end_x_m - lane.start_x_m, width = lane.left_y_m - lane.right_y_m;
       const flat = new THREE.Mesh(new THREE.PlaneGeometry(length, width), new THREE.MeshBasicMaterial({ color: 0xfff2c0, transparent: true, opacity: 0.28, depthWrite: false }));
       flat.renderOrder = -2;
       flat.position.set(lane.start_x_m + length / 2, lane.right_y_m + width / 2, -0.005);
       this.course.add(flat);
+    }
+    for (let i = 0; i + 1 < line.length; i += 2) {  // dashes
+      const [x, y] = line[i], ahead = line[i + 1][0] - x, left = line[i + 1][1] - y;
+      const dash = new THREE.Mesh(new THREE.PlaneGeometry(Math.hypot(ahead, left), 0.2), new THREE.MeshBasicMaterial({ color: 0xffffff, transparent: true, opacity: 0.7, depthWrite: false }));
+      dash.renderOrder = -2;
+      dash.rotation.z = Math.atan2(left, ahead);
+      dash.position.set(x + ahead / 2, y + left / 2, 0);
+      this.course.add(dash);
     }
     if (radius) {
       const ring = new THREE.Mesh(new THREE.RingGeometry(radius - 0.1, radius + 0.1, 128), new THREE.MeshBasicMaterial({ color: 0xffffff, transparent: true, depthWrite: false }));
@@ -234,16 +249,14 @@ export class Scene {
   }
 
   // Follow the velocity of cars, not their heading: a car that slides then turns in the picture. All of them stay in it.
-  follow(names, dt, velocity) {
+  follow(names, velocity) {
     const places = names.map((name) => this.cars.get(name)?.bodies[0].position).filter(Boolean);
     if (!places.length) return;
     const middle = (key) => (Math.min(...places.map((place) => place[key])) + Math.max(...places.map((place) => place[key]))) / 2;
     const at = { x: middle("x"), y: middle("y") }, spread = Math.max(...places.map(({ x, y }) => Math.hypot(x - at.x, y - at.y)));
     const speed = Math.hypot(...velocity);
     const wanted = speed > SLOW_MPS ? Math.atan2(velocity[1], velocity[0]) : this.heading ?? 0;
-    if (this.heading == null) this.heading = wanted;
-    const turn = Math.atan2(Math.sin(wanted - this.heading), Math.cos(wanted - this.heading));
-    this.heading += turn * (1 - Math.exp(-dt / TURN_S));
+    this.heading = wanted;  // at once: a camera that lags shows a car in a steady turn as one that slides
     const cos = Math.cos(this.heading), sin = Math.sin(this.heading);
     const back = CAMERA_BACK + SPREAD_BACK * spread;
     this.camera.position.set(at.x - 1.3 - back * cos, at.y - back * sin, CAMERA_UP + SPREAD_UP * spread);

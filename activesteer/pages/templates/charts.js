@@ -2,7 +2,7 @@
 "use strict";
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 // Colours of the stylesheet, light or dark; read again when the scheme changes.
-const PAINTS = ["paper", "quiet", "grid", "lane", "cone", "struck", "path", "failed", "ink", "link", ...Array.from({ length: 6 }, (_, i) => `run-${i}`)];
+const PAINTS = ["paper", "quiet", "grid", "lane", "patch", "cone", "struck", "path", "failed", "ink", "link", ...Array.from({ length: 6 }, (_, i) => `run-${i}`)];
 const paint = {};
 const mix = () => { const style = getComputedStyle(document.documentElement); for (const name of PAINTS) paint[name] = style.getPropertyValue(`--${name}`).trim(); };
 mix();

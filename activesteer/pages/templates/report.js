@@ -246,11 +246,14 @@
       this.note.textContent = [
         ...(stretch > 1.05 || stretch < 0.95 ? [`lateral positions stretched ${stretch.toFixed(1)} times`] : []),
         ...(covers ? ["shaded: width of the bodies"] : []),
+        ...(this.data.patches.length ? [`blue: friction ${[...new Set(this.data.patches.map(({ mu }) => mu))].slice(0, 3).join(", ")}`] : []),
         ...(factors ? [`wheels turned ${[...new Set(factors)].join(" and ")} times as far`] : []),
       ].join(", ");
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
       ctx.lineJoin = "round";
+      ctx.fillStyle = paint.patch;
+      for (const { corners } of this.data.patches) { ctx.beginPath(); for (const [x, y] of corners) ctx.lineTo(px(x), py(y)); ctx.fill(); }
       ctx.fillStyle = paint.lane;
       for (const { x, y } of this.data.lanes) ctx.fillRect(px(x[0]), py(y[1]), px(x[1]) - px(x[0]), py(y[0]) - py(y[1]));
       const line = ({ x, y }, colour, width, dash) => {

@@ -117,6 +117,23 @@ def test_a_car_that_drives_straight_on_hits_cones_once_and_leaves_the_others(tmp
     car.end()
 
 
+def test_a_course_of_cones_alone_has_its_path_painted_on_the_road(tmp_path: Path) -> None:
+    slalom, lane_change = drive("slalom", tmp_path), drive("lane_change", tmp_path)
+    start, other = (next(car.start()).header for car in (slalom, lane_change))
+    slalom.end()
+    lane_change.end()
+    x_m, y_m = np.array(start["line"]).T
+    cones = np.array(start["cones"])
+    assert x_m[0] == 0.0
+    assert x_m[-1] > cones[-1, 0] - 2.0
+    assert np.diff(x_m).max() < 2.5
+    # It passes the cones of a slalom on one side and the other, in turn.
+    beside_m = np.interp(cones[:, 0], x_m, y_m) - cones[:, 1]
+    assert np.abs(beside_m).min() > 0.9
+    assert (np.sign(beside_m[1:]) == -np.sign(beside_m[:-1])).sum() >= len(cones) // 2
+    assert other["line"] == []  # it has lanes
+
+
 def test_a_drive_past_a_gate_has_no_time(tmp_path: Path) -> None:
     car = drive("lane_change", tmp_path)  # straight on, beside the lane in the middle
     while (header := car.frame().header)["time_s"] < 8.0:
