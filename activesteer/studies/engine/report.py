@@ -59,8 +59,9 @@ def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> P
     """Return the page: what ran, then what `study.js` draws, then the factors and the file of the study."""
     title, data = study.title or name, _data(study, table)
     counts = ", ".join(f"{number} {status}" for status, number in progress.by_status.items())
-    driven = f"{'; '.join(data['groups'])}; controllers {', '.join(data['controllers'])}"
-    lead: list[Text] = [f"{progress.done} of {progress.total} runs: {counts}. Driven: {driven}.", *_finding(data)]
+    parts = (("Manoeuvres", "maneuver"), ("Vehicles", "vehicle"), ("Controllers", "controller"))
+    driven = " ".join(f"{word}: {', '.join(table[part].unique().to_pylist())}." for word, part in parts)
+    lead: list[Text] = [f"{progress.done} of {progress.total} runs: {counts}. {driven}", *_finding(data)]
     lead += [
         Markup("Without effect: <code>{}</code> changes no metric of any run.").format(key)
         for key in progress.without_effect
