@@ -207,8 +207,7 @@ function drawGroup() {
   begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
   others.sort((a, b) => firstPlace(a.name) - firstPlace(b.name));
   show("first", others.splice(0, others.filter(({ name }) => DATA.first.includes(name)).length || 4));
-  if (!others.length) return;
-  body = body.appendChild(element("details", { class: "rows" }, element("summary", {}, `${others.length} more metrics`)));
+  if (others.length) body = body.appendChild(element("details", { class: "rows" }, element("summary", {}, `${others.length} more metrics`)));
   show("all", others);
 }
 
