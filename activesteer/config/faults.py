@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Annotated, Any, Final, NamedTuple
@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, NamedTuple
 from activesteer.config import Range, Source, build
 from activesteer.core.conventions import CORNERS
 from activesteer.core.signals import Measurement, numbers_of
+from activesteer.core.units import display_unit
 from activesteer.errors import ManeuverError, ParameterError, nearest_names, shown
 
 
@@ -230,6 +231,18 @@ def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
     elif found["unit"] is not None:
         table["delay_s" if found["unit"] == "s" else f"size_{found['unit']}"] = float(found["value"])
     return table
+
+
+def fault_words(fault: Mapping[str, Any]) -> str:
+    """Return a fault of a manoeuvre in SI units without its time, with its size in display units."""
+    said = f"{str(fault.get('part', '?')).replace('_', ' ')}: {fault.get('kind', '?')}"
+    for key, value in fault.items():
+        if key == "side" and value:
+            said += f" {value}"
+        elif (key == "delay_s" or key.startswith("size_")) and isinstance(value, int | float):
+            unit, factor = display_unit(key)
+            said += f" {factor * value:.4g} {unit}"
+    return said
 
 
 def fault_from(given: Any, now_s: float) -> Fault:

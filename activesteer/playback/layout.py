@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from activesteer.core.units import display_unit
+from activesteer.config.faults import fault_words
 from activesteer.drawing.cars import CHASSIS, bytes_of
 from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Panel, panels_in
 from activesteer.playback import plots
@@ -103,24 +103,12 @@ def _faults(run: ReplayedRun) -> Iterator[Event]:
     for fault in faults if isinstance(faults, list | tuple) else ():
         if not isinstance(fault, Mapping):
             continue
-        name = f"{fault.get('part', '?')}: {fault.get('kind', '?')}{_size(fault)}"
+        name = fault_words(fault)
         ends = (("start_s", f"FAULT {name}", rr.TextLogLevel.ERROR), ("end_s", f"{name} is over", rr.TextLogLevel.INFO))
         for key, text, level in ends:
             time_s = fault.get(key)
             if isinstance(time_s, int | float) and time_s <= last_s:
                 yield Event(float(time_s), text, level)
-
-
-def _size(fault: Mapping[str, Any]) -> str:
-    """Return the size of a fault in display units."""
-    said = ""
-    for key, value in fault.items():
-        if key == "side":
-            said += f" {value}"
-        elif (key == "delay_s" or key.startswith("size_")) and isinstance(value, int | float):
-            unit, factor = display_unit(key)
-            said += f" {factor * value:.4g} {unit}"
-    return said
 
 
 def _limits(run: ReplayedRun) -> Iterator[Event]:

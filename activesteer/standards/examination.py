@@ -130,7 +130,7 @@ def examination_page(result: Examination) -> Page:
     versions = ", ".join(f"{name} {version}" for name, version in result.versions.items())
     lead.append(Markup('<span class="quiet">{}</span>').format(versions))
     rows = [(name, _verdict(found), found.error or found.summary) for name, found in result.findings.items()]
-    sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])]
+    sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])] if len(rows) > 1 else []
     together = _together(result.findings)
     if together:
         sections.append(Section("All controllers", pictures=list(together.values())))

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from activesteer.config import Source, build
-from activesteer.config.faults import Fault, fault_table
+from activesteer.config.faults import Fault, fault_table, fault_words
 from activesteer.controllers import system_of
 from activesteer.core.conventions import Array
 from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
@@ -94,7 +94,10 @@ def examine(runner: StandardRunner) -> Findings:
                 "steering": name, "direction": side, "radius_m": requirement.radius_m, "time_s": found.time_s,
                 "effort_N": found.effort_N, "limit_N": requirement.limit_N, "pass": good,
             })  # fmt: skip
-    faults = _faults(runner)
+    try:
+        faults = fault_circles(runner)
+    except SimulationDiverged as reason:
+        raise NoResult(f"the car without fault does not complete the circle: {reason}") from reason
     values = {
         "rim_radius_m": RIM_RADIUS_M, "efforts": efforts, "faults": faults,
         "pass": all(row["pass"] for row in efforts),
@@ -106,13 +109,6 @@ def examine(runner: StandardRunner) -> Findings:
         _dots(faults),
     ]
     return Findings(values, summary, [_effort_table(efforts), _fault_table(faults)], pictures)
-
-
-def _faults(runner: StandardRunner) -> list[dict[str, Any]]:
-    try:
-        return fault_circles(runner)
-    except SimulationDiverged as reason:
-        raise NoResult(f"the car without fault does not complete the circle: {reason}") from reason
 
 
 def _spirals(runner: StandardRunner, name: str, effort: Effort) -> dict[str, StandardRun]:
@@ -160,10 +156,13 @@ def _fault_words(faults: list[dict[str, Any]]) -> str:
     if done:
         worst = max(done, key=lambda row: row["steering_correction_rad"])
         words = (
-            f"{worst['fault']} ({worst['direction']}) needs the largest correction, "
+            f"{_named(worst)} ({worst['direction']}) needs the largest correction, "
             f"{math.degrees(worst['steering_correction_rad']):.0f} deg at the steering wheel; the car is "
             f"{abs(worst['lateral_offset_1s_driver_m']):.2f} m off its course after 1 s"
         )
+    count = len({row["fault"] for row in faults})
+    if idle := count - len(_with_effect(faults)):
+        words += f"; {idle} of {count} faults change nothing, because the controller does not use what fails"
     return words + ("" if done == faults else f"; {len(faults) - len(done)} of {len(faults)} faults did not finish")
 
 
@@ -189,7 +188,7 @@ def _fault_table(faults: list[dict[str, Any]]) -> Table:
 
     rows = [
         (
-            row["fault"], row["direction"], *(cell(_shown(row, name), 2) for name in FIGURES[:-1]),
+            _named(row), row["direction"], *(cell(_shown(row, name), 2) for name in FIGURES[:-1]),
             row.get("error") or tolerated(row),
         )
         for row in faults
@@ -204,19 +203,27 @@ def _fault_table(faults: list[dict[str, Any]]) -> Table:
     return Table("Failures in a circle of 100 m at 80 km/h", columns, rows, outside)
 
 
+def _named(row: Mapping[str, Any]) -> str:
+    return fault_words(vars(build(Fault, fault_table(row["fault"], 0.0), Source(row["fault"]))))
+
+
+def _with_effect(faults: list[dict[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(_named(row) for row in faults if any(row[name] != 0.0 for name in FIGURES[:-1])))
+
+
 def _shown(row: Mapping[str, Any], name: str) -> float:
     return display_unit(name).factor * row[name]
 
 
 def _dots(faults: list[dict[str, Any]]) -> Picture:
-    """Return the effects of the faults, a row for each fault: the right circle stands below the left one."""
-    names = list(dict.fromkeys(row["fault"] for row in faults))
+    """Return the effects of the faults that have one, a row for each: the right circle stands below the left one."""
+    names = _with_effect(faults)
 
     def panel(figure: str, label: str) -> Panel:
         curves = []
         for side, below, marker in zip(SIDES, (0.0, 0.2), "oD", strict=True):  # in rows
-            own = [row for row in faults if row["direction"] == side]
-            x, y = [_shown(row, figure) for row in own], [names.index(row["fault"]) + below for row in own]
+            own = [row for row in faults if row["direction"] == side and _named(row) in names]
+            x, y = [_shown(row, figure) for row in own], [names.index(_named(row)) + below for row in own]
             curves.append(Curve(x, y, side, dashes="", marker=marker, size=6.0))
         return Panel(label, "", curves, names=names)
 
@@ -225,7 +232,7 @@ def _dots(faults: list[dict[str, Any]]) -> Picture:
         panel("lateral_offset_1s_m", "lateral offset after 1 s,\nhands fixed [m]"),
         panel("steering_correction_rad", "driver's correction,\nsteering wheel [deg]"),
     ]
-    return Picture("Failures in a circle of 100 m at 80 km/h", panels)
+    return Picture("Failures with an effect in a circle of 100 m at 80 km/h", panels)
 
 
 RADIUS_M: Final = 100.0

@@ -196,6 +196,19 @@ def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_
 
 
 @pytest.mark.slow
+def test_legends_show_points_for_curves_of_points(shown, tmp_path):
+    x = np.linspace(0.0, 1.0, 20)
+    markers = {"line": "", "o": "o", "D": "D", "x": "x", "s": "s"}
+    curves = [Curve(x, x, name, "#d55e00", "" if marker else "-", marker=marker) for name, marker in markers.items()]
+    sections = [Section(pictures=[Picture("", [Panel("x [m]", "y [m]", curves)])])]
+    page = shown(write_page(Page("all", "Legends", [], sections), tmp_path / "l.html"), **DESK)
+    widths = page.locator(".swatch path").evaluate_all("(paths) => paths.map((path) => path.getBBox().width)")
+    assert widths[0] == 28
+    assert len(widths) == len(markers)
+    assert all(0 < width <= 6 for width in widths[1:])
+
+
+@pytest.mark.slow
 def test_pictures_of_a_section_with_the_same_names_share_one_legend(shown, tmp_path):
     x = np.linspace(0.0, 1.0, 20)
 

@@ -53,14 +53,15 @@ const DARK = matchMedia("(prefers-color-scheme: dark)"), NARROW = matchMedia("(m
 // All that is drawn anew for another colour scheme, another width, or paper.
 const drawn = [];
 
-function swatchOf(colour, dashes) {
+const POINTS = { o: "M13 3a1 1 0 1 0 2 0a1 1 0 1 0-2 0z", D: "M14 1.5l1.5 1.5-1.5 1.5-1.5-1.5z", x: "M11.5 .5l5 5m0-5l-5 5" };
+function swatchOf(colour, dashes, marker = "") {
   const swatch = document.createElementNS(SVG, "svg");
   swatch.setAttribute("class", "swatch");
   swatch.setAttribute("viewBox", "0 0 28 6");
   swatch.style.setProperty("--run", colour);
   const line = swatch.appendChild(document.createElementNS(SVG, "path"));
-  line.setAttribute("d", "M0 3h28");
-  line.setAttribute("stroke-dasharray", dashes.join(" "));
+  line.setAttribute("d", marker ? POINTS[marker] ?? POINTS.o : "M0 3h28");
+  if (marker) line.style.fill = colour; else line.setAttribute("stroke-dasharray", dashes.join(" "));
   return swatch;
 }
 
@@ -335,10 +336,10 @@ function drawPicture(box, picture, place) {
   if (names.length) legend = own;
   bar.classList.toggle("shared", shared);
   Object.assign(picture, { place, hidden });
-  const entry = (label, colour, dashes) => {
+  const entry = (label, colour, dashes, marker) => {
     if (!label || seen.has(label)) return;
     seen.add(label);
-    const button = element("button", { type: "button", "aria-pressed": "true" }, swatchOf(colour, dashes), label);
+    const button = element("button", { type: "button", "aria-pressed": "true" }, swatchOf(colour, dashes, marker), label);
     button.addEventListener("click", () => {
       const hide = !hidden.delete(label);
       if (hide) hidden.add(label);
@@ -350,7 +351,7 @@ function drawPicture(box, picture, place) {
   for (const panel of picture.panels) {
     if (panel.legend && !seen.has(panel.legend)) bar.append(element("span", { class: "scale" }, panel.legend));
     seen.add(panel.legend);
-    for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || [1, 2]).map((length) => 2 * length));
+    for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || []).map((length) => 2 * length), curve.dashes ? "" : curve.marker);
     for (const area of panel.areas) entry(area.label, inkOf(area.colour), []);
     for (const [, label] of panel.limits) entry(label, "var(--failed)", [6, 4]);
   }

@@ -9,6 +9,7 @@ const colourOf = (controller) => `run-${DATA.places[controller]}`;
 const curveOf = (controller, x, y, parts) => ({ x, y, label: DATA.controllers[controller], colour: colourOf(controller), dashes: null, width: 1, marker: "o", size: 4.5, shade: null, turns: true, ...parts });
 const withUnit = (label, unit) => (unit && unit !== "-" ? `${label} [${unit}]` : label);
 const axisOf = (each) => withUnit(each.label, each.unit);
+const firstPlace = (name) => (DATA.first.indexOf(name) + 1 || 99);
 const number = (value) => (value == null ? "-" : short(value));
 const endsOf = (values) => { let low = Infinity, high = -Infinity; for (const v of values) if (v != null) { low = Math.min(low, v); high = Math.max(high, v); } return [low, high]; };
 const constantIn = (low, high) => !(high - low > 1e-3 * Math.max(Math.abs(low), Math.abs(high)));
@@ -22,10 +23,11 @@ function show(id, panels, scale = null) {
 
 function histogram(metric, { edges, counts }) {
   const x = edges.flatMap((edge) => [edge, edge]);
+  const alpha = counts.length > 1 ? 0 : 0.15; // filled areas that overlap would make a colour without a name
   const areas = counts.map((part, c) => {
     const all = part.reduce((a, b) => a + b, 0) || 1, shares = part.map((count) => (100 * count) / all);
     const high = [0, ...shares.flatMap((share) => [share, share]), 0];
-    return { x, low: high.map(() => 0), high, label: DATA.controllers[c], colour: colourOf(c), alpha: 0.15, edge: colourOf(c), shade: null };
+    return { x, low: high.map(() => 0), high, label: DATA.controllers[c], colour: colourOf(c), alpha, edge: colourOf(c), shade: null };
   });
   return panelOf(axisOf(metric), "share of the runs [%]", { areas, y_range: [0, null] });
 }
@@ -200,11 +202,12 @@ function drawGroup() {
     if (!DATA.by_group[group][other.name]) continue;
     const known = rows.map((i) => DATA.rows.metrics[other.name][i]).filter((value) => value != null);
     if (constantIn(...endsOf(known))) constant.push(`${other.label} ${known.length ? short(known[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
-    else others.push({ ...histogram(other, DATA.by_group[group][other.name].histogram), title: other.label });
+    else others.push({ ...histogram(other, DATA.by_group[group][other.name].histogram), title: other.label, name: other.name });
   }
   begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
-  body = body.appendChild(element("details", { class: "rows" }, element("summary", {}, `${others.length} metrics`)));
-  body.open = !NARROW.matches;
+  others.sort((a, b) => firstPlace(a.name) - firstPlace(b.name));
+  show("first", others.splice(0, others.filter(({ name }) => DATA.first.includes(name)).length || 4));
+  if (others.length) body = body.appendChild(element("details", { class: "rows" }, element("summary", {}, `${others.length} more metrics`)));
   show("all", others);
 }
 
@@ -213,8 +216,7 @@ function choose() {
   const has = DATA.by_group[Number(chosenGroup.value)];
   if (has[chosenMetric.value]) return;
   const names = DATA.metrics.map((metric) => metric.name).filter((name) => has[name]);
-  const asked = names.find((name) => ["sideslip_peak_abs_rad", "sideslip_peak_rad", "yaw_rate_peak_radps"].includes(name));
-  if (names.length) chosenMetric.value = asked || names[0];
+  if (names.length) chosenMetric.value = names.sort((a, b) => firstPlace(a) - firstPlace(b))[0];
 }
 
 document.querySelector("#study > .drawn").replaceChildren(

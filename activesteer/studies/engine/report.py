@@ -17,7 +17,7 @@ from scipy.stats import rankdata
 from activesteer.controllers import controller_spec
 from activesteer.core.conventions import Array, run_looks
 from activesteer.core.files import file_word, write_text
-from activesteer.core.metric_table import recorded_metric
+from activesteer.core.metric_table import SIDESLIP_PEAKS, recorded_metric
 from activesteer.core.units import parameter_label
 from activesteer.driver import driver_spec
 from activesteer.errors import ActiveSteerError, StudyError
@@ -34,12 +34,12 @@ _SHOWN_ROWS: Final = 3000
 """Most runs whose points the page holds. Counts and means are over all runs."""
 _BINS: Final = 40
 _EXTREMES: Final = 5
+_FIRST: Final = (*SIDESLIP_PEAKS, "yaw_rate_peak_radps", "ay_peak_mps2")
+"""Metrics that a page shows first."""
 _MAX_INDICES: Final = 400
 """Most sets of indices. Each takes some hundredths of a second."""
 
 Places = NDArray[np.int64]
-Group = tuple[str, str]
-"""Manoeuvre and vehicle."""
 
 
 def write_report(folder: str | os.PathLike[str]) -> Path:
@@ -59,29 +59,43 @@ def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> P
     """Return the page: what ran, then what `study.js` draws, then the factors and the file of the study."""
     title, data = study.title or name, _data(study, table)
     counts = ", ".join(f"{number} {status}" for status, number in progress.by_status.items())
-    lead: list[Text] = [f"{progress.done} of {progress.total} runs: {counts}."]
+    parts = (("Manoeuvres", "maneuver"), ("Vehicles", "vehicle"), ("Controllers", "controller"))
+    driven = " ".join(f"{word}: {', '.join(table[part].unique().to_pylist())}." for word, part in parts)
+    lead: list[Text] = [f"{progress.done} of {progress.total} runs: {counts}. {driven}", *_finding(data)]
     lead += [
         Markup("Without effect: <code>{}</code> changes no metric of any run.").format(key)
         for key in progress.without_effect
     ]
     errors = [(str(number), error) for error, number in progress.errors.items()]
     factors = [
-        (
-            f"{each['label']} [{each['unit']}]" if each["unit"] else each["label"],
-            Markup("<code>{}</code>").format(each["key"]),
-        )
+        (each["label"], f"{each['range']} {each['unit']}".rstrip(), Markup("<code>{}</code>").format(each["key"]))
         for each in data["factors"]
     ]
+    is_relative = any(factor.nominal for factor in study.factors)
+    note = "Relative: ratio to the value of the file; change: difference from it." if is_relative else ""
+    tables = [Table("", ["runs", "error"], errors)] if errors else []
+    columns = ("factor", "driven values", "key")
+    tables.append(Table("Factors", columns, factors, folded=len(factors) > _FACTORS, note=note))
     sections = [
-        Section(tables=[Table("", ["runs", "error"], errors)] if errors else [], anchor="study"),
-        Section(
-            "Factors",
-            ["Relative: ratio to the value of the file; change: difference from it."],
-            [Table("", ["factor", "key"], factors)],
-        ),
+        Section(tables=tables, anchor="study"),
         Section("The study", [Markup('<code class="file">{}</code>').format(study.to_toml())]),
     ]
     return Page(title, title, lead, sections, ["study.js"], data)
+
+
+def _finding(data: Mapping[str, Any]) -> list[Text]:
+    """Say which numeric factor the first metric of the first manoeuvre follows most, by controller."""
+    rows, names, told = data["rows"], data["by_group"][0], []
+    name = next((name for name in (*_FIRST, *names) if name in names), None)
+    for place, controller in enumerate(data["controllers"] if name else ()):
+        own = (np.array(rows["group"]) == 0) & (np.array(rows["controller"]) == place)
+        columns = {each["label"]: rows["factors"][each["key"]] for each in data["factors"] if each["numeric"]}
+        pairs = ((label, np.array([x, rows["metrics"][name]], np.float64)) for label, x in columns.items())
+        found = [(_correlation(*pair[:, own & np.isfinite(pair).all(axis=0)]), label) for label, pair in pairs]
+        value, most = max(found, default=(0.0, ""))
+        told += [f"{most} with {controller} ({value:.2f})"] if value else []
+    words = f"{recorded_metric(name or '').label} depends most on {', on '.join(told)}. In brackets: rank correlation."
+    return [f"{data['groups'][0]}: {words}"] if told else []
 
 
 def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
@@ -98,6 +112,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     return {
         "controllers": who["controller"][0],
         "places": [run_looks(who["controller"][0])[name].place for name in who["controller"][0]],
+        "first": _FIRST,
         "groups": [f"{who['maneuver'][0][m]}, {who['vehicle'][0][v]}" for m, v in groups],
         "metrics": [{"name": metric.name, "label": metric.label, "unit": metric.unit.name} for metric in found],
         "factors": [_factor(study, key, table[key]) for key in study.keys],
@@ -150,6 +165,8 @@ def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, An
     relative = next((factor.nominal for factor in study.factors if factor.key == key), None)
     words, unit = _label(study, key)
     told = {"label": f"{words}{_RELATIVE.get(relative or '', '')}", "unit": "" if relative == "times" else unit}
+    several = ", ".join(map(str, ordered)) if len(ordered) <= _FACTORS else f"{len(ordered)} different"
+    told["range"] = f"{min(levels):.4g} to {max(levels):.4g}" if numeric and levels else several
     return {"key": key, **told, "numeric": numeric, "levels": ordered}
 
 
@@ -207,7 +224,7 @@ def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
     # The page holds five digits; values that differ by less are one value.
     if high - low <= 1e-3 * max(abs(low), abs(high), 1e-300):
         low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
-    edges = np.linspace(low, high, min(_BINS, max(5, int(np.sqrt(max(map(len, parts)))) + 1)) + 1)
+    edges = np.linspace(low, high, min(_BINS, max(8, 2 * int(np.sqrt(max(map(len, parts)))))) + 1)
     return {"edges": _json(edges), "counts": [np.histogram(part, edges)[0].tolist() for part in parts]}
 
 
@@ -298,7 +315,7 @@ def _json(column: Array) -> list[float | None]:
 
 
 _FACTORS: Final = 5
-"""Number of factors that are drawn: those with which the margin correlates most."""
+"""Most factors that a page does not fold, or that are drawn: those with which the margin correlates most."""
 _KEPT, _BROKEN, _GREY = "#5b9fd0", "#b3261e", "0.6"
 
 

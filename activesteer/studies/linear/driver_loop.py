@@ -101,7 +101,7 @@ def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
 """Default speeds [km/h]."""
 LEAST_DAMPING: Final = 0.25
-"""Least damping ratio that is asked of a loop."""
+"""Least damping ratio that is asked of a loop at 80 and 100 km/h."""
 LEAST_PHASE_MARGIN_DEG: Final = 30.0
 """Least phase margin of humans, as McRuer and Krendel measured it [deg]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.2, 60.0, 300)
@@ -398,16 +398,18 @@ def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[st
         if swings:
             (x, y), size = zip(*swings, strict=True), max(3.0, 9.0 - 3.0 * place)
             damping.append(Curve(x, y, "", look.colour, "", marker="o", size=size))
+    damping.append(Curve([80.0, 100.0], [LEAST_DAMPING] * 2, "", "#b3261e", "--", 1.2))
     lowest = min(0.0, *(row["damping_in_run"] for row in rows))
     dots = "; dots: runs" if any(curve.marker for curve in damping) else ""
+    at = f"at {middle:.0f} km/h{' only' if len(speeds) > 1 else ''}"
     below, after = "frequency [rad/s]", "after a step of the path [s]"
     panels = [
-        Panel(below, f"gain at {middle:.0f} km/h [-]", gain, log="xy", x_range=x_range, y_range=(0.05, 50.0)),
-        Panel(below, "phase [deg]", phase, log="x", x_range=x_range, y_range=(-360.0, -90.0)),
-        Panel(after, f"lateral position at {middle:.0f} km/h [m],\ndotted: linear loop", step),
+        Panel(below, "gain [-]", gain, f"Bode diagram {at}", log="xy", x_range=x_range, y_range=(0.05, 50.0)),
+        Panel(below, "phase [deg]", phase, f"Bode diagram {at}", log="x", x_range=x_range, y_range=(-360.0, -90.0)),
+        Panel(after, "lateral position [m],\ndotted: linear loop", step, f"Step of the path {at}"),
         Panel(
             "speed [km/h]", f"damping of the linear loop [-],\ndashed: least asked{dots}", damping,
-            y_range=(lowest, 1.1), limits=[(LEAST_DAMPING, "least damping asked")], legend=None,
+            "Damping over speed", y_range=(lowest, 1.1), legend=None,
         ),
     ]  # fmt: skip
     return Picture("", panels, columns=2, width_in=9.0, height_in=7.0)

@@ -11,10 +11,12 @@ from importlib import resources
 
 import numpy as np
 import pytest
+from scipy.stats import rankdata
 
 from activesteer import study
 from activesteer.commands.cli import main
 from activesteer.errors import StudyError
+from activesteer.pages import Page, Section, render_page
 from activesteer.studies.engine.analysis import indices
 from activesteer.studies.engine.design import draw
 from activesteer.studies.engine.factors import Factor
@@ -140,6 +142,32 @@ def test_the_line_of_a_run_drives_it_again(tmp_path, monkeypatch, capsys):
 def test_a_study_without_rows_has_no_page(tmp_path):
     with raises(StudyError, value=tmp_path):
         write_report(tmp_path)
+
+
+def test_the_head_says_what_was_driven_and_on_which_factor_the_first_metric_depends_most(page):
+    text, data, rows = page
+    head = text.partition('id="study"')[0]
+    maneuver, vehicle = data["groups"][0].split(", ")
+    told = f"Manoeuvres: {maneuver}. Vehicles: {vehicle}. Controllers: {', '.join(data['controllers'])}."
+    assert f"16 ok, 2 failed. {told}" in head
+    assert {factor["key"]: factor["range"] for factor in data["factors"]} == {
+        RATIO: "0.8 to 1",
+        "speed_kmh": "70 to 80",
+    }
+    assert text.index("70 to 80") < text.index('class="drawn"')
+    name = next(name for name in data["first"] if name in data["by_group"][0])
+    peaks = [(row["speed_kmh"], row[RATIO], row[name]) for row in rows if row["controller"] == "none"]
+    speed, ratio, peak = (np.array(column) for column in zip(*peaks, strict=True))
+    on_speed, on_ratio = (abs(np.corrcoef(rankdata(factor), rankdata(peak))[0, 1]) for factor in (speed, ratio))
+    assert on_speed > on_ratio
+    assert f"depends most on speed with none ({on_speed:.2f})" in head
+
+
+def test_the_plots_of_several_manoeuvres_stand_where_the_script_looks_for_them(page):
+    """The script draws into a child of the section."""
+    data = page[1] | {"groups": ["one, compact", "two, compact"]}
+    text = render_page(Page("", "", [], [Section(anchor="study")], ["study.js"], data))
+    assert "<details" not in text.partition('id="study"')[2].partition('class="drawn"')[0]
 
 
 def test_a_metric_that_hardly_varies_has_a_histogram_that_can_be_drawn(page):
