@@ -9,11 +9,14 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, TypeVar, dataclass_transform
 
 from activesteer.config import Range, build, read_toml
+from activesteer.core.conventions import CORNERS
+from activesteer.core.signals import Measurement, widths_of
 from activesteer.errors import ParameterError
 
+_Class = TypeVar("_Class")
 _Amount = Annotated[float, Range(0.0)]
 _Delay = Annotated[float, Range(0.0, 0.1)]
 _SampleTime = Annotated[float, Range(1e-4, 0.1)]
@@ -110,9 +113,36 @@ RANDOM: Final = ("noise", "bias", "drift")
 """First words of the keys whose values are drawn from the seed."""
 
 
-@dataclass(frozen=True)
+_KINDS: Final = {"radps": RateSensor, "mps2": AccelerationSensor, "rad": AngleSensor, "Pa": PressureSensor}
+"""Unit of a field of `Measurement` -> the kind of its sensor."""
+
+
+def sensor_kinds() -> dict[str, type[Sensor]]:
+    """Return name and kind of each sensor, from the fields of a `Measurement` that have one."""
+    kinds: dict[str, type[Sensor]] = {}
+    for field, width in zip(Measurement._fields, widths_of(Measurement), strict=True):
+        name, _, unit = field.rpartition("_")
+        if unit in _KINDS:  # time and speed have none
+            kinds[name] = WheelSpeedSensor if width == len(CORNERS) and unit == "radps" else _KINDS[unit]
+    return kinds
+
+
+@dataclass_transform(frozen_default=True)
+def _with_sensors(cls: type[_Class]) -> type[_Class]:
+    """Decorator: make a frozen dataclass with a field for each sensor, without errors by default."""
+    for name, kind in sensor_kinds().items():
+        cls.__annotations__[name] = kind
+        setattr(cls, name, kind())
+    return dataclass(frozen=True)(cls)
+
+
+@_with_sensors
 class Sensors:
-    """Sensors between the car and its controllers; default `ideal`."""
+    """Sensors between the car and its controllers; default `ideal`.
+
+    Each signal of a `Measurement` but time and speed has a sensor, whose table has the name of the signal without its
+    unit: `yaw_rate`, `ay`, `wheel_speed`. The wheels share one table.
+    """
 
     KEY_HINTS: ClassVar = {
         "noise": "each sensor has its own, as sensors.yaw_rate.noise_degps",
@@ -124,25 +154,15 @@ class Sensors:
     """Default of all keys."""
     seed: Annotated[int, Range(0, 2**32 - 1)] | None = None
     """Seed of noise, bias and drift. Default 0. It has no effect if no sensor has any of these."""
-    yaw_rate: RateSensor = RateSensor()
-    """Yaw rate."""
-    ax: AccelerationSensor = AccelerationSensor()
-    """Longitudinal acceleration."""
-    ay: AccelerationSensor = AccelerationSensor()
-    """Lateral acceleration."""
-    steering_wheel: AngleSensor = AngleSensor()
-    """Steering wheel angle."""
-    rear_steer: AngleSensor = AngleSensor()
-    """Position of the rear steering actuator, at the wheels."""
-    superposition: AngleSensor = AngleSensor()
-    """Position of the front superposition, at the road wheels."""
-    wheel_speed: WheelSpeedSensor = WheelSpeedSensor()
-    """Rotational speed of each wheel."""
-    brake_pressure: PressureSensor = PressureSensor()
-    """Pressure in each wheel brake."""
     speed_from_wheels: bool | None = None
     """Whether the speed is that of the wheels that are not driven (of all wheels if all are driven) times their rolling
     radius. Else it is the car's own."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Sensor:
+            """Return a sensor."""
+            ...
 
     def __post_init__(self) -> None:
         """Fill in the values of the preset."""

@@ -7,10 +7,12 @@ import math
 import pytest
 
 from activesteer.config import Source, build, to_table
+from activesteer.core.signals import Measurement
 from activesteer.errors import ParameterError
 from activesteer.scenario import load_car
 from activesteer.sensors import Sensors
 from activesteer.sensors.block import speed_radii
+from activesteer.sensors.parameters import AccelerationSensor, AngleSensor, PressureSensor, RateSensor, WheelSpeedSensor
 from tests.raising import raises
 
 
@@ -25,9 +27,9 @@ def test_a_single_value_stands_beside_those_of_the_preset():
     changed = load_car(
         overrides={"sensors.preset": "production", "sensors.yaw_rate.noise_degps": 0.3, "sensors.wheel_speed.teeth": 96}
     ).config.sensors
-    assert changed.yaw_rate.noise_radps == pytest.approx(math.radians(0.3))
+    assert changed.yaw_rate.amount("noise") == pytest.approx(math.radians(0.3))
     assert changed.yaw_rate.delay_s == plain.yaw_rate.delay_s
-    assert changed.wheel_speed.teeth == 96
+    assert changed.wheel_speed.amount("teeth") == 96
     assert changed.ay == plain.ay
     alone = load_car(overrides={"sensors.yaw_rate.noise_degps": 0.3}).config.sensors
     assert (alone.is_ideal, alone.seed, alone.ay) == (False, 0, Sensors().ay)
@@ -78,3 +80,13 @@ def test_speed_comes_from_the_wheels_that_are_not_driven():
     assert speed_radii(1.0, radii_m) == (0.0, 0.0, 0.16, 0.16)
     assert speed_radii(0.0, radii_m) == (0.15, 0.15, 0.0, 0.0)
     assert speed_radii(0.4, radii_m) == (0.075, 0.075, 0.08, 0.08)
+
+
+def test_each_signal_but_time_and_speed_has_a_sensor_in_its_unit():
+    sensors = Sensors().all()
+    ends = {"radps": RateSensor, "mps2": AccelerationSensor, "rad": AngleSensor, "Pa": PressureSensor}
+    assert [*sensors] == [field.rpartition("_")[0] for field in Measurement._fields[2:]]
+    for field, sensor in zip(Measurement._fields[2:], sensors.values(), strict=True):
+        assert isinstance(sensor, ends[field.rpartition("_")[2]]), field
+    assert isinstance(sensors["wheel_speed"], WheelSpeedSensor)
+    assert not isinstance(sensors["yaw_rate"], WheelSpeedSensor)

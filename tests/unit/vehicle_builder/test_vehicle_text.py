@@ -91,7 +91,7 @@ def test_actuators_and_sensors_of_a_table_are_those_of_the_new_car(tmp_path: Pat
     assert config.rear_actuator == build(RearActuator, asked["rear_actuator"], Source("asked"))
     assert config.superposition_actuator.has_motor
     wanted = build(Sensors, asked["sensors"], Source("asked"))
-    assert config.sensors.yaw_rate.noise_radps == pytest.approx(wanted.yaw_rate.noise_radps, rel=1e-6)
+    assert config.sensors.yaw_rate.amount("noise") == pytest.approx(wanted.yaw_rate.amount("noise"), rel=1e-6)
     assert dataclasses.replace(config.sensors, yaw_rate=wanted.yaw_rate) == wanted
     assert config.motors == build(Motors, asked["motors"], Source("asked"))
     assert config.battery.discharge_power_W == 100e3
