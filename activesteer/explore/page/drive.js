@@ -129,6 +129,7 @@ export class Drive {
 
   going() {
     this.running = true;
+    this.pressed.clear();  // a key that was let go after the last drive
     this.fold();
     this.latencies = [];
     $("start").blur();

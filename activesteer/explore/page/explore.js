@@ -109,7 +109,7 @@ const hear = {
 
   description(header, arrays) {
     if (header.id !== state.id) return;
-    $("title").textContent = header.title;
+    showTitle(header.title);
     state.sliders = header.sliders;
     for (const { key, low, high } of header.sliders) if (key in state.wanted) state.values[key] = Math.min(high, Math.max(low, +state.wanted[key])) || 0;
     state.wanted = {};
@@ -120,7 +120,7 @@ const hear = {
 
   run(header, arrays) {
     if (header.id !== state.id) return;
-    $("title").textContent = header.title;
+    showTitle(header.title);
     // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
     if (state.first == null) state.first = performance.now() - state.asked;
     if (header.error) say(`${header.name}: ${header.error}`);
@@ -182,6 +182,12 @@ function showColours() {
   $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run))));
 }
 
+// On a phone the heading is out of sight while a slider moves.
+function showTitle(title) {
+  $("title").textContent = title;
+  $("held").textContent = /\((.*until you let go)\)$/.exec(title)?.[1] ?? "";
+}
+
 function showFigures() {
   showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value }) => value != null).map((figure) => [figure.title, figure])));
@@ -200,7 +206,7 @@ function showSliders() {
   const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group)), known = new Set([...$("group").options].map(({ value }) => value));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
-    box.open = open.size ? open.has(group) || !known.has(group) : i === 0 || (i !== 1 && i < 4);
+    box.open = open.size ? open.has(group) || !known.has(group) : i !== 1;
     for (const slider of state.sliders.filter((other) => other.group === group)) box.append(sliderOf(slider));
     return box;
   }));
