@@ -68,7 +68,7 @@ def test_foreign_controller_goes_through_all_commands(call: Call) -> None:
         ("YawBeta: k_beta", "rad/rad"), ("YawBeta: k_yaw", ""),
     ]  # fmt: skip
     heat = shown["by_group"][0]["yaw_rate_overshoot"]["heat"]
-    assert heat["keys"] == ["controllers.YawBeta.k_beta", "controllers.YawBeta.k_yaw"]
+    assert [axis["key"] for axis in heat["axes"]] == ["controllers.YawBeta.k_beta", "controllers.YawBeta.k_yaw"]
     assert len({value for row in heat["maps"][1] for value in row}) == 4
 
     Path("tune.toml").write_text(STUDY.replace("KIND", "uniform") + TUNE)
