@@ -44,6 +44,11 @@ def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
     return wrapped_line(TYRE_USE_NOTE) if above else []
 
 
+_NEAR_SHARE: Final = 0.005
+"""Part of a value below which a difference is written without a percentage: it would be 0 %. It also tells no values
+apart whose metric has no known significance."""
+
+
 class Change(StrEnum):
     """Significance of a difference from the first run."""
 
@@ -68,8 +73,8 @@ def significance(name: str, value: float, first: float) -> Change:
 
 def is_near(name: str, value: float, first: float) -> bool:
     """Return whether neither a driver nor a sensor could tell two values [SI] apart."""
-    near = abs(value - first) <= recorded_metric(name).significance
-    return near or difference_text(name, value, first).text == "0"
+    least = recorded_metric(name).significance or _NEAR_SHARE * abs(first)
+    return abs(value - first) <= least or difference_text(name, value, first).text == "0"
 
 
 class Cell(NamedTuple):
@@ -102,7 +107,7 @@ def difference_text(name: str, value: float, first: float) -> Cell:
     nearly_nothing = max(metric.significance * metric.unit.factor, 0.01)
     if metric.unit.name == "%" or first * metric.unit.factor <= nearly_nothing:
         return Cell(text)
-    if not 0.005 <= abs(share := (value - first) / first) < 10.0:
+    if not _NEAR_SHARE <= abs(share := (value - first) / first) < 10.0:
         return Cell(text)
     return Cell(text, typeset(f"{share * 100.0:+.0f}\N{NO-BREAK SPACE}%"))
 

@@ -16,10 +16,10 @@ force:
 
     f* - M / (l C_V),  g* + M / (l C_H)
 
-In a steady turn, snow looks like dry road with soft tyres, and a car of soft front tyres turns less. Steering it to the
-turn of new tyres would take the friction that nobody knows, and the rear axle with it. So as far as the friction is
-unknown, a car that understeers more by its estimated stiffnesses keeps its own turn: the front wheels get the
-additional slip angle, and for the driver's angle both axles turn by the same angle, which does not change the turn.
+In a steady turn, snow looks like dry road with soft tyres, and a car with soft front tyres turns less. Steered to the
+turn of new tyres, its rear axle could slide on snow. So as far as the friction is unknown, a car that understeers more
+by its estimated stiffnesses keeps its own turn: the front wheels get the additional slip angle. Both axles then turn by
+the same angle, which leaves the yaw rate as it is.
 
 u* are the angles of the turn at the time when the present demand takes effect, a lag T_a and a call ahead. The law is
 
@@ -297,7 +297,7 @@ def fed_back(
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     assumed = friction + block._friction_deviations * now[_FRICTION_STD]
     understeer = _understeer(block, now, certain)
-    # For the same turn, the front wheels of this car are steered so many times further.
+    # Front angle of this car over that of a car with new tyres, for the same turn.
     further = 1.0 + understeer * speed * yaw_rate_gain(block._reference._single_track, speed)
     desired = desired_turn(block._reference, driver_rad / further, speed, assumed)
     # The tyres follow the angles over their relaxation length.

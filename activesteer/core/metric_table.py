@@ -30,8 +30,7 @@ TIME_S: Final = 0.01
 TRACK_M: Final = 0.05
 """Difference of two tracks [m]: differential satellite positioning gives each track to 0.02 m."""
 STEERING_WHEEL_RAD: Final = math.radians(5.0)
-"""Difference of two steering wheel angles [rad]: about what a driver can tell apart while he turns the wheel. For rates
-it is turned within a second."""
+"""Difference of two steering wheel angles [rad]: about what a driver can tell apart while he turns the wheel."""
 
 FRICTION_UTILISATION: Final = ("friction_utilisation_max", "friction_utilisation_mean")
 RENAMED: Final = {f"tyre_use_{end}": f"friction_utilisation_{end}" for end in ("max", "mean")}
@@ -143,7 +142,7 @@ METRICS: Final = {
             "yaw_rate_begin", "yaw_rate_after_1000ms", significance=YAW_RATE_RADPS,
         ),
         *_declare("radps", "yaw_rate_deviation_after_1000ms", significance=YAW_RATE_RADPS, better=_SMALLER),
-        *_declare("radps", "steering_wheel_rate_rms", significance=STEERING_WHEEL_RAD, better=_SMALLER),
+        *_declare("radps", "steering_wheel_rate_rms", better=_SMALLER),
         *_declare("radps", "steering_wheel_rate_peak", "steering_wheel_max_rate"),
         *_declare(
             "mps2", "ay_steady_state", "ay_peak", "ay_peak_abs", "ay_rms", "ay_gates_rms", "ay_after_gates_rms",

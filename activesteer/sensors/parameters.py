@@ -111,28 +111,19 @@ class AngleSensor(Sensor):
 
 RANDOM: Final = ("noise", "bias", "drift")
 """First words of the keys whose values are drawn from the seed."""
-
-
 _KINDS: Final = {"radps": RateSensor, "mps2": AccelerationSensor, "rad": AngleSensor, "Pa": PressureSensor}
 """Unit of a field of `Measurement` -> the kind of its sensor."""
-
-
-def sensor_kinds() -> dict[str, type[Sensor]]:
-    """Return name and kind of each sensor, from the fields of a `Measurement` that have one."""
-    kinds: dict[str, type[Sensor]] = {}
-    for field, width in zip(Measurement._fields, widths_of(Measurement), strict=True):
-        name, _, unit = field.rpartition("_")
-        if unit in _KINDS:  # time and speed have none
-            kinds[name] = WheelSpeedSensor if width == len(CORNERS) and unit == "radps" else _KINDS[unit]
-    return kinds
 
 
 @dataclass_transform(frozen_default=True)
 def _with_sensors(cls: type[_Class]) -> type[_Class]:
     """Decorator: make a frozen dataclass with a field for each sensor, without errors by default."""
-    for name, kind in sensor_kinds().items():
-        cls.__annotations__[name] = kind
-        setattr(cls, name, kind())
+    for field, width in zip(Measurement._fields, widths_of(Measurement), strict=True):
+        name, _, unit = field.rpartition("_")
+        if unit in _KINDS:  # time and speed have none
+            kind = WheelSpeedSensor if width == len(CORNERS) and unit == "radps" else _KINDS[unit]
+            cls.__annotations__[name] = kind
+            setattr(cls, name, kind())
     return dataclass(frozen=True)(cls)
 
 

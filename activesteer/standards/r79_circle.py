@@ -162,7 +162,7 @@ def _fault_words(faults: list[dict[str, Any]]) -> str:
         )
     count = len({row["fault"] for row in faults})
     if idle := count - len(_with_effect(faults)):
-        words += f"; {idle} of {count} faults change nothing, because the controller does not use what fails"
+        words += f"; {idle} of {count} faults change nothing with this controller"
     return words + ("" if done == faults else f"; {len(faults) - len(done)} of {len(faults)} faults did not finish")
 
 

@@ -57,7 +57,7 @@ def test_a_value_is_written_in_the_form_of_its_metric(name, value, text):
         ("yaw_rate_rms_radps", math.radians(0.5)),
         ("ay_lag_s", 0.01),
         ("track_deviation_max_m", 0.05),
-        ("steering_wheel_rate_rms_radps", math.radians(5.0)),
+        ("steering_wheel_rate_rms_radps", 0.0),
         ("ay_peak_mps2", 0.0),
     ],
 )

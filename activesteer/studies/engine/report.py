@@ -84,7 +84,7 @@ def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> P
 
 
 def _finding(data: Mapping[str, Any]) -> list[Text]:
-    """Say which numeric factor the first metric of the first manoeuvre follows most, by controller."""
+    """Name the numeric factor with the largest rank correlation with the first metric, for each controller."""
     rows, names, told = data["rows"], data["by_group"][0], []
     name = next((name for name in (*_FIRST, *names) if name in names), None)
     for place, controller in enumerate(data["controllers"] if name else ()):
@@ -94,8 +94,8 @@ def _finding(data: Mapping[str, Any]) -> list[Text]:
         found = [(_correlation(*pair[:, own & np.isfinite(pair).all(axis=0)]), label) for label, pair in pairs]
         value, most = max(found, default=(0.0, ""))
         told += [f"{most} with {controller} ({value:.2f})"] if value else []
-    words = f"{recorded_metric(name or '').label} depends most on {', on '.join(told)}. In brackets: rank correlation."
-    return [f"{data['groups'][0]}: {words}"] if told else []
+    words = f"largest rank correlation of the {recorded_metric(name or '').label}: {', '.join(told)}"
+    return [f"{data['groups'][0]}: {words}."] if told else []
 
 
 def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:

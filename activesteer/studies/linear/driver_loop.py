@@ -101,7 +101,9 @@ def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
 """Default speeds [km/h]."""
 LEAST_DAMPING: Final = 0.25
-"""Least damping ratio that is asked of a loop at 80 and 100 km/h."""
+"""Least damping ratio that is asked of a loop."""
+DAMPED_KMH: Final = 80.0, 100.0
+"""Least and greatest speed at which it is asked [km/h]."""
 LEAST_PHASE_MARGIN_DEG: Final = 30.0
 """Least phase margin of humans, as McRuer and Krendel measured it [deg]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.2, 60.0, 300)
@@ -309,10 +311,12 @@ def driver_loops(
 def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
     """Return in words the smallest phase margin and the smallest damping, against what is asked."""
     found: list[Text] = []
+    slowest, fastest = DAMPED_KMH
+    damped = f" from {slowest:g} to {fastest:g} km/h"
     for key, words, unit, asked, digits, speeds in (
         ("phase_margin_deg", "phase margin", " deg", LEAST_PHASE_MARGIN_DEG, 0, ""),
-        ("damping", "damping ratio of the linear loop", "", LEAST_DAMPING, 2, " at 80 and 100 km/h"),
-        ("damping_in_run", "damping ratio in a run", "", LEAST_DAMPING, 2, " at 80 and 100 km/h"),
+        ("damping", "damping ratio of the linear loop", "", LEAST_DAMPING, 2, damped),
+        ("damping_in_run", "damping ratio in a run", "", LEAST_DAMPING, 2, damped),
     ):
         if key == "damping_in_run" and all(row[key] == 1.0 for row in rows):
             rest_m = max(row["rest_in_run_m"] for row in rows)
@@ -320,7 +324,8 @@ def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
             kept = f"After a step of the path by {STEP_M:g} m, no run crosses the path. The cars end "
             found.append(Markup("{}{}.").format(kept, (passed if rest_m <= _CLOSE_M else failed)(far)))
             continue
-        judged = [row for row in rows if math.isfinite(row[key])]
+        counts = (row for row in rows if not speeds or slowest <= row["speed_kmh"] <= fastest)
+        judged = [row for row in counts if math.isfinite(row[key])]
         if not judged:
             continue
         row = min(judged, key=lambda row: row[key])
@@ -398,7 +403,7 @@ def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[st
         if swings:
             (x, y), size = zip(*swings, strict=True), max(3.0, 9.0 - 3.0 * place)
             damping.append(Curve(x, y, "", look.colour, "", marker="o", size=size))
-    damping.append(Curve([80.0, 100.0], [LEAST_DAMPING] * 2, "", "#b3261e", "--", 1.2))
+    damping.append(Curve(DAMPED_KMH, [LEAST_DAMPING] * 2, "", "#b3261e", "--", 1.2))
     lowest = min(0.0, *(row["damping_in_run"] for row in rows))
     dots = "; dots: runs" if any(curve.marker for curve in damping) else ""
     at = f"at {middle:.0f} km/h{' only' if len(speeds) > 1 else ''}"

@@ -59,6 +59,9 @@ JUDGED = [metric for metric in METRICS.values() if metric.better is not None]
         ("sideslip_peak_rad", -0.1, 0.2, Change.BETTER),
         ("sideslip_peak_rad", -0.2, 0.1, Change.WORSE),
         ("lane_overstep_m", -0.3, 0.2, Change.BETTER),
+        # No significance is declared: a change of 0 % is none.
+        ("steering_wheel_rate_rms_radps", 0.9009, 0.9007, Change.SAME),
+        ("steering_wheel_rate_rms_radps", 0.91, 0.90, Change.WORSE),
         ("lane_overstep_m", 0.3, -0.4, Change.WORSE),
         ("entry_speed_mps", 15.0, 14.0, Change.BETTER),
         ("mean_deceleration_mps2", 7.0, 9.0, Change.WORSE),

@@ -101,6 +101,9 @@ def test_the_loop_of_the_driver_is_judged_by_what_is_asked():
     assert margin == f"{least}; the typical driver must reach 30 deg."
     assert "\N{CHECK MARK} 0.40" in linear
     assert "\N{BALLOT X} 0.24 with afs" in in_run
+    # A damping is asked from 80 to 100 km/h only.
+    _, linear, _ = conclusion([*rows, rows[0] | {"speed_kmh": 140.0, "damping": 0.1}])
+    assert "\N{CHECK MARK} 0.40" in linear
 
 
 @pytest.mark.parametrize(("rest_m", "mark"), [(0.0212, "\N{CHECK MARK}"), (0.12, "\N{BALLOT X}")])
