@@ -186,6 +186,7 @@ def _fault_table(faults: list[dict[str, Any]]) -> Table:
     def tolerated(row: Mapping[str, Any]) -> str:
         return "always" if row["fault_tolerant_time_s"] is None else cell(row["fault_tolerant_time_s"], 3)
 
+    faults = sorted(faults, key=lambda row: not _has_effect(row))  # the others last
     rows = [
         (
             _named(row), row["direction"], *(cell(_shown(row, name), 2) for name in FIGURES[:-1]),
@@ -208,7 +209,11 @@ def _named(row: Mapping[str, Any]) -> str:
 
 
 def _with_effect(faults: list[dict[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(_named(row) for row in faults if any(row[name] != 0.0 for name in FIGURES[:-1])))
+    return list(dict.fromkeys(_named(row) for row in faults if _has_effect(row)))
+
+
+def _has_effect(row: Mapping[str, Any]) -> bool:
+    return any(row[name] != 0.0 for name in FIGURES[:-1])
 
 
 def _shown(row: Mapping[str, Any], name: str) -> float:

@@ -119,7 +119,8 @@ class Gauges:
         ImageDraw.Draw(layer).rectangle((0, top, 0.6 * gap, top + self._row - 1), colour)
         _write(layer, (1.4 * gap, base), dial.label, colour, self._text)
         for x, end, reading in zip(self._columns[:-1], self._columns[1:], self._readings, strict=True):
-            value = reading.value_text(dial.value(reading.channel, time_s))
+            found = dial.value(reading.channel, time_s)
+            value = reading.value_text(found) if math.isfinite(found) else "-"
             unit_at = end - 2.0 * gap - self._small.getlength(reading.unit.name)
             _write(layer, (x, base), reading.short, _GREY, self._small)
             _write(layer, (unit_at - 0.3 * gap, base), value, _WHITE, self._text, "rs")

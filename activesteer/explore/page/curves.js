@@ -159,6 +159,13 @@ export class Track {
       for (const [x, y] of [[start, below], [end, below], [end, above], [start, above]]) pen.lineTo(...place(x, y));
       pen.fill();
     }
+    if (course.path) {
+      pen.strokeStyle = paint("quiet");
+      pen.lineWidth = 1;
+      pen.setLineDash([5, 4]);
+      line(course.path.x, course.path.y);
+      pen.setLineDash([]);
+    }
     pen.fillStyle = paint("cone");
     for (const cone of course.cones) { pen.beginPath(); pen.arc(...place(cone[0], cone[1]), 2.4, 0, 7); pen.fill(); }
     for (const [runs, tail, thick] of [[this.ghosts, GHOST, 1.2], [this.runs, "", 2]]) {
@@ -184,6 +191,6 @@ export class Track {
     pen.fillStyle = paint("quiet");
     const stretch = zoomY / zoomX;
     const frictions = [...new Set(course.patches.map(({ mu }) => mu))].slice(0, 3);
-    pen.fillText(`from above, ${Math.round(right - left)} m${frictions.length ? `; blue: friction ${frictions.join(", ")}` : ""}${stretch > 1.05 ? `; cars and widths are ${stretch.toFixed(1)} times larger` : ""}`, 10, height - 7);
+    pen.fillText(`from above, ${Math.round(right - left)} m${course.path ? "; dashed: path of the course" : ""}${frictions.length ? `; blue: friction ${frictions.join(", ")}` : ""}${stretch > 1.05 ? `; cars and widths are ${stretch.toFixed(1)} times larger` : ""}`, 10, height - 7);
   }
 }

@@ -32,6 +32,7 @@ export class Drive {
     $("hold").addEventListener("change", () => this.hold());
     $("start").addEventListener("click", () => this.act({ go: true }, true));
     $("end").addEventListener("click", () => this.end());
+    $("again").addEventListener("click", () => this.prepare());
     addEventListener("keydown", (event) => this.key(event, true));
     addEventListener("keyup", (event) => this.key(event, false));
     addEventListener("blur", () => { this.pressed.clear(); this.hands(); });
@@ -96,12 +97,13 @@ export class Drive {
   // Put a car at the start, where it waits for the button. A drive ends.
   prepare() {
     this.say("");
+    $("drive-speed").value = this.start_kmh; // the pedals may have moved it
     this.values();
     this.ready = false;
     $("driven").textContent = ""; // of the last drive, perhaps of another course
     $("start").disabled = true;
     $("start").textContent = "Getting the car ready …";
-    this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: +$("drive-speed").value, mu: +$("drive-mu").value });
+    this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: this.start_kmh, mu: +$("drive-mu").value });
   }
 
   failed() { $("start").textContent = "Cannot drive: choose another control or car"; }
@@ -134,7 +136,7 @@ export class Drive {
     this.latencies = [];
     $("start").blur();
     $("waiting").hidden = true;
-    $("end").hidden = false;
+    $("end").hidden = $("again").hidden = false;
     $("driven").textContent = "";
     this.hold();
   }
@@ -151,6 +153,7 @@ export class Drive {
   key(event, down) {
     if (!this.shown || !this.running || event.ctrlKey || event.metaKey || event.altKey) return;
     if (down && event.key === "Escape") { this.end(); return; }
+    if (down && event.key.toLowerCase() === "r") { this.prepare(); return; } // also the way back from off the course
     const place = Number(event.key) - 1;
     if (down && SWITCH[place]) { $("drive-controller").value = SWITCH[place]; this.values(); this.act({ controller: SWITCH[place] }); return; }
     const what = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
@@ -242,10 +245,8 @@ export class Drive {
     this.fold();
     this.sent.clear();
     this.last = "";
-    $("end").hidden = true;
+    $("end").hidden = $("again").hidden = true;
     const same = this.settings() === this.setting, before = same ? this.ghost?.lap_s : null, lap = this.lap_s;
-    $("drive-speed").value = this.start_kmh; // the pedals have moved it
-    this.values();
     if (same && this.frames.length && (lap || !before)) this.ghosts.set(this.setting, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
     const cones = this.scene.cones.length ? ` ${["No cone", "1 cone"][this.struck] ?? `${this.struck} cones`} hit.` : "";

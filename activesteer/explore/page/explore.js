@@ -26,6 +26,7 @@ const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(
 const drive = new Drive(socket, say);
 
 const NAMED = ["maneuver", "vehicle", "driver"];
+const SYSTEMS = ["none", "ars", "afs"], places = new Map(); // name of a controller -> place of its colour
 const swatches = new Map(); // name of a controller -> its colour beside its box
 const boxes = () => [...$("controllers").querySelectorAll("input")];
 const chosen = () => boxes().filter((box) => box.checked).map((box) => box.value);
@@ -124,7 +125,7 @@ const hear = {
     // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
     if (state.first == null) state.first = performance.now() - state.asked;
     if (header.error) say(`${header.name}: ${header.error}`);
-    state.runs.set(header.name, { ...header, poses: arrays[0] });
+    state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
     redraw();
   },
 
@@ -167,6 +168,14 @@ function redraw() {
   }
   player.length();
   showFigures();
+}
+
+// A controller keeps its colour when another one is ticked. The three systems always have theirs.
+function placeOf({ name, place }) {
+  const others = chosen().filter((other) => other !== name).map((other) => SYSTEMS.includes(other) ? SYSTEMS.indexOf(other) : places.get(other));
+  const free = [places.get(name), place, 3, 4, 5, 0, 1, 2].find((one) => one != null && !others.includes(one));
+  places.set(name, SYSTEMS.includes(name) ? place : free);
+  return places.get(name);
 }
 
 const swatchOf = (run) => element("i", { class: "swatch", style: `background:${runColour(run.place)}` });
