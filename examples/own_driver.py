@@ -27,7 +27,7 @@ class PurePursuit:
         self.travelled_m = 0.0
 
     def step(self, setpoint, measurement, motion):
-        """Return the driver's command; called every millisecond with setpoint, measurement and motion of the car."""
+        """Return the driver's command for setpoint, measurement and motion of the car, every millisecond."""
         if setpoint.path is None:  # the car still settles, or the manoeuvre gives the steering wheel angle itself
             return self.robot.step(setpoint, measurement, motion)
         search = PathSearch(setpoint.path)

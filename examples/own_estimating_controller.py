@@ -21,7 +21,7 @@ class SideslipDamper:
         self.gain, self.limit_rad = gain, math.radians(limit_deg)
 
     def step(self, command, measurement):
-        """Return the actuator command; called every millisecond, and the estimator with it."""
+        """Advance the estimator and return the actuator command, every millisecond."""
         estimate = self.estimator.step(measurement)
         # Rear wheels steered to the right stop a car that slides to the left of its heading.
         wanted_rad = -self.gain * estimate.sideslip_rad

@@ -39,7 +39,7 @@ class EnvelopeMpc:
     interval_s = 0.01
 
     def __init__(self, setup, yaw_rate_scale_degps=1.0, sideslip_scale_deg=0.35, change_scale_deg=5.0):
-        """Take the car, its tyres and its servos from `setup`; the scales are errors that cost the same."""
+        """Take the car, its tyres and its servos from `setup`, and scales of errors that cost the same."""
         self.car, self.timestep_s, self.servos = setup.single_track, setup.timestep_s, setup.gains.servos
         self.estimator, tyres = setup.estimator(), setup.estimation.tyres
         arms_m = self.car.cg_to_rear_m, self.car.cg_to_front_m  # the other axle's arm gives the load
@@ -53,7 +53,7 @@ class EnvelopeMpc:
         self.before_rad, self.lagged_rad = np.zeros(2), 0.0
 
     def step(self, command, measurement):
-        """Return both angles; called every 10 ms."""
+        """Return both angles, every 10 ms."""
         now = self.estimator.step(measurement)
         speed_mps, driver_rad = now.speed_mps, command.front_steer_demand_rad
         if speed_mps < 2.0:
@@ -174,7 +174,7 @@ def single_track(car, speed_mps, softer, offset_rad=0.0):
 
 
 def discrete(a, b, c, lag_s, timestep_s):
-    """Return the model from one call to the next; states: yaw rate, sideslip, both angles, the driver's angle."""
+    """Return the model from one call to the next, for yaw rate, sideslip, both angles and the driver's angle."""
     whole = np.zeros((8, 8))
     whole[:2, :2], whole[:2, 2:4], whole[:2, 4], whole[:2, 7] = a, b, b[:, 0], c
     whole[2:4, 2:4], whole[2:4, 5:7] = -np.eye(2) / lag_s, np.eye(2) / lag_s

@@ -141,7 +141,7 @@ def timestep(time_s: Array) -> float:
 def step_response(
     time_s: Array, values: Array, step_time_s: float, window_s: float, minimum: float
 ) -> dict[str, float]:
-    """Return steady state, response time, peak, peak time and overshoot of a signal; times count from the step.
+    """Return steady state, response time, peak, peak time and overshoot of a signal, with times from the step.
 
     The signal is at zero before the step and may move either way. `smooth` reduces its noise for crossings and maxima;
     the steady-state value is the mean of the samples of a window at the end. The response time is nan if the signal

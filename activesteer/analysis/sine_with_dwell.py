@@ -214,7 +214,7 @@ def _displacement(recording: RecordingLike, times: Steering) -> float:
 
 
 def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> float:
-    """Return the displacement 1.07 s after the beginning of steer, integrated twice [m]; FMVSS 126, S7.11.9."""
+    """Return the displacement 1.07 s after the start of steer, integrated twice [m] (FMVSS 126, S7.11.9)."""
     end_s = begin_s + DISPLACEMENT_TIME_S
     if end_s > time_s[-1]:
         return math.nan

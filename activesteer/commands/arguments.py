@@ -201,7 +201,7 @@ FIGURES: Final = output("DIR", "folder for figures (default: no figures)")
 
 
 def check_effect(options: argparse.Namespace, effect: str, *keys: str) -> None:
-    """Refuse options that were given although they have no effect; `effect` says when."""
+    """Reject options that were given although they have no effect, with `effect` as the reason."""
     for key in keys:
         if getattr(options, key) not in (None, False):
             raise ParameterError(f"has {effect}", key=f"--{key}")
@@ -216,7 +216,7 @@ def numbers(text: str) -> list[float]:
 
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the parameters that `--overrides` and `--set` replace, with values as in TOML; any other is a text."""
+    """Return the parameters that `--overrides` and `--set` replace, with values as in TOML or else as texts."""
     from activesteer.config import parse_value, read_toml
 
     values = dict(given or {})

@@ -110,7 +110,7 @@ def print_notes(notes: Iterable[str]) -> None:
 
 
 def entry(head: str, text: str, hanging: int = 2) -> str:
-    """Return a head and a text, which may come from any file, in lines of 80 columns; further lines are indented."""
+    """Return a head and a text from any source in lines of 80 columns, with all lines but the first indented."""
     lines = textwrap.wrap(printable(text), COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **WHOLE)
     return "\n".join(lines) or head.rstrip()
 

@@ -158,7 +158,7 @@ def toml_value(value: Any) -> str:
 
 
 def toml_text(table: Mapping[str, Any], remarks: Mapping[str, str] | None = None) -> str:
-    """Return a table as the text of a file, each inner table below its header; `read_toml` restores it.
+    """Return a table as the text of a file that `read_toml` reads, each inner table below its header.
 
     A list of tables is written in one line. Remarks are comments above the header of a table, by its dotted name.
     """
@@ -477,7 +477,7 @@ def check_points(
 
 
 def to_table(value: Any, *, defaults: bool = True) -> Any:
-    """Return a dataclass as plain tables for JSON; `build` restores it."""
+    """Return a dataclass as plain tables for JSON that `build` reads."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         values = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
         return {

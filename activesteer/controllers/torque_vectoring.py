@@ -106,7 +106,7 @@ class SplitTorques:
         self._levers = [0.5 * track_m / self._radius_m[2 * axle] for axle, track_m in enumerate(tracks_m)]
 
     def ranges(self, command: DriverCommand, measurement: Measurement, now: Estimate) -> list[Range]:
-        """Return the ranges of the electric axles for the present motion; the driver's torque counts first."""
+        """Return the ranges of the electric axles for the current motion, after the driver's torque."""
         if not self._axles:
             return []
         if command.brake_pedal > 0.0:

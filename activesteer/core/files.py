@@ -194,7 +194,9 @@ class CsvRow(NamedTuple):
 def read_csv(
     path: str | os.PathLike[str], error: type[ActiveSteerError], *, empty_cells_count: bool = False
 ) -> list[CsvRow]:
-    """Read the rows of a CSV with cells separated by commas, semicolons or tabs; the first line with any decides.
+    """Read the rows of a CSV with cells separated by commas, semicolons or tabs.
+
+    The first line with a separator decides which one applies.
 
     Text after `#` is a comment. With semicolons or tabs, 1,5 is the number 1.5.
     """

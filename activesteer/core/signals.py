@@ -1,4 +1,4 @@
-"""The messages that the blocks exchange in every step. Immutable; SI units; signs of `conventions`.
+"""Immutable messages that the blocks exchange in every step, in SI units with the signs of `conventions`.
 
 Messages are named tuples because the loop creates them every millisecond, and a frozen dataclass takes several times
 as long to create. Where even the call of the class takes too long, use `new_message`.

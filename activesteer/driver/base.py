@@ -91,7 +91,7 @@ class Drivetrain(Protocol):
         ...
 
     def limits_Nm(self, speed_radps: float, gear: int, /) -> tuple[float, float]:
-        """Return the smallest and largest total wheel torque in a gear, 1 or -1; forward positive [N m]."""
+        """Return the smallest and largest total wheel torque in a gear, 1 or -1, forward positive [N m]."""
         ...
 
 

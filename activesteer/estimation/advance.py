@@ -199,7 +199,7 @@ def _write_estimate(known, memory):
 
 @compiled
 def advance(known, tyres, memory, said, line):
-    """Process the present measurement, and make the estimate; the records have the shape (1,)."""
+    """Process the current measurement and return the estimate, with records of shape (1,)."""
     k, m = known[0], memory[0]
     first = m.calls == 0
     if first:

@@ -1,4 +1,4 @@
-"""The two-track model of the estimator: lateral motion, axle forces, and their unknown parts; compiled.
+"""The compiled two-track model of the estimator: lateral motion, axle forces, and their unknown parts.
 
 For the axles i = f, r:
 

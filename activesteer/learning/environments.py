@@ -190,7 +190,7 @@ class _Picture:
 
 
 class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
-    """Many `CarEnv`, driven in one native call; equal to `SyncVectorEnv` of them in every autoreset mode.
+    """Many `CarEnv` in one native call, equal to their `SyncVectorEnv` in every autoreset mode.
 
     Attributes:
         episodes: The simulation.

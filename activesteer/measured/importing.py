@@ -252,7 +252,7 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
 
 
 def known_time_unit(name: str) -> str:
-    """Return the unit in the name of a time column; s by default."""
+    """Return the unit in the name of a time column, by default s."""
     ending = name.rstrip("])").replace("[", " ").replace("(", " ").replace("_", " ").split()
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 

@@ -81,7 +81,7 @@ def record_type(kind: type[NativeBlock]) -> np.dtype[Any]:
 
 
 def values(block: NativeBlock) -> tuple[Any, ...]:
-    """Return the attributes of a block as its record takes them; the block owns the memory of its arrays."""
+    """Return the attributes of a block as its record takes them, in memory that the block owns."""
     found: list[Any] = []
     for name in _members(type(block)):
         value = getattr(block, name)

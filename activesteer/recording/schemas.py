@@ -231,7 +231,7 @@ _FOXGLOVE_ENUMS = {
 
 
 def _define(package: str, name: str, fields: str, enum: Sequence[str] = ()) -> DescriptorProto:
-    """Return the descriptor of a message; `fields` in the notation of a .proto file, `enum` its nested `Type`."""
+    """Return the descriptor of a message with `fields` in the notation of .proto and `enum` as nested `Type`."""
     message = DescriptorProto(name=name)
     for repeated, kind, field_name, number in _FIELD.findall(fields):
         # An explicit JSON name separates names that differ in case only (`a_n`, `a_N`).

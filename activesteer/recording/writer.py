@@ -340,7 +340,7 @@ class McapWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Close the file; after an exception, mark it as incomplete."""
+        """Close the file, and mark it as incomplete after an exception."""
         if error is None:
             self.close()
             return

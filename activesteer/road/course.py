@@ -62,7 +62,7 @@ class Course:
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
 
     def on_lane_side(self) -> NDArray[np.bool_]:
-        """Return which cones stand on the side of a lane; shape (number of cones,)."""
+        """Return which cones stand on the side of a lane, shape (number of cones,)."""
         return self._outward() != 0.0
 
     def cone_centres_m(self) -> Array:
@@ -70,7 +70,7 @@ class Course:
         return np.column_stack([self.cones_m[:, 0], self.cones_m[:, 1] + CONE_RADIUS_M * self._outward()])
 
     def _outward(self) -> Array:
-        """Return 1 for a cone on the left side of a lane, -1 on the right, 0 elsewhere; shape (number of cones,)."""
+        """Return 1 for each cone on the left of a lane, -1 on the right, 0 elsewhere, shape (number of cones,)."""
         x, y = self.cones_m.T
         outward = np.zeros(len(x))
         for lane in self.lanes:

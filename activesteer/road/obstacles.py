@@ -89,7 +89,7 @@ OBSTACLE: Final = numbers_type(
 
 @dataclass(frozen=True)
 class Obstacle:
-    """An obstacle; keys of a table [[road.obstacle]]."""
+    """An obstacle, as a table [[road.obstacle]]."""
 
     kind: Kind
     """`cosine_bump`: h/2 (1 - cos(2 pi x/L)). `cleat`, `kerb`: a step of `height_m` with edges of `edge_m`. `pothole`:
@@ -180,7 +180,7 @@ _NUGGET: Final = 1e-10
 
 @dataclass(frozen=True)
 class Roughness:
-    """A random rough surface; keys of the table [road.roughness]."""
+    """A random rough surface, as the table [road.roughness]."""
 
     OVERRULED: ClassVar = {"class_": {"spectrum_m3": None}}
 

@@ -42,7 +42,7 @@ _SHOWN_BESIDE_M: Final = 4.0
 
 @dataclass(frozen=True)
 class RoadPatch:
-    """A stretch of the track with its own friction; keys of a table [[road.patches]]."""
+    """A stretch of the track with its own friction, as a table [[road.patches]]."""
 
     start_m: float
     """Start along x or along the path, see `along`; included [m]."""
@@ -120,7 +120,7 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Road:
-    """The road under the wheels; keys of the table [road] in a manoeuvre file."""
+    """The road under the wheels, as the table [road] of a manoeuvre file."""
 
     OVERRULED: ClassVar = {"mu": {"mu_left": None, "mu_right": None}}
     KEY_HINTS: ClassVar = {
@@ -267,7 +267,7 @@ class Road:
         return (*split, *(Area(it.start_m, it.end_m, *SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return quadrangles that show the areas within a rectangle of the world [m]; later ones hide earlier ones."""
+        """Return quadrangles that show the areas within a rectangle of the world [m], later ones on top."""
         shown = (area.clipped(start_m, end_m, right_m, left_m) for area in self.areas())
         return [
             piece

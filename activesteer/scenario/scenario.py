@@ -244,7 +244,7 @@ def _holders(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
 
 
 def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> Any:
-    """Return the value of a key of the manoeuvre, the vehicle or the driver; a number in the unit of the key.
+    """Return the value of a key of the manoeuvre, the vehicle or the driver, a number in the unit of the key.
 
     Keys and controllers are those of `resolve`.
     """

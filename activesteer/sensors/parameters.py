@@ -25,7 +25,7 @@ _Bandwidth = Annotated[float, Range(0.1, 1e4)]
 
 @dataclass(frozen=True)
 class Sensor:
-    """Keys that all sensors have; the other keys carry the unit of the measured quantity.
+    """Keys common to all sensors, without those in the unit of the measured quantity.
 
     `noise`: white noise of the samples, rms. `bias`: offset of a run, drawn from the seed, rms over seeds. `drift`:
     random walk of the offset, rms of its change within a minute. `quantum`: step of quantisation. `limit`: saturation
@@ -129,7 +129,7 @@ def _with_sensors(cls: type[_Class]) -> type[_Class]:
 
 @_with_sensors
 class Sensors:
-    """Sensors between the car and its controllers; default `ideal`.
+    """Sensors between the car and its controllers, by default `ideal`.
 
     Each signal of a `Measurement` but time and speed has a sensor, whose table has the name of the signal without its
     unit: `yaw_rate`, `ay`, `wheel_speed`. The wheels share one table.

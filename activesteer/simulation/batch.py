@@ -134,7 +134,7 @@ class Batch(Copyable):
             return dict(zip(first, pool.map(call, first.values()), strict=True))
 
     def _build(self) -> None:
-        """Build the loops; of cars with the same scenario, only the first one settles."""
+        """Build the loops, and let only the first car of each scenario settle."""
 
         def settled(car: int) -> ClosedLoop:
             return ClosedLoop(self.scenarios[car], self._controller, self._timestep_s)

@@ -247,7 +247,7 @@ class ClosedLoop(Uncopyable):
         self._maneuver = maneuver
 
     def _setpoint_at(self, step: int) -> Setpoint:
-        """Return the setpoint of a step; with phases, of the present one only."""
+        """Return the setpoint of a step, in a manoeuvre of phases that of the current phase."""
         if self.settling is not None:
             return self.settling
         time_s = step * self.vehicle.timestep_s

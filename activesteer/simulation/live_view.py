@@ -55,7 +55,7 @@ class Viewer(Protocol):
         ...
 
     def set_texts(self, texts: Any) -> None:
-        """Show text over the picture: font, place, left column, right column; `None` for the default."""
+        """Show text over the frame: font, place, left column, right column, each `None` for the default."""
         ...
 
 
@@ -195,7 +195,7 @@ def drive(
 
 
 class _Follow:
-    """Camera that moves with the car; the user chooses direction and distance."""
+    """Camera that moves with the car at the direction and distance that the user chooses."""
 
     def __init__(self, simulation: ClosedLoop) -> None:
         self._simulation = simulation
@@ -289,7 +289,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
 
 @contextmanager
 def _threads_joined() -> Iterator[None]:
-    """Wait for the thread of the viewer at the end; without it, the shutdown of Python crashes."""
+    """Wait for the thread of the viewer at the end, because the shutdown of Python otherwise crashes."""
     before = set(threading.enumerate())
     try:
         yield

@@ -438,7 +438,9 @@ class Simulation(Copyable):
 
     @contextmanager
     def recorded_to(self, path: Path) -> Iterator[None]:
-        """Write a file while the context lasts and the run proceeds; enter it before the first step.
+        """Write a file while the context lasts and the run proceeds.
+
+        Enter the context before the first step.
 
         Args:
             path: MCAP file to write. It is completed in every case, and marked as incomplete after an exception.

@@ -365,7 +365,7 @@ class _FaultRuns:
         return self.again(fault, _HandsFixed(self._commands))
 
     def again(self, fault: Fault, driver: Any = None) -> _Signals:
-        """Return the motion with a fault; without a driver, that of the loop responds."""
+        """Return the motion with a fault, with the driver of the loop unless another one is given."""
         loop = self.loop
         loop.fail(())
         loop.restore_state(self._start)

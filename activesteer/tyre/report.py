@@ -205,7 +205,7 @@ def _loads(params: TyreParameters) -> list[float]:
 
 
 def _side_force(formula: MagicFormula) -> Picture:
-    """Side force above, aligning moment below; loads on the left, cambers on the right."""
+    """Draw side force above, aligning moment below, for several loads on the left and cambers on the right."""
     params, nominal = formula.parameters, _nominal(formula.parameters)
     alpha = _within(params, "ALPMIN", "ALPMAX", _WIDEST_ANGLE_RAD)
     cambers = np.unique(

@@ -34,7 +34,7 @@ from activesteer.tyre.kernels.magic_formula import (
 
 @dataclass(frozen=True)
 class TyreConventions:
-    """Evaluation of a tyre's coefficients; keys of the table [tyres.conventions] in a vehicle file."""
+    """Evaluation of a tyre's coefficients, as the table [tyres.conventions] of a vehicle file."""
 
     camber: bool = True
     """Whether camber enters the formula. Without it, camber still acts by geometry: contact point and direction of

@@ -227,7 +227,7 @@ def motor_records(motors: Motors, timestep_s: float) -> NDArray[Any]:
 
 
 class ElectricDrive(NamedTuple):
-    """Memory of the electric drive of one car; no records and no numbers in `state` without motors.
+    """Memory of the electric drive of one car, without records and numbers in `state` if it has no motors.
 
     `state` is a `BATTERY_STATE` followed by a `MOTOR_STATE` for each motor, as numbers.
     """

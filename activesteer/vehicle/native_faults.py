@@ -164,7 +164,7 @@ def fail_part(part, block, gain, bias, healthy, kind, offset, held):
 
 @inlined
 def set_fault(part, block, gain, bias, healthy, kind, offset, held):
-    """Carry out `fail_part` by addresses; a negative kind saves the healthy numbers instead."""
+    """Carry out `fail_part` by addresses, or save the healthy numbers if the kind is negative."""
     own = carray(_part_pointer(part), (1,))[0]
     numbers = f64_pointer(block), f64_pointer(gain), f64_pointer(bias), f64_pointer(healthy)
     if kind < 0:

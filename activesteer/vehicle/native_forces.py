@@ -84,7 +84,7 @@ def _interpolate(x, xs, ys, count):
 
 @inlined
 def _road_mu(block, header, mu, x, y):
-    """Return the friction of the road at a place on it [m]; `mu` outside all areas."""
+    """Return the friction of the road at a place on it [m], `mu` outside all areas."""
     if header.areas_felt == 0.0:
         return mu
     areas = _areas_at(block, header.areas, header.n_areas)

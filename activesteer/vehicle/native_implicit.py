@@ -134,7 +134,7 @@ def _assemble(plan):
 
 @inlined
 def _factorise(plan):
-    """Factorise into unit upper triangular rows times diagonal, in place; store reciprocals of the diagonal."""
+    """Factorise in place into unit upper triangular rows times diagonal, and store the diagonal's reciprocals."""
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
     update = _indices(plan.update)
     target = 0

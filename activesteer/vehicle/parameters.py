@@ -327,7 +327,7 @@ class VehicleParameters:
 
     @property
     def engine_fractions(self) -> tuple[float, float, float, float]:
-        """Fraction of the engine's torque at each wheel [-], order of `CORNERS`; all 0 without an engine."""
+        """Fraction of the engine's torque at each wheel [-], order of `CORNERS`, all 0 without an engine."""
         share = self.engine_share or 1.0
         front, _, rear, _ = self.powertrain.wheel_fractions
         front, rear = (0.0 if self.motors.on(ax) else part / share for ax, part in (("front", front), ("rear", rear)))

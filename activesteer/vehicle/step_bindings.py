@@ -74,7 +74,7 @@ TAPE: Final = numbers_type(words=("room", "row", "row_bytes", "rows", "pose_ever
 
 
 class Tape:
-    """Memory that steps are recorded in; it owns what its `TAPE` record, shape (1,), points to.
+    """Memory that steps are recorded in, and owner of what its `TAPE` record, shape (1,), points to.
 
     `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row. `rows`, `pose_every`: rows
     recorded so far, and rows between two poses. `position`, `quaternion`: addresses of the next poses.

@@ -33,7 +33,7 @@ UNITS: Final = ("m", "mm")
 
 @dataclass(frozen=True)
 class LinkTable:
-    """Keys of a link; one of `stiffness_Npm`, `bushings_Npm` and `bushing`."""
+    """Keys of a link, with one of `stiffness_Npm`, `bushings_Npm` and `bushing`."""
 
     stiffness_Npm: Positive | None = None
     """Rod and both bushings in series [N/m]."""
@@ -65,7 +65,7 @@ class TopMountTable:
 
 @dataclass(frozen=True)
 class AxleTable:
-    """Keys of an axle; points of its left side."""
+    """Keys of an axle, with points of its left side."""
 
     type: str | None = None
     """Kind of suspension."""

@@ -39,7 +39,7 @@ from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, chas
 
 @dataclass
 class TrimmedAxle:
-    """One axle; values of the left side."""
+    """One axle, with values of the left side."""
 
     spring_rate_Npm: float = 25000.0
     spring_force_N: float = 4000.0  # spring force in the design position [N]
@@ -167,7 +167,7 @@ def _swept(
 
 
 def _poses(held: HeldCar) -> Array:
-    """Return forwards, left, camber, caster, toe, upwards of each wheel, with the signs of the rig; shape (4, 6)."""
+    """Return forwards, left, camber, caster, toe, upwards of each wheel, shape (4, 6), with the signs of the rig."""
     rows = []
     for corner in range(4):
         pose = held.wheel(corner)

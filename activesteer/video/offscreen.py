@@ -110,7 +110,7 @@ class Offscreen:
         return self._scene
 
     def draw(self) -> NDArray[np.uint8]:
-        """Render the prepared scene, top row first, shape (height, width, 3); the next frame overwrites the pixels."""
+        """Render the prepared scene, top row first, shape (height, width, 3), until the next frame overwrites it."""
         self._context.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._drawer)
         mujoco.mjr_readPixels(self._pixels, None, self._rect, self._drawer)

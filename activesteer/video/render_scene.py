@@ -126,7 +126,7 @@ class RenderScene:
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 
     def update(self) -> None:
-        """Update everything that is attached to the bodies; a ghost fades out near the car that it accompanies."""
+        """Update everything that is attached to the bodies, and fade out a ghost near the car that it accompanies."""
         chassis = [self.data.mocap_pos[mocap[index]] for mocap, index in zip(self._mocap, self._chassis, strict=True)]
         for ghost, geoms, tendons in self._ghosts:
             apart = min(float(np.linalg.norm(chassis[ghost] - chassis[other])) for other in range(ghost))

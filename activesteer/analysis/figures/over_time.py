@@ -181,7 +181,7 @@ _AFTER: Final = 0.2
 
 
 def fill_panels(axes: Sequence[Axes], drawn: Sequence[DrawnRun], panels: Sequence[Panel]) -> None:
-    """Draw panels over one time axis that shows the transient; the curves of the first panel carry the labels."""
+    """Draw panels over one time axis that shows the transient, with the labels in the first panel."""
     for row, (axis, panel) in enumerate(zip(axes, panels, strict=True)):
         for curve in drawn:
             label = curve.look.label if row == 0 else ""

@@ -354,7 +354,10 @@ _MAX_KEPT_BYTES: Final = 4_000_000
 
 
 class Fmu:
-    """An FMU from which a driver or controller can be made for any car; `PARAMETERS` as in `activesteer.plugins`."""
+    """An FMU from which a driver or controller can be made for any car.
+
+    `PARAMETERS` is as in `activesteer.plugins`.
+    """
 
     checks_itself = True
     reads = ()

@@ -61,7 +61,7 @@ class WheelPose(NamedTuple):
 
 @dataclass
 class Case:
-    """Loads and positions that the rig imposes at one point of a sweep; arrays by corner."""
+    """Loads and positions, in arrays by corner, that the rig imposes at one point of a sweep."""
 
     hold: Hold = "centre"  # what the pads hold: heights of the wheel centres, heights of the contact points, or nothing
     # Height above the height in the standing car [m], shape (4,)

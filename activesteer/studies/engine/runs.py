@@ -117,7 +117,7 @@ _VERSION: Final = "version of "
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that all runs of a study share; small, because every task carries them."""
+    """Settings that all runs of a study share, small because every task carries them."""
 
     study: StudyFile  # the study without its cases and searches
     maneuvers: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each manoeuvre

@@ -1,4 +1,4 @@
-"""Workers behind one interface: this process, processes of this machine, or a Dask cluster; and their tasks.
+"""Workers with their tasks behind one interface: this process, processes of this machine, or a Dask cluster.
 
 `TaskQueue` distributes tasks and returns their results as they arrive. If a worker dies, only its own tasks are lost
 and repeated. A task that kills its worker every time is given up.
@@ -57,7 +57,7 @@ class Workers:
         return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:
-        """End the workers; if abandoned, without waiting for their tasks."""
+        """End the workers, without waiting for their tasks if abandoned."""
 
 
 class LocalProcesses(Workers):

@@ -129,7 +129,7 @@ class DriverLoop:
 
     @cached_property
     def response(self) -> NDArray[np.complexfloating]:
-        """Return the return ratio at `FREQUENCIES_RADPS`, complex; -1 is the limit of stability."""
+        """Return the complex return ratio at `FREQUENCIES_RADPS`, with -1 as the limit of stability."""
         from scipy.linalg import schur, solve_triangular  # noqa: PLC0415 - slow to import
 
         steps = len(self.c)
@@ -146,7 +146,7 @@ class DriverLoop:
         return np.asarray(-np.mean(z[:, :steps].conj() * answers, axis=1), dtype=np.complex128)
 
     def crossover(self) -> tuple[float, float]:
-        """Return crossover frequency [rad/s] and phase margin [rad]; the smallest margin of several crossovers.
+        """Return crossover frequency [rad/s] and phase margin [rad], the smallest margin of several crossovers.
 
         Both are nan if the gain never crosses 1.
         """

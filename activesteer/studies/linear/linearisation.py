@@ -176,7 +176,7 @@ class LinearCar:
     actuators: Array
 
     def modes(self) -> list[Mode]:
-        """Return all modes by natural frequency; of a conjugate pair, the mode with positive imaginary part."""
+        """Return all modes by natural frequency, of a conjugate pair the one with positive imaginary part."""
         return find_modes(self.a, self.states, self.timestep_s)
 
     def state_space(self, cut_off_Hz: float = CUT_OFF_HZ) -> control.StateSpace:
@@ -389,7 +389,7 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
 
 
 def _conclusion(modes: Sequence[Mode]) -> list[Text]:
-    """Return in words whether the car is stable, and its least damped mode; of yaw and sideslip too."""
+    """Return in words the stability and the least damped mode of the car, and of yaw and sideslip."""
     shown = [mode for mode in modes if mode.natural_frequency_Hz <= CUT_OFF_HZ]
     growing = ", ".join(dict.fromkeys(mode.name for mode in shown if mode.eigenvalue_1ps.real > 0.0))
     swinging = sorted((mode for mode in shown if mode.eigenvalue_1ps.imag), key=lambda mode: mode.damping_ratio)

@@ -158,7 +158,7 @@ def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Respon
 
 
 def opened(returned: Response, loop: str) -> Response:
-    """Return the loop gain L opened at one demand with the other closed; 1 + L = 0 is the limit of stability."""
+    """Return the loop gain L opened at one demand with the other closed, where 1 + L = 0 is the limit of stability."""
     own = LOOPS.index(loop)
     other = 1 - own
     through = returned[:, own, other] * returned[:, other, own] / (1.0 - returned[:, other, other])

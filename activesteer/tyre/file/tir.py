@@ -129,7 +129,7 @@ def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
 
 
 def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
-    """Return the version of a PAC2002 file, which has no FITTYP; refuse files of other tyre models."""
+    """Return the version of a PAC2002 file, which has no FITTYP, or reject a file of another tyre model."""
     model = words.get("PROPERTY_FILE_FORMAT", "PAC2002").upper()
     if not model.startswith(("PAC2002", "USER", "MF")):
         raise TyreFileError(

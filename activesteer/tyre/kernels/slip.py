@@ -255,7 +255,7 @@ MIN_RELAXATION_LENGTH_M: Final = 0.02
 
 @compiled
 def rolling_relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Return the relaxation lengths of a rolling tyre as the contact uses them [m]; arguments as `relaxation_lengths`.
+    """Return the relaxation lengths of a rolling tyre [m] as the contact uses them.
 
     A tyre whose file or vehicle says that slip builds up at once has those of a tread block.
     """

@@ -101,7 +101,7 @@ def _resume(setup, state, wheel, slow):
 
 @inlined
 def _largest_slip(setup, state, wheel, fed_Pa):
-    """Slip that releases a wheel in any case; more for a front wheel that a controller brakes."""
+    """Slip that releases a wheel in any case, larger for a front wheel that a controller brakes."""
     return setup.intervention_slip if wheel < 2 and state.demand_Pa[wheel] > fed_Pa else setup.largest_slip
 
 
@@ -147,7 +147,7 @@ def _rolls_slowly(setup, state, wheel, locking, gain):
 
 @inlined
 def _recover(setup, state, wheel, gain, regains, slow, locking):
-    """Advance a wheel that regains speed; a slow one first rolls until its tyre has followed."""
+    """Advance a wheel that regains speed, and let a slow wheel roll until its tyre has followed."""
     state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
     state.regained_mps2[wheel] = max(state.regained_mps2[wheel], gain)
     if slow and state.phase_s[wheel] < _TYRE_LAG_M / state.reference_mps:
