@@ -170,7 +170,7 @@ def _controller() -> dict[str, Figure]:
 
 
 def _sensors() -> dict[str, Figure]:
-    """True and measured yaw rate and lateral acceleration at the beginning of a sine with dwell."""
+    """True and measured yaw rate and lateral acceleration at the start of a sine with dwell."""
     run = run_scenario(
         with_amplitude_found(resolve("sine_with_dwell", overrides={"sensors.preset": "production"})), "ars"
     )

@@ -148,7 +148,7 @@ _ESTIMATION_HEAD: Final = (
 
 
 def estimation_row(scenario: str, system: str) -> str:
-    """Return the estimation_row of one run: a system drives, and an estimator runs beside it on the same sensors."""
+    """Return the estimation_row of one run: a system drives, and an estimator runs alongside on the same sensors."""
     innovations: list[float] = []
 
     class Watched:

@@ -67,7 +67,7 @@ class Steering(NamedTuple):
 
 
 def steering(recording: RecordingLike) -> Steering:
-    """Return beginning, reversal and completion of a sine with dwell, interpolated between samples."""
+    """Return start, reversal and completion of a sine with dwell, interpolated between samples."""
     time_s = recording.time_s
     angle = low_pass(recording["steering_wheel_rad"], timestep(time_s), STEERING_CUT_OFF_Hz)
     if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor

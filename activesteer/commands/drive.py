@@ -205,7 +205,7 @@ def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Nam
 
 
 def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
-    """Print the key metrics of all runs beside each other, or every metric."""
+    """Print the key metrics of all runs next to each other, or every metric."""
     from activesteer.analysis.metrics import KEY_METRICS, evaluated_kind
     from activesteer.analysis.tables import comparison
 
@@ -288,7 +288,7 @@ def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
 
 
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
-    """Draw all runs in one figure, and for a step steer the car without control beside its linear models."""
+    """Draw all runs in one figure, and for a step steer the car without control next to its linear models."""
     from activesteer.analysis.figures import figure_2, figure_for
     from activesteer.studies.reproduction import models_beside
 

@@ -30,7 +30,7 @@ from activesteer.theory.single_track import SingleTrack, rear_prediction
 
 
 class RearPrediction(NativeBlock):
-    """The transfer function G(s) of eq. 5 in the time domain, with coefficients of the present speed.
+    """The transfer function G(s) of eq. 5 in the time domain, with coefficients of the current speed.
 
     State form: T_1 dx/dt = delta_V - x, delta_H = K_H x + K_H T_z dx/dt; exact for an input held between steps.
     """

@@ -41,7 +41,7 @@ def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Abst
 
 @contextmanager
 def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[Path]:
-    """Yield a new file beside `path` that replaces `path` at the end.
+    """Yield a new file next to `path` that replaces `path` at the end.
 
     No one can read half a file: if the body fails, the new file is deleted and the old one stays. A device is written
     directly.

@@ -183,7 +183,7 @@ class WheelTorques(NamedTuple):
 
 
 class Setpoint(NamedTuple):
-    """Demand of the manoeuvre on the driver at one instant.
+    """Demand of the manoeuvre on the driver at one time.
 
     Attributes:
         steering_wheel_demand_rad: Steering wheel angle [rad], left positive.

@@ -33,7 +33,7 @@ KINDS: Final[dict[str, type[Maneuver]]] = {}
 
 
 class NamedFile(NamedTuple):
-    """A key of a manoeuvre that names a file, and the keys beside it that the file fills.
+    """A key of a manoeuvre that names a file, and the keys next to it that the file fills.
 
     Attributes:
         key: The key, as the path of names to it.

@@ -122,7 +122,7 @@ class PathSpeed:
         self._acceleration_mps2 = speed_mps * np.gradient(speed_mps, path.s_m)
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the present place of the car (see `PhaseSequence.setpoint`)."""
+        """Return the setpoint for the current place of the car (see `PhaseSequence.setpoint`)."""
         speed_mps, x_m, y_m = seen[3:6]
         self._along_m = self._search.nearest(x_m, y_m, self._along_m, _WINDOW_M)
         wanted_mps = float(np.interp(self._along_m, self._s_m, self._speed_mps))

@@ -61,7 +61,7 @@ def understood(path: Path, what: str) -> Iterator[None]:
 
 
 def numbers(values: Any, name: str, path: Path) -> Array:
-    """Convert values to numbers, and instants to seconds since the first one."""
+    """Convert values to numbers, and times to seconds since the first one."""
     try:
         array = np.asarray(values)
         if array.dtype.kind in "mM":

@@ -249,7 +249,7 @@ def _content(file: Path) -> bytes:
 
 @functools.cache
 def _imported(file: Path, package: Path) -> tuple[Path, ...]:
-    """Return the files of the package that a file imports from, and the table beside it with its name."""
+    """Return the files of the package that a file imports from, and the table next to it with its name."""
     if file.suffix != ".py":
         return ()
     table = file.with_suffix(".txt")

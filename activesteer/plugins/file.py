@@ -84,7 +84,7 @@ def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, byt
 
 
 def is_user_module(name: str) -> bool:
-    """Return whether a module was loaded from a user's file, or from beside it."""
+    """Return whether a module was loaded from a user's file, or from next to it."""
     return isinstance(getattr(getattr(sys.modules.get(name), "__spec__", None), "loader", None), _Uncached)
 
 
@@ -96,7 +96,7 @@ class _Uncached(SourceFileLoader):
 
 
 class _Neighbours:
-    """Finder of the modules beside users' files: folder -> names of the modules that are imported from it."""
+    """Finder of the modules next to users' files: folder -> names of the modules that are imported from it."""
 
     folders: ClassVar[dict[str, frozenset[str]]] = {}
 
@@ -132,7 +132,7 @@ class _Neighbours:
 
 
 def source_of(text: str) -> dict[str, bytes]:
-    """Read the file that a text names, and the modules beside it that it imports, without running them."""
+    """Read the file that a text names, and the modules next to it that it imports, without running them."""
     form = _FORM.fullmatch(text)
     return {} if form is None else _with_neighbours(user_path(form["path"], ParameterError), ParameterError)
 

@@ -46,7 +46,7 @@ _ZERO, _KEEP_LAST = 1, 2
 
 
 class CrgRoad(NamedTuple):
-    """Heights from the beginning of the reference line on, and that line, from the origin along x, if it is curved."""
+    """Heights from the start of the reference line on, and that line, from the origin along x, if it is curved."""
 
     grid: Grid
     line: Path | None

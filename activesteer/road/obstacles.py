@@ -48,7 +48,7 @@ class Grid(NamedTuple):
         return self.d_m + self.step_d_m * np.arange(self.z_m.shape[1])
 
     def knows(self, s_m: Array, d_m: Array) -> NDArray[np.bool_]:
-        """Return for each place whether it lies within the grid."""
+        """Return for each place whether it is within the grid."""
         along, across = (s_m - self.s_m) / self.step_s_m, (d_m - self.d_m) / self.step_d_m
         rows, columns = self.z_m.shape
         return (along >= 0.0) & (along <= rows - 1) & (across >= 0.0) & (across <= columns - 1)

@@ -301,7 +301,7 @@ class LaidRoad(Road):
     """The path of the course."""
 
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
-        """Return world x and y of places along and beside the path, straight beyond its end (see the base class)."""
+        """Return world x and y of places along and next to the path, straight beyond its end (see the base class)."""
         path = self.path
         assert path is not None
         x, y, heading = (np.interp(s_m, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
@@ -310,7 +310,7 @@ class LaidRoad(Road):
         return x + beyond * cos - d_m * sin, y + beyond * sin + d_m * cos
 
     def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Return the places along and beside the nearest point of the path (see the base class)."""
+        """Return the places along and next to the nearest point of the path (see the base class)."""
         from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
 
         path = self.path

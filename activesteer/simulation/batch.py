@@ -183,12 +183,12 @@ class Batch(Copyable):
 
     @property
     def measurement(self) -> Any:
-        """Present signals of the sensors, a `Measurement`. Each field has shape (n,), or (n, 4) for the wheels."""
+        """Current signals of the sensors, a `Measurement`. Each field has shape (n,), or (n, 4) for the wheels."""
         return arrays_of(Measurement, self.rows(Measurement))
 
     @property
     def motion(self) -> Any:
-        """Present positions and motions as the drivers see them, a `Motion`. Each field has shape (n,)."""
+        """Current positions and motions as the drivers see them, a `Motion`. Each field has shape (n,)."""
         return arrays_of(Motion, self.rows(Motion))
 
     @property
@@ -202,7 +202,7 @@ class Batch(Copyable):
         return arrays_of(ActuatorCommand, self.rows(ActuatorCommand))
 
     def rows(self, kind: type[Any], cars: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """Return the numbers of present messages, a copy of shape (cars, numbers) (see `signals.arrays_of`).
+        """Return the numbers of current messages, a copy of shape (cars, numbers) (see `signals.arrays_of`).
 
         Args:
             kind: `Measurement`, `Motion`, `DriverCommand` or `ActuatorCommand`.
@@ -297,7 +297,7 @@ class Batch(Copyable):
                     self.loops[car].change(key, values[car])
 
     def fail(self, fault: str | Fault, cars: ArrayLike | None = None) -> None:
-        """Set a fault in some cars, beside those that act already (see `Simulation.fail`).
+        """Set a fault in some cars, in addition to those that act already (see `Simulation.fail`).
 
         Args:
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.

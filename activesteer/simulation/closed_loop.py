@@ -258,12 +258,12 @@ class ClosedLoop(Uncopyable):
 
     @property
     def measurement(self) -> Measurement:
-        """Present signals of the sensors."""
+        """Current signals of the sensors."""
         return new_message(Measurement, self._measured.item(0))
 
     @property
     def motion(self) -> Motion:
-        """Present position and motion of the car."""
+        """Current position and motion of the car."""
         return new_message(Motion, self._motion.item(0))
 
     @property
@@ -310,7 +310,7 @@ class ClosedLoop(Uncopyable):
         self._store()
 
     def add_fault(self, fault: str | Fault) -> str:
-        """Set a fault, beside those that act already, and return it in words (see `Simulation.fail`)."""
+        """Set a fault, in addition to those that act already, and return it in words (see `Simulation.fail`)."""
         now_s = self.step_count * self.vehicle.timestep_s
         given = fault_from(fault, now_s)
         self.fail([given], more=True)
@@ -541,7 +541,7 @@ class ClosedLoop(Uncopyable):
             record["path"][0] = spacing_m, (xs.ctypes.data, xs.size), (ys.ctypes.data, ys.size), headings
 
     def _prepare(self) -> None:
-        """Compute the gains of the driver for the present speed."""
+        """Compute the gains of the driver for the current speed."""
         speed_mps = float(self._record["motion"][0, _SPEED])
         self._record["driver"]["_path"]["_row_size"] = self.blocks[0].prepare(speed_mps)
 

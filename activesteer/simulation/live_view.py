@@ -51,7 +51,7 @@ class Viewer(Protocol):
         ...
 
     def sync(self) -> None:
-        """Show the present scene."""
+        """Show the current scene."""
         ...
 
     def set_texts(self, texts: Any) -> None:

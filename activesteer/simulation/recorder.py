@@ -175,7 +175,7 @@ class Recorder(Uncopyable):
         return self._times(first, last), self._kept.values[: last - first], self._poses_between(first, last)
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> dict[str, float]:
-        """Return the values of all channels at the present instant, by name, without recording them."""
+        """Return the values of all channels at the current time, by name, without recording them."""
         self._take()
         for raw, now in zip(self._raw, self._vehicle.rows.present(driver_command, actuator_command), strict=True):
             raw[0] = now[0]

@@ -171,12 +171,12 @@ class Simulation(Copyable):
 
     @property
     def measurement(self) -> Measurement:
-        """Present signals of the sensors: everything that a controller sees."""
+        """Current signals of the sensors: everything that a controller sees."""
         return self.loop.measurement
 
     @property
     def motion(self) -> Motion:
-        """Present position and motion of the car, as a driver sees them."""
+        """Current position and motion of the car, as a driver sees them."""
         return self.loop.motion
 
     @property
@@ -250,7 +250,7 @@ class Simulation(Copyable):
                     self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
 
     def _drive_by_the_clock(self, steps: int, given: Given) -> None:
-        """Drive steps one by one, each at its instant and with the commands that have arrived until then."""
+        """Drive steps one by one, each at its time and with the commands that have arrived until then."""
         pacer, link, loop = self._pacer, self._link, self.loop
         collects = gc.isenabled()
         gc.disable()  # a collection takes longer than a step
@@ -297,7 +297,7 @@ class Simulation(Copyable):
             self._note("set", f"{key} = {json.dumps(value, default=str)}")
 
     def fail(self, fault: str | Fault) -> None:
-        """Set a fault, beside those that act already. The recording keeps it as an event.
+        """Set a fault, in addition to those that act already. The recording keeps it as an event.
 
         Args:
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.

@@ -209,7 +209,7 @@ def axis_label(name: str) -> str:
 
 
 def time_panels(runs: Mapping[str, StandardRun], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
-    """Return channels of runs over time, a panel each. Time counts from an instant, which is also given in words."""
+    """Return channels of runs over time, a panel each. Time counts from a given time, which has a name."""
     return [
         Panel(
             f"time from {begin} [s]",

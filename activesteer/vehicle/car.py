@@ -198,7 +198,7 @@ class Vehicle(Uncopyable):
         return sum(part * height for part, height in zip(fractions, self.wheels.heights_m().tolist(), strict=True))
 
     def rebase(self) -> None:
-        """Make the present position and heading the origin of the road, and the present instant the origin of time.
+        """Make the current position and heading the origin of the road, and the current time the origin of time.
 
         The motion continues unchanged. From here on the friction of the road's areas counts; before, the road's `mu`.
         """
@@ -398,7 +398,7 @@ class Vehicle(Uncopyable):
         native_step.engage(self._address, float(state[-1]))
 
     def _memory(self) -> list[NDArray[np.float64]]:
-        """Memory apart from the engine's state: brakes, motors, sensors, estimate, the engine's present sensor data."""
+        """Memory apart from the engine's state: brakes, motors, sensors, estimate, the engine's current sensor data."""
         sensors = [] if self.sensors is None else [self.sensors.memory]
         return [self._brake_row, self.electric.state, self.data.sensordata, self.rows.estimate, *sensors]
 

@@ -207,7 +207,7 @@ class _ActuatorFault(_DemandFault):
         self._set(native.WORKS)
 
     def recover(self) -> None:
-        """Start a servo that was free at its present angle (see `resume_part`)."""
+        """Start a servo that was free at its current angle (see `resume_part`)."""
         if self._kind == native.FLOAT:
             native.resume_of(self._part.ctypes.data, self._data.act.ctypes.data, self._data.qpos.ctypes.data)
 

@@ -56,7 +56,7 @@ class LocalState:
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Take the present state of the vehicle, which rolls along the world's x axis, as the reference."""
+        """Take the current state of the vehicle, which rolls along the world's x axis, as the reference."""
         self.vehicle = vehicle
         model = vehicle.model
         if model.opt.gravity[1] != 0.0 or fb.header_of(model)["n_surfaces"][0] != 0.0:

@@ -175,7 +175,7 @@ def set_fault(part, block, gain, bias, healthy, kind, offset, held):
 
 @inlined
 def resume_part(part, act, qpos):
-    """Start a servo that was free at its present angle. It returns to its demand with its own lag and rate."""
+    """Start a servo that was free at its current angle. It returns to its demand with its own lag and rate."""
     if part.seized == 0:
         act[part.act] = qpos[part.qpos]
 

@@ -395,7 +395,7 @@ def engine_speed(fractions: Sequence[float], wheel_speeds_radps: Sequence[float]
 
 
 class PowertrainLimits:
-    """The drive as its driver knows it: its torque limits at the present speed of the wheels.
+    """The drive as its driver knows it: its torque limits at the current speed of the wheels.
 
     Attributes:
         fractions: Fraction of the torque that each wheel gets.

@@ -254,7 +254,7 @@ class RecordedArrays:
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> RawRows:
-        """Return one row as a step fills it, for the present instant and the present inputs. Change nothing."""
+        """Return one row as a step fills it, for the current time and inputs. Change nothing."""
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)
@@ -335,7 +335,7 @@ class WheelSet:
         return self._data.xpos[self._bodies, 2]
 
     def effective_radii_m(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
-        """Return the rolling radii under the present loads. With fitted sensors, the car stands still."""
+        """Return the rolling radii under the current loads. With fitted sensors, the car stands still."""
         loads_N = fb.wheel_outputs(self._data, len(CORNERS))["fz_N"]
         return [
             float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)

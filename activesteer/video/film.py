@@ -1,4 +1,4 @@
-"""Films of recordings: cameras behind the car, above it or beside a wheel, and files as MP4."""
+"""Films of recordings: cameras behind the car, above it or next to a wheel, and files as MP4."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _SIDE_LIMIT: Final = 8192
 
 
 def aim(camera: mujoco.MjvCamera, name: str, tracks: Sequence[Track], time_s: float, corner: str = CORNERS[0]) -> None:
-    """Aim a camera at the cars at an instant [s]. It does not roll or heave with the first car, which it follows."""
+    """Aim a camera at the cars at a time [s]. It does not roll or heave with the first car, which it follows."""
     track = tracks[0]
     places = np.array([each.middle(time_s) for each in tracks])
     # All cars stay in the picture, unless they are so far apart that the first one could hardly be seen.
@@ -144,14 +144,14 @@ class Film:
             canvas.close()
 
     def times(self) -> NDArray[np.float64]:
-        """Return the instants of the frames [s], from the first pose of any car to the last."""
+        """Return the times of the frames [s], from the first pose of any car to the last."""
         start = min(track.start_s for track in self._tracks)
         end = max(track.end_s for track in self._tracks)
         step = self.settings.speed / self.settings.rate_hz
         return np.asarray(start + step * np.arange(int((end - start) / step + 1e-9) + 1), np.float64)
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
-        """Return the frame of an instant, shape (height, width, 3)."""
+        """Return the frame of a time, shape (height, width, 3)."""
         drawn = [pane.picture(canvas, time_s) for pane, canvas in zip(self._panes, self._canvases, strict=True)]
         return self._gauges.draw(np.hstack(drawn), time_s)
 
@@ -190,7 +190,7 @@ class _Pane:
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
 
     def picture(self, canvas: Offscreen, time_s: float) -> NDArray[np.uint8]:
-        """Return the picture of an instant without gauges."""
+        """Return the frame of a time, without gauges."""
         for number, track in enumerate(self._tracks):
             self.scene.place(number, *track.poses(time_s))
         self.scene.update()

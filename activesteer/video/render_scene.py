@@ -82,7 +82,7 @@ class RenderScene:
         drawn: DrawnSurface | None = None,
         paths: Sequence[Array] = (),
     ) -> None:
-        """Build the scene. A straight road has edges beside the paths of the cars [m]."""
+        """Build the scene. A straight road has edges next to the paths of the cars [m]."""
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
             add_road(spec, road or Road(), drawn)

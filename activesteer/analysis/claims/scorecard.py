@@ -210,7 +210,7 @@ def _verdict(claim: Claim, known: Mapping[str, str]) -> Verdict:
 
 
 def number_lines(values: Mapping[str, float]) -> list[str]:
-    """Return the values of a claim, in degrees and km/h: a line for each metric, the systems beside each other."""
+    """Return the values of a claim, in degrees and km/h: a line for each metric, the systems next to each other."""
     by_metric: dict[str, list[tuple[str, float]]] = {}
     for name, value in values.items():
         system, _, metric = name.partition("_")

@@ -123,7 +123,7 @@ def plain(axis: Axes, title: str = "") -> None:
 
 
 def note(axis: Axes, text: str, at: tuple[float, float], offset_pt: tuple[float, float], **look: Any) -> None:
-    """Write a small grey text beside a point."""
+    """Write a small grey text next to a point."""
     look = {"color": "#555555", **look}
     axis.annotate(text, at, offset_pt, textcoords="offset points", fontsize=TEXT_PT, **look)
 
@@ -322,7 +322,7 @@ def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE)) -> Figure:
-    """Draw panels over one time axis, as wide as a column, with phases or instants of a standard's criterion."""
+    """Draw panels over one time axis, as wide as a column, with phases or times of a standard's criterion."""
     drawn = drawn_runs(recordings)
     shown = present(panels, drawn)
     figure = new_figure(width_in=COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))

@@ -72,7 +72,7 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
 
 
 def time_grid(times_s: Sequence[Array]) -> Array:
-    """Return the instants of all plots: thinned samples of the first run, to the end of the longest run [s]."""
+    """Return the times of all plots: thinned samples of the first run, to the end of the longest run [s]."""
     first = times_s[0]
     start = min(float(time_s[0]) for time_s in times_s)
     end = max(float(time_s[-1]) for time_s in times_s)
@@ -100,7 +100,7 @@ def _panel(panel: Panel, view: str, runs: Sequence[ReportedRun], grid: Array) ->
 
 
 def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
-    """Return the values at the instants of the grid, or nan before and after the run."""
+    """Return the values at the times of the grid, or nan before and after the run."""
     return np.interp(grid, time_s, values, left=math.nan, right=math.nan)
 
 

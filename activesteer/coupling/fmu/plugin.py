@@ -234,7 +234,7 @@ class FmuBlock:
         return self._held
 
     def _when(self) -> str:
-        """The time of the present step, in words."""
+        """The time of the current step, in words."""
         *_, step_s = self._about
         return f", {(self._steps - 1) // self._every * step_s:g} s after its initialisation"
 

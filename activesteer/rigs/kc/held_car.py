@@ -158,7 +158,7 @@ class HeldCar:
         return np.array([scale * x * z, scale * y * z, -self._radii[corner] * across])
 
     def equilibrium(self, case: Case) -> None:
-        """Move the car from its present position into equilibrium."""
+        """Move the car from its current position into equilibrium."""
         self._command(case)
         residual = self._residual(case)
         size = np.abs(residual).max()
@@ -228,7 +228,7 @@ class HeldCar:
         self.load_N += step[-4:]
 
     def _renew(self, case: Case, residual: Array) -> None:
-        """Compute and invert the stiffness of the car with its pads, at the present position."""
+        """Compute and invert the stiffness of the car with its pads, at the current position."""
         data, count = self.data, self._free.size
         matrix = np.empty((count + 4, count + 4))
         start, load = data.qpos.copy(), self.load_N.copy()

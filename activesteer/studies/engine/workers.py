@@ -323,7 +323,7 @@ class TaskQueue:
         self._waiting.append(_Task(key, function, arguments))
 
     def add_alone(self, key: Any, function: Callable[..., Any], *arguments: Any) -> None:
-        """Append a task that may kill its worker: it is tried once, with no other task beside it."""
+        """Append a task that may kill its worker: it is tried once, without other tasks at the same time."""
         self._suspects.append(_Task(key, function, arguments, _ATTEMPTS - 1))
 
     def outcomes(self, more: Iterator[tuple[Any, ...]] | None = None) -> Iterator[Outcome]:

@@ -22,7 +22,7 @@ from activesteer.vehicle.force_block import sensor_columns
 
 
 class RawRows(NamedTuple):
-    """Copies of the engine's arrays and the commands, one row a step, all of the same instant."""
+    """Copies of the engine's arrays and the commands, one row a step, all of the same time."""
 
     sensordata: Array
     userdata: Array
