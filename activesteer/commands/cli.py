@@ -1,4 +1,4 @@
-"""Command line of the program. The commands are in `commands`."""
+"""Command line of the program."""
 
 from __future__ import annotations
 

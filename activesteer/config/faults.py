@@ -214,7 +214,7 @@ _WHEN: Final = "@START[-END]"
 
 
 def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
-    """Read a fault into the table that a manoeuvre file has. The table is checked there."""
+    """Read a fault into the table that a manoeuvre file has, without checks of the table."""
     found = _FAULT.fullmatch(text.strip())
     if found is None or (found["start"] is None) is (start_s is None):
         if start_s is None:

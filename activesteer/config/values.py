@@ -69,7 +69,7 @@ class Source:
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
     def _line_of(self, path: Sequence[str]) -> int | None:
-        """Return the line of a key in the text. Tomllib does not keep it."""
+        """Return the line of a key in the text, which tomllib does not keep."""
         wanted = ".".join(path)
         table = ""
         elements: dict[str, int] = {}
@@ -138,7 +138,7 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value written as in TOML. Any other text is returned as it is."""
+    """Return a value written as in TOML, or any other text unchanged."""
     try:
         table = _parsed(f"value = {text}")
     except tomllib.TOMLDecodeError:
@@ -149,7 +149,7 @@ def parse_value(text: str) -> Any:
 
 
 def toml_value(value: Any) -> str:
-    """Return a value as TOML. Texts, numbers and lists of JSON are valid TOML."""
+    """Return a value as TOML, which has the texts, numbers and lists of JSON."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{json.dumps(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
@@ -176,7 +176,7 @@ def _lines(table: Mapping[str, Any], remarks: Mapping[str, str], name: str) -> I
 
 
 def spellings(name: str) -> list[str]:
-    """Return the keys that fill a field: its name, and the name in a display unit. `class` fills `class_`."""
+    """Return the keys that fill a field (`class` for `class_`): its name, and the name in a display unit."""
     name = name.removesuffix("_")
     edges = [name[: -len(si)] + edge for edge, (si, _) in EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]

@@ -189,7 +189,7 @@ class TorqueVectoring:
     gains = TorqueVectoringParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run. Its car needs an axle whose torques can differ."""
+        """Create the controller of one run for a car with an axle whose torques can differ."""
         if not setup.split_axles:
             raise ControllerError(
                 "needs an electric axle whose left and right torques can differ: motors.rl and motors.rr (or fl and "

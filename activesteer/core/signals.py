@@ -142,7 +142,7 @@ def _types_of(message: type[tuple[Any, ...]]) -> tuple[Any, ...]:
 
 
 def message_of(kind: type[_Message], row: Iterable[float]) -> _Message:
-    """Return a message from its numbers. Fields without numbers are None."""
+    """Return a message from its numbers, with None for fields without numbers."""
     numbers, fields = iter(row), []
     for width, hint in zip(widths_of(kind), _types_of(kind), strict=True):
         if width == 1:
@@ -153,7 +153,9 @@ def message_of(kind: type[_Message], row: Iterable[float]) -> _Message:
 
 
 def arrays_of(kind: type[_Message], rows: Any) -> _Message:
-    """Return a message whose fields are arrays, from rows of its numbers. A field without numbers is None.
+    """Return a message whose fields are arrays, from rows of its numbers.
+
+    A field without numbers is None.
 
     Args:
         kind: Class of the message.
@@ -270,7 +272,9 @@ class Measurement(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Position and motion of the car over the ground, as the driver sees and feels them. No controller gets it.
+    """Position and motion of the car over the ground, as the driver sees and feels them.
+
+    No controller receives it.
 
     Attributes:
         x_m: Position of the centre of gravity, world x [m].

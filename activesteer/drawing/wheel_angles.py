@@ -77,7 +77,7 @@ def tips_beside(size: Footprint) -> Array:
 
 
 class Plan(NamedTuple):
-    """A car in plan view. Every part is a closed line in the axes of the car."""
+    """A car in plan view, with every part as a closed line in the axes of the car."""
 
     body: Array  # outline of the body [m], shape (points, 2)
     wheels: Array  # outlines of the wheels [m], turned by the enlarged angles, shape (..., 4, 4, 2)

@@ -105,7 +105,7 @@ def titles() -> dict[str, str]:
 
 
 def _content_of(file: Path) -> Iterator[tuple[str, str]]:
-    """Yield the list to which a file belongs, and what its name there ends with. No code of the file is executed."""
+    """Yield the list to which a file belongs, and the ending of its name there, without executing its code."""
     text = file.read_text("utf-8")
     if file.suffix == ".toml":
         table = tomllib.loads(text)

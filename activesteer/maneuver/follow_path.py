@@ -141,7 +141,7 @@ class PathSpeed:
 
 @dataclass(frozen=True)
 class PathTable:
-    """Points in the order of travel. The car starts at (0, 0), heading along x."""
+    """Points in the order of travel, from (0, 0) along x."""
 
     csv: str | None = None
     """CSV file with the columns x_m and y_m, and speed_mps (or speed_kmh) and width_m if wanted: a path, or a name in

@@ -215,7 +215,7 @@ def least_jerk(start_x_m: float, end_x_m: float, end_y_m: float, bounds: Sequenc
 
 
 def _bounded(a: Array, b: Array, g: Array, low: Array, high: Array) -> Array:
-    """Return the z that minimises |A z - b| for low <= G z <= high. A has full column rank (LSI, LDP)."""
+    """Return the z that minimises |A z - b| for low <= G z <= high, for A of full column rank (LSI, LDP)."""
     from scipy.linalg import solve_triangular  # noqa: PLC0415 - slow to import
     from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
 

@@ -234,7 +234,7 @@ def _shared_times(files: _Files, chosen: MeasurementMap, lacking: list[Path]) ->
 
 
 def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, named: bool) -> Array:
-    """Return the times of a file [s]. Of several files, `time` of the map may name the column of some."""
+    """Return the times of a file [s], from the column that `time` of the map names or from its only time column."""
     if chosen.time and named:
         column = find(columns, chosen.time, path)
     else:

@@ -49,13 +49,13 @@ class NativeBlock:
 
     @property
     def is_watched(self) -> bool:
-        """True if somebody has replaced the method `step`, for example to watch it. Compiled code then stays away."""
+        """True if the method `step` is replaced, for example to watch it, so that compiled code stays away."""
         kind: Any = type(self)
         return "step" in vars(self) or kind.step is not kind._written_step
 
 
 def table(numbers: Table) -> Table:
-    """Return a block's numbers. Compiled code makes an array of the record of their memory (`native.memory`)."""
+    """Return a block's numbers, whose memory compiled code reads as a record (`native.memory`)."""
     return numbers
 
 

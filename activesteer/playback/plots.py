@@ -143,7 +143,7 @@ def axis_range(low: float, high: float, least: float, most: float) -> tuple[floa
 
 
 def views_by_corner(plot: Panel, runs: Sequence[ReplayedRun]) -> list[rrb.TimeSeriesView]:
-    """Return a view for each wheel of a wheel plot. Each run's lines have the colour of the run."""
+    """Return a view for each wheel of a wheel plot, with each run's lines in the colour of the run."""
     shown = []
     for line in plot.lines:
         present = [run for run in runs if run.has(line.channel)]

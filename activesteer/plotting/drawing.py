@@ -45,7 +45,7 @@ def plain_axis(axis: Axes) -> None:
 
 
 def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:
-    """Write a figure and return its path. The first file fixes the layout, which other formats keep."""
+    """Write a figure in all formats, with the layout of the first file, and return its path."""
     with atomic_write(path, error) as part:
         try:
             figure.savefig(part, dpi=DOTS_PER_INCH)

@@ -183,7 +183,9 @@ class Plugin:
 
     @functools.cached_property
     def declared(self) -> dict[str, Declared]:
-        """Parameters of a user's block: name -> declaration. An object has none, because it is made already.
+        """Parameters of a user's block: name -> declaration.
+
+        An object has none, because it exists already.
 
         Raises:
             ActiveSteerError: of the kind's type: the declaration is wrong.

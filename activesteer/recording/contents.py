@@ -334,7 +334,9 @@ class Primitive(NamedTuple):
 
 
 class Link(NamedTuple):
-    """Straight part through points of bodies, such as a suspension link. The poses of the bodies move it.
+    """Straight part through points of bodies, such as a suspension link.
+
+    The poses of the bodies move it.
 
     Attributes:
         name: Name of the part.

@@ -99,7 +99,7 @@ class FixedMessage:
         return self.raw(dtype)
 
     def raw(self, dtype: str) -> FixedMessage:
-        """Append an untagged number. Extend the last run if the distance is the same."""
+        """Append an untagged number, to the last run if the distance is the same."""
         offset = len(self.template)
         if self.runs:
             last = self.runs[-1]
@@ -396,7 +396,7 @@ class ChannelTable:
         return columns
 
     def __getitem__(self, name: str) -> Channel:
-        """Return a channel by its name. Raise `RecordingError` if there is none."""
+        """Return a channel by its name, or raise `RecordingError` if there is none."""
         return self._channels[self.index(name)]
 
     def __iter__(self) -> Iterator[Channel]:

@@ -20,7 +20,7 @@ from activesteer.native.compilation import compiled
 
 
 class PathSearch:
-    """Positions along a path, also before its start and beyond its end. `line` holds the arguments of the kernels."""
+    """Positions along a path and beyond its ends, with `line` as the arguments of the kernels."""
 
     def __init__(self, path: Path) -> None:
         """Prepare the arguments of the kernels."""

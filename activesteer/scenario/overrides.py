@@ -67,7 +67,7 @@ def own_path(key: str) -> tuple[str, str] | None:
 
 
 def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
-    """Return users' controllers by the names that they have in keys. The same class may drive with other parameters."""
+    """Return users' controllers, also of one class with other parameters, by the names that they have in keys."""
     found: dict[str, list[Plugin]] = {}
     for plugin in map(controller_spec, controllers):
         if not plugin.is_builtin:

@@ -384,7 +384,7 @@ def is_recording(maneuver: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def recorded_inputs(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the manoeuvre of a file. See `open_loop_of`. A damaged file is used up to the damage."""
+    """Return the manoeuvre of a recording, up to a damage (see `open_loop_of`)."""
     file = user_path(path, RecordingError)
     return open_loop_of(Recording.open(file, recover=True), file.stem)
 

@@ -197,7 +197,7 @@ def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tupl
 
 
 def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float) -> tuple[float, ...]:
-    """Return a record of `CHAIN`. Each sensor has its own random stream, whatever the others are."""
+    """Return a record of `CHAIN`, with a random stream that does not depend on the other sensors."""
     period = max(1, round((sensor.sample_time_s or 0.0) / timestep_s))
     bandwidth_Hz = sensor.bandwidth_Hz or 0.0
     fraction = 1.0 - math.exp(-2.0 * math.pi * bandwidth_Hz * timestep_s) if bandwidth_Hz else 1.0

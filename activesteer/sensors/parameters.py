@@ -65,7 +65,9 @@ class RateSensor(Sensor):
 
 @dataclass(frozen=True)
 class WheelSpeedSensor(RateSensor):
-    """A sensor of the rotational speed of a wheel. All four are alike.
+    """A sensor of the rotational speed of a wheel.
+
+    All four are alike.
 
     With teeth, the sensor counts the edges of a pulse wheel that pass between two samples and measures their time. If
     no edge passes, the reading is at most the speed that the time since the last edge allows. The sign of rotation is

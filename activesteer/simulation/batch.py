@@ -91,7 +91,9 @@ class Batch(Copyable):
         timestep_s: float = DEFAULT_TIMESTEP_S,
         threads: int | None = None,
     ) -> None:
-        """Build the cars and let them settle. Cars with the same inputs settle once.
+        """Build the cars and let them settle.
+
+        Cars with the same inputs settle once.
 
         Args:
             maneuver: Name, path, or table of a manoeuvre; or a `Scenario`, which includes vehicle and driver.
@@ -183,22 +185,22 @@ class Batch(Copyable):
 
     @property
     def measurement(self) -> Any:
-        """Current signals of the sensors, a `Measurement`. Each field has shape (n,), or (n, 4) for the wheels."""
+        """Current signals of the sensors, a `Measurement` with fields of shape (n,), or (n, 4) for the wheels."""
         return arrays_of(Measurement, self.rows(Measurement))
 
     @property
     def motion(self) -> Any:
-        """Current positions and motions as the drivers see them, a `Motion`. Each field has shape (n,)."""
+        """Current positions and motions as the drivers see them, a `Motion` with fields of shape (n,)."""
         return arrays_of(Motion, self.rows(Motion))
 
     @property
     def driver_command(self) -> Any:
-        """Last commands of the drivers, a `DriverCommand`. Each field has shape (n,)."""
+        """Last commands of the drivers, a `DriverCommand` with fields of shape (n,)."""
         return arrays_of(DriverCommand, self.rows(DriverCommand))
 
     @property
     def actuator_command(self) -> Any:
-        """Last commands of the controllers, an `ActuatorCommand`. Each field has shape (n,), for the wheels (n, 4)."""
+        """Last commands of the controllers, an `ActuatorCommand` with fields of shape (n,), for the wheels (n, 4)."""
         return arrays_of(ActuatorCommand, self.rows(ActuatorCommand))
 
     def rows(self, kind: type[Any], cars: NDArray[np.intp] | slice = slice(None)) -> Array:

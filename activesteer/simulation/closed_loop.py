@@ -83,7 +83,7 @@ class NonReentrantLock:
 
 @dataclass(frozen=True)
 class LoopState:
-    """State from which a loop continues bit-identically. `inputs` describes the loops that it belongs to."""
+    """State from which a loop continues bit-identically, with the inputs of the loops that it belongs to."""
 
     inputs: tuple[Any, ...]
     engine: NDArray[np.float64]
@@ -206,7 +206,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def driver(self) -> Any:
-        """The driver. A new one takes over from the next step on."""
+        """The driver, who may be replaced from the next step on."""
         self._store()
         return self.blocks[0]
 
@@ -217,7 +217,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def controller(self) -> Any:
-        """The controller. A new one takes over from the next step on, with the control unit of the former one."""
+        """The controller, which may be replaced from the next step on and then keeps its control unit."""
         self._store()
         return self.blocks[1]
 

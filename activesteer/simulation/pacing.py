@@ -24,7 +24,7 @@ class RealtimePacer:
     """
 
     def __init__(self, factor: float, timestep_s: float) -> None:
-        """Prepare the clock. It starts with the first step."""
+        """Prepare the clock, which starts with the first step."""
         self.factor = checked_number("realtime", factor, FACTOR)
         self._interval_s = timestep_s / self.factor
         self._start_s: float | None = None

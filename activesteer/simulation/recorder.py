@@ -31,7 +31,7 @@ _TAPE_ROWS: Final = 125
 
 @dataclass
 class _Kept:
-    """Rows and poses in memory. The first `referred_rows` are in use elsewhere and are never overwritten."""
+    """Rows and poses in memory, the first `referred_rows` of which are in use elsewhere and never overwritten."""
 
     values: NDArray[np.float64]
     positions_m: NDArray[np.float64]
@@ -104,7 +104,7 @@ class Recorder(Uncopyable):
 
     @property
     def rows(self) -> int:
-        """Number of recorded rows. A row holds the values at the start of its step."""
+        """Number of recorded rows, each with the values at the start of its step."""
         return int(self._tape["rows"][0])
 
     @property

@@ -44,7 +44,7 @@ _COARSE: Final = (
 
 
 class Link(Protocol):
-    """Another process that gives commands. `name` is the key of its `report` in the recording."""
+    """Another process that gives commands, with `name` as the key of its `report` in the recording."""
 
     name: str
     report: dict[str, int]
@@ -269,7 +269,9 @@ class Simulation(Copyable):
                 gc.enable()
 
     def set(self, key: str, value: Any) -> None:
-        """Change a key from the next step on. The recording keeps the change as an event.
+        """Change a key from the next step on.
+
+        The recording keeps the change as an event.
 
         The frictions of the road, the speed and the inputs of the manoeuvre, and the parameters of controller and
         driver can change. Controller and driver keep their memory.
@@ -297,7 +299,9 @@ class Simulation(Copyable):
             self._note("set", f"{key} = {json.dumps(value, default=str)}")
 
     def fail(self, fault: str | Fault) -> None:
-        """Set a fault, in addition to those that act already. The recording keeps it as an event.
+        """Set a fault, in addition to those that act already.
+
+        The recording keeps it as an event.
 
         Args:
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.
@@ -467,7 +471,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Note a failure, after which the states of the blocks do not match. The recorded rows are kept."""
+        """Note a failure, after which the states of the blocks do not match, and keep the recorded rows."""
         try:
             yield
         except BaseException as failure:

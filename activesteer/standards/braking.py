@@ -24,7 +24,7 @@ _BRAKE_S: Final = 0.5
 
 
 def corrected_distance(distance_m: float, speed_mps: float, nominal_mps: float) -> float:
-    """Return the stopping distance at the nominal speed [m]. It is proportional to the square of the speed."""
+    """Return the stopping distance at the nominal speed [m], in proportion to the square of the speed."""
     return distance_m * (nominal_mps / speed_mps) ** 2
 
 

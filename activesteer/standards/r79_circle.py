@@ -284,7 +284,7 @@ def circle(direction: str) -> dict[str, Any]:
 
 
 def fault_circles(runner: StandardRunner) -> list[dict[str, Any]]:
-    """Drive every usual fault in both circles. The runs are not kept."""
+    """Drive every usual fault in both circles, without keeping the runs."""
     faults = usual_faults(runner.controller)
     drive = functools.partial(fault_circle, runner.controller, runner.driver, runner.vehicle, runner.overrides, faults)
     done = in_parallel(

@@ -219,7 +219,7 @@ _REAR_PER_YAW_RATE_S: Final = 0.05
 
 
 def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure batches of cars in the sine with dwell with ideal sensors. The best of some interleaved rounds counts."""
+    """Measure batches of cars in the sine with dwell with ideal sensors, best of several interleaved rounds."""
     found: dict[str, float] = {}
     for size in SIZES:
         before, threads = _memory_MB(), os.cpu_count() or 1

@@ -188,7 +188,9 @@ _RANGES = (("PRESMIN", "PRESMAX"), ("FZMIN", "FZMAX"), ("KPUMIN", "KPUMAX"), ("A
 
 @dataclass(frozen=True)
 class TyreParameters(Mapping[str, float]):
-    """Coefficients of one tyre, in SI and radians. A read-only mapping from key to value, defaults included.
+    """Coefficients of one tyre, in SI and radians.
+
+    A read-only mapping from key to value, defaults included.
 
     Attributes:
         given: Values in the file, by key in upper case, in SI.

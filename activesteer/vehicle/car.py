@@ -1,4 +1,4 @@
-"""The car in the engine: commands in, one step, measurements out. MuJoCo's arrays are bound once, by name."""
+"""The car in the engine: commands in, one step, measurements out."""
 
 from __future__ import annotations
 
@@ -244,7 +244,9 @@ class Vehicle(Uncopyable):
         return self._said()
 
     def record_on(self, tape: Tape | None) -> None:
-        """Record the following steps on a tape. None stops recording.
+        """Record the following steps on a tape.
+
+        None stops recording.
 
         Raises:
             ParameterError: `tape` is something else.
@@ -255,7 +257,7 @@ class Vehicle(Uncopyable):
 
     @property
     def address(self) -> int:
-        """Address of the record by which compiled code steps this car. The car must outlive it."""
+        """Address of the record by which compiled code steps this car, which must outlive it."""
         return self._address
 
     @property
@@ -439,7 +441,7 @@ class Vehicle(Uncopyable):
                     raise ParameterError(f"belongs to another car: {name} has another size", key="model")
 
     def change_road(self, road: Road) -> None:
-        """Drive on with other frictions. The road has as many areas as before."""
+        """Drive on with other frictions of the same number of areas."""
         fb.section_of(self.model, "wheels")["mu"] = road.mu
         areas = fb.section_of(self.model, "areas")
         assert len(areas) == len(road.areas())

@@ -219,7 +219,7 @@ def curve_axle_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDAr
 
 
 def _joints_of_model(model: mujoco.MjModel, corner: str) -> tuple[int, int]:
-    """Return the addresses of a corner's first coordinate and velocity. The others follow."""
+    """Return the addresses of a corner's first coordinate and velocity, which the others follow."""
     joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_{name}") for name in JOINTS]
     qpos, dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     if (np.diff(qpos) != 1).any() or (np.diff(dofs) != 1).any():

@@ -30,7 +30,7 @@ class Faults:
     """The faults of a run."""
 
     def __init__(self, vehicle: Vehicle, faults: Sequence[Fault] = ()) -> None:
-        """Look up the faulty parts. Nothing is changed yet, except that brakes use sensors that may fail."""
+        """Look up the faulty parts, and give the brakes sensors if a sensor may fail."""
         self._vehicle = vehicle
         self._acting: list[_Acting] = []
         vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
@@ -134,7 +134,7 @@ class _Acting:
         """Restore the part as built."""
 
     def recover(self) -> None:
-        """Do what the part needs when the fault ends. A motor returns to its demand with its lag and rate."""
+        """Do what the part needs when the fault ends, such as the return of a motor to its demand with lag and rate."""
 
 
 class _DemandFault(_Acting):

@@ -123,7 +123,7 @@ class LocalState:
         data.act[self._activations] += difference[count + model.nv :]
 
     def _turn_home(self) -> None:
-        """Put the car at the origin of the road with heading 0 and unturned wheels. Its motion stays."""
+        """Put the car at the origin of the road with heading 0, unturned wheels and the same motion."""
         data = self.vehicle.data
         # The heading of the chassis' x axis (ISO 8855) does not change with a rotation about that axis.
         turn_chassis_back(data, 0.5 * float(yaw_of(data.qpos[3:7])))

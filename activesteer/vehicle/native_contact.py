@@ -178,7 +178,7 @@ def contact_plane(
 
 @compiled
 def plane_axes(forward, sideways, heading_x, heading_y):
-    """Return normal and two axes of a plane, nine components in world axes. The first axis is above world x."""
+    """Return normal and two axes of a plane, nine components in world axes, the first axis above world x."""
     slope_x = forward * heading_x - sideways * heading_y
     slope_y = forward * heading_y + sideways * heading_x
     nz = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)

@@ -407,7 +407,7 @@ def _install() -> None:
 
 
 def remove_native_forces() -> None:
-    """Remove our callbacks from this process, for example to measure the bare engine. Those of others stay."""
+    """Remove our callbacks, not those of others, from this process, for example to measure the bare engine."""
     for _, present, install in _SLOTS:
         if any(present() is ours for ours in _installed):
             install(None)
@@ -417,7 +417,9 @@ def remove_native_forces() -> None:
 
 @contextlib.contextmanager
 def engine_warnings_held() -> Iterator[None]:
-    """Leave the engine's warnings to `Vehicle.check`. By default it writes them to a file in the user's folder.
+    """Leave the engine's warnings to `Vehicle.check`.
+
+    By default it writes them to a file in the user's folder.
 
     A handler that another part of the program has installed stays in force.
     """

@@ -162,7 +162,7 @@ class Steering:
 
 @dataclass(frozen=True)
 class Aerodynamics:
-    """Drag. Lift is left out."""
+    """Drag, without lift."""
 
     drag_area_m2: NotNegative
     """Drag coefficient times frontal area [m2]."""
@@ -243,7 +243,7 @@ class Factors:
     """Factor on the lag of the model's servos of rear wheels and superposition. A screw and a motor have none."""
 
     def on_tyres(self, front: TyreParameters, rear: TyreParameters) -> tuple[TyreParameters, TyreParameters]:
-        """Return the tyres of both axles with their scale factors multiplied. Unchanged if all factors are 1."""
+        """Return the tyres of both axles with their scale factors multiplied, unchanged if all factors are 1."""
         axles = (
             (self.front_cornering_stiffness, self.front_tyre_friction),
             (self.rear_cornering_stiffness, self.rear_tyre_friction),

@@ -254,7 +254,7 @@ class RecordedArrays:
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> RawRows:
-        """Return one row as a step fills it, for the current time and inputs. Change nothing."""
+        """Return one row as a step fills it, for the current time and inputs, without any change."""
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)
@@ -335,7 +335,7 @@ class WheelSet:
         return self._data.xpos[self._bodies, 2]
 
     def effective_radii_m(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
-        """Return the rolling radii under the current loads. With fitted sensors, the car stands still."""
+        """Return the rolling radii under the current loads."""
         loads_N = fb.wheel_outputs(self._data, len(CORNERS))["fz_N"]
         return [
             float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)
@@ -361,7 +361,7 @@ def torque_numbers(torques: WheelTorques) -> tuple[float, ...]:
 
 
 class ActuatorRecords:
-    """Views of the records of a compiled car. A change acts from the next step on."""
+    """Views of the records of a compiled car, whose changes act from the next step on."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         """Find the block."""

@@ -161,7 +161,7 @@ _DIGITS: Final = 7
 
 @dataclass(frozen=True)
 class MeasuredAxle:
-    """Measurements of an axle, for one wheel. None stands for what was not measured."""
+    """Measurements of an axle, for one wheel, None for what was not measured."""
 
     curves: AxleCurves  # measured curves, and the stiffness
     wheel_load_N: tuple[float, ...] | None  # over `curves.travel_m`, relative to the standing car

@@ -82,7 +82,7 @@ class RenderScene:
         drawn: DrawnSurface | None = None,
         paths: Sequence[Array] = (),
     ) -> None:
-        """Build the scene. A straight road has edges next to the paths of the cars [m]."""
+        """Build the scene, with edges next to the paths of the cars [m] on a straight road."""
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
             add_road(spec, road or Road(), drawn)
@@ -117,7 +117,7 @@ class RenderScene:
         return int(self.model.body_mocapid[self.model.body(body).id])
 
     def place(self, car: int, positions_m: Array, quaternions: Array) -> None:
-        """Place a car. Call `update` to apply it."""
+        """Place a car, before `update` applies it."""
         data, chassis = self.data, self._chassis[car]
         data.mocap_pos[self._mocap[car]] = positions_m
         data.mocap_quat[self._mocap[car]] = quaternions

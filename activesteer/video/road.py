@@ -51,7 +51,7 @@ _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 
 
 def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None) -> None:
-    """Add the surface. Lower friction makes it bluer."""
+    """Add the surface, bluer for lower friction."""
     colour = np.array(_colour(road.mu))
     spec.add_texture(
         name=_TEXTURE,

@@ -44,7 +44,7 @@ class Track:
     """Poses of a car over time, from the first usable one at `start_s` to the last at `end_s`."""
 
     def __init__(self, recording: Recording, name: str) -> None:
-        """Read the poses that can be drawn. A run that diverged ends with poses that cannot."""
+        """Read the poses that can be drawn, without those at the end of a run that diverged."""
         poses = recording.poses
         self.bodies = poses.names
         whole = poses.usable()
@@ -62,7 +62,7 @@ class Track:
         self._direction_rad = direction_of_motion(self._time_s, middle_m, self._heading_rad)
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
-        """Return positions [m] and orientations w x y z of the bodies. Outside the recording, its end poses."""
+        """Return positions [m] and orientations w x y z of the bodies, outside the recording its end poses."""
         last = len(self._time_s) - 1
         after = min(max(int(np.searchsorted(self._time_s, time_s, side="right")), min(1, last)), last)
         before = max(after - 1, 0)
@@ -171,7 +171,7 @@ def _strip(scene: mujoco.MjvScene, start: Array, stop: Array, width_m: float, rg
 
 
 class Markings:
-    """Wheel angles and tyre forces of one car. `notes` give their scales in words."""
+    """Wheel angles and tyre forces of one car, with `notes` that give their scales in words."""
 
     def __init__(self, recording: Recording, track: Track, colour: str, shown_with: Sequence[Recording]) -> None:
         """Prepare the markings."""

@@ -160,7 +160,7 @@ def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance:
 
 
 def _is_cut_short(recording: RecordingLike) -> bool:
-    """Return whether a run ended before its manoeuvre. The last row of a whole run is one step before the end."""
+    """Return whether a run ended before its manoeuvre, whose last row is one step before the end."""
     maneuver: Any = recording.metadata.get("maneuver")
     duration_s = maneuver.get("duration_s") if isinstance(maneuver, Mapping) else None
     time_s = recording.time_s
@@ -304,7 +304,7 @@ def _slippery_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 class _Limit(float):
-    """Number of a criterion. `{:%}` writes a share with its percent sign apart."""
+    """Number of a criterion, which `{:%}` writes with a space before the percent sign."""
 
     def __format__(self, spec: str) -> str:
         return f"{100.0 * self:.0f} %" if spec == "%" else f"{float(self):g}"

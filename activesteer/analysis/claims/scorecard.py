@@ -154,7 +154,7 @@ class Scorecard:
         return int(any(item.verdict is Verdict.FAILED for item in self.judged))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the scorecard as JSON values. An undefined number (nan) is None."""
+        """Return the scorecard as JSON values, with None for undefined numbers (nan)."""
         return {
             "setting": self.setting,
             "claims": [

@@ -65,7 +65,7 @@ class DrawnRun(NamedTuple):
 
 
 def drawn_runs(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
-    """Return the runs in the paper's order. The three systems always have the same colours."""
+    """Return the runs in the paper's order, in which the three systems always have the same colours."""
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
     return [DrawnRun(recordings[name], look) for name, look in run_looks(recordings).items()]
@@ -85,7 +85,7 @@ def draw(
 
 
 def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width: float = LINE_PT) -> None:
-    """Draw the lines of a run. Those after the first are dotted."""
+    """Draw the lines of a run, all but the first dotted."""
     lines = panel.lines_in(FIGURE)
     # A panel of one line needs it; of several, a run has some.
     shown = lines if len(lines) == 1 else [line for line in lines if line.of(curve.recording) is not None]
@@ -208,7 +208,9 @@ def finish_time(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
-    """Return the time from before the first motion to after the last run has settled [s]. Runs that spin do not count.
+    """Return the time from before the first motion to after the last run has settled [s].
+
+    Runs that spin do not count.
 
     If no run settles, this is the whole time.
     """
@@ -303,7 +305,7 @@ def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Shade the times at which a wheel stands on another friction than at the start. One shade for each run."""
+    """Shade the times at which a wheel stands on another friction than at the start, once for each run."""
     for curve in drawn:
         try:
             mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])

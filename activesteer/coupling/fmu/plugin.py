@@ -483,7 +483,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
 
 def isolated(given: Any, limit_s: float) -> Any:
-    """Return an FMU in its own process. Other blocks are returned unchanged."""
+    """Return an FMU in its own process, or any other block unchanged."""
     if not is_fmu(given):
         return given
     text = os.fspath(given)

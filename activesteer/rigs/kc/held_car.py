@@ -145,7 +145,7 @@ class HeldCar:
         mujoco.mj_fwdPosition(self.model, self.data)
 
     def wheel(self, corner: int) -> WheelPose:
-        """Return the pose of a wheel. Its contact point is the lowest point of the rigid circle."""
+        """Return the pose of a wheel, with the lowest point of the rigid circle as its contact point."""
         body = self._wheels[corner]
         centre = self.data.xpos[body].copy()
         return WheelPose(centre, self.data.xmat[body].reshape(3, 3).copy(), centre + self._down(corner))

@@ -32,7 +32,7 @@ _SMALL: Final = {
 
 
 class Axle(NamedTuple):
-    """One axle of the measured car. Arrays of its wheels are in the order left, right."""
+    """One axle of the measured car, with arrays of its wheels in the order left, right."""
 
     name: str
     measured: Measured

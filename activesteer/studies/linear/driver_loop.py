@@ -350,7 +350,7 @@ _FROM_RUNS: Final = ("damping_in_step", "damping_in_run")
 
 
 def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture) -> Page:
-    """Return the page of a loop. Columns in which nothing oscillates are left out."""
+    """Return the page of a loop, without columns in which nothing oscillates."""
     heads = {key: head for key, head in _HEADS.items() if key not in _FROM_RUNS or any(row[key] < 1.0 for row in rows)}
     cells = [
         [

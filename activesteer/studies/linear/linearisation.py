@@ -290,7 +290,7 @@ def linear_car(
     overrides: Mapping[str, Any] | None = None,
     controllers: Sequence[Any] = (),
 ) -> LinearCar:
-    """Return the car before reduction, with all modes. Overrides may set parameters of controllers."""
+    """Return the car before reduction, with all modes, for overrides that may include controllers."""
     speed_mps = float(speed_mps)
     if not MIN_SPEED_MPS <= speed_mps < math.inf:
         raise ParameterError(
@@ -438,7 +438,7 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
 
 
 def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequence[float]) -> Picture:
-    """Return the named poles of a car over its speed, with rays of equal damping. The systems are in modal form."""
+    """Return the named poles of a car versus its speed, from systems in modal form, with rays of equal damping."""
     limit, angle = 2.0 * math.pi * LOCUS_LIMIT_Hz, np.linspace(math.pi / 2.0, math.pi, 60)
     curves, notes = [], []
     for frequency_Hz in range(1, math.ceil(LOCUS_LIMIT_Hz)):

@@ -146,7 +146,7 @@ def si_factor(quantity: str, units: Mapping[str, float]) -> float:
 
 
 class Coefficient(NamedTuple):
-    """One key of a .tir file. A default of None means that another quantity replaces it."""
+    """One key of a .tir file, with a default of None if another quantity replaces it."""
 
     name: str
     section: str

@@ -150,7 +150,7 @@ def lateral_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) 
 def slip_induced_side_force(
     p, dfz: float, kappa: float, alpha_s: float, gamma_s: float, mu_fz: float, z2: float
 ) -> float:
-    """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67). Mu_fz is mu_y F_z [N]."""
+    """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67), with mu_fz = mu_y F_z [N]."""
     d = mu_fz * (p.RVY1 + p.RVY2 * dfz + p.RVY3 * gamma_s) * math.cos(math.atan(p.RVY4 * alpha_s)) * z2
     return d * math.sin(p.RVY5 * math.atan(p.RVY6 * kappa)) * p.LVYKA
 

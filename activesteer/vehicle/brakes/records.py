@@ -200,7 +200,7 @@ def brake_setup(
     inertia_kgm2: Sequence[float],
     differential: Sequence[bool],
 ) -> NDArray[Any]:
-    """Return the constants of a car's brakes, a `BRAKE_SETUP` of shape (1,). Rows are in the order of `CORNERS`."""
+    """Return the constants of a car's brakes, a `BRAKE_SETUP` of shape (1,), with rows in the order of `CORNERS`."""
     setup = np.zeros(1, BRAKE_SETUP)
     for part, names in ((brakes.hydraulics, _HYDRAULICS), (brakes.antilock, _ANTILOCK), (brakes.traction, _TRACTION)):
         for name in names:

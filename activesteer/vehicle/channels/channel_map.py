@@ -134,7 +134,7 @@ class ChannelMap:
         return within(out, self._late, MAX_VALUE)
 
     def evaluate(self, rows: RawRows) -> Array:
-        """Return all channels of n raw rows, shape (n, len(channels)). The first yaw angle is within half a turn."""
+        """Return all channels of n raw rows, shape (n, len(channels)), with the first yaw angle within half a turn."""
         count = len(rows.sensordata)
         out, inputs = np.empty((count, len(self.channels)), order="F"), self.inputs(count)
         self.take(rows, out, inputs)

@@ -71,7 +71,9 @@ class AxialForce(NamedTuple):
 
 
 class Actuator(NamedTuple):
-    """Limits of an actuator that follows a command with a lag. Torques are infinite if there is no limit.
+    """Limits of an actuator that follows a command with a lag.
+
+    Torques are infinite if there is no limit.
 
     `control`: its place among the commands and the forces; `activation`: among the activations.
     """
