@@ -1,4 +1,4 @@
-"""Compare a controller of your own, a yaw damper for the rear wheels, with no control and the built-in rear steering.
+"""Compare your own controller, a yaw damper for the rear wheels, with no control and the built-in rear steering.
 
     python examples/own_controller.py
     activesteer run sine_with_dwell -c none -c "examples/own_controller.py:YawDamper?gain_s=0.05"

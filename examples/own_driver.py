@@ -1,4 +1,4 @@
-"""Drive the double lane change with a driver of your own, who steers towards one point ahead (pure pursuit).
+"""Drive the double lane change with your own driver, who steers towards one point ahead (pure pursuit).
 
     python examples/own_driver.py
     activesteer run double_lane_change --driver "examples/own_driver.py:PurePursuit?preview_s=0.5"

@@ -1,4 +1,4 @@
-"""Control the sideslip angle with a controller of your own that takes the angle from an estimator.
+"""Control the sideslip angle with your own controller, which takes the angle from an estimator.
 
     python examples/own_estimating_controller.py
     activesteer run step_steer -c "examples/own_estimating_controller.py:SideslipDamper?gain=0.4"

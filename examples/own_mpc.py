@@ -1,4 +1,4 @@
-"""Steer both axles by model predictive control within an envelope, with a controller and a solver of your own.
+"""Steer both axles by model predictive control within an envelope, with your own controller and solver.
 
     pip install "activesteer[control]"
     python examples/own_mpc.py
@@ -140,7 +140,7 @@ def curve(tyre, load_N):
 
 
 def secant(angles_rad, forces, slip_rad):
-    """Return force over slip angle, 1 at zero slip angle."""
+    """Return force versus slip angle, 1 at zero slip angle."""
     size_rad = max(abs(slip_rad), 1e-6)
     return max(np.interp(size_rad, angles_rad, forces) / size_rad, 0.1)
 

@@ -267,7 +267,7 @@ def compare(
 
 
 def _entry_speed(vehicle: FileOrTable, controller: str, seed: int) -> float:
-    """Return the highest speed at which a car stays in the severe lane change, by bisection [m/s], or nan for none."""
+    """Return the highest speed of a car that stays in the severe lane change, by bisection [m/s], or nan for none."""
     changes = SENSORS | ENTRY_LINE | {"sensors.seed": seed}
     course = resolve(_LANE_CHANGE, vehicle, changes, ENTRY_DRIVER, [controller]).maneuver.course
     assert course is not None

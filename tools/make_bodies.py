@@ -156,7 +156,7 @@ def colours(shape: Shape, x: Array) -> NDArray[np.str_]:
 
 
 def normals_of(vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Normals of vertices, those of the faces around each weighted with their area."""
+    """Normals of vertices, as the normals of the faces around each weighted with their area."""
     a, b, c = (vertices[faces[:, number]] for number in range(3))
     across = np.cross(b - a, c - a)
     found = np.zeros_like(vertices)

@@ -120,7 +120,7 @@ class WorstRun:
 
     @classmethod
     def from_json(cls, table: dict[str, Any]) -> WorstRun:
-        """Return the run from JSON values, in which an infinite growth is None."""
+        """Return the run from JSON values, with None as an infinite growth."""
         growth = {name: math.inf if value is None else value for name, value in table["growth"].items()}
         return cls(**table | {"growth": growth, "severity": table["severity"] or math.inf})
 
@@ -200,7 +200,7 @@ _PROPORTIONS: Final = ("saved", "spoiled", "lower", "harmed", "harmed_anywhere")
 
 @dataclass(frozen=True)
 class ClaimProportion:
-    """Proportion of a population in which a claim holds."""
+    """Proportion of a population for which a claim holds."""
 
     id: str  # number of the claim
     passed: bool  # whether the claim holds with the nominal car, road and driver
@@ -562,7 +562,7 @@ def _count(held: Iterable[bool]) -> Proportion:
 
 
 def _has_lowest_peak(runs: Mapping[tuple[str, Car], Row], system: str, car: Car) -> bool:
-    """Return whether the peak sideslip angle is below that of every reference, where a missing peak is the largest."""
+    """Return whether the peak sideslip angle is below every reference, with a missing peak as the largest."""
 
     def peak(controller: str) -> float:
         row = runs.get((controller, car), {})

@@ -106,7 +106,7 @@ def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
 
 
 def first_at(recording: RecordingLike, x_m: float) -> int | None:
-    """Return the first sample at which the front axle centre has reached an x, or None if it never has."""
+    """Return the first sample where the front axle centre has reached an x, or None if it never has."""
     reached = np.flatnonzero(front_axle(recording)[0] >= x_m)
     return int(reached[0]) if reached.size else None
 

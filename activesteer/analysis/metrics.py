@@ -1,4 +1,4 @@
-"""The metrics that belong to a recording, chosen by the kind of its manoeuvre, and those of all runs.
+"""The metrics of a recording: the general ones, and the ones of its kind of manoeuvre.
 
 The latter are sizes, energy, ride and rollover.
 
@@ -172,7 +172,7 @@ LIFTED_N: Final = 1.0
 
 
 def rollover_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the general metrics, and those of the wheel loads."""
+    """Return the general metrics, including the metrics of the wheel loads."""
     loads_N = np.array([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS])
     lifted = loads_N < LIFTED_N
     both = (lifted[0] & lifted[2]) | (lifted[1] & lifted[3])

@@ -150,7 +150,7 @@ def several(*parts: Part) -> Part:
 
 
 def one_of(*parts: Part) -> Part:
-    """Declare options of which at most one may be given."""
+    """Declare options that exclude each other."""
     return lambda parser: several(*parts)(parser.add_mutually_exclusive_group())
 
 

@@ -174,7 +174,7 @@ def declared_parameters(given: Any, gains: ControllerParameters | None = None) -
 
 
 def load_controller(given: Any, setup: ControllerSetup) -> Controller:
-    """Find and make a controller.
+    """Find and create a controller.
 
     Args:
         given: See `controller_spec`.

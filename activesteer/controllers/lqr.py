@@ -355,7 +355,7 @@ def fed_back(
 
 @shared
 def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
-    """Return the slip angle of soft front tyres beyond that of soft rear tyres, per lateral acceleration [s2 rad/m].
+    """Return how much the slip angle of soft front tyres exceeds that of soft rear ones, per acceleration [s2 rad/m].
 
     It is at least 0, and counts as far as the friction is not `certain`.
     """

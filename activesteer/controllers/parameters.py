@@ -293,7 +293,7 @@ class SplitAxle(NamedTuple):
 
 @dataclass(frozen=True)
 class ControllerSetup:
-    """Input from which a controller is made.
+    """Input for the creation of a controller.
 
     Attributes:
         single_track: The car as a single-track model.

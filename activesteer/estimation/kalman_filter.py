@@ -99,7 +99,7 @@ _CREEP_DENSITY: Final = 0.05
 
 @compiled
 def begin(known, memory):
-    """Set state and covariance to those of a car that drives straight ahead."""
+    """Set state and covariance for a car that drives straight ahead."""
     state, covariance = memory.state, memory.covariance
     state[:] = 0.0
     state[FRICTION] = known.friction
@@ -347,7 +347,7 @@ def reopen(known, memory):
 
 @compiled
 def take_in_friction(memory, friction, duration_s):
-    """Correct the friction by the one that sliding wheels show."""
+    """Correct the friction by the friction of sliding wheels."""
     covariance, std = memory.covariance, _SLIDING_STD * friction
     # Its error lasts: during this time all samples count as one measurement.
     variance = std * std * (1.0 + 2.0 * SLIDING_S / duration_s)

@@ -135,7 +135,7 @@ class KnownTyre:
 
 @dataclass(frozen=True)
 class EstimatorSetup:
-    """Input from which an estimator is made.
+    """Input for the creation of an estimator.
 
     Attributes:
         single_track: Mass, yaw inertia, axle distances and axle stiffnesses.

@@ -1,4 +1,4 @@
-"""Messages of the page: their fields, ranges and sizes, checked in this one place, and the queue in which they wait."""
+"""Messages of the page: their fields, ranges and sizes, checked only here, and the queue of waiting messages."""
 
 from __future__ import annotations
 

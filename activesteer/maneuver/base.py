@@ -104,7 +104,7 @@ class Maneuver(ABC):
         return None
 
     def sequence(self) -> Any:
-        """Return what follows the car through the phases of one run, or None if setpoints depend on time alone."""
+        """Return what follows the car through the phases of one run, or None if setpoints depend only on time."""
         return None
 
     @property

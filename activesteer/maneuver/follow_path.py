@@ -156,7 +156,7 @@ class PathTable:
     """Widths of the road at the points [m], the path in its middle; for evaluation."""
 
     def __post_init__(self) -> None:
-        """Check that the points make a path."""
+        """Check that the points form a path."""
         if self.x_m is None or self.y_m is None:
             raise ManeuverError("csv (a file with the columns x_m and y_m) or both lists x_m and y_m are needed")
         check_points(self.x_m, self.y_m, lambda index: f"point {index + 1}")

@@ -90,7 +90,7 @@ class AlongCourse(Maneuver):
 
 
 def known_width(vehicle_width_m: float | None) -> float:
-    """Return the width of the vehicle, for which a course is laid out [m]."""
+    """Return the vehicle width that the course is laid out for [m]."""
     if vehicle_width_m is None:
         raise ManeuverError(
             "is missing; it comes from the vehicle file (width_m) unless it is given here", key="vehicle_width_m"
@@ -141,7 +141,7 @@ def lanes(
 
 
 def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
-    """Return the points at which cones touch the edges of lanes: at both ends, and at most 5 m apart in between.
+    """Return the points where cones touch the edges of lanes: at both ends, and at most 5 m apart in between.
 
     By the standards the edges of a lane are tangents to the feet of its cones.
     """

@@ -302,7 +302,7 @@ class DwellInput:
 
     @property
     def completion_s(self) -> float:
-        """Time at which the steering wheel is straight again [s]."""
+        """Time when the steering wheel is straight again [s]."""
         return self.start_s + 1.0 / self.frequency_Hz + self.dwell_s
 
 

@@ -218,7 +218,7 @@ def fit(
     scheduler: str | None = None,
     progress: FitProgress = lambda *_: None,
 ) -> Fit:
-    """Find values of factors for which the car, driven by recorded inputs, matches recordings best."""
+    """Find values of factors that match the car, driven by recorded inputs, best to recordings."""
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, problem.settings)

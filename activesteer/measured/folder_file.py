@@ -329,7 +329,7 @@ def measured_folder(name: str) -> Path:
 
 
 def is_measured(name: str) -> bool:
-    """Return whether a name is that of a folder of measured runs."""
+    """Return whether a name belongs to a folder of measured runs."""
     return is_file(_folder(name) / NAME)
 
 

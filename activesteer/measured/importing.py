@@ -294,7 +294,7 @@ def _plausible(values: Array, column: str, path: Path) -> Array:
 
 
 def _grid(sampled: Mapping[str, signals.Samples], chosen: MeasurementMap, path: Path) -> tuple[Array, float]:
-    """Return times of the file at which all signals exist, and their step: that of the fastest signal."""
+    """Return times of the file when all signals exist, and their step, the step of the fastest signal."""
     times = [time_s for time_s, _ in sampled.values()]
     start, end = max(float(time_s[0]) for time_s in times), min(float(time_s[-1]) for time_s in times)
     step = chosen.step_s or min(float(np.median(np.diff(time_s))) for time_s in times)

@@ -97,7 +97,7 @@ _TYPES: Final = {0: _IGNORED, 1: types.float64}
 
 
 def native_type(message: type[Any]) -> types.Tuple:
-    """The type by which compiled code takes a message from Python.
+    """The type of a message from Python in compiled code.
 
     Every number is converted to float64. Check class and length of a message first: one that is too short ends the
     process.

@@ -213,7 +213,7 @@ def send_car(stream: rr.RecordingStream, run: ReplayedRun, *, cutaway: bool = Fa
 
 
 def body_path(run: ReplayedRun, body: str) -> str:
-    """Return the entity of a body, with which entities below it move."""
+    """Return the entity of a body, which moves all entities below it."""
     return f"{run.scene}/car/{body}"
 
 

@@ -117,7 +117,7 @@ def _range(plot: Panel, runs: Sequence[ReplayedRun], beside: int) -> tuple[float
 
 
 def axis_range(low: float, high: float, least: float, most: float) -> tuple[float, float]:
-    """Return a range that contains zero and in which the viewer draws at least three tick labels.
+    """Return a range with zero and with at least three tick labels in the viewer.
 
     The viewer labels multiples of one power of ten if they are at least 22 points apart.
     """

@@ -175,7 +175,7 @@ def _set_axes(axis: Axes, panel: Panel) -> None:
 
 
 def _add_abscissa(axis: Axes, label: str, first: Array, second: Array) -> None:
-    """Draw a second abscissa above a panel, whose values grow with those of the first one."""
+    """Draw a second abscissa above a panel, with values that grow with the values of the first one."""
 
     def to_second(x: ArrayLike) -> ArrayLike:
         return np.interp(np.asarray(x), first, second)

@@ -282,7 +282,7 @@ class BlockDecoder:
         return Block(row_ns, columns, times[:, 0], positions, quaternions, others)
 
     def _starts(self, data: bytes) -> tuple[dict[int, list[int]], dict[int, list[bytes]]]:
-        """Find the messages of our topics, and those of other topics."""
+        """Find the messages of our topics and of other topics."""
         starts: dict[int, list[int]] = {number: [] for number in self._lengths}
         others: dict[int, list[bytes]] = {}
         foreign = 0

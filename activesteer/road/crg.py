@@ -53,7 +53,7 @@ class CrgRoad(NamedTuple):
 
 
 def packed(files: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Return files, that of the road first, as texts that a recording keeps."""
+    """Return files, the road's file first, as texts that a recording keeps."""
     content = b"".join(f"{name}\0{len(text)}\0".encode() + text for name, text in files.items())
     text = base64.b64encode(zlib.compress(content, 9)).decode()
     return tuple(text[start : start + _PIECE] for start in range(0, len(text), _PIECE))

@@ -261,7 +261,7 @@ class Road:
         return float(np.mean(~grid.knows(s, d) & (s >= self.start_m)))
 
     def areas(self) -> tuple[Area, ...]:
-        """Return the areas whose friction is not `mu`, of which the later one counts where they overlap."""
+        """Return the areas with a friction other than `mu`, the later one where they overlap."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
         split = [Area(-math.inf, math.inf, *SIDES[side], mu) for side, mu in sides if mu is not None]
         return (*split, *(Area(it.start_m, it.end_m, *SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
@@ -278,7 +278,7 @@ class Road:
 
 
 def _sliced(index: int, area: Area, slices: int, place: Callable[[Array, Array], tuple[Array, Array]]) -> list[Piece]:
-    """Cut an area into slices, with `place` to turn its x and y into those of the world."""
+    """Cut an area into slices, with `place` to turn its x and y into world coordinates."""
     stations = np.linspace(area.start_m, area.end_m, slices + 1)
     edges = [np.column_stack(place(stations, np.full(slices + 1, y))) for y in (area.right_m, area.left_m)]
     corners = np.stack([edges[0][:-1], edges[0][1:], edges[1][1:], edges[1][:-1]], axis=1)

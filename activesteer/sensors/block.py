@@ -146,7 +146,7 @@ _MINUTE_S: Final = 60.0
 
 
 class SensorBlock:
-    """The sensors of one car: `CHAIN` records, and memory from which a run continues bit-identically.
+    """The sensors of one car: `CHAIN` records, and memory for a bit-identical continuation.
 
     `outputs` is a view of the memory: the members of `Measurement` without its time.
     """
@@ -175,7 +175,7 @@ class SensorBlock:
             own[LINE:] = value
 
     def say(self, measurement: Measurement) -> None:
-        """Replace the readings until the next step, for example by those of a faulty sensor."""
+        """Replace the readings until the next step, for example by the readings of a faulty sensor."""
         parts = (part if isinstance(part, tuple) else (part,) for part in measurement[1:])
         self.outputs[:] = [number for part in parts for number in part]
 

@@ -119,7 +119,7 @@ _KINDS: Final = {"radps": RateSensor, "mps2": AccelerationSensor, "rad": AngleSe
 
 @dataclass_transform(frozen_default=True)
 def _with_sensors(cls: type[_Class]) -> type[_Class]:
-    """Decorator: make a frozen dataclass with a field for each sensor, without errors by default."""
+    """Decorator: turn a class into a frozen dataclass with a field for each sensor, without errors by default."""
     for field, width in zip(Measurement._fields, widths_of(Measurement), strict=True):
         name, _, unit = field.rpartition("_")
         if unit in _KINDS:  # time and speed have none
@@ -188,7 +188,7 @@ def _production() -> Sensors:
 
 
 def _filled(given: Any, preset: Any) -> Any:
-    """Return the given values, and those of the preset for missing ones."""
+    """Return the given values, or the preset's values where they are missing."""
     if not isinstance(preset, Sensor):
         return preset if given is None else given
     return replace(preset, **{key: value for key, value in vars(given).items() if value is not None})

@@ -315,7 +315,7 @@ class Batch(Copyable):
                     self.loops[car].add_fault(fault)
 
     def save_state(self, cars: ArrayLike | None = None) -> list[LoopState]:
-        """Return the states of some cars, from which they continue bit-identically.
+        """Return the states of some cars for a bit-identical continuation.
 
         Args:
             cars: Numbers of the cars, or a mask; by default all.

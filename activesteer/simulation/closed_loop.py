@@ -83,7 +83,7 @@ class NonReentrantLock:
 
 @dataclass(frozen=True)
 class LoopState:
-    """State from which a loop continues bit-identically, with the inputs of the loops that it belongs to."""
+    """State for the bit-identical continuation of a loop, with the inputs of the loops that it belongs to."""
 
     inputs: tuple[Any, ...]
     engine: NDArray[np.float64]
@@ -227,7 +227,7 @@ class ClosedLoop(Uncopyable):
         self.blocks = self.blocks[0], controller
 
     def replace_controller(self, controller: Any) -> None:
-        """Let another controller take over, with a control unit of its own (see `activesteer.plugins.find`).
+        """Let another controller take over, with a separate control unit (see `activesteer.plugins.find`).
 
         Raises:
             ControllerError: there is no such controller, or it cannot be created.
@@ -247,7 +247,7 @@ class ClosedLoop(Uncopyable):
         self._maneuver = maneuver
 
     def _setpoint_at(self, step: int) -> Setpoint:
-        """Return the setpoint of a step, in a manoeuvre of phases that of the current phase."""
+        """Return the setpoint of a step, in a manoeuvre of phases from the current phase."""
         if self.settling is not None:
             return self.settling
         time_s = step * self.vehicle.timestep_s
@@ -290,7 +290,7 @@ class ClosedLoop(Uncopyable):
         return round(self.maneuver.duration_s / self.vehicle.timestep_s)
 
     def fail(self, faults: Sequence[Fault], *, more: bool = False) -> None:
-        """Replace the faults by these, each of which acts at its time.
+        """Replace the faults by others, with their own times.
 
         Args:
             faults: The faults.
@@ -401,7 +401,7 @@ class ClosedLoop(Uncopyable):
             recorder.make_room()
 
     def save_state(self) -> LoopState:
-        """Return the state from which the loop continues bit-identically."""
+        """Return the state for a bit-identical continuation of the loop."""
         self._store()
         return LoopState(
             self._inputs,
@@ -416,7 +416,7 @@ class ClosedLoop(Uncopyable):
         )
 
     def restore_state(self, state: LoopState) -> None:
-        """Go back to a saved state, from which the loop continues bit-identically.
+        """Go back to a saved state for a bit-identical continuation of the loop.
 
         Args:
             state: A state of this loop, or of another one with the same inputs.

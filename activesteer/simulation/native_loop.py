@@ -145,7 +145,7 @@ def _control(car):
 
 @inlined
 def _pass_on(car):
-    """Put the held decision on the bus, and take the one that arrives."""
+    """Put the held decision on the bus, and take the arriving one."""
     length, bus = car.on_bus + 1, array_of(car.bus)
     newest, oldest = car.calls % length * N_HELD, (car.calls + 1) % length * N_HELD
     for place in range(N_HELD):

@@ -109,7 +109,7 @@ class Recorder(Uncopyable):
 
     @property
     def room(self) -> int:
-        """Number of rows for which the tape has room."""
+        """Number of rows that still fit into the tape."""
         return int(self._tape["room"][0])
 
     def make_room(self) -> None:

@@ -65,7 +65,7 @@ class Link(Protocol):
 
 @dataclass(frozen=True)
 class SavedState:
-    """State from which a simulation continues bit-identically, with the rows recorded so far."""
+    """State for the bit-identical continuation of a simulation, with the rows recorded so far."""
 
     metadata: dict[str, Any]
     loop: LoopState
@@ -346,7 +346,7 @@ class Simulation(Copyable):
         self.advance(self.steps - self.loop.step_count)
 
     def save_state(self) -> SavedState:
-        """Return the state from which the simulation continues bit-identically, with the rows recorded so far.
+        """Return the state for a bit-identical continuation of the simulation, with the rows recorded so far.
 
         Raises:
             SimulationDiverged: a recorded value is not finite.
@@ -358,7 +358,7 @@ class Simulation(Copyable):
             return SavedState(self.context.metadata, self.loop.save_state(), rows, dict(self._given), self.events)
 
     def restore_state(self, state: SavedState) -> None:
-        """Go back to a saved state, from which the simulation continues bit-identically.
+        """Go back to a saved state for a bit-identical continuation of the simulation.
 
         The recording then holds the rows that led to this state. Recordings taken before are not changed.
 

@@ -424,7 +424,7 @@ def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
 
 
 def _tolerant_s(runs: _FaultRuns, fault: Fault, broken_s: float) -> float:
-    """Find the time by bisection, below the time at which the lasting fault exceeds a limit.
+    """Find the time by bisection, below the time when the lasting fault exceeds a limit.
 
     The search assumes that a longer fault has a larger effect. It returns the bound that keeps the limits.
     """

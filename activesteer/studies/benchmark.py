@@ -130,7 +130,7 @@ class _KeptInputs:
             inputs[:] = self.vehicle.data.ctrl
 
     def replay_us(self) -> float:
-        """Return the time of the engine alone per step of the same drive [us], all in one native call."""
+        """Return the time of only the engine per step of the same drive [us], all in one native call."""
         self.vehicle.restore_state(self._start)
         return per_call_us(self.vehicle.replay, 1, self._inputs) / len(self._inputs)
 
@@ -143,7 +143,7 @@ class _Nothing:
 
 
 def _closed_loop(scenario: Scenario, controller: Any = _CONTROLLER, threads: int = 0) -> float:
-    """Return the time per step of a run, or of several together, each in a thread of its own [us]."""
+    """Return the time per step of a run, or of several together, each in a separate thread [us]."""
     loops = [ClosedLoop(scenario, controller) for _ in range(max(threads, 1))]
     recorders = [Recorder(loop.vehicle, loop.steps) for loop in loops]
 

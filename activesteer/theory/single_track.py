@@ -78,7 +78,7 @@ class SingleTrackParameters:
 
 
 def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:
-    """Return the speed at which an understeering car reaches half the yaw rate of a neutral one, sqrt(l/EG).
+    """Return the speed where an understeering car reaches half the yaw rate of a neutral one, sqrt(l/EG).
 
     Args:
         wheelbase_m: l [m].

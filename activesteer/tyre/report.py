@@ -94,7 +94,7 @@ def _over_load(params: TyreParameters, loads: np.ndarray) -> dict[str, list[floa
 
 
 def size(params: TyreParameters) -> str | None:
-    """Return the size in words, such as 205/55 R16, or None if the file has no dimensions of its own."""
+    """Return the size in words, such as 205/55 R16, or None if the file has no dimensions."""
     if not {"WIDTH", "RIM_RADIUS", "ASPECT_RATIO"} <= params.given.keys():
         return None
     rim = 2.0 * params["RIM_RADIUS"] / _INCH_M
@@ -276,7 +276,7 @@ def _friction_ellipse(formula: MagicFormula) -> Picture:
 
 
 def _combined_slip(formula: MagicFormula) -> Picture:
-    """Forces over slip for slip angles, and forces against each other."""
+    """Forces versus slip for slip angles, and forces against each other."""
     params = formula.parameters
     nominal, kappa = _nominal(params), _within(params, "KPUMIN", "KPUMAX", _WIDEST_SLIP)
     angles = [math.radians(value) for value in (0, 2, 4, 8, 12)]

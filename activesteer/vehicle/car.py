@@ -257,7 +257,7 @@ class Vehicle(Uncopyable):
 
     @property
     def address(self) -> int:
-        """Address of the record by which compiled code steps this car, which must outlive it."""
+        """Address of the record for compiled code that steps this car, which must outlive it."""
         return self._address
 
     @property
@@ -266,7 +266,7 @@ class Vehicle(Uncopyable):
         return float(self._forces["gear"][0])
 
     def replay(self, inputs: NDArray[np.float64]) -> None:
-        """Advance the engine alone by several steps in one native call, without commands, checks or recording.
+        """Advance only the engine by several steps in one native call, without commands, checks or recording.
 
         Args:
             inputs: Inputs of all actuators in each step, as a run left them in `data.ctrl`; shape (steps, actuators).
@@ -377,7 +377,7 @@ class Vehicle(Uncopyable):
             _write_estimate(self._estimate_memory, estimate)
 
     def save_state(self) -> NDArray[np.float64]:
-        """Return the state of engine, brakes, motors, sensors and gear, from which a run continues bit-identically."""
+        """Return the state of engine, brakes, motors, sensors and gear for a bit-identical continuation."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
         return np.concatenate((state, *self._memory(), (self.gear,)))

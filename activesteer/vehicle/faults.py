@@ -50,7 +50,7 @@ class Faults:
         vehicle.act_in_every_step(self._records)
 
     def next_change(self, step: int) -> int:
-        """Return the first step after this one at which a fault begins or ends."""
+        """Return the first step after this one when a fault begins or ends."""
         changes = (change for acting in self._acting for change in (acting.listens, acting.begins, acting.ends))
         return min((change for change in changes if change > step), default=_NEVER)
 

@@ -244,7 +244,7 @@ def _part_of(state: str) -> str:
 
 
 def _sides(shape: NDArray[np.complex128], participation: NDArray[np.float64], states: tuple[str, ...]) -> str:
-    """Return ` parallel` or ` opposite` for a mode in which left and right wheels move alike or oppositely."""
+    """Return ` parallel` or ` opposite` for the motion of left and right wheels in a mode."""
     top = states[int(participation.argmax())]
     match = re.search(r"(?<![a-z])([fr])([lr])_", top)
     if match is None:

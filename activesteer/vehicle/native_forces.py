@@ -407,7 +407,7 @@ def _install() -> None:
 
 
 def remove_native_forces() -> None:
-    """Remove our callbacks, not those of others, from this process, for example to measure the bare engine."""
+    """Remove only our callbacks from this process, for example to measure the bare engine."""
     for _, present, install in _SLOTS:
         if any(present() is ours for ours in _installed):
             install(None)

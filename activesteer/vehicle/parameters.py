@@ -149,7 +149,7 @@ class Powertrain:
 
 @dataclass(frozen=True)
 class Steering:
-    """The overall steering ratio, with which driver and controllers relate steering wheel and road wheels."""
+    """The overall ratio of steering wheel and road wheels, for driver and controllers."""
 
     ratio: Positive
     """Steering wheel angle over mean road-wheel angle around straight ahead [-]."""

@@ -148,7 +148,7 @@ def read_through(bindings: NDArray[Any], sensors: SensorBlock | None) -> None:
 
 
 def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
-    """Numbers of a row, in the order in which `write_commands` stores them."""
+    """Numbers of a row, in the order of `write_commands`."""
     count = Counter(field for message in messages.values() for field in message._fields)
     return {
         f"{sender}_{number.name}" if count[number.field] > 1 else number.name: number
@@ -375,7 +375,7 @@ class ActuatorRecords:
         return self._actuators[actuator : actuator + 1]
 
     def screw(self, actuator: int) -> tuple[NDArray[Any], ...]:
-        """Return the records of link and screw of an actuator, of its motor alone if no link follows, or nothing."""
+        """Return the records of link and screw of an actuator, only of its motor if no link follows, or nothing."""
         record = self.of(actuator)
         place = int(record["record"][0])
         if record["kind"] == fb.KIND_SCREW:

@@ -143,7 +143,7 @@ class AxleTable:
 
 @dataclass(frozen=True)
 class MassTable:
-    """Masses of the whole standing car with driver, or of the chassis alone."""
+    """Masses of the whole standing car with driver, or of only the chassis."""
 
     total_kg: Positive | None = None
     """Mass of the whole car [kg]."""

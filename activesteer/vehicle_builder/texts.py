@@ -233,7 +233,7 @@ def _axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
 
 
 def _in_design(axle: Axle, point: Array) -> Array:
-    """Return a point of the knuckle at zero joints, from which curves turn it by the static angles."""
+    """Return a point of the knuckle at zero joints, before curves turn it by the static angles."""
     if axle.measured is None:
         return point
     curves = axle.measured.curves

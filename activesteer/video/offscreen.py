@@ -104,7 +104,7 @@ class Offscreen:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def prepare(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> mujoco.MjvScene:
-        """Prepare the scene of the next frame, to which more geometry can be added."""
+        """Prepare the scene of the next frame, ready for more geometry."""
         every = int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self._model, data, self._look, None, camera, every, self._scene)
         return self._scene

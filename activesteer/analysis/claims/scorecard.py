@@ -86,7 +86,7 @@ def read_setting(name: str) -> Setting:
 
 
 def setting_of(recording: RecordingLike) -> str:
-    """Return the name of the setting in which a run was made, or empty if it has other overrides or is of the user."""
+    """Return the name of a run's setting, or an empty text if it has other overrides or belongs to the user."""
     name, overrides = entry(recording, "maneuver", "name"), recording.metadata.get("overrides") or {}
     if name not in SCENARIOS or not isinstance(overrides, Mapping):
         return ""

@@ -65,7 +65,7 @@ class DrawnRun(NamedTuple):
 
 
 def drawn_runs(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
-    """Return the runs in the paper's order, in which the three systems always have the same colours."""
+    """Return the runs in the paper's order, with the same colours of the three systems everywhere."""
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
     return [DrawnRun(recordings[name], look) for name, look in run_looks(recordings).items()]
@@ -95,7 +95,7 @@ def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width
 
 
 def friction_label(low: float, high: float) -> str:
-    """Return the label of places with another friction, which keeps them out of the legend of their own axis."""
+    """Return the label of places with another friction, which keeps them out of the legend of their axis."""
     return f"_friction {low:.2g}" + (f" to {high:.2g}" if f"{low:.2g}" != f"{high:.2g}" else "")
 
 
@@ -305,7 +305,7 @@ def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Shade the times at which a wheel stands on another friction than at the start, once for each run."""
+    """Shade the times when a wheel stands on another friction than at the start, once for each run."""
     for curve in drawn:
         try:
             mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])

@@ -284,7 +284,7 @@ class Row(NamedTuple):
 
 
 def parameters(recordings: Sequence[Recording], *tables: str) -> list[Row]:
-    """Return the entries of tables of the metadata: those of the first run in its order, then those of later runs."""
+    """Return the entries of tables of the metadata: of the first run in its order, then of later runs."""
     flat = []
     for run in recordings:
         chosen = {key: run.metadata[key] for key in tables if key in run.metadata}

@@ -354,7 +354,7 @@ _MAX_KEPT_BYTES: Final = 4_000_000
 
 
 class Fmu:
-    """An FMU from which a driver or controller can be made for any car.
+    """An FMU that can become a driver or controller of any car.
 
     `PARAMETERS` is as in `activesteer.plugins`.
     """

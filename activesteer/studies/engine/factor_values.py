@@ -112,7 +112,7 @@ class Prior:
     """
 
     def __init__(self, study: StudyFile) -> None:
-        """Find the nominal values: those of the files, and no change for factors that are relative to them."""
+        """Find the nominal values: from the files, and no change for factors that are relative to them."""
         self._searched = [factor for factor in study.factors if not factor.values]
         self.nominal: dict[str, Any] = {}
         for factor in study.factors:

@@ -144,7 +144,7 @@ def _shown_rows(table: pa.Table) -> Places:
 
 
 def _acting(study: StudyFile, key: str, rows: pa.Table) -> list[Any]:
-    """Return the values of a factor, None in manoeuvres in which it does not vary."""
+    """Return the values of a factor, None in manoeuvres where it does not vary."""
     named = [factor.maneuvers for factor in study.factors if factor.key == key]
     values, maneuvers = rows[key].to_pylist(), rows["maneuver"].to_pylist()
     if not all(named):

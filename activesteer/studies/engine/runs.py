@@ -217,7 +217,7 @@ def run_command(
     overrides: Mapping[str, Any],
     driver: Any = DEFAULT_DRIVER,
 ) -> str:
-    """Return the `activesteer run` that repeats a run to the last bit.
+    """Return the `activesteer run` that repeats a run bit for bit.
 
     A manoeuvre or vehicle given as a table appears as its name. The override `driver` replaces the driver.
     """

@@ -134,7 +134,7 @@ class Judge:
     """
 
     def __init__(self, plan: Plan, table: TuneTable, examined: str = "") -> None:
-        """Read the expressions of a table, in which `controller` stands for the examined controller."""
+        """Read the expressions of a table, with `controller` for the examined controller."""
         study, shared, self._examined = plan.study, plan.settings, examined
         controllers, maneuvers = ([label for label, _ in items] for items in (shared.controllers, shared.maneuvers))
         claims = {claim: (f"{DISTANCE}{claim}", name) for claim, name in SCENARIO_OF.items() if name in maneuvers}

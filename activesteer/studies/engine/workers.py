@@ -331,7 +331,7 @@ class TaskQueue:
         self._suspects.append(_Task(key, function, arguments, _ATTEMPTS - 1))
 
     def outcomes(self, more: Iterator[tuple[Any, ...]] | None = None) -> Iterator[Outcome]:
-        """Do the tasks and yield their outcomes, in the order in which they end.
+        """Do the tasks and yield their outcomes, in the order of completion.
 
         The caller may add tasks while iterating.
         """

@@ -350,7 +350,7 @@ _FROM_RUNS: Final = ("damping_in_step", "damping_in_run")
 
 
 def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture) -> Page:
-    """Return the page of a loop, without columns in which nothing oscillates."""
+    """Return the page of a loop, without columns where nothing oscillates."""
     heads = {key: head for key, head in _HEADS.items() if key not in _FROM_RUNS or any(row[key] < 1.0 for row in rows)}
     cells = [
         [
@@ -371,7 +371,7 @@ def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture)
 
 
 def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[str, Any]]) -> Picture:
-    """Return Bode diagrams and a step of the path at the middle speed, and the damping over speed."""
+    """Return Bode diagrams and a step of the path at the middle speed, and the damping versus speed."""
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))

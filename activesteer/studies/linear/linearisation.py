@@ -373,7 +373,7 @@ def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, 
 
 
 def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture) -> Page:
-    """Return the page of a linear car: its modes, its response to the steering wheel, and its poles over speed."""
+    """Return the page of a linear car: its modes, its response to the steering wheel, and its poles versus speed."""
     rows = [[cell.replace("+-", "\N{PLUS-MINUS SIGN}") for cell in row] for row in _mode_rows(modes, CUT_OFF_HZ)]
     table = Table("", _MODE_COLUMNS, rows)
     sections = [

@@ -146,7 +146,7 @@ def _held(steps: int, back: Response) -> Response:
 
 
 def _calls(sensor: Sensor, unit_s: float) -> int:
-    """Return the number of calls of the control unit for which a sample is held."""
+    """Return the number of calls of the control unit that hold one sample."""
     return max(1, round((sensor.sample_time_s or 0.0) / unit_s))
 
 

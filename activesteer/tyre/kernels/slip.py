@@ -32,7 +32,7 @@ MF52 = 52.0
 
 @compiled
 def guarded(x: float) -> float:
-    """Move a denominator away from zero, in the direction of its own sign."""
+    """Move a denominator away from zero, in the direction of its sign."""
     return x + EPSILON if x >= 0.0 else x - EPSILON
 
 

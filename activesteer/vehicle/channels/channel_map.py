@@ -103,7 +103,7 @@ class ChannelMap:
         self._late = np.array([place for place, *_ in (*self._motion, *self._computed)], np.intp)
 
     def signals(self) -> list[Signal]:
-        """Return the channels with their rules, without those of the motion that `CarMotion` computes."""
+        """Return the channels with their rules, without the motion that `CarMotion` computes."""
         channels = (channel for channel in MOTION_CHANNELS if channel.name in self._motion_copied)
         return [*(Signal(channel, self._motion_copied[channel.name]) for channel in channels), *self._signals]
 
