@@ -51,11 +51,11 @@ class Viewer(Protocol):
         ...
 
     def sync(self) -> None:
-        """Show the present scene."""
+        """Show the current scene."""
         ...
 
     def set_texts(self, texts: Any) -> None:
-        """Show text over the picture: font, place, left column, right column; `None` for the default."""
+        """Show text over the frame: font, place, left column, right column, each `None` for the default."""
         ...
 
 
@@ -79,7 +79,7 @@ class FramePacer:
 
     @property
     def speed(self) -> float:
-        """Simulated seconds per second of the clock. A new value holds from the next picture on."""
+        """Simulated seconds per second of the clock, which may change from the next frame on."""
         return self._speed
 
     @speed.setter
@@ -122,7 +122,7 @@ class Keys:
         self.faster = 1.0
 
     def __call__(self, code: int) -> None:
-        """Take a key, by the code of GLFW, which is the upper-case letter. Other keys are the viewer's own."""
+        """Take a key of ours, by the code of GLFW, which is the upper-case letter."""
         if code == ord(" "):
             self.paused = not self.paused
         elif code == ord("R"):
@@ -195,7 +195,7 @@ def drive(
 
 
 class _Follow:
-    """Camera that moves with the car; the user chooses direction and distance."""
+    """Camera that moves with the car at the direction and distance that the user chooses."""
 
     def __init__(self, simulation: ClosedLoop) -> None:
         self._simulation = simulation
@@ -239,7 +239,7 @@ def _texts(simulation: ClosedLoop, time_s: float, speed: float, *, paused: bool)
 
 
 def check_display() -> None:
-    """Check that there is a display with OpenGL. Without one, the viewer would wait forever."""
+    """Check that there is a display with OpenGL, without which the viewer would wait forever."""
     import glfw  # noqa: PLC0415 - looks for its library when it is imported
 
     with warnings.catch_warnings(record=True) as caught:
@@ -259,7 +259,7 @@ def check_display() -> None:
 
 
 def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> None:
-    """Drive a scenario again and again in a window until it is closed. Nothing is recorded."""
+    """Drive a scenario again and again in a window until it is closed, without a recording."""
     import mujoco.viewer  # noqa: PLC0415 - needs a display
 
     simulation, keys = ClosedLoop(scenario, controller), Keys()
@@ -289,7 +289,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
 
 @contextmanager
 def _threads_joined() -> Iterator[None]:
-    """Wait for the thread of the viewer at the end; without it, the shutdown of Python crashes."""
+    """Wait for the thread of the viewer at the end, because the shutdown of Python otherwise crashes."""
     before = set(threading.enumerate())
     try:
         yield

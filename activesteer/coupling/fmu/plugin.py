@@ -234,7 +234,7 @@ class FmuBlock:
         return self._held
 
     def _when(self) -> str:
-        """The time of the present step, in words."""
+        """The time of the current step, in words."""
         *_, step_s = self._about
         return f", {(self._steps - 1) // self._every * step_s:g} s after its initialisation"
 
@@ -354,7 +354,10 @@ _MAX_KEPT_BYTES: Final = 4_000_000
 
 
 class Fmu:
-    """An FMU from which a driver or controller can be made for any car; `PARAMETERS` as in `activesteer.plugins`."""
+    """An FMU that can become a driver or controller of any car.
+
+    `PARAMETERS` is as in `activesteer.plugins`.
+    """
 
     checks_itself = True
     reads = ()
@@ -480,7 +483,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
 
 def isolated(given: Any, limit_s: float) -> Any:
-    """Return an FMU in its own process. Other blocks are returned unchanged."""
+    """Return an FMU in its own process, or any other block unchanged."""
     if not is_fmu(given):
         return given
     text = os.fspath(given)
