@@ -9,8 +9,8 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from typing import Any, Final, NamedTuple, Protocol
+from contextlib import contextmanager
+from typing import Any, Final
 
 from activesteer.core.conventions import run_looks
 from activesteer.core.units import quantity_of
@@ -35,28 +35,6 @@ _SLOWEST, _FASTEST = 0.01, 100.0
 _LONGEST_CLOSING_S: Final = 5.0
 _TURN_S: Final = 0.4
 """Time constant of the camera's direction behind the car's direction of motion [s]."""
-
-
-class Viewer(Protocol):
-    """Part of the interface of MuJoCo's passive viewer."""
-
-    cam: Any
-
-    def is_running(self) -> bool:
-        """Return whether the window is still open."""
-        ...
-
-    def lock(self) -> AbstractContextManager[Any]:
-        """Return the lock to hold while the scene changes."""
-        ...
-
-    def sync(self) -> None:
-        """Show the present scene."""
-        ...
-
-    def set_texts(self, texts: Any) -> None:
-        """Show text over the picture: font, place, left column, right column; `None` for the default."""
-        ...
 
 
 class FramePacer:
@@ -133,20 +111,6 @@ class Keys:
             self.faster *= 2.0
 
 
-class DriveResult(NamedTuple):
-    """Result of a drive in a window.
-
-    Attributes:
-        simulated_s: Simulated time [s].
-        pictures: Number of pictures shown.
-        finished: Whether the drive finished before the window was closed or the drive was restarted.
-    """
-
-    simulated_s: float
-    pictures: int
-    finished: bool
-
-
 def scene_for(
     simulation: ClosedLoop, maneuver: Maneuver, controller: str = "none", *, cutaway: bool = False
 ) -> RenderScene:
@@ -158,22 +122,21 @@ def scene_for(
     return RenderScene([car], maneuver.course, maneuver.ground)
 
 
-def drive(
-    simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: FramePacer, keys: Keys | None = None
-) -> DriveResult:
+def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Any, pacer: FramePacer, keys: Keys) -> tuple[float, bool]:
     """Drive and show a manoeuvre from start to end, or until the window is closed or the drive is restarted.
 
-    The drawn model is separate from the simulated one: pulling at the car does not affect the simulation.
+    The drawn model is separate from the simulated one: pulling at the car does not affect the simulation. `viewer` is
+    MuJoCo's passive viewer. Return the simulated time [s], and whether the drive reached its end.
     """
     vehicle, timestep_s = simulation.vehicle, simulation.vehicle.timestep_s
     follow = _Follow(simulation)
-    keys = keys or Keys()
     keys.restart = False
-    done = pictures = 0
+    done = 0
     while viewer.is_running() and not keys.restart:
         now_s = done * timestep_s
         if keys.faster != 1.0:
             pacer.speed, keys.faster = min(max(pacer.speed * keys.faster, _SLOWEST), _FASTEST), 1.0
+        # Font and place are the default ones.
         viewer.set_texts((None, None, *_texts(simulation, now_s, pacer.speed, paused=keys.paused)))
         # Under one lock: a picture in between would combine the camera of one instant with the car of another.
         with viewer.lock():
@@ -181,9 +144,8 @@ def drive(
             scene.update()
             follow(viewer.cam, now_s)
             viewer.sync()
-        pictures += 1
         if done >= simulation.steps:
-            return DriveResult(now_s, pictures, finished=True)
+            return now_s, True
         if keys.paused:
             pacer.wait()
             continue
@@ -191,7 +153,7 @@ def drive(
         steps = max(1, min(target, simulation.steps) - done)
         simulation.advance(steps)
         done += steps
-    return DriveResult(done * timestep_s, pictures, finished=False)
+    return done * timestep_s, False
 
 
 class _Follow:
@@ -272,15 +234,13 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
     ):
         pacer = FramePacer(speed)
         while viewer.is_running():
-            driven = drive(simulation, scene, viewer, pacer, keys)
+            simulated_s, finished = drive(simulation, scene, viewer, pacer, keys)
             slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
-            if driven.finished:
-                print(
-                    f"{driven.simulated_s:.1f} s driven{slow}; R drives again, close the window to end", file=sys.stderr
-                )
+            if finished:
+                print(f"{simulated_s:.1f} s driven{slow}; R drives again, close the window to end", file=sys.stderr)
             elif not keys.restart:
-                print(f"closed at {driven.simulated_s:.1f} s{slow}", file=sys.stderr)
-            while driven.finished and viewer.is_running() and not keys.restart:
+                print(f"closed at {simulated_s:.1f} s{slow}", file=sys.stderr)
+            while finished and viewer.is_running() and not keys.restart:
                 time.sleep(0.05)
                 viewer.sync()
             pacer = FramePacer(pacer.speed)
