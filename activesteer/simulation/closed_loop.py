@@ -568,9 +568,6 @@ class ClosedLoop(Uncopyable):
             self._held[-1] = 0.0
         self._stage[0] = native.PASS_ON
 
-    def _check(self) -> None:
-        self.vehicle.check()
-
 
 _ACTS: Final[dict[int, Callable[[ClosedLoop], None]]] = {
     native.NEEDS_BLOCKS: ClosedLoop._load,
@@ -580,7 +577,7 @@ _ACTS: Final[dict[int, Callable[[ClosedLoop], None]]] = {
     native.NEEDS_GAINS: ClosedLoop._prepare,
     native.NEEDS_DRIVER: ClosedLoop._ask_driver,
     native.NEEDS_CONTROLLER: ClosedLoop._ask_controller,
-    native.INSANE: ClosedLoop._check,
+    native.INSANE: lambda loop: loop.vehicle.check(),
 }
 
 

@@ -107,11 +107,6 @@ class Recorder(Uncopyable):
         """Number of recorded rows. A row holds the values at the start of its step."""
         return int(self._tape["rows"][0])
 
-    @property
-    def room(self) -> int:
-        """Number of rows for which the tape has room."""
-        return int(self._tape["room"][0])
-
     def make_room(self) -> None:
         """Take the rows from the tape, and flush a full block."""
         if self.rows - self._flushed == self._block_rows:
