@@ -16,17 +16,11 @@ from activesteer.errors import ManeuverError, ParameterError, nearest_names, sho
 
 
 class Actuator(NamedTuple):
-    """An actuator as faults name it.
+    """An actuator as faults name it."""
 
-    Attributes:
-        members: The engine's actuators that it stands for.
-        unit: Unit of a size, as the suffix of a key.
-        by_ratio: True if its angle is the steering ratio times that of the road wheel; a size is given at the road
-            wheel.
-    """
-
-    members: tuple[str, ...]
-    unit: str = "rad"
+    members: tuple[str, ...]  # the engine's actuators that it stands for
+    unit: str = "rad"  # unit of a size, as the suffix of a key
+    # true if its angle is the steering ratio times that of the road wheel; a size is given at the road wheel
     by_ratio: bool = False
 
     @property

@@ -39,19 +39,12 @@ class Range(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """Origin of a table, for error messages.
+    """Origin of a table, for error messages."""
 
-    Attributes:
-        name: Name of the file, or of a table without a file.
-        text: Text of the file, to find lines in.
-        error: Class of the errors.
-        overridden: Dotted keys whose values came from overrides.
-    """
-
-    name: str
-    text: str = ""
-    error: type[ActiveSteerError] = ParameterError
-    overridden: frozenset[str] = frozenset()
+    name: str  # name of the file, or of a table without a file
+    text: str = ""  # text of the file, to find lines in
+    error: type[ActiveSteerError] = ParameterError  # class of the errors
+    overridden: frozenset[str] = frozenset()  # dotted keys whose values came from overrides
 
     def fail(self, path: Sequence[str], problem: str, value: object = None, allowed: Any = None) -> ActiveSteerError:
         """Return an error with file, line and key."""

@@ -180,15 +180,10 @@ def read_text(
 
 
 class CsvRow(NamedTuple):
-    """Row of a CSV.
+    """Row of a CSV."""
 
-    Attributes:
-        line: Line in the file, from 1.
-        cells: Cells without surrounding blanks.
-    """
-
-    line: int
-    cells: list[str]
+    line: int  # line in the file, from 1
+    cells: list[str]  # cells without surrounding blanks
 
 
 def read_csv(

@@ -33,19 +33,12 @@ KINDS: Final[dict[str, type[Maneuver]]] = {}
 
 
 class NamedFile(NamedTuple):
-    """A key of a manoeuvre that names a file, and the keys beside it that the file fills.
+    """A key of a manoeuvre that names a file, and the keys beside it that the file fills."""
 
-    Attributes:
-        key: The key, as the path of names to it.
-        fills: Keys that it fills, in the same table.
-        read: Function from the file to the values of these keys.
-        folder: Folder of the file among those that are kept with a recording; empty if the values are the whole file.
-    """
-
-    key: tuple[str, ...]
-    fills: tuple[str, ...]
-    read: Callable[[Path], dict[str, Any]]
-    folder: str
+    key: tuple[str, ...]  # the key, as the path of names to it
+    fills: tuple[str, ...]  # keys that it fills, in the same table
+    read: Callable[[Path], dict[str, Any]]  # function from the file to the values of these keys
+    folder: str  # folder of the file among those that are kept with a recording; empty if the values are the whole file
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -163,19 +163,12 @@ _INCOMPATIBLE: Final = 1e-9
 
 
 class Bound(NamedTuple):
-    """Bounds on y of a point that moves with the car.
+    """Bounds on y of a point that moves with the car."""
 
-    Attributes:
-        x_m: Position of the car's centre [m].
-        ahead_m: Distance of the point ahead of the centre, along the path [m].
-        low_m: Least y of the point [m].
-        high_m: Largest y of the point [m].
-    """
-
-    x_m: float
-    ahead_m: float
-    low_m: float
-    high_m: float
+    x_m: float  # position of the car's centre [m]
+    ahead_m: float  # distance of the point ahead of the centre, along the path [m]
+    low_m: float  # least y of the point [m]
+    high_m: float  # largest y of the point [m]
 
 
 def least_jerk(start_x_m: float, end_x_m: float, end_y_m: float, bounds: Sequence[Bound]) -> BSpline:

@@ -72,23 +72,14 @@ _LICENSES: Final = (
 
 
 class Export(NamedTuple):
-    """A car in the form in which it is exported.
+    """A car in the form in which it is exported."""
 
-    Attributes:
-        name: Name of the vehicle.
-        variables: Its variables; the value reference is the place.
-        token: Digest of everything that decides its behaviour.
-        library: The shared library.
-        engine: The engine's library beside it, and its name.
-        timestep_s: Length of a step [s].
-    """
-
-    name: str
-    variables: list[Variable]
-    token: str
+    name: str  # of the vehicle
+    variables: list[Variable]  # its variables; the value reference is the place
+    token: str  # digest of everything that decides its behaviour
     library: bytes
-    engine: tuple[str, bytes]
-    timestep_s: float
+    engine: tuple[str, bytes]  # the engine's library beside it, and its name
+    timestep_s: float  # length of a step [s]
 
 
 def export_fmu(scenario: Scenario, path: Path, version: int = 2) -> Export:
