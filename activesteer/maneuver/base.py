@@ -244,22 +244,10 @@ _ROAD_FILES: Final = (
 def with_files(
     kind: type[Maneuver], table: Mapping[str, Any], folder: Path | None, source: Source
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Fill the values of the files that a manoeuvre names into its table.
+    """Return a table with the values of the files that it names, and the CSV files, to be kept with the recording.
 
-    A table without a file may have both the name of a file and values. It comes from a recording, and the values are
-    those that were read then, unless an override names another file.
-
-    Args:
-        kind: Class of the manoeuvre.
-        table: The table.
-        folder: Folder of the manoeuvre file; None for a table that has no file.
-        source: For error messages.
-
-    Returns:
-        The table, and the CSV files by their names, to be kept with the recording.
-
-    Raises:
-        ManeuverError: a file is not found or wrong, or a manoeuvre file gives the values too.
+    A table without a file has no `folder`, and may have both the name of a file and values. It comes from a recording,
+    and the values are those that were read then, unless an override names another file.
     """
     filled, files = dict(table), {}
     for key, fills, read, kept in (*kind.FILES, *_ROAD_FILES):

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, Final
 
 from activesteer.config import Range
 from activesteer.core.signals import Setpoint, new_message
@@ -25,24 +25,9 @@ _Ramp = Annotated[float, Range(0.0, 60.0)]
 _SENSES: Final = ("above", "below", "within")
 
 
-class Seen(NamedTuple):
-    """State of the car that ends a phase.
-
-    Attributes:
-        yaw_rate_radps: Yaw rate, left positive [rad/s].
-        roll_rate_radps: Roll rate, positive when the left side rises [rad/s].
-        ay_mps2: Lateral acceleration, left positive [m/s2].
-        speed_mps: Speed along the heading [m/s].
-        x_m: World x of the centre of gravity [m].
-        y_m: World y, left positive [m].
-    """
-
-    yaw_rate_radps: float
-    roll_rate_radps: float
-    ay_mps2: float
-    speed_mps: float
-    x_m: float
-    y_m: float
+SEEN: Final = ("yaw_rate_radps", "roll_rate_radps", "ay_mps2", "speed_mps", "x_m", "y_m")
+"""State of the car that ends a phase: yaw rate, left positive; roll rate, positive when the left side rises; lateral
+acceleration, left positive; speed along the heading; place of the centre of gravity in the world."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +69,9 @@ class Until:
 
     @cached_property
     def conditions(self) -> tuple[tuple[int, str, float], ...]:
-        """Conditions on the car: place in `Seen`, sense, and value."""
+        """Conditions on the car: place in `SEEN`, sense, and value."""
         found = []
-        for place, name in enumerate(Seen._fields):
+        for place, name in enumerate(SEEN):
             stem, _, unit = name.rpartition("_")
             for sense in _SENSES:
                 value = getattr(self, f"{stem}_{sense}_{unit}", None)
@@ -187,7 +172,7 @@ class Phases(Maneuver, kind="phases"):
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Setpoint of phases that end by their times and inputs alone. A run uses `sequence`."""
-        sequence, never = self.sequence(), (math.nan,) * len(Seen._fields)
+        sequence, never = self.sequence(), (math.nan,) * len(SEEN)
         while True:
             setpoint = sequence.setpoint(time_s, never)
             if not sequence.moved:
@@ -256,11 +241,9 @@ class PhaseSequence:
         return self.maneuver.phases[self._number % len(self.maneuver.phases)]
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the driver. Go on to the next phase if this one has ended.
+        """Return the setpoint for the driver at a time [s] and a state of the car, in the order of `SEEN`.
 
-        Args:
-            time_s: Time since the start of the recording [s].
-            seen: State of the car, in the order of `Seen`.
+        Go on to the next phase if this one has ended.
         """
         self.moved = False
         maneuver, until, elapsed_s = self.maneuver, self._phase.until, time_s - self._begin_s
@@ -295,7 +278,7 @@ def _along(ramp: tuple[float, float, float], elapsed_s: float) -> float:
 
 
 def seen_of(measurement: Any, motion: Any, roll_rate_radps: float) -> tuple[float, ...]:
-    """Return the state of the car in the order of `Seen`, from the true measurement and motion."""
+    """Return the state of the car in the order of `SEEN`, from the true measurement and motion."""
     return (
         motion.yaw_rate_radps, roll_rate_radps, measurement.ay_mps2, motion.speed_mps, motion.x_m, motion.y_m
     )  # fmt: skip
