@@ -240,10 +240,6 @@ class Road:
         grids = [part.grid() for part in (self.roughness, self.heights) if part is not None]
         return summed(*grids) if len(grids) > 1 else grids[0] if grids else None
 
-    def cross_slopes(self) -> tuple[float, float, Array] | None:
-        """Return first distance, step [m] and cross slopes of `banking`, or None without it."""
-        return None if self.banking is None else self.banking.sampled()
-
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
         """Return world x and y of places along and to the left of the middle of the road [m]."""
         return s_m, d_m
