@@ -209,16 +209,6 @@ def read_csv(
     return rows
 
 
-def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, column: str) -> float:
-    """Return the number in a cell of a CSV."""
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    limits.check_number(value, error, text=cell, file=file, line=line, key=column)
-    return value
-
-
 def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:
     """Create a folder with its parents if needed, and return its path."""
     folder = Path(path)

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 from activesteer.config import Range, Source, build, field_in_unit, find_file
 from activesteer.config.faults import Fault, check_faults
 from activesteer.core import limits
-from activesteer.core.files import csv_number, is_file, read_bytes, read_csv
+from activesteer.core.files import is_file, read_bytes, read_csv
 from activesteer.core.signals import Setpoint, new_message
 from activesteer.errors import ManeuverError, nearest_names, shown
 from activesteer.road.course import Course
@@ -195,14 +195,12 @@ def read_columns(
                 key=name,
                 allowed=(*required, *optional),
             )
-    columns: dict[str, list[float]] = {
-        name: [
-            csv_number(row.cells[place] if place < len(row.cells) else "", ManeuverError, path.name, row.line, given)
-            * factor
-            for row in rows
-        ]
-        for name, (place, given, factor) in places.items()
-    }
+    columns: dict[str, list[float]] = {name: [] for name in places}
+    for name, (place, given, factor) in places.items():
+        for row in rows:
+            cell = row.cells[place] if place < len(row.cells) else ""
+            number = limits.number_in(cell, ManeuverError, file=path.name, line=row.line, key=given)
+            columns[name].append(number * factor)
     return columns, [row.line for row in rows]
 
 

@@ -344,7 +344,6 @@ def _revived(fmu: Fmu, setup: Any, parameters: Mapping[str, Any], content: bytes
     return block
 
 
-ENDING: Final = ".fmu"
 ISOLATE: Final = "isolate"
 _ISOLATE_RANGE: Final = (0.001, 3600.0)
 _MESSAGES: Final = {"controller": (DriverCommand, Measurement), "driver": (Setpoint, Measurement, Motion)}
@@ -456,11 +455,6 @@ def _grouped(links: Sequence[Link]) -> list[Group]:
     return [Group(*key, [v.reference for v in part], sum(v.size for v in part)) for key, part in groups]
 
 
-def is_fmu(given: Any) -> bool:
-    """Return whether a block is given as an FMU."""
-    return isinstance(given, (str, os.PathLike)) and os.fspath(given).partition("?")[0].lower().endswith(ENDING)
-
-
 def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
     """Read an FMU as a controller or driver.
 
@@ -481,7 +475,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
 def isolated(given: Any, limit_s: float) -> Any:
     """Return an FMU in its own process. Other blocks are returned unchanged."""
-    if not is_fmu(given):
+    text = os.fspath(given) if isinstance(given, (str, os.PathLike)) else ""
+    if not text.partition("?")[0].lower().endswith(".fmu"):
         return given
-    text = os.fspath(given)
     return f"{text}{'&' if '?' in text else '?'}{ISOLATE}={limit_s:g}"
