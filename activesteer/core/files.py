@@ -54,27 +54,20 @@ def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) ->
             yield target
             return
         part = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}.part{target.suffix}")
-        with temporary_file(part):
+        _passing.add(part)
+        try:
             yield part
             if target.exists():
                 part.chmod(target.stat().st_mode & 0o777)
             part.replace(target)
-
-
-@contextmanager
-def temporary_file(part: Path) -> Iterator[None]:
-    """Context around the writing of a temporary file. Deletes the file if it still exists at the end."""
-    _passing.add(part)
-    try:
-        yield
-    finally:
-        with suppress(OSError):  # where it cannot be deleted, the error of the writing itself says why
-            part.unlink(missing_ok=True)
-        _passing.discard(part)
+        finally:
+            with suppress(OSError):  # where it cannot be deleted, the error of the writing itself says why
+                part.unlink(missing_ok=True)
+            _passing.discard(part)
 
 
 def delete_temporary_files() -> None:
-    """Delete all temporary files of `temporary_file`, before the process ends without unwinding."""
+    """Delete all temporary files of `atomic_write`, before the process ends without unwinding."""
     for part in tuple(_passing):
         with suppress(OSError):
             part.unlink(missing_ok=True)

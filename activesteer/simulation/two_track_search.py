@@ -33,6 +33,10 @@ _STEADY_S: Final = ((2.0, 2.5), (4.5, 5.0))
 _STEPS_S: Final = (0.0, 0.5, 0.7, 2.5, 2.9, 5.0)
 _PEDAL: Final = 0.3
 _BRAKING_S: Final = (1.5, 2.5)
+_BRAKING: Final = {
+    "kind": "open_loop", "name": "braking", "speed_mps": 100.0 / 3.6, "duration_s": _BRAKING_S[1],
+    "brake": {"time_s": [0.0, 0.3, _BRAKING_S[1]], "pedal": [0.0, _PEDAL, _PEDAL]},
+}  # fmt: skip
 _EVERY: Final = 10
 """Rows between two samples of the fit."""
 
@@ -65,7 +69,7 @@ def two_track_of(vehicle: FileOrTable, run: Run, overrides: Mapping[str, Any] | 
         roll_frequency_Hz=frequency_Hz,
         roll_damping=damping,
         roll_arm_m=max(0.0, (height_m - float(body.cg_m[2])) / (GRAVITY_MPS2 * gradient)),
-        pitch_gradient_radpmps2=_pitch_gradient(run(resolve(_braking(), vehicle, overrides))),
+        pitch_gradient_radpmps2=_pitch_gradient(run(resolve(_BRAKING, vehicle, overrides))),
         wheel_inertia_kgm2=float(car.model.body_inertia[wheels].max(axis=1).mean()),  # about the axis
     )
 
@@ -79,13 +83,6 @@ def _steps(vehicle: FileOrTable, overrides: Mapping[str, Any] | None) -> dict[st
     return {
         "kind": "open_loop", "name": "steps", "speed_mps": _SPEED_MPS, "duration_s": _STEPS_S[-1],
         "steering": {"time_s": list(_STEPS_S), "steering_wheel_rad": angles_rad},
-    }  # fmt: skip
-
-
-def _braking() -> dict[str, Any]:
-    return {
-        "kind": "open_loop", "name": "braking", "speed_mps": 100.0 / 3.6, "duration_s": _BRAKING_S[1],
-        "brake": {"time_s": [0.0, 0.3, _BRAKING_S[1]], "pedal": [0.0, _PEDAL, _PEDAL]},
     }  # fmt: skip
 
 

@@ -203,11 +203,6 @@ def _seeds(loop: ClosedLoop) -> bytes:
     return table.tobytes()
 
 
-def _sensor_places(model: mujoco.MjModel) -> list[int]:
-    """Return the places of the sensors of `PLACES` in the engine's sensor data."""
-    return [sensor_columns(model, name).start + (2 if name.endswith("_position") else 0) for name in PLACES]
-
-
 def _numbers(values: Any) -> str:
     return ", ".join(str(int(value)) if isinstance(value, int) else _real(float(value)) for value in values)
 
@@ -264,6 +259,7 @@ def _data(
     base = dict(zip(COMMANDS, (*numbers_in(DriverCommand()), *numbers_in(ActuatorCommand())), strict=True))
     base["front_steer_demand_rad"] = 0.0
     stride = fb.WHEEL.itemsize // 8
+    places = [sensor_columns(model, name).start + (2 if name.endswith("_position") else 0) for name in PLACES]
     arrays: dict[str, tuple[str, Any]] = {
         "COMMANDS": ("double", base.values()),
         "COMMAND_INPUTS": ("int", [COMMANDS.index(name) for name in CARRIED_OUT]),
@@ -273,7 +269,7 @@ def _data(
         "TYRES": ("int", [tyres + wheel * (TYRE_RECORD.itemsize // 8) for wheel in range(4)]),
         "TORQUE_PER_PRESSURE": ("double", setup["torque_per_pressure_NmpPa"]),
         "RADIUS_M": ("double", setup["rolling_radius_m"]),
-        "SENSOR_PLACES": ("int64_t", _sensor_places(model)),
+        "SENSOR_PLACES": ("int64_t", places),
         "DESIGN": ("double", [*design_heights_m(model), vehicle.parameters.steering.ratio]),
         "BIAS_RMS": ("double", [0.0] if sensors is None else sensors.bias_rms),
     }  # fmt: skip
