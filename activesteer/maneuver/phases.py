@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 from activesteer.config import Range
 from activesteer.core.signals import Setpoint, new_message
@@ -25,9 +25,15 @@ _Ramp = Annotated[float, Range(0.0, 60.0)]
 _SENSES: Final = ("above", "below", "within")
 
 
-SEEN: Final = ("yaw_rate_radps", "roll_rate_radps", "ay_mps2", "speed_mps", "x_m", "y_m")
-"""State of the car that ends a phase: yaw rate, left positive; roll rate, positive when the left side rises; lateral
-acceleration, left positive; speed along the heading; place of the centre of gravity in the world."""
+class Seen(NamedTuple):
+    """State of the car that ends a phase."""
+
+    yaw_rate_radps: float  # left positive
+    roll_rate_radps: float  # positive when the left side rises
+    ay_mps2: float  # left positive
+    speed_mps: float  # along the heading
+    x_m: float  # of the centre of gravity, in the world
+    y_m: float  # left positive
 
 
 @dataclass(frozen=True)
@@ -69,9 +75,9 @@ class Until:
 
     @cached_property
     def conditions(self) -> tuple[tuple[int, str, float], ...]:
-        """Conditions on the car: place in `SEEN`, sense, and value."""
+        """Conditions on the car: place in `Seen`, sense, and value."""
         found = []
-        for place, name in enumerate(SEEN):
+        for place, name in enumerate(Seen._fields):
             stem, _, unit = name.rpartition("_")
             for sense in _SENSES:
                 value = getattr(self, f"{stem}_{sense}_{unit}", None)
@@ -172,7 +178,7 @@ class Phases(Maneuver, kind="phases"):
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Setpoint of phases that end by their times and inputs alone. A run uses `sequence`."""
-        sequence, never = self.sequence(), (math.nan,) * len(SEEN)
+        sequence, never = self.sequence(), (math.nan,) * len(Seen._fields)
         while True:
             setpoint = sequence.setpoint(time_s, never)
             if not sequence.moved:
@@ -241,7 +247,7 @@ class PhaseSequence:
         return self.maneuver.phases[self._number % len(self.maneuver.phases)]
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the driver at a time [s] and a state of the car, in the order of `SEEN`.
+        """Return the setpoint for the driver at a time [s] and a state of the car, in the order of `Seen`.
 
         Go on to the next phase if this one has ended.
         """
@@ -278,7 +284,7 @@ def _along(ramp: tuple[float, float, float], elapsed_s: float) -> float:
 
 
 def seen_of(measurement: Any, motion: Any, roll_rate_radps: float) -> tuple[float, ...]:
-    """Return the state of the car in the order of `SEEN`, from the true measurement and motion."""
+    """Return the state of the car in the order of `Seen`, from the true measurement and motion."""
     return (
         motion.yaw_rate_radps, roll_rate_radps, measurement.ay_mps2, motion.speed_mps, motion.x_m, motion.y_m
     )  # fmt: skip

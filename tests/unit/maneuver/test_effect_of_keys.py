@@ -57,7 +57,7 @@ def seen(maneuver: Maneuver) -> str:
 
 
 def _waves(time_s: float) -> tuple[float, ...]:
-    """Return a motion that passes every condition of a phase again and again, in the order of `SEEN`."""
+    """Return a motion that passes every condition of a phase again and again, in the order of `Seen`."""
     up = np.sin(3.0 * time_s)
     return (0.5 * up, 0.2 * up, 5.0 * up, 10.0 + 10.0 * up, 20.0 * time_s, 3.0 * up)
 
