@@ -41,6 +41,7 @@ class FramePacer:
     """Keeper of simulated time to the time of a clock.
 
     Attributes:
+        speed: Simulated seconds per second of the clock.
         lost_s: Delay of the drive behind the clock so far [s of the clock].
     """
 
@@ -51,18 +52,13 @@ class FramePacer:
         sleep: Callable[[float], object] = time.sleep,
     ) -> None:
         """Take a clock, which starts with the first picture."""
-        self._speed, self._clock, self._sleep = speed, clock, sleep
+        self.speed, self._clock, self._sleep = speed, clock, sleep
         self._start_s: float | None = None
         self.lost_s = 0.0
 
-    @property
-    def speed(self) -> float:
-        """Simulated seconds per second of the clock. A new value holds from the next picture on."""
-        return self._speed
-
-    @speed.setter
-    def speed(self, speed: float) -> None:
-        self._speed, self._start_s = speed, None
+    def change_speed(self, factor: float) -> None:
+        """Change the speed by a factor, from the next picture on."""
+        self.speed, self._start_s = min(max(self.speed * factor, _SLOWEST), _FASTEST), None
 
     def wait(self) -> None:
         """Wait for the time of one picture without simulated time."""
@@ -73,8 +69,8 @@ class FramePacer:
         """Wait until the next picture is due."""
         now_s = self._clock()
         if self._start_s is None:
-            self._start_s = now_s - shown_s / self._speed
-        passed_s = now_s - self._start_s - shown_s / self._speed
+            self._start_s = now_s - shown_s / self.speed
+        passed_s = now_s - self._start_s - shown_s / self.speed
         if passed_s < FRAME_S:
             self._sleep(FRAME_S - passed_s)
             passed_s = FRAME_S
@@ -82,7 +78,7 @@ class FramePacer:
             self._start_s += passed_s - _MAX_S
             self.lost_s += passed_s - _MAX_S
             passed_s = _MAX_S
-        return shown_s + passed_s * self._speed
+        return shown_s + passed_s * self.speed
 
 
 class Keys:
@@ -135,7 +131,8 @@ def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Any, pacer: FrameP
     while viewer.is_running() and not keys.restart:
         now_s = done * timestep_s
         if keys.faster != 1.0:
-            pacer.speed, keys.faster = min(max(pacer.speed * keys.faster, _SLOWEST), _FASTEST), 1.0
+            pacer.change_speed(keys.faster)
+            keys.faster = 1.0
         # Font and place are the default ones.
         viewer.set_texts((None, None, *_texts(simulation, now_s, pacer.speed, paused=keys.paused)))
         # Under one lock: a picture in between would combine the camera of one instant with the car of another.
