@@ -64,7 +64,7 @@ class Source:
         key = ".".join(path)
         overridden = any(key == other or key.startswith(other + ".") for other in self.overridden)
         # A key in an inline table or a list has no line of its own.
-        line = next((found for end in range(len(path), 0, -1) if (found := self._line_of(path[:end]))), None)
+        line = next((found for end in range(len(path), 0, -1) if (found := self.line_of(path[:end]))), None)
         return self.error(
             problem, file=self.name, line=line, key=key or None, value=value, allowed=allowed, overridden=overridden
         )
@@ -74,7 +74,7 @@ class Source:
         inner = reason.key.split(".") if reason.key else ()
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
-    def _line_of(self, path: Sequence[str]) -> int | None:
+    def line_of(self, path: Sequence[str]) -> int | None:
         """Return the line of a key in the text. Tomllib does not keep it."""
         wanted = ".".join(path)
         table = ""
