@@ -367,14 +367,12 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
             raise source.fail(where, f"{first} and {key} are the same key in two units; give one of them")
         values[name] = convert(hints[name], raw, factor, source, where, _default_of(fields[name]))
     for name, field in fields.items():
-        if name in values or field.default is not dataclasses.MISSING:
+        has_default = field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
+        if name in values or has_default:
             continue
-        if field.default_factory is not dataclasses.MISSING:
-            continue
-        if base is not None:
-            values[name] = getattr(base, name)
-            continue
-        raise source.fail((*path, name), f"the key {' or '.join(spellings(name))} is missing")
+        if base is None:
+            raise source.fail((*path, name), f"the key {' or '.join(spellings(name))} is missing")
+        values[name] = getattr(base, name)
     try:
         return cls(**values)
     except ActiveSteerError as reason:  # from checks of the class, which do not know the file
