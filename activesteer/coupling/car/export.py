@@ -43,7 +43,6 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.brakes.records import BRAKE_SETUP
 from activesteer.vehicle.channels.corners import design_heights_m
 from activesteer.vehicle.channels.native_channels import Actuator, AxialForce
 from activesteer.vehicle.faults import part_of
@@ -255,7 +254,6 @@ def _data(
         **{f"TYRE_{name}": offset(TYRE_RECORD, name) // 8 for name in ("LMUX", "LMUY", "LKY", "LKX")},
         "CHASSIS": chassis, "CG_SITE": model.site("cg").id, "SETTLING_STEPS": round(_SETTLING_S / vehicle.timestep_s),
     }  # fmt: skip
-    assert BRAKE_SETUP.fields is not None
     base = dict(zip(COMMANDS, (*numbers_in(DriverCommand()), *numbers_in(ActuatorCommand())), strict=True))
     base["front_steer_demand_rad"] = 0.0
     stride = fb.WHEEL.itemsize // 8
