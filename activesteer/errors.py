@@ -17,7 +17,9 @@ _GAP: Final = " ... "
 
 
 class ActiveSteerError(Exception):
-    """Base of every error that activesteer raises on purpose. Its message is one line, made from its attributes.
+    """Base of every error that activesteer raises on purpose.
+
+    Its message is one line, made from its attributes.
 
     Attributes:
         problem: The problem and its remedy.
@@ -77,7 +79,7 @@ class DriverError(ActiveSteerError):
 
 
 class SimulationDiverged(ActiveSteerError):  # noqa: N818 - an event of the physics, named as one
-    """The state became non-finite, or the engine raised a warning. The recording so far is kept."""
+    """A non-finite state or a warning of the engine, with the recording so far."""
 
 
 class RecordingError(ActiveSteerError):

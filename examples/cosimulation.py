@@ -48,7 +48,7 @@ def steering_wheel_rad(time_s):
 
 
 def made_fmus(folder):
-    """Export the car and compile the controller; return both FMUs."""
+    """Export the car, compile the controller, and return both FMUs."""
     build = runpy.run_path(str(HERE / "fmu" / "build.py"))["build"]
     controller = build(HERE / "fmu" / "paper_afs.c", 2, folder)
     export_fmu(resolve("straight_line", "compact", CAR), folder / "car.fmu")
@@ -56,7 +56,7 @@ def made_fmus(folder):
 
 
 def single_process(delay_s=0.0):
-    """Drive the car with the built-in controller; return the results and the processor time of a step."""
+    """Drive the car with the built-in controller, and return the results and the processor time of a step."""
     overrides = {**CAR, "controllers.bus_delay_s": delay_s}
     simulation = activesteer.Simulation("straight_line", "afs", overrides=overrides)
     drive_nm, began = simulation.loop.commands[0].drive_torque_demand_Nm, time.process_time()
@@ -107,7 +107,7 @@ class Slave:
 
 
 def coupled(car_path, controller_path, exchange_s, *, delayed):
-    """Couple both FMUs; return the results and the processor time of a millisecond.
+    """Couple both FMUs, and return the results and the processor time of a millisecond.
 
     Args:
         car_path: FMU of the car.

@@ -1,4 +1,4 @@
-"""Make a car of your own in two ways: change keys of the compact, and build a car from a table of hardpoints.
+"""Build your own car in two ways: change keys of the compact, and start from a table of hardpoints.
 
     python examples/own_car.py
 

@@ -1,4 +1,4 @@
-"""Compare a controller of your own, a yaw damper for the rear wheels, with no control and the built-in rear steering.
+"""Compare your own controller, a yaw damper for the rear wheels, with no control and the built-in rear steering.
 
     python examples/own_controller.py
     activesteer run sine_with_dwell -c none -c "examples/own_controller.py:YawDamper?gain_s=0.05"
@@ -16,14 +16,14 @@ class YawDamper:
     """Steer the rear wheels in the direction of every fast change of the yaw rate, but not of a steady yaw rate."""
 
     def __init__(self, setup, gain_s=0.05, washout_s=0.3):
-        """Take the car's data from `setup`; the other arguments are your own parameters."""
+        """Take the car's data from `setup`, and your own parameters from the other arguments."""
         self.gain_s = gain_s
         self.fraction = setup.timestep_s / washout_s  # of a first-order low-pass filter, per step
         self.limit_rad = math.radians(3.0)  # stop of the rear steering hinge
         self.lasting_radps = 0.0
 
     def step(self, command, measurement):
-        """Return the actuator command; called every millisecond with the driver's command and the measurement."""
+        """Return the actuator command for the driver's command and the measurement, every millisecond."""
         quick_radps = measurement.yaw_rate_radps - self.lasting_radps
         self.lasting_radps += self.fraction * quick_radps
         wanted_rad = self.gain_s * quick_radps

@@ -1,4 +1,4 @@
-"""Drive the double lane change with a driver of your own, who steers towards one point ahead (pure pursuit).
+"""Drive the double lane change with your own driver, who steers towards one point ahead (pure pursuit).
 
     python examples/own_driver.py
     activesteer run double_lane_change --driver "examples/own_driver.py:PurePursuit?preview_s=0.5"
@@ -27,7 +27,7 @@ class PurePursuit:
         self.travelled_m = 0.0
 
     def step(self, setpoint, measurement, motion):
-        """Return the driver's command; called every millisecond with setpoint, measurement and motion of the car."""
+        """Return the driver's command for setpoint, measurement and motion of the car, every millisecond."""
         if setpoint.path is None:  # the car still settles, or the manoeuvre gives the steering wheel angle itself
             return self.robot.step(setpoint, measurement, motion)
         search = PathSearch(setpoint.path)

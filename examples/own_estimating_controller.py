@@ -1,4 +1,4 @@
-"""Control the sideslip angle with a controller of your own that takes the angle from an estimator.
+"""Control the sideslip angle with your own controller, which takes the angle from an estimator.
 
     python examples/own_estimating_controller.py
     activesteer run step_steer -c "examples/own_estimating_controller.py:SideslipDamper?gain=0.4"
@@ -21,7 +21,7 @@ class SideslipDamper:
         self.gain, self.limit_rad = gain, math.radians(limit_deg)
 
     def step(self, command, measurement):
-        """Return the actuator command; called every millisecond, and the estimator with it."""
+        """Advance the estimator and return the actuator command, every millisecond."""
         estimate = self.estimator.step(measurement)
         # Rear wheels steered to the right stop a car that slides to the left of its heading.
         wanted_rad = -self.gain * estimate.sideslip_rad

@@ -1,4 +1,4 @@
-"""Drive a car in a loop of your own with your own commands: from 10 to 15 m/s, and into a left turn of 50 m radius.
+"""Drive a car in your own loop with your own commands: from 10 to 15 m/s, and into a left turn of 50 m radius.
 
     python examples/own_loop.py
 

@@ -1,4 +1,4 @@
-"""Drive a manoeuvre of your own, made in Python, at several speeds: a bend that tightens (clothoid).
+"""Drive your own manoeuvre, written in Python, at several speeds: a bend that tightens (clothoid).
 
     python examples/own_manoeuvre.py
 

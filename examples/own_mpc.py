@@ -1,4 +1,4 @@
-"""Steer both axles by model predictive control within an envelope, with a controller and a solver of your own.
+"""Steer both axles by model predictive control within an envelope, with your own controller and solver.
 
     pip install "activesteer[control]"
     python examples/own_mpc.py
@@ -39,7 +39,7 @@ class EnvelopeMpc:
     interval_s = 0.01
 
     def __init__(self, setup, yaw_rate_scale_degps=1.0, sideslip_scale_deg=0.35, change_scale_deg=5.0):
-        """Take the car, its tyres and its servos from `setup`; the scales are errors that cost the same."""
+        """Take the car, its tyres and its servos from `setup`, and scales of errors that cost the same."""
         self.car, self.timestep_s, self.servos = setup.single_track, setup.timestep_s, setup.gains.servos
         self.estimator, tyres = setup.estimator(), setup.estimation.tyres
         arms_m = self.car.cg_to_rear_m, self.car.cg_to_front_m  # the other axle's arm gives the load
@@ -53,7 +53,7 @@ class EnvelopeMpc:
         self.before_rad, self.lagged_rad = np.zeros(2), 0.0
 
     def step(self, command, measurement):
-        """Return both angles; called every 10 ms."""
+        """Return both angles, every 10 ms."""
         now = self.estimator.step(measurement)
         speed_mps, driver_rad = now.speed_mps, command.front_steer_demand_rad
         if speed_mps < 2.0:
@@ -140,7 +140,7 @@ def curve(tyre, load_N):
 
 
 def secant(angles_rad, forces, slip_rad):
-    """Return force over slip angle, 1 at zero slip angle."""
+    """Return force versus slip angle, 1 at zero slip angle."""
     size_rad = max(abs(slip_rad), 1e-6)
     return max(np.interp(size_rad, angles_rad, forces) / size_rad, 0.1)
 
@@ -174,7 +174,7 @@ def single_track(car, speed_mps, softer, offset_rad=0.0):
 
 
 def discrete(a, b, c, lag_s, timestep_s):
-    """Return the model from one call to the next; states: yaw rate, sideslip, both angles, the driver's angle."""
+    """Return the model from one call to the next, for yaw rate, sideslip, both angles and the driver's angle."""
     whole = np.zeros((8, 8))
     whole[:2, :2], whole[:2, 2:4], whole[:2, 4], whole[:2, 7] = a, b, b[:, 0], c
     whole[2:4, 2:4], whole[2:4, 5:7] = -np.eye(2) / lag_s, np.eye(2) / lag_s

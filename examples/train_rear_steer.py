@@ -48,7 +48,7 @@ TRAINING, EVALUATION, FINAL = 1, 1001, 2001
 
 
 def features(front_rad: Any, measurement: Any, memory: Any) -> Any:
-    """Return what the policy sees, in units in which each number is about one; arrays or numbers.
+    """Return what the policy sees, arrays or numbers, in units in which each number is about one.
 
     All of them are errors of the car. A part of the driver's angle, of the yaw rate or of the lateral acceleration
     would fit the cars of the training, and harm others: 0.15 deg of rear angle per 2.9 deg of the driver changes the

@@ -95,7 +95,7 @@ def drifts(news: Metrics, olds: Metrics) -> list[Drift]:
 
 
 def read_baseline(path: Path = BASELINE) -> dict[Run, dict[str, float]]:
-    """Return the stored baseline. Null stands for nan."""
+    """Return the stored baseline, nan for null."""
     try:
         return {
             (maneuver, controller): {

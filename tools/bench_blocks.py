@@ -29,7 +29,7 @@ _ROUNDS: Final = 5
 
 
 def blocks(scenario: Scenario) -> dict[str, float]:
-    """Measure each block of the loop on its own, in the order of the data. The vehicle writes the rows."""
+    """Measure each block of the loop on its own, in the order of the data, with rows that the vehicle writes."""
     loop = ClosedLoop(scenario, "ars")
     vehicle = loop.vehicle
     measurement, motion, setpoint = vehicle.measure(), vehicle.motion(), loop.maneuver.setpoint(0.6)
@@ -96,7 +96,7 @@ class DrivenStop:
 
 @compiled
 def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
-    """Step sensors and brakes as `native_step.step` does. Return the number of steps with reduced pressure."""
+    """Step sensors and brakes as `native_step.step` does, and return the number of steps with reduced pressure."""
     asked_Nm, held = np.zeros(4), 0
     for row in rows:
         speeds = memory[WHEEL_SPEEDS : WHEEL_SPEEDS + 4]

@@ -45,7 +45,7 @@ TRACK_HARM_M: Final = 0.10
 
 
 class Target(NamedTuple):
-    """Verdict on a target of a controller. The text holds the target and the result."""
+    """Verdict on a target of a controller, with the target and the result as text."""
 
     controller: str
     text: str
@@ -267,7 +267,7 @@ def compare(
 
 
 def _entry_speed(vehicle: FileOrTable, controller: str, seed: int) -> float:
-    """Return the highest speed at which a car stays in the severe lane change, by bisection [m/s], or nan for none."""
+    """Return the highest speed of a car that stays in the severe lane change, by bisection [m/s], or nan for none."""
     changes = SENSORS | ENTRY_LINE | {"sensors.seed": seed}
     course = resolve(_LANE_CHANGE, vehicle, changes, ENTRY_DRIVER, [controller]).maneuver.course
     assert course is not None
@@ -343,7 +343,7 @@ def comparison_text(found: Population) -> str:
 
 
 def shown_growth(name: str, growth: float) -> str:
-    """Return the growth of a measure in its unit. `lost` where only the car without control gets so far."""
+    """Return the growth of a measure in its unit, or `lost` where only the car without control gets so far."""
     unit = UNITS[name]
     return f"{growth * unit.factor:+.2f} {unit.name}".rstrip() if math.isfinite(growth) else "undefined"
 
@@ -405,7 +405,7 @@ def comparison_figure(made: Comparison) -> Figure:
 
 
 def _shade(metric: str, value: float, first: float) -> float:
-    """Return how much better a value is than the first controller's, 1 at a factor of `_RANGE`. Worse is below 0."""
+    """Return how much better a value is than the first controller's: 1 at a factor of `_RANGE`, below 0 if worse."""
     change = significance(metric, value, first)
     if change not in (Change.BETTER, Change.WORSE):
         return 0.0 if math.isfinite(value) else math.nan

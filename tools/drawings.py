@@ -102,7 +102,7 @@ class Drawing:
         self.dot(x, y, radius_m * self._scale, fill)
 
     def text(self, x: float, y: float, words: str, colour: str = INK, anchor: str = "start") -> None:
-        """A word. `words` may hold SVG."""
+        """A word, for which `words` may hold SVG."""
         tx, ty = self._at(x, y)
         self.parts.append(f'<text x="{tx}" y="{ty}" fill="{colour}" text-anchor="{anchor}">{words}</text>')
 

@@ -99,7 +99,7 @@ def sine_with_dwell(
 
 
 def passes(row: Mapping[str, float]) -> bool:
-    """Return whether a sine with dwell keeps the limits. The displacement counts at all amplitudes."""
+    """Return whether a sine with dwell keeps the limits, the displacement at all amplitudes."""
     ratio_1000ms, ratio_1750ms, displacement_m = LIMITS
     return (
         abs(row["ratio_1000ms"]) <= ratio_1000ms

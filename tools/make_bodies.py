@@ -83,7 +83,7 @@ SALOON: Final = Shape(
 
 
 def line(points: Sequence[tuple[float, float]]) -> Callable[[Array], Array]:
-    """Straight from point to point. X of the points falls."""
+    """Straight lines from point to point, with falling x."""
     x, y = np.array(points[::-1]).T
     return lambda at: np.interp(at, x, y)
 
@@ -156,7 +156,7 @@ def colours(shape: Shape, x: Array) -> NDArray[np.str_]:
 
 
 def normals_of(vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Normals of vertices, those of the faces around each weighted with their area."""
+    """Normals of vertices, as the normals of the faces around each weighted with their area."""
     a, b, c = (vertices[faces[:, number]] for number in range(3))
     across = np.cross(b - a, c - a)
     found = np.zeros_like(vertices)
@@ -173,7 +173,7 @@ def mirrored(mesh: Mesh) -> Mesh:
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
-    """Several meshes as one. Vertices that no face uses are left out."""
+    """Several meshes as one, without vertices that no face uses."""
     start, faces = 0, []
     for mesh in meshes:
         faces.append(mesh[2] + start)
@@ -200,7 +200,7 @@ def surface(points: Array) -> Mesh:
 
 
 def ellipsoid(centre: Sequence[float], size: Sequence[float], power: float = 0.5) -> Mesh:
-    """A rounded block. Of power 1 it is an ellipsoid, of less it has more of a block."""
+    """A rounded block, for a power of 1 an ellipsoid, below it more of a block."""
     across, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 13), np.linspace(-0.5 * np.pi, 0.5 * np.pi, 7))
 
     def rounded(value: Array) -> Array:
@@ -273,7 +273,7 @@ def lathe(profile: Sequence[tuple[float, float]], parts: int = 36) -> Mesh:
 
 
 def wheel() -> dict[str, Mesh]:
-    """A wheel of radius 1 and width 1 about the y axis, with five spokes on both sides. One of them is marked."""
+    """A wheel of radius 1 and width 1 about the y axis, with five spokes on both sides, one of them marked."""
     tyre = lathe([(0.68, -0.5), (0.94, -0.5), (1.0, -0.36), (1.0, 0.36), (0.94, 0.5), (0.68, 0.5)])
     inside = [lathe([(0.0, -0.2), (0.68, -0.2), (0.68, -0.5)]), lathe([(0.68, 0.5), (0.68, 0.2), (0.0, 0.2)])]
     rings = [lathe([(0.6, -0.5), (0.7, -0.52)]), lathe([(0.7, 0.52), (0.6, 0.5)])]

@@ -187,7 +187,7 @@ def around(name: str) -> StudyFile:
 
 
 def span(study: StudyFile, factor: Factor) -> dict[str, Any]:
-    """Return the range of a factor relative to its nominal value, as the table of a factor. Choices as they are."""
+    """Return the range of a factor relative to its nominal value, as the table of a factor, choices as they are."""
     given = factor.to_table()
     if factor.values or factor.nominal or factor.key == "lane.margin_m":
         return given

@@ -103,7 +103,7 @@ def tell_controllers(file: Path, name: str, command: str) -> None:
 
 
 def write_tyre(given: dict[str, Any], file: Path) -> None:
-    """Write the tyre as PAC2002. Its radius is half of DIAMETER, as UNLOADED_RADIUS (0.314 m) is another tyre's."""
+    """Write the tyre as PAC2002 with half of DIAMETER as radius, as UNLOADED_RADIUS (0.314 m) is another tyre's."""
     dimension = {
         "UNLOADED_RADIUS": 0.5 * given["DIAMETER"], "WIDTH": given["WIDTH"], "ASPECT_RATIO": given["ASPECT_RATIO"],
         "RIM_RADIUS": 0.5 * 0.0254 * given["RIM"], "RIM_WIDTH": given["RIM_WIDTH"],

@@ -170,7 +170,7 @@ def _controller() -> dict[str, Figure]:
 
 
 def _sensors() -> dict[str, Figure]:
-    """True and measured yaw rate and lateral acceleration at the beginning of a sine with dwell."""
+    """True and measured yaw rate and lateral acceleration at the start of a sine with dwell."""
     run = run_scenario(
         with_amplitude_found(resolve("sine_with_dwell", overrides={"sensors.preset": "production"})), "ars"
     )
@@ -210,7 +210,7 @@ def _stepping() -> dict[str, Figure]:
 
 
 def _driver() -> dict[str, Figure]:
-    """The loop of the typical driver and the compact: Bode diagrams, a step of the path, and damping over speed."""
+    """The loop of the typical driver and the compact: Bode diagrams, a step of the path, and damping versus speed."""
     loops = driver_loops()
     return {"driver_loop": draw(driver_loops_picture(loops, [loop.to_json() for loop in loops]))}
 
@@ -270,7 +270,7 @@ def _reference_and_band() -> dict[str, Figure]:
 
 
 def _tyres() -> dict[str, Figure]:
-    """Side force of the summer and of the winter tyre over slip angle, at three loads."""
+    """Side force of the summer and of the winter tyre versus slip angle, at three loads."""
     figure = new_figure(6.0, 3.2)
     axis = figure.subplots()
     alpha_deg = np.linspace(0.0, 15.0, 151)

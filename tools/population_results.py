@@ -120,7 +120,7 @@ class WorstRun:
 
     @classmethod
     def from_json(cls, table: dict[str, Any]) -> WorstRun:
-        """Return the run from JSON values, in which an infinite growth is None."""
+        """Return the run from JSON values, with None as an infinite growth."""
         growth = {name: math.inf if value is None else value for name, value in table["growth"].items()}
         return cls(**table | {"growth": growth, "severity": table["severity"] or math.inf})
 
@@ -200,7 +200,7 @@ _PROPORTIONS: Final = ("saved", "spoiled", "lower", "harmed", "harmed_anywhere")
 
 @dataclass(frozen=True)
 class ClaimProportion:
-    """Proportion of a population in which a claim holds."""
+    """Proportion of a population for which a claim holds."""
 
     id: str  # number of the claim
     passed: bool  # whether the claim holds with the nominal car, road and driver
@@ -236,7 +236,7 @@ class ClaimProportion:
 
 
 def read_claims(table: Mapping[str, Any]) -> tuple[ClaimProportion, ...]:
-    """Return the proportions of a stored population. A damaged table raises `StudyError`."""
+    """Return the proportions of a stored population, or raise `StudyError` for a damaged table."""
     try:
         return tuple(
             ClaimProportion(**{key: claim[key] for key in claim if key != "verdict"}) for claim in table["claims"]
@@ -364,7 +364,7 @@ def read_population(name: str) -> Population | None:
 def population_study(
     samples: int | None = None, seed: int | None = None, vehicle: FileOrTable | None = None
 ) -> StudyFile:
-    """Return the study of the paper's claims. Values that are not given are those of its file."""
+    """Return the study of the paper's claims, with values of its file for those that are not given."""
     return _study(STUDY, samples, seed, vehicle)
 
 
@@ -430,7 +430,7 @@ def _claims_of(name: str, vehicle: FileOrTable) -> list[Claim]:
 
 
 def summarise(table: pa.Table, planned: StudyFile, nominal: Sequence[Claim] = ()) -> Population:
-    """Count the results of a population's runs as far as it is. A comparison has no nominal claims."""
+    """Count the results of a population's runs as far as it is, without nominal claims for a comparison."""
     rows = table.to_pylist()
     names = [label_of(controller) for controller in planned.controllers]
     failed = sum(row["status"] != "ok" for row in rows)
@@ -562,7 +562,7 @@ def _count(held: Iterable[bool]) -> Proportion:
 
 
 def _has_lowest_peak(runs: Mapping[tuple[str, Car], Row], system: str, car: Car) -> bool:
-    """Return whether the peak sideslip angle is below that of every reference. A run without a peak has the largest."""
+    """Return whether the peak sideslip angle is below every reference, with a missing peak as the largest."""
 
     def peak(controller: str) -> float:
         row = runs.get((controller, car), {})

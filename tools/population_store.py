@@ -101,7 +101,7 @@ relative to the same sample without control: median, and the range of 90 % of th
 
 
 def driven(options: argparse.Namespace, controllers: Sequence[str] | None, name: str) -> tuple[Population, Path]:
-    """Drive a population or what is missing of it. Return its results and the folder of its runs."""
+    """Drive a population or what is missing of it, and return its results and the folder of its runs."""
     output = options.output or Path("build", name)
     with Progress("population", quiet=False) as progress:
         found = population(options.samples, controllers, output=output, jobs=options.jobs, progress=progress.count)
@@ -182,7 +182,7 @@ _WORST: Final = {
 
 
 def _worst(effect: SystemEffect, measures: Sequence[str]) -> str:
-    """Return the largest growth of the measures in their unit. It is undefined if the car is lost."""
+    """Return the largest growth of the measures in their unit, undefined if the car is lost."""
     values = [value for value in map(effect.worst, measures) if not math.isnan(value)]
     if not values:
         return "-"

@@ -59,7 +59,7 @@ class Proportion:
 
 
 def percent(proportion: float) -> str:
-    """Write a proportion in whole percent. Within one percent of 0 or 100 with the digit that differs from them."""
+    """Write a proportion in whole percent, near 0 and 100 with the digit that differs from them."""
     value = 100.0 * proportion
     beyond = float(f"{min(value, 100.0 - value):.1g}")
     decimals = max(0, -math.floor(math.log10(beyond))) if beyond > 0.0 else 0

@@ -111,7 +111,7 @@ def _pictures(options: Options) -> int:
 
 
 def _films(options: Options) -> int:
-    """Draw the still and the animations: the files with these names, or all. This needs offscreen OpenGL."""
+    """Draw the still and the animations, all or those with these names, by offscreen OpenGL."""
     from tools.film_pictures import draw_films
 
     draw_films(options.names)

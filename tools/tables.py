@@ -41,7 +41,7 @@ NOT_REPRODUCED: Final = "\N{NOT EQUAL TO} not reproduced"
 
 
 def claims_table() -> str:
-    """Return the claims_table in Markdown: statements about the systems alone, then statements with a driver."""
+    """Return the claims_table in Markdown: first statements only about the systems, then statements with a driver."""
     known, population = not_reproduced(VEHICLE), read_population("population")
     fails = read_setting(PAPER).fails
     lines = [*summary(), ""]
@@ -148,7 +148,7 @@ _ESTIMATION_HEAD: Final = (
 
 
 def estimation_row(scenario: str, system: str) -> str:
-    """Return the estimation_row of one run: a system drives, and an estimator runs beside it on the same sensors."""
+    """Return the estimation_row of one run: a system drives, and an estimator runs alongside on the same sensors."""
     innovations: list[float] = []
 
     class Watched:

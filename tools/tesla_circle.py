@@ -32,7 +32,7 @@ _RADIUS_M: Final = 0.335
 
 
 class Change(NamedTuple):
-    """A change of the car. The fields that are given act in this order."""
+    """A change of the car, whose given fields act in this order."""
 
     without: tuple[str, ...] = ()  # effects to remove
     set: Mapping[str, Any] = MappingProxyType({})  # overrides
@@ -97,7 +97,7 @@ def _least_toe_by_moment(compliance: Array) -> None:
 
 
 def _no_camber(compliance: Array) -> None:
-    """Reduce the camber compliance to a thousandth. Toe over a side force at the road is unchanged."""
+    """Reduce the camber compliance to a thousandth, without a change of toe versus side force at the road."""
     own, over_roll = compliance[_CAMBER, _CAMBER], compliance[_TOE, _CAMBER]
     compliance[_CAMBER, :] = compliance[:, _CAMBER] = 0.0
     compliance[_CAMBER, _CAMBER] = 1e-3 * own

@@ -1,4 +1,4 @@
-"""Metrics, claims, tables and figures, made from recordings alone.
+"""Metrics, claims, tables and figures, computed only from recordings.
 
 - `metrics`: the metrics of a recording by its kind of manoeuvre: `step_response`, `frequency_response` (ISO 7401),
   `handling` (ISO 4138), `sine_with_dwell` (FMVSS 126), `braking` (ISO 7975, ISO 21994,

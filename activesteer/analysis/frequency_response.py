@@ -119,7 +119,7 @@ def frequency_response_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _falls_to(x: NDArray[np.floating], y: Array, level: float) -> float:
-    """Return the first abscissa at which y falls to a level, interpolated, or nan if it never does."""
+    """Return the first abscissa where y falls to a level, interpolated, or nan if it never does."""
     below = np.flatnonzero((y[1:] <= level) & (y[:-1] > level))
     if below.size == 0:
         return math.nan

@@ -67,7 +67,7 @@ def car_of(recording: RecordingLike) -> CarGeometry:
 
 
 def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[str, float]:
-    """Return the steady-state handling from a slow ramp; by default with the car in the recording's metadata."""
+    """Return the steady-state handling from a slow ramp, by default for the car in the recording's metadata."""
     car = car or car_of(recording)
     ay = recording["ay_mps2"]
     side = math.copysign(1.0, float(ay[int(np.abs(ay).argmax())]))

@@ -49,12 +49,12 @@ def has_spun(metrics: Metrics) -> bool:
 
 
 def is_lost(metrics: Metrics) -> bool:
-    """Return whether the car was lost: it spins, leaves its lanes, or misses a cone of a slalom. A touch is none."""
+    """Return whether the car was lost: it spins, leaves its lanes, or misses (not just touches) a cone of a slalom."""
     return has_spun(metrics) or _leaves_course(metrics)
 
 
 def is_controlled(metrics: Metrics) -> bool:
-    """Return whether nothing tells that the car was lost. A manoeuvre may have no metric that could."""
+    """Return whether no metric tells that the car was lost."""
     tells = any(name in metrics for name in (*SIDESLIP_PEAKS, "heading_end_rad"))
     return not ((tells and has_spun(metrics)) or _leaves_course(metrics))
 

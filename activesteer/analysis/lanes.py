@@ -55,7 +55,7 @@ def cone_distances(recording: RecordingLike, course: Course, car: Footprint) -> 
 
 
 def _distances(recording: RecordingLike, points_m: Array, car: Footprint) -> Array:
-    """Return the smallest distance of each point from the body over the run [m], below 0 inside. Points are (n, 2)."""
+    """Return the smallest distance of each point, shape (n, 2), from the body over the run [m], below 0 inside."""
     front_x, front_y, cos, sin = _pose(recording)
     middle_m = 0.5 * (car.front_m + car.rear_m)
     half_length_m = car.front_m - middle_m
@@ -106,7 +106,7 @@ def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
 
 
 def first_at(recording: RecordingLike, x_m: float) -> int | None:
-    """Return the first sample at which the front axle centre has reached an x, or None if it never has."""
+    """Return the first sample where the front axle centre has reached an x, or None if it never has."""
     reached = np.flatnonzero(front_axle(recording)[0] >= x_m)
     return int(reached[0]) if reached.size else None
 
@@ -152,7 +152,7 @@ def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -
 
 
 def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
-    """Return distance along a path and distance to its left [m] of a car that follows it. The path may cross itself."""
+    """Return distance along a path, which may cross itself, and distance to its left [m] of a car that follows it."""
     along, beside = np.empty(len(x_m)), np.empty(len(x_m))
     at = 0
     for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):

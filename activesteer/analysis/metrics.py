@@ -1,4 +1,4 @@
-"""The metrics that belong to a recording, chosen by the kind of its manoeuvre, and those of all runs.
+"""The metrics of a recording: the general ones, and the ones of its kind of manoeuvre.
 
 The latter are sizes, energy, ride and rollover.
 
@@ -61,7 +61,7 @@ def general_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def measured_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the metrics whose channels were measured. A car on a proving ground has no sensors of tyre forces."""
+    """Return the metrics whose channels were measured."""
     values: dict[str, float] = {}
     for part in _MEASURABLE:
         with suppress(RecordingError):
@@ -147,7 +147,7 @@ def seat_acceleration_mps2(recording: RecordingLike) -> float:
 
 
 def weighted(acceleration_mps2: Array, step_s: float) -> Array:
-    """Return a vertical acceleration filtered by W_k. Its mean is removed first."""
+    """Return a vertical acceleration without its mean, filtered by W_k."""
     spectrum = np.fft.rfft(acceleration_mps2 - np.mean(acceleration_mps2))
     gain = weighting(np.fft.rfftfreq(len(acceleration_mps2), step_s))
     return np.fft.irfft(spectrum * gain, len(acceleration_mps2))
@@ -172,7 +172,7 @@ LIFTED_N: Final = 1.0
 
 
 def rollover_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the general metrics, and those of the wheel loads."""
+    """Return the general metrics, including the metrics of the wheel loads."""
     loads_N = np.array([recording[f"{corner}_tyre_fz_N"] for corner in CORNERS])
     lifted = loads_N < LIFTED_N
     both = (lifted[0] & lifted[2]) | (lifted[1] & lifted[3])

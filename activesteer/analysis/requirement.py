@@ -79,7 +79,9 @@ _Number = Callable[[Runs], float]
 
 
 class Expression:
-    """A number over the metrics of runs. `metrics` has those that it reads, each with its run.
+    """A number over the metrics of runs.
+
+    `metrics` has those that it reads, each with its run.
 
     `comparisons` has left side, sign and right side of each comparison of a requirement.
     """
@@ -87,7 +89,7 @@ class Expression:
     wanted = "a sum of metrics such as yaw_rate_overshoot(ars) is needed"
 
     def __init__(self, text: str, names: Names, source: Source, where: tuple[str, ...]) -> None:
-        """Read an expression. Errors name its place in the source."""
+        """Read an expression, with its place in the source for errors."""
         self.text, self._names = text, names
         self.metrics: dict[tuple[str, EvaluatedRun], None] = {}
         self.comparisons: list[tuple[_Number, str, _Number]] = []
@@ -167,7 +169,7 @@ class Expression:
 
 
 class Requirement(Expression):
-    """A comparison of such numbers, or several. Its value is the margin, which is negative if it is violated."""
+    """A comparison of such numbers, or several, with a margin as its value that is negative if it is violated."""
 
     wanted = "a comparison such as stopping_distance_m(none) <= 45 is needed"
 
@@ -187,7 +189,7 @@ class Requirement(Expression):
         return lambda runs: _all([margin(runs) for margin in margins])
 
     def _comparison(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> _Number:
-        """Return the margin. The limit is the side without a metric, or else the right one."""
+        """Return the margin to the limit, which is the side without a metric, or else the right one."""
         one, other = self._number(left), self._number(right)
         self.comparisons.append((one, _SIGNS[type(sign)], other))
         less, more = (one, other) if isinstance(sign, (ast.Lt, ast.LtE)) else (other, one)

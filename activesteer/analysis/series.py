@@ -46,7 +46,7 @@ def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
 
 
 def counted(recording: RecordingLike, channel: str, part: slice = _ALL) -> Array:
-    """Return the samples of a channel that count in metrics: all, and of the sideslip those of `counted_sideslip`."""
+    """Return the samples of a channel that count in metrics: all, or the `counted_sideslip` of a sideslip angle."""
     return counted_sideslip(recording, part) if channel == "sideslip_rad" else recording[channel][part]
 
 
@@ -77,7 +77,7 @@ def smooth(values: Array, timestep_s: float) -> Array:
 
 
 def crossing_time(time_s: Array, values: Array, level: float) -> float:
-    """Return the first time at which a signal rises through a level, interpolated between samples."""
+    """Return the first time when a signal rises through a level, interpolated between samples."""
     rising = np.flatnonzero((values[:-1] < level) & (values[1:] >= level))
     if rising.size == 0:
         return math.nan
@@ -107,7 +107,7 @@ def rms(values: Array) -> float:
 
 
 def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> float:
-    """Return the lag of a signal behind another signal: the shift at which the two are most alike."""
+    """Return the lag of a signal behind another signal: the shift with the greatest similarity."""
     count, maximum = len(leader), round(longest_s / timestep_s)
     if count < 2 * maximum:
         return math.nan
@@ -141,7 +141,7 @@ def timestep(time_s: Array) -> float:
 def step_response(
     time_s: Array, values: Array, step_time_s: float, window_s: float, minimum: float
 ) -> dict[str, float]:
-    """Return steady state, response time, peak, peak time and overshoot of a signal; times count from the step.
+    """Return steady state, response time, peak, peak time and overshoot of a signal, with times from the step.
 
     The signal is at zero before the step and may move either way. `smooth` reduces its noise for crossings and maxima;
     the steady-state value is the mean of the samples of a window at the end. The response time is nan if the signal

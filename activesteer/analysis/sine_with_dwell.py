@@ -67,7 +67,7 @@ class Steering(NamedTuple):
 
 
 def steering(recording: RecordingLike) -> Steering:
-    """Return beginning, reversal and completion of a sine with dwell, interpolated between samples."""
+    """Return start, reversal and completion of a sine with dwell, interpolated between samples."""
     time_s = recording.time_s
     angle = low_pass(recording["steering_wheel_rad"], timestep(time_s), STEERING_CUT_OFF_Hz)
     if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
@@ -161,14 +161,14 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _crossing_before(time_s: Array, values: Array, index: int) -> float:
-    """Return the last time before a sample at which a signal rises through zero."""
+    """Return the last time before a sample when a signal rises through zero."""
     rising = np.flatnonzero((values[:index] < 0.0) & (values[1 : index + 1] >= 0.0))
     i = int(rising[-1])
     return float(time_s[i] - values[i] * (time_s[i + 1] - time_s[i]) / (values[i + 1] - values[i]))
 
 
 def _completion(time_s: Array, angle: Array, start: int) -> float:
-    """Return the time at which the second half, here positive, is back at the centre."""
+    """Return the time when the second half, here positive, is back at the centre."""
     # With an elastic steering system the wheel may creep over the last degrees or stop short of the centre. The line
     # through 10 and 5 deg is then extrapolated to the centre, so that creep does not delay the completion.
     below = np.flatnonzero(angle[start:] < THRESHOLD_RAD)
@@ -214,7 +214,7 @@ def _displacement(recording: RecordingLike, times: Steering) -> float:
 
 
 def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> float:
-    """Return the displacement 1.07 s after the beginning of steer, integrated twice [m]; FMVSS 126, S7.11.9."""
+    """Return the displacement 1.07 s after the start of steer, integrated twice [m] (FMVSS 126, S7.11.9)."""
     end_s = begin_s + DISPLACEMENT_TIME_S
     if end_s > time_s[-1]:
         return math.nan

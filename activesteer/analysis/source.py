@@ -14,7 +14,7 @@ from activesteer.road.course import Course, Footprint, course_of, footprint_of
 
 
 class RecordingLike(Protocol):
-    """A recorded run. `activesteer.recording.Recording` is one."""
+    """A recorded run, such as `activesteer.recording.Recording`."""
 
     @property
     def time_s(self) -> Array:

@@ -85,7 +85,7 @@ class Cell(NamedTuple):
 
 
 def number(name: str, value: float) -> str:
-    """Write the value of a metric [SI] for display: three decimals, fewer for large values; a dash for nan."""
+    """Write the value of a metric [SI] with three decimals, with fewer for large values, and as a dash for nan."""
     if not math.isfinite(value):
         return "\N{EN DASH}"
     metric = recorded_metric(name)

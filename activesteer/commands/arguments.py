@@ -41,7 +41,7 @@ Part = Callable[[Any], object]
 
 
 class Group:
-    """Commands that `--help` lists together. Call it with a declaration to decorate the function of a command."""
+    """Commands that `--help` lists together, and decorator for their functions if called with a declaration."""
 
     def __init__(self, title: str) -> None:
         self.title = title
@@ -97,7 +97,7 @@ class CommandLine:
         self.names = [name for group in groups for name, *_ in group.commands]
 
     def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
-        """Parse a command line. End the program with a correction if the command line is wrong."""
+        """Parse a command line, or end the program with a correction if it is wrong."""
         words = list(sys.argv[1:] if arguments is None else arguments)
         command = next((word for word in words if not word.startswith("-")), None)
         if command in SUCCESSORS:
@@ -129,7 +129,7 @@ def _hint(parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -
 
 
 def option(names: str, metavar: str | tuple[Any, ...], help: str, default: Any = None, **words: Any) -> Part:
-    """Declare an argument with a value. Its help ends with the default if there is one."""
+    """Declare an argument with a value, and with help that ends with the default if there is one."""
     if words.pop("many", False):
         words["action"] = "append"
     words["metavar" if isinstance(metavar, str) else "choices"] = metavar
@@ -150,7 +150,7 @@ def several(*parts: Part) -> Part:
 
 
 def one_of(*parts: Part) -> Part:
-    """Declare options of which at most one may be given."""
+    """Declare options that exclude each other."""
     return lambda parser: several(*parts)(parser.add_mutually_exclusive_group())
 
 
@@ -177,7 +177,7 @@ RECORDINGS: Final = option("files", "FILE.mcap", f"{_RECORDING}; several are com
 
 
 def driver(default: str = "") -> Part:
-    """Return `--driver`. With a default in words, `options.driver` is None without the option."""
+    """Return `--driver`, whose value is None without the option if its default is in words."""
     words = "novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu"
     if default:
         return option("--driver", "DRIVER", f"{words} (default: {default})")
@@ -185,7 +185,7 @@ def driver(default: str = "") -> Part:
 
 
 def controllers(default: str = "none") -> Part:
-    """Return `-c`. `options.controller` is a list, or None for the default, which is given in words."""
+    """Return `-c`, whose value is a list, or None for the default, which is given in words."""
     words = (
         "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
     )
@@ -193,7 +193,7 @@ def controllers(default: str = "none") -> Part:
 
 
 def output(metavar: str, help: str, default: str | None = None) -> Part:
-    """Return `-o`. The help says what is written there, and what happens without the option if it has no default."""
+    """Return `-o`, with help on what is written there, and on the case without the option if it has no default."""
     return option("-o --output", metavar, help, None if default is None else Path(default), type=Path)
 
 
@@ -201,7 +201,7 @@ FIGURES: Final = output("DIR", "folder for figures (default: no figures)")
 
 
 def check_effect(options: argparse.Namespace, effect: str, *keys: str) -> None:
-    """Refuse options that were given although they have no effect; `effect` says when."""
+    """Reject options that were given although they have no effect, with `effect` as the reason."""
     for key in keys:
         if getattr(options, key) not in (None, False):
             raise ParameterError(f"has {effect}", key=f"--{key}")
@@ -216,7 +216,7 @@ def numbers(text: str) -> list[float]:
 
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the parameters that `--overrides` and `--set` replace, with values as in TOML; any other is a text."""
+    """Return the parameters that `--overrides` and `--set` replace, with values as in TOML or else as texts."""
     from activesteer.config import parse_value, read_toml
 
     values = dict(given or {})

@@ -1,4 +1,4 @@
-"""Command line of the program. The commands are in `commands`."""
+"""Command line of the program."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
 
 
 def command_line() -> CommandLine:
-    """Return the command line with all commands, in the groups in which `--help` lists them."""
+    """Return the command line with all commands, in the groups of `--help`."""
     from activesteer.commands import car, drive, recordings, studying, verify
     from activesteer.commands.arguments import CommandLine
     from activesteer.core.version import __version__

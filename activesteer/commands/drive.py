@@ -60,11 +60,11 @@ def _titles(names: Iterable[str], find: Callable[[str], Path]) -> dict[str, str]
 
 
 class _Failures(dict[str, str]):
-    """Label of a controller -> message of its error. The other controllers drive all the same."""
+    """Label of a failed controller -> message of its error."""
 
     @contextmanager
     def caught(self, label: str, *, alone: bool) -> Iterator[None]:
-        """Report an error of a controller. The error of a controller that drives alone ends the command."""
+        """Report an error of a controller, and end the command if no other controller drives."""
         try:
             yield
         except ActiveSteerError as error:
@@ -205,7 +205,7 @@ def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Nam
 
 
 def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
-    """Print the key metrics of all runs beside each other, or every metric."""
+    """Print the key metrics of all runs next to each other, or every metric."""
     from activesteer.analysis.metrics import KEY_METRICS, evaluated_kind
     from activesteer.analysis.tables import comparison
 
@@ -222,7 +222,7 @@ def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
 def _paint(
     metrics: Mapping[str, Mapping[str, float]], run: str, name: str, value: float, first: float, text: str
 ) -> str:
-    """Return a value in green if it is better than in the first run, in red if it is worse. Plain if a run is lost."""
+    """Return a value in green if better than in the first run, in red if worse, and plain if a run is lost."""
     from activesteer.analysis.harm import is_controlled
     from activesteer.analysis.tables import Change, significance
 
@@ -288,7 +288,7 @@ def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
 
 
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
-    """Draw all runs in one figure, and for a step steer the car without control beside its linear models."""
+    """Draw all runs in one figure, and for a step steer the car without control next to its linear models."""
     from activesteer.analysis.figures import figure_2, figure_for
     from activesteer.studies.reproduction import models_beside
 

@@ -89,7 +89,7 @@ class StopSignals:
         self.end(in_order=False)
 
     def end(self, *, in_order: bool = True) -> int:
-        """Print which files are saved. End the process if it belongs to the program."""
+        """Print which files are saved, and end the process if it belongs to the program."""
         number = self.number or signal.SIGINT
         with self._ending:  # never released by the first caller; a second one waits for the end
             if in_order and self._watching:

@@ -35,7 +35,7 @@ def table_lines(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -
 
 
 def cells(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[list[str]]:
-    """Return the cells of a table of rows. Numbers have three digits."""
+    """Return the cells of a table of rows, with three digits for numbers."""
     return [[row[key] if isinstance(row[key], str) else f"{row[key]:.3g}" for key in keys] for row in rows]
 
 
@@ -67,7 +67,7 @@ _for_json: Final[list[TextIO]] = []
 
 @contextmanager
 def stdout_for_json() -> Iterator[None]:
-    """Reserve standard output for `print_json`. All other output, such as a user's `print`, goes to standard error."""
+    """Reserve standard output for `print_json`, and send all other output to standard error."""
     stream = sys.stdout
     own = stream if stream is sys.__stdout__ else None
     if own is not None:  # native code and other processes write to it, too
@@ -110,7 +110,7 @@ def print_notes(notes: Iterable[str]) -> None:
 
 
 def entry(head: str, text: str, hanging: int = 2) -> str:
-    """Return a head and a text, which may come from any file, in lines of 80 columns; further lines are indented."""
+    """Return a head and a text from any source in lines of 80 columns, with all lines but the first indented."""
     lines = textwrap.wrap(printable(text), COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **WHOLE)
     return "\n".join(lines) or head.rstrip()
 
@@ -140,7 +140,7 @@ _LINE_EVERY_S: Final = 10.0
 
 
 class Progress:
-    """Bar on a terminal that shows which fraction of the work is done. A log gets lines for runs that are counted."""
+    """Bar on a terminal that shows which fraction of the work is done, or lines in a log for counted runs."""
 
     def __init__(self, label: str, *, quiet: bool) -> None:
         self._label, self._quiet = label, quiet

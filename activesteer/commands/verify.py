@@ -21,7 +21,7 @@ SETTINGS: Final = {"paper": "paper's setting", "literature": "driver from litera
 
 
 def _setting(name: str) -> str:
-    """Return the name of a setting. Its former name is rejected."""
+    """Return the name of a setting, or reject its former name."""
     if name == "human":
         raise argparse.ArgumentTypeError("the setting 'human' is now 'literature'")
     return name

@@ -75,7 +75,7 @@ class Source:
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
     def line_of(self, path: Sequence[str]) -> int | None:
-        """Return the line of a key in the text. Tomllib does not keep it."""
+        """Return the line of a key in the text, which tomllib does not keep."""
         wanted = ".".join(path)
         table = ""
         elements: dict[str, int] = {}
@@ -144,7 +144,7 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value written as in TOML. Any other text is returned as it is."""
+    """Return a value written as in TOML, or any other text unchanged."""
     try:
         table = _parsed(f"value = {text}")
     except tomllib.TOMLDecodeError:
@@ -155,7 +155,7 @@ def parse_value(text: str) -> Any:
 
 
 def toml_value(value: Any) -> str:
-    """Return a value as TOML. Texts, numbers and lists of JSON are valid TOML."""
+    """Return a value as TOML, which has the texts, numbers and lists of JSON."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{json.dumps(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
@@ -164,7 +164,7 @@ def toml_value(value: Any) -> str:
 
 
 def toml_text(table: Mapping[str, Any], remarks: Mapping[str, str] | None = None) -> str:
-    """Return a table as the text of a file, each inner table below its header; `read_toml` restores it.
+    """Return a table as the text of a file that `read_toml` reads, each inner table below its header.
 
     A list of tables is written in one line. Remarks are comments above the header of a table, by its dotted name.
     """
@@ -182,7 +182,7 @@ def _lines(table: Mapping[str, Any], remarks: Mapping[str, str], name: str) -> I
 
 
 def spellings(name: str) -> list[str]:
-    """Return the keys that fill a field: its name, and the name in a display unit. `class` fills `class_`."""
+    """Return the keys that fill a field (`class` for `class_`): its name, and the name in a display unit."""
     name = name.removesuffix("_")
     edges = [name[: -len(si)] + edge for edge, (si, _) in EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]
@@ -481,7 +481,7 @@ def check_points(
 
 
 def to_table(value: Any, *, defaults: bool = True) -> Any:
-    """Return a dataclass as plain tables for JSON; `build` restores it."""
+    """Return a dataclass as plain tables for JSON that `build` reads."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         values = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
         return {

@@ -1,4 +1,4 @@
-"""Faults of actuators and sensors in files and on the command line; `vehicle.faults` activates them."""
+"""Faults of actuators and sensors as files and the command line declare them."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ _WHEN: Final = "@START[-END]"
 
 
 def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
-    """Read a fault into the table that a manoeuvre file has. The table is checked there."""
+    """Read a fault into the table that a manoeuvre file has, without checks of the table."""
     found = _FAULT.fullmatch(text.strip())
     if found is None or (found["start"] is None) is (start_s is None):
         if start_s is None:
@@ -237,7 +237,7 @@ def fault_words(fault: Mapping[str, Any]) -> str:
 
 
 def fault_from(given: Any, now_s: float) -> Fault:
-    """Return a fault given during a run, as an object or as text; without a time it begins now."""
+    """Return a fault given during a run as an object or as text, by default from the current time on."""
     if isinstance(given, str):
         table = fault_table(given, None if "@" in given else now_s)
         given = build(Fault, table, Source("", error=ManeuverError))

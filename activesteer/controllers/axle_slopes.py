@@ -189,6 +189,6 @@ def _borne_mps2(slips: Table, slip_angle_rad: float, friction: float) -> float:
 
 @shared
 def _between(values: Table, place: float) -> float:
-    """Interpolate in a row at a fractional index; beyond its end the last value holds."""
+    """Interpolate in a row at a fractional index, and hold the last value beyond its end."""
     index = min(int(place), len(values) - 2)
     return values[index] + min(place - index, 1.0) * (values[index + 1] - values[index])

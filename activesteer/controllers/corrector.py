@@ -14,7 +14,9 @@ from activesteer.theory.tolerance import tolerance
 
 @shared
 def rear_direction(error_radps: float) -> int:
-    """Return the direction of the rear wheels, 1 left, -1 right or 0; the front wheels turn the other way.
+    """Return the direction of the rear wheels: 1 left, -1 right, or 0.
+
+    The front wheels turn the other way.
 
     With oversteer, the error of desired less actual yaw rate has the sign against the turn, and the rear wheels turn in
     the direction of the yaw rate; with understeer they turn against it.
@@ -69,7 +71,9 @@ class Corrector(NativeBlock):
         self._filtered_radps = math.nan  # before the first error
 
     def step(self, error_radps: float, saturated: int = 0) -> float:
-        """Return the angle of the corrector [rad]; with P alone it has the sign of the error.
+        """Return the angle of the corrector [rad].
+
+        With only a P part it has the sign of the error.
 
         Args:
             error_radps: Desired less actual yaw rate [rad/s].

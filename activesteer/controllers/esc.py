@@ -82,7 +82,7 @@ def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
 def wheel_torques(
     moment_Nm: float, yaw_rate_radps: float, levers: tuple[float, float], limit_Nm: float
 ) -> tuple[float, float, float, float]:
-    """Return the brake torques that make a yaw moment by one wheel, order of `CORNERS` [Nm].
+    """Return the brake torques for a yaw moment by one wheel, order of `CORNERS` [Nm].
 
     Args:
         moment_Nm: Yaw moment, left positive [Nm].

@@ -59,7 +59,7 @@ class _ControllerKind(Kind):
     """Controllers, whose torques of the wheels are four numbers in one field."""
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> ActuatorCommand:
-        """Return a command whose other fields are checked too; see the base class."""
+        """Return a command whose other fields are checked too."""
         for field in _OF_WHEELS:
             torques = getattr(command, field)
             if torques is NO_BRAKES or torques is NO_TORQUES:
@@ -112,7 +112,7 @@ CONTROLLER: Final = _ControllerKind(
 
 
 def controller_spec(given: Any) -> Plugin:
-    """Find a controller; see `activesteer.plugins.find`.
+    """Find a controller.
 
     Args:
         given: Name of a controller or variant, or path of a variant file; or a user's own code:
@@ -135,7 +135,7 @@ def is_variant(given: Any) -> bool:
 
 
 def system_of(given: str) -> str:
-    """Return the name of the registered controller behind a variant; other names stay as they are."""
+    """Return the registered controller behind the name of a variant, or another name unchanged."""
     return read_variant(given).system if is_variant(given) else given
 
 
@@ -174,7 +174,7 @@ def declared_parameters(given: Any, gains: ControllerParameters | None = None) -
 
 
 def load_controller(given: Any, setup: ControllerSetup) -> Controller:
-    """Find and make a controller.
+    """Find and create a controller.
 
     Args:
         given: See `controller_spec`.

@@ -50,7 +50,7 @@ class FrontSuperposition(NativeBlock):
 def front_superposition(
     block: FrontSuperposition, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `FrontSuperposition.step`; returns the first fields of an `ActuatorCommand`."""
+    """Law of `FrontSuperposition.step`, which returns the first fields of an `ActuatorCommand`."""
     speed_mps = measurement.speed_mps
     desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, speed_mps)
     if speed_mps < MIN_SPEED_MPS:

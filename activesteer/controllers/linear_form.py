@@ -190,7 +190,7 @@ def _answers(
     height: float = 0.0,
     calls: int = 1,
 ) -> Array:
-    """Return the commands of `count` calls, the first `calls` of them with a pulse; shape (count, len(COMMANDS))."""
+    """Return the commands of `count` calls, shape (count, len(COMMANDS)), the first `calls` of them with a pulse."""
     straight = DriverCommand(front_steer_demand_rad=0.0)
     commands = np.empty((count, len(COMMANDS)))
     for call in range(count):

@@ -244,7 +244,7 @@ class Lqr(NativeBlock):
         return *angles_rad, moment_change(self._allocation, now, driver_rad, at_rad, angles_rad)
 
     def apply(self, superposition_rad: float, rear_rad: float) -> None:
-        """Store the final demands of the actuators; for a failed actuator its position."""
+        """Store the final demands of the actuators, or the position of a failed actuator."""
         self._superposition_before_rad, self._rear_before_rad = superposition_rad, rear_rad
 
 
@@ -259,7 +259,7 @@ def regulated(
     rear_rad: float,
     pressures_Pa: PerWheel,
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `Lqr.step`; returns the first fields of an `ActuatorCommand`."""
+    """Law of `Lqr.step`, which returns the first fields of an `ActuatorCommand`."""
     desired, _, _, steady, front_demand, rear_demand, least, most = fed_back(
         block, now, innovation, driver_rad, brake_pedal, superposition_rad, rear_rad, pressures_Pa, NO_BRAKES
     )
@@ -290,7 +290,7 @@ def fed_back(
     pressures_Pa: PerWheel,
     own_brakes_Nm: PerWheel,
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """Law of `Lqr.turn`; returns the fields of `Turn` behind the estimate, one after the other."""
+    """Law of `Lqr.turn`, which returns the fields of `Turn` after the estimate in their order."""
     speed, friction = now[_SPEED], now[_FRICTION]
     certain, authority = confidence(block._confidence, innovation, now[_FRICTION_STD])
     if speed < MIN_SPEED_MPS:
@@ -355,7 +355,7 @@ def fed_back(
 
 @shared
 def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
-    """Return the slip angle of soft front tyres beyond that of soft rear tyres, per lateral acceleration [s2 rad/m].
+    """Return how much the slip angle of soft front tyres exceeds that of soft rear ones, per acceleration [s2 rad/m].
 
     It is at least 0, and counts as far as the friction is not `certain`.
     """
@@ -445,7 +445,7 @@ def schedule(
 def steady_turn(
     car: SingleTrackParameters, speed_mps: float, works: tuple[bool, bool] = BOTH, *, in_phase: bool = False
 ) -> Array:
-    """Return front angle, rear angle and sideslip of a steady turn; with both actuators there is no sideslip.
+    """Return front angle, rear angle and sideslip of a steady turn, which both actuators drive without sideslip.
 
     Args:
         car: The known car.
@@ -502,7 +502,7 @@ def feedback(
     interval_s: float,
     works: tuple[bool, bool] = BOTH,
 ) -> Array:
-    """Return K at a speed, shape (2, 8): superposition and rear angle per deviation of `STATES`; 0 if failed."""
+    """Return K at a speed, shape (2, 8): superposition and rear angle per deviation of `STATES`, or 0 if failed."""
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
     a, b = model(car, parameters, servo_lag_s, speed_mps, interval_s)

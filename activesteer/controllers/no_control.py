@@ -21,7 +21,7 @@ class NoControl(NativeBlock):
         self._desired = DesiredYawRate(SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.timestep_s)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return no angles; the desired yaw rate is recorded."""
+        """Return no angles, and the desired yaw rate for the recording."""
         return steering(no_control(self, command, measurement))
 
 
@@ -29,13 +29,13 @@ class NoControl(NativeBlock):
 def no_control(
     block: NoControl, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `NoControl.step`; returns the first fields of an `ActuatorCommand`."""
+    """Law of `NoControl.step`, which returns the first fields of an `ActuatorCommand`."""
     desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, measurement.speed_mps)
     return 0.0, 0.0, desired, 0.0, 0.0, False
 
 
 class Observer:
-    """No control; an estimator records speed, sideslip, yaw rate and friction."""
+    """No control, with an estimator that records speed, sideslip, yaw rate and friction."""
 
     reads = ("estimator",)
 
@@ -44,5 +44,5 @@ class Observer:
         self._estimator = setup.estimator()
 
     def step(self, _command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return no angles; the estimate is recorded."""
+        """Return no angles, and the estimate for the recording."""
         return ActuatorCommand(estimate=self._estimator.step(measurement))

@@ -1,4 +1,4 @@
-"""Gains and limits of the controllers: types and ranges; the values are in `models/controllers` and vehicle files."""
+"""Types and ranges of the controllers' gains and limits, with values in `models/controllers` and vehicle files."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def file_gains(name: str, gains: type[T]) -> T:
 
 @dataclass(frozen=True)
 class SideslipRearSteerParameters:
-    """Rear steering with a sideslip term (`ars_sideslip`); [controllers.ars] gives its other gains."""
+    """Rear steering with a sideslip term (`ars_sideslip`), in addition to the gains of [controllers.ars]."""
 
     sideslip_gain: _Gain
     """Rear angle against the sideslip angle [rad/rad]: share by which the rear axle becomes stiffer against
@@ -130,7 +130,7 @@ class TorqueVectoringParameters(YawMomentParameters):
 
 @dataclass(frozen=True)
 class IntegratedParameters:
-    """Brakes for what the steering of `lqr` cannot give (`integrated`); [controllers.lqr] gives the feedback.
+    """Brakes for what the steering of `lqr` cannot give (`integrated`), in addition to [controllers.lqr].
 
     A missing moment as large as its scale in [controllers.lqr] and a brake force as large as its scale cost the same.
     """
@@ -180,7 +180,7 @@ class DesiredYawRateParameters:
 
 @dataclass(frozen=True)
 class CorrectorParameters:
-    """Tolerance band and PID corrector on the yaw rate error; the paper uses the P part alone."""
+    """Tolerance band and PID corrector on the yaw rate error, of which the paper has only the P part."""
 
     deadband_start_radps: _NotNegative = math.radians(0.5)
     """c_off: below this error there is no action [rad/s]."""
@@ -220,7 +220,7 @@ class FrontSuperpositionParameters:
 
 @dataclass(frozen=True)
 class ServoParameters:
-    """The actuators of both axles as `lqr` and `integrated` know them; angles at the road wheels."""
+    """The actuators of both axles as `lqr` and `integrated` know them, with angles at the road wheels."""
 
     lag_s: _Lag = 0.025
     """Lag of both actuators [s]."""
@@ -293,7 +293,7 @@ class SplitAxle(NamedTuple):
 
 @dataclass(frozen=True)
 class ControllerSetup:
-    """Input from which a controller is made.
+    """Input for the creation of a controller.
 
     Attributes:
         single_track: The car as a single-track model.

@@ -106,7 +106,7 @@ class SplitTorques:
         self._levers = [0.5 * track_m / self._radius_m[2 * axle] for axle, track_m in enumerate(tracks_m)]
 
     def ranges(self, command: DriverCommand, measurement: Measurement, now: Estimate) -> list[Range]:
-        """Return the ranges of the electric axles for the present motion; the driver's torque counts first."""
+        """Return the ranges of the electric axles for the current motion, after the driver's torque."""
         if not self._axles:
             return []
         if command.brake_pedal > 0.0:
@@ -189,7 +189,7 @@ class TorqueVectoring:
     gains = TorqueVectoringParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run. Its car needs an axle whose torques can differ."""
+        """Create the controller of one run for a car with an axle whose torques can differ."""
         if not setup.split_axles:
             raise ControllerError(
                 "needs an electric axle whose left and right torques can differ: motors.rl and motors.rr (or fl and "

@@ -30,7 +30,7 @@ class TurnReference(NativeBlock):
     def __init__(
         self, single_track: SingleTrackParameters, length_m: float, friction_fraction: float, interval_s: float
     ) -> None:
-        """Compute the constants; `length_m` is the distance over which the yaw rate follows the driver."""
+        """Compute the constants from the distance over which the yaw rate follows the driver, `length_m`."""
         self._single_track = SingleTrack(single_track)
         self._length_m, self._interval_s = length_m, interval_s
         self._most_mps2 = friction_fraction * GRAVITY_MPS2

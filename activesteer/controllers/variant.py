@@ -72,7 +72,7 @@ class Variant:
         return CONTROLLERS[self.system].reads
 
     def from_vehicle(self, setup: ControllerSetup) -> Any:
-        """Make the controller for a car; raises as `gains_in` does."""
+        """Create the controller for a car, or raise the errors of `gains_in`."""
         return CONTROLLERS[self.system](replace(setup, gains=self.gains_in(setup)))
 
     def gains_in(self, setup: ControllerSetup) -> ControllerParameters:

@@ -54,7 +54,7 @@ class Child:
         return self._finalizer.alive
 
     def ask(self, request: bytes, doing: str, limit_s: float, max_bytes: int) -> bytes:
-        """Return the answer to a request. The child is killed if there is none."""
+        """Return the answer to a request, or kill the child if there is none."""
         if not self.alive:
             raise ChildFault(f"has ended, before {doing}")
         try:
@@ -101,7 +101,7 @@ class Child:
 
 
 def _left_s(end_s: float) -> float:
-    """Return the time until a deadline. With less than nothing, a socket would not wait, and with nothing for ever."""
+    """Return the time until a deadline, or raise `TimeoutError` if it has passed."""
     if (left_s := end_s - time.monotonic()) <= 0.0:
         raise TimeoutError
     return left_s

@@ -1,4 +1,6 @@
-"""Axes, signs and orders of the whole package. SI units and radians are used everywhere inside it.
+"""Axes, signs and orders of the whole package.
+
+SI units and radians are used everywhere inside it.
 
 Axes follow ISO 8855: x forward, y left, z up; a left turn, a left steer and a left yaw are positive.
 Roll is positive to the right (rotation about +x), pitch is positive nose down (rotation about +y).

@@ -41,7 +41,7 @@ def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Abst
 
 @contextmanager
 def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[Path]:
-    """Yield a new file beside `path` that replaces `path` at the end.
+    """Yield a new file next to `path` that replaces `path` at the end.
 
     No one can read half a file: if the body fails, the new file is deleted and the old one stays. A device is written
     directly.
@@ -74,14 +74,14 @@ def delete_temporary_files() -> None:
 
 
 def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerError]) -> Path:
-    """Write a text file in UTF-8, and return its path. An existing file is replaced as a whole."""
+    """Write a text file in UTF-8 that replaces an existing file as a whole, and return its path."""
     with atomic_write(path, error) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)
 
 
 def json_text(value: Any) -> str:
-    """Return a value as indented JSON. A number that is not finite becomes null."""
+    """Return a value as indented JSON, with null for numbers that are not finite."""
     return json.dumps(finite(value), indent=2, allow_nan=False)
 
 
@@ -114,7 +114,7 @@ def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Pa
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Return whether a path is a regular file. Also for names that no file can have."""
+    """Return whether a path is a regular file, False for names that no file can have."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -122,7 +122,7 @@ def is_file(path: str | os.PathLike[str]) -> bool:
 
 
 def is_folder(path: str | os.PathLike[str]) -> bool:
-    """Return whether a path is a folder. Also for names that no folder can have."""
+    """Return whether a path is a folder, False for names that no folder can have."""
     try:
         return stat.S_ISDIR(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -162,7 +162,7 @@ def read_text(
     error: type[ActiveSteerError],
     max_bytes: int = limits.MAX_TEXT_BYTES,
 ) -> str:
-    """Read a text file in UTF-8. See `read_bytes`. Line ends are normalised, and a byte order mark is removed."""
+    """Read a text file in UTF-8 as by `read_bytes`, with normalised line ends and without a byte order mark."""
     try:
         text = read_bytes(path, error, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
@@ -182,7 +182,9 @@ class CsvRow(NamedTuple):
 def read_csv(
     path: str | os.PathLike[str], error: type[ActiveSteerError], *, empty_cells_count: bool = False
 ) -> list[CsvRow]:
-    """Read the rows of a CSV with cells separated by commas, semicolons or tabs; the first line with any decides.
+    """Read the rows of a CSV with cells separated by commas, semicolons or tabs.
+
+    The first line with a separator decides which one applies.
 
     Text after `#` is a comment. With semicolons or tabs, 1,5 is the number 1.5.
     """

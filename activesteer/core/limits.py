@@ -1,4 +1,6 @@
-"""Limits of files from outside: size, count, depth and numbers. The page `docs/limits.md` says what they guarantee.
+"""Limits of files from outside: size, count, depth and numbers.
+
+The page `docs/limits.md` says what they guarantee.
 
 Every reader checks with these limits and functions before it uses what a file holds, so that a small file can fill
 neither memory nor time.
@@ -119,7 +121,7 @@ def number_in(text: str, error: type[ActiveSteerError], **place: Any) -> float:
 
 
 def too_large(values: Any, *, infinite: bool = False) -> Any:
-    """Return which values are above `MAX_NUMBER`. Nan is a missing value, infinity may be that of a diverged run."""
+    """Return which values are above `MAX_NUMBER`, or above it but finite if `infinite`."""
     size = abs(values)
     return (size > MAX_NUMBER) & (size < math.inf) if infinite else size > MAX_NUMBER
 
@@ -165,7 +167,7 @@ def number(value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M
 def numbers(
     value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M, count: int | None = None
 ) -> NDArray[np.float64]:
-    """Return the value [m] if it is a list of numbers from `low` to `high`, `count` of them if given. Else raise."""
+    """Return the value [m] if it is a list of numbers from `low` to `high`, `count` of them if given, or raise."""
     import numpy as np  # noqa: PLC0415 - slow to import
 
     listed = sequence(value, key)

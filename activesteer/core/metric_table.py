@@ -87,7 +87,7 @@ class Metric(NamedTuple):
         return self.form is not Form.NUMBER
 
     def text(self, value: float) -> str:
-        """Return a value [SI] as tables show it. `-` where the value is not defined (nan)."""
+        """Return a value [SI] as tables show it, `-` for nan."""
         if math.isnan(value):
             return "-"
         if self.form is Form.YES_OR_NO:
@@ -95,7 +95,7 @@ class Metric(NamedTuple):
         return f"{value:z.0f}" if self.form is Form.COUNT else f"{value * self.unit.factor:z.3f}"
 
     def cost(self, value: float) -> float:
-        """Return what shall be small [SI]. The value itself where the metric has no preferred direction."""
+        """Return what shall be small [SI], or the value itself if the metric has no preferred direction."""
         if self.better is Better.SMALLER:
             return abs(value)
         return -value if self.better is Better.HIGHER else value

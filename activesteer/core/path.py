@@ -76,7 +76,7 @@ class Path:
 
     @classmethod
     def between(cls, x_m: Array, y_m: Array) -> Path:
-        """Make a path of known points. Differences between them give arc length, heading and curvature."""
+        """Create a path of known points, with arc length, heading and curvature by differences between them."""
         s = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(y_m)))])
         heading = np.unwrap(np.arctan2(np.gradient(y_m, s), np.gradient(x_m, s)))
         x_m, y_m = np.ascontiguousarray(x_m), np.ascontiguousarray(y_m)

@@ -1,4 +1,4 @@
-"""The messages that the blocks exchange in every step. Immutable; SI units; signs of `conventions`.
+"""Immutable messages that the blocks exchange in every step, in SI units with the signs of `conventions`.
 
 Messages are named tuples because the loop creates them every millisecond, and a frozen dataclass takes several times
 as long to create. Where even the call of the class takes too long, use `new_message`.
@@ -142,7 +142,7 @@ def _types_of(message: type[tuple[Any, ...]]) -> tuple[Any, ...]:
 
 
 def message_of(kind: type[_Message], row: Iterable[float]) -> _Message:
-    """Return a message from its numbers. Fields without numbers are None."""
+    """Return a message from its numbers, with None for fields without numbers."""
     numbers, fields = iter(row), []
     for width, hint in zip(widths_of(kind), _types_of(kind), strict=True):
         if width == 1:
@@ -153,7 +153,9 @@ def message_of(kind: type[_Message], row: Iterable[float]) -> _Message:
 
 
 def arrays_of(kind: type[_Message], rows: Any) -> _Message:
-    """Return a message whose fields are arrays, from rows of its numbers. A field without numbers is None.
+    """Return a message whose fields are arrays, from rows of its numbers.
+
+    A field without numbers is None.
 
     Args:
         kind: Class of the message.
@@ -183,7 +185,7 @@ class WheelTorques(NamedTuple):
 
 
 class Setpoint(NamedTuple):
-    """Demand of the manoeuvre on the driver at one instant.
+    """Demand of the manoeuvre on the driver at one time.
 
     Attributes:
         steering_wheel_demand_rad: Steering wheel angle [rad], left positive.
@@ -270,7 +272,9 @@ class Measurement(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Position and motion of the car over the ground, as the driver sees and feels them. No controller gets it.
+    """Position and motion of the car over the ground, as the driver sees and feels them.
+
+    No controller receives it.
 
     Attributes:
         x_m: Position of the centre of gravity, world x [m].

@@ -25,7 +25,9 @@ def text_table(
     gap: int = 2,
     marks: Sequence[str] = (),
 ) -> Iterator[str]:
-    """Yield the lines of a table. Its first row is the head.
+    """Yield the lines of a table.
+
+    Its first row is the head.
 
     A table that is too wide gets narrower columns, then smaller gaps. If that is not enough, it is split into several
     tables below each other, or its words are wrapped.
@@ -58,7 +60,7 @@ def text_table(
 
 
 def wrapped_line(line: str, width: int = COLUMNS) -> list[str]:
-    """Return a line in parts that fit. Further parts are indented four columns more than the line."""
+    """Return a line in parts that fit, further parts indented by four more columns than the line."""
     if _length(line) <= width:
         return [line]
     indent = " " * (len(line) - len(line.lstrip()) + 4)

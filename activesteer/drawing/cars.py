@@ -78,7 +78,7 @@ def direction_of_motion(time_s: Array, places_m: Array, heading_rad: Array) -> A
 
 
 def _smooth(time_s: Array, values: Array) -> Array:
-    """Return a moving average with Gaussian weights and no phase shift. The end values are continued at both ends."""
+    """Return a moving average with Gaussian weights and no phase shift, with the end values continued."""
     step = float(np.median(np.diff(time_s)))
     reach = round(4.0 * _STEADY_S / step)
     offsets = np.arange(-reach, reach + 1) * step

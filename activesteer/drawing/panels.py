@@ -1,4 +1,4 @@
-"""The panels over time: what each one draws, and in which views it stands."""
+"""The panels over time: their curves, and the views that show them."""
 
 from __future__ import annotations
 

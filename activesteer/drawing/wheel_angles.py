@@ -71,13 +71,13 @@ def wheel_centres(size: Footprint) -> Array:
 
 
 def tips_beside(size: Footprint) -> Array:
-    """Return the tips of wedges beside the car [m], shape (4, 2)."""
+    """Return the tips of wedges next to the car [m], shape (4, 2)."""
     beside = 0.5 * size.width_m + _BESIDE_M
     return np.array([(x, side * beside) for x in (0.0, -size.wheelbase_m) for side in (1.0, -1.0)])
 
 
 class Plan(NamedTuple):
-    """A car in plan view. Every part is a closed line in the axes of the car."""
+    """A car in plan view, with every part as a closed line in the axes of the car."""
 
     body: Array  # outline of the body [m], shape (points, 2)
     wheels: Array  # outlines of the wheels [m], turned by the enlarged angles, shape (..., 4, 4, 2)

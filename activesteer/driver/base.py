@@ -87,17 +87,17 @@ class Drivetrain(Protocol):
     """Engine and gearbox as a driver knows them."""
 
     def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float], /) -> float:
-        """Return the mean speed of the driven wheels, with which the engine turns [rad/s]."""
+        """Return the mean speed of the driven wheels, which turns the engine [rad/s]."""
         ...
 
     def limits_Nm(self, speed_radps: float, gear: int, /) -> tuple[float, float]:
-        """Return the smallest and largest total wheel torque in a gear, 1 or -1; forward positive [N m]."""
+        """Return the smallest and largest total wheel torque in a gear, 1 or -1, forward positive [N m]."""
         ...
 
 
 @dataclass(frozen=True)
 class DriverSetup:
-    """Input from which a driver is made.
+    """Input for the creation of a driver.
 
     Attributes:
         single_track: The car without control as a single-track model.

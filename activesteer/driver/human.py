@@ -109,7 +109,9 @@ _MAX_TABLES: Final = 64
 
 
 class SetpointTable(NamedTuple):
-    """Setpoints of successive steps for compiled code. The last one holds on.
+    """Setpoints of successive steps for compiled code.
+
+    The last one holds on.
 
     Attributes:
         rows: Records of `SETPOINT`.

@@ -15,7 +15,9 @@ _STANDSTILL_MPS: Final = 0.05
 
 
 class SpeedHold(NativeBlock):
-    """Speed control by drive torque and engine braking. The integral stands still while a limit is active.
+    """Speed control by drive torque and engine braking.
+
+    The integral stands still while a limit is active.
 
     A negative speed engages the reverse gear: the engine then drives backwards and brakes forwards.
 
@@ -229,7 +231,7 @@ class ConstantRadiusDriver(NativeBlock):
         self._correction_1pm = 0.0
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """Return the command. A setpoint without a curvature gives the steering wheel angle. See `Driver`."""
+        """Return the command of a driver, with the steering wheel angle of a setpoint without a curvature."""
         curvature = setpoint.curvature_demand_1pm
         if curvature is None:
             return self.robot.step(setpoint, measurement, motion)
@@ -249,6 +251,6 @@ def circle_angle(block: ConstantRadiusDriver, robot: OpenLoopDriver, curvature_1
 
 @shared
 def correct_circle(block: ConstantRadiusDriver, curvature_1pm: float, yaw_rate_radps: float, speed_mps: float) -> None:
-    """Integrate the curvature error. Call it only while the steering wheel is not at its stop."""
+    """Integrate the curvature error while the steering wheel is not at its stop."""
     if speed_mps > _MIN_SPEED_MPS:
         block._correction_1pm += block._fraction * (curvature_1pm - yaw_rate_radps / speed_mps)

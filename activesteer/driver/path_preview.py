@@ -139,7 +139,7 @@ class PathPreviewDriver(NativeBlock):
             self._note(rounded, row)
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """Return the command; without a path the driver carries out his last decisions. See `Driver`."""
+        """Return the command of the driver, who repeats his last decisions without a path."""
         path = setpoint.path
         if self._steps % self._preview_every_steps == 0 and path is not None:
             decided = self._decided_rad
@@ -154,7 +154,7 @@ class PathPreviewDriver(NativeBlock):
 
 @shared
 def looks(speed_mps: float) -> bool:
-    """Return whether a driver looks ahead at a speed [m/s]. Otherwise he holds the steering wheel."""
+    """Return whether a driver looks ahead at a speed [m/s] instead of holding the steering wheel."""
     return speed_mps >= _MIN_SPEED_MPS
 
 
@@ -251,7 +251,7 @@ def _steering_gains(
     parameters: DriverParameters,
     steering_ratio: float,
 ) -> SteeringGains:
-    """Cached `steering_gains`; the matrices of the car row by row."""
+    """Cached `steering_gains` for the matrices of the car row by row."""
     from scipy.linalg import expm, solve_discrete_are  # noqa: PLC0415 - slow to import, and only this driver needs it
 
     # States: yaw rate, sideslip angle, heading, lateral position, steering wheel angle; then the decision, held.

@@ -154,7 +154,7 @@ def _filter(known, tyres, memory, said, line):
 
 @compiled
 def _predict_present(known, tyres, memory, line):
-    """Advance the model alone from the time of the filters to the present, with the later angles."""
+    """Advance only the model from the time of the filters to the present, with the later angles."""
     now, count, length = memory.now, memory.calls, len(line)
     for index in range(N_STATES):
         now[index] = memory.state[index]
@@ -199,7 +199,7 @@ def _write_estimate(known, memory):
 
 @compiled
 def advance(known, tyres, memory, said, line):
-    """Process the present measurement, and make the estimate; the records have the shape (1,)."""
+    """Process the current measurement and return the estimate, with records of shape (1,)."""
     k, m = known[0], memory[0]
     first = m.calls == 0
     if first:

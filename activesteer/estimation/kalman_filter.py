@@ -99,7 +99,7 @@ _CREEP_DENSITY: Final = 0.05
 
 @compiled
 def begin(known, memory):
-    """Set state and covariance to those of a car that drives straight ahead."""
+    """Set state and covariance for a car that drives straight ahead."""
     state, covariance = memory.state, memory.covariance
     state[:] = 0.0
     state[FRICTION] = known.friction
@@ -136,7 +136,7 @@ def _force_errors(known, front_N, rear_N):
 
 @compiled
 def _differentiate(known, tyres, memory, duration_s, moved, slope):
-    """Compute the state after an interval, and its derivatives by the present state."""
+    """Compute the state after an interval, and its derivatives by the current state."""
     state = memory.state
     start, other, braked = state.copy(), np.empty(N_STATES), _is_braked(known, memory)
     follow(known, tyres, memory, start, duration_s, moved)
@@ -347,7 +347,7 @@ def reopen(known, memory):
 
 @compiled
 def take_in_friction(memory, friction, duration_s):
-    """Correct the friction by the one that sliding wheels show."""
+    """Correct the friction by the friction of sliding wheels."""
     covariance, std = memory.covariance, _SLIDING_STD * friction
     # Its error lasts: during this time all samples count as one measurement.
     variance = std * std * (1.0 + 2.0 * SLIDING_S / duration_s)

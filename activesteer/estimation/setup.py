@@ -18,7 +18,7 @@ _NotNegative = Annotated[float, Range(0.0)]
 
 @dataclass(frozen=True)
 class EstimatorParameters:
-    """Roll steer and uncertainties of the estimator's model; the data sheets give the uncertainties of the sensors."""
+    """Roll steer and uncertainties of the estimator's model."""
 
     front_roll_steer: Annotated[float, Range(-2.0, 2.0)] = 0.0
     """Slip angle that the front axle loses per roll angle [rad/rad]. From a K&C test: `roll_understeer`, plus
@@ -135,7 +135,7 @@ class KnownTyre:
 
 @dataclass(frozen=True)
 class EstimatorSetup:
-    """Input from which an estimator is made.
+    """Input for the creation of an estimator.
 
     Attributes:
         single_track: Mass, yaw inertia, axle distances and axle stiffnesses.

@@ -1,4 +1,4 @@
-"""The filter of the speed, from reliable wheels and the longitudinal acceleration; compiled.
+"""The compiled filter of the speed, from reliable wheels and the longitudinal acceleration.
 
 Load, longitudinal force and speed of each wheel come first, from the sensors:
 

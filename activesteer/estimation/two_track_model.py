@@ -1,4 +1,4 @@
-"""The two-track model of the estimator: lateral motion, axle forces, and their unknown parts; compiled.
+"""The compiled two-track model of the estimator: lateral motion, axle forces, and their unknown parts.
 
 For the axles i = f, r:
 
@@ -134,7 +134,7 @@ def forces_of(known, tyres, memory, state):
 
 @inlined
 def slip_angles(known, memory, state, vx_mps):
-    """Return the slip angles of both axles from the motion of the car alone [rad]."""
+    """Return the slip angles of both axles from only the motion of the car [rad]."""
     across_mps = state[LATERAL_SPEED] + memory.rolling_mps
     front_rad = memory.front_angle_rad - (across_mps + known.cg_to_front_m * state[YAW_RATE]) / vx_mps
     rear_rad = memory.rear_angle_rad - (across_mps - known.cg_to_rear_m * state[YAW_RATE]) / vx_mps

@@ -39,14 +39,14 @@ _ARGUMENTS: Final = {3: "controllers", 4: "drivers"}
 
 
 class Folder:
-    """Names that the page may use: those of the package, and files of one folder."""
+    """Names that the page may use: of the package, and files of one folder."""
 
     def __init__(self, path: Path) -> None:
         """Take the folder."""
         self.path = path
 
     def names(self) -> dict[str, list[str]]:
-        """Return the names of manoeuvres, vehicles, drivers and controllers, those of the folder last."""
+        """Return the names of manoeuvres, vehicles, drivers and controllers, with the folder's names last."""
         names = _of_package()
         files = sorted([*self.path.glob("*.toml"), *self.path.glob("*.py"), *self.path.glob("vehicles/*/*.toml")])
         for file in files:
@@ -105,7 +105,7 @@ def titles() -> dict[str, str]:
 
 
 def _content_of(file: Path) -> Iterator[tuple[str, str]]:
-    """Yield the list to which a file belongs, and what its name there ends with. No code of the file is executed."""
+    """Yield the list of a file and the ending of its name there, without executing its code."""
     text = file.read_text("utf-8")
     if file.suffix == ".toml":
         table = tomllib.loads(text)

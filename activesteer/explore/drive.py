@@ -58,7 +58,7 @@ COURSES: Final = {
 
 
 class HandDriver:
-    """A driver whose hands and feet are those of a person at the page.
+    """A driver with the hands and feet of a person at the page.
 
     The hands turn the wheel at a limited rate towards the angle asked for. Full steering is the angle of a steady turn
     at `_FASTEST_MPS2`, a (l / v^2) (1 + (v / v_ch)^2) times the steering ratio, and at most the lock. Without a foot on

@@ -1,4 +1,4 @@
-"""Messages of the page: their fields, ranges and sizes, checked in this one place, and the queue in which they wait."""
+"""Messages of the page: their fields, ranges and sizes, checked only here, and the queue of waiting messages."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ class RunRequest(Choice, frozen=True, tag="run"):
 
 
 class Start(Choice, frozen=True, tag="start"):
-    """The page asks for a car at the start of a course. It waits there for `Act.go`."""
+    """Request of the page for a car that waits at the start of a course for `Act.go`."""
 
     speed_kmh: _Speed | None = None  # speed at the start; that of the course by default
     mu: _Friction | None = None  # friction of the road; that of the course by default
 
 
 class Act(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="act"):
-    """Hands and feet, controller, speed and friction during a drive. What is unset stays as it is."""
+    """Hands and feet, controller, speed and friction during a drive, each unchanged if unset."""
 
     # Position of the steering, -1 full right to 1 full left. Throttle, brake and direct count with it
     steer: Annotated[float, Meta(ge=-1.0, le=1.0)] | UnsetType = UNSET
@@ -95,7 +95,9 @@ def read(text: str | bytes) -> Message:
 
 
 def add(waiting: deque[Message], message: Message) -> bool:
-    """Append a message to a queue, where it replaces an older one of the same meaning. Return False if it is full.
+    """Append a message to a queue, where it replaces an older one of the same meaning.
+
+    Return False if it is full.
 
     Beginning and end of a drive are always taken: they make older hands useless.
     """

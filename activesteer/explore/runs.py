@@ -86,7 +86,7 @@ class Slider(NamedTuple):
 
 
 def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Path] | None = None) -> list[Slider]:
-    """Return the sliders of a run; those of `own`, group -> file of the user, include all numbers of the file."""
+    """Return the sliders of a run, for the groups in `own` (group -> the user's file) with all numbers of the file."""
     found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
     for group, file in (own or {}).items():
         found += _of_file(group, scenario, file)
@@ -282,7 +282,7 @@ class Runs:
         return sliders(self._resolved(choice, {}), self._located(choice), own)
 
     def _limits(self, choice: Choice) -> dict[str, tuple[float, float]]:
-        """Return the limits of the sliders; those of the last choice are kept, since they take as long as a run."""
+        """Return the limits of the sliders, kept from the last choice because they take as long as a run."""
         names = choice.maneuver, choice.vehicle, choice.driver, choice.controllers
         if self._limits_of[0] != names:
             self._limits_of = names, {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}

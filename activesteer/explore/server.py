@@ -150,7 +150,7 @@ class ExploreServer:
         return HTMLResponse(self._report)
 
     async def _talk(self, page: WebSocket) -> None:
-        """Pass messages of the page to the worker. A second page takes the place of the first."""
+        """Pass messages of the page to the worker, until a second page takes its place."""
         if page.headers.get("origin") not in (f"http://{self._host}", f"http://localhost:{self.port}"):
             await page.close(1008)
             return
@@ -180,7 +180,7 @@ class ExploreServer:
                 self._hand_on(End())
 
     def _hand_on(self, message: Message) -> bool:
-        """Put a message for the worker into the queue. Return False if it is full."""
+        """Put a message for the worker into the queue, and return whether it fitted."""
         taken = add(self._waiting, message)
         self._came.set()
         return taken

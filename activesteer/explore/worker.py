@@ -133,7 +133,7 @@ def _error(error: BaseException, message: Message) -> Reply:
 
 
 def _words(error: BaseException) -> str:
-    """Return the message of our own errors, and the class of others with their message."""
+    """Return the message of errors of this package, and the class and message of others."""
     if isinstance(error, ActiveSteerError):
         return str(error)
     try:

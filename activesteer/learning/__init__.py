@@ -1,4 +1,4 @@
-"""Gymnasium environments on `Batch`; importing this package registers them.
+"""Gymnasium environments on `Batch`, which the import of this package registers.
 
 Examples:
     >>> import gymnasium

@@ -187,7 +187,7 @@ class _Picture:
 
 
 class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
-    """Many `CarEnv`, driven in one native call; equal to `SyncVectorEnv` of them in every autoreset mode.
+    """Many `CarEnv` in one native call, equal to their `SyncVectorEnv` in every autoreset mode.
 
     Attributes:
         episodes: The simulation.
@@ -228,7 +228,7 @@ class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.fl
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Start all episodes, or those of `options["reset_mask"]` (see `gymnasium.vector.VectorEnv.reset`)."""
+        """Start all episodes, or only `options["reset_mask"]` (see `gymnasium.vector.VectorEnv.reset`)."""
         seeds = [seed + number for number in range(self.num_envs)] if isinstance(seed, int) else seed
         mask = np.ones(self.num_envs, dtype=bool)
         if options is not None and "reset_mask" in options:

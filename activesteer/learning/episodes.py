@@ -257,7 +257,7 @@ class Episodes:
         self._started = np.zeros(n, dtype=bool)
 
     def reset(self, episodes: Sequence[int], generators: Sequence[np.random.Generator]) -> NDArray[np.float32]:
-        """Start some episodes anew, each with a car that its generator draws. Return the observations of all."""
+        """Start some episodes anew, each with a car that its generator draws, and return all observations."""
         for episode, generator in zip(episodes, generators, strict=True):
             self._active[episode] = episode * self._cars + int(generator.integers(self._cars))
         cars = self._active[list(episodes)]

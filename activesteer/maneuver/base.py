@@ -33,7 +33,7 @@ KINDS: Final[dict[str, type[Maneuver]]] = {}
 
 
 class NamedFile(NamedTuple):
-    """A key of a manoeuvre that names a file, and the keys beside it that the file fills."""
+    """A key of a manoeuvre that names a file, and the keys next to it that the file fills."""
 
     key: tuple[str, ...]  # the key, as the path of names to it
     fills: tuple[str, ...]  # keys that it fills, in the same table
@@ -43,7 +43,9 @@ class NamedFile(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Maneuver(ABC):
-    """Base of all kinds. The fields are the keys of the TOML file.
+    """Base of all kinds.
+
+    The fields are the keys of the TOML file.
 
     Examples:
         >>> from activesteer.scenario import resolve
@@ -95,7 +97,7 @@ class Maneuver(ABC):
         return None
 
     def sequence(self) -> Any:
-        """Return what follows the car through the phases of one run, or None if setpoints depend on time alone."""
+        """Return what follows the car through the phases of one run, or None if setpoints depend only on time."""
         return None
 
     @property
@@ -135,7 +137,7 @@ class Search:
 
 
 def within(value: float, most: float) -> float:
-    """Return a value limited to 0 and `most`. In a setpoint `min` and `max` would take most of the time."""
+    """Return a value limited to 0 and `most`, faster than by `min` and `max`."""
     return 0.0 if value < 0.0 else most if value > most else value
 
 
@@ -147,7 +149,7 @@ def check_begin(key: str, start_s: float, duration_s: float) -> None:
 
 
 def check_speed(speed_mps: float, needing: str, instead: str = "", least_mps: float = MIN_SEARCH_SPEED_MPS) -> None:
-    """Check that the car drives forwards and fast enough. `instead` is the key with which a search is not needed."""
+    """Check that the car drives forwards and fast enough, with `instead` as the key that needs no search."""
     if speed_mps < least_mps:
         given, least = 3.6 * speed_mps, 3.6 * least_mps
         problem = f"is {given:g} km/h; {needing} needs at least {least:g} km/h, forwards"
@@ -158,7 +160,9 @@ def check_speed(speed_mps: float, needing: str, instead: str = "", least_mps: fl
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
 ) -> tuple[dict[str, list[float]], list[int]]:
-    """Read required and optional columns of a CSV whose first line names them. Other columns are ignored.
+    """Read required and optional columns of a CSV whose first line names them.
+
+    Other columns are ignored.
 
     A column may be in degrees or km/h, as in a TOML file: `steering_wheel_deg` fills `steering_wheel_rad`.
     """

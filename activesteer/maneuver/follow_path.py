@@ -122,7 +122,7 @@ class PathSpeed:
         self._acceleration_mps2 = speed_mps * np.gradient(speed_mps, path.s_m)
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the present place of the car (see `PhaseSequence.setpoint`)."""
+        """Return the setpoint for the current place of the car (see `PhaseSequence.setpoint`)."""
         speed_mps, x_m, y_m = seen[3:6]
         self._along_m = self._search.nearest(x_m, y_m, self._along_m, _WINDOW_M)
         wanted_mps = float(np.interp(self._along_m, self._s_m, self._speed_mps))
@@ -141,7 +141,7 @@ class PathSpeed:
 
 @dataclass(frozen=True)
 class PathTable:
-    """Points in the order of travel. The car starts at (0, 0), heading along x."""
+    """Points in the order of travel, from (0, 0) along x."""
 
     csv: str | None = None
     """CSV file with the columns x_m and y_m, and speed_mps (or speed_kmh) and width_m if wanted: a path, or a name in
@@ -156,7 +156,7 @@ class PathTable:
     """Widths of the road at the points [m], the path in its middle; for evaluation."""
 
     def __post_init__(self) -> None:
-        """Check that the points make a path."""
+        """Check that the points form a path."""
         if self.x_m is None or self.y_m is None:
             raise ManeuverError("csv (a file with the columns x_m and y_m) or both lists x_m and y_m are needed")
         check_points(self.x_m, self.y_m, lambda index: f"point {index + 1}")

@@ -90,7 +90,7 @@ class AlongCourse(Maneuver):
 
 
 def known_width(vehicle_width_m: float | None) -> float:
-    """Return the width of the vehicle, for which a course is laid out [m]."""
+    """Return the vehicle width that the course is laid out for [m]."""
     if vehicle_width_m is None:
         raise ManeuverError(
             "is missing; it comes from the vehicle file (width_m) unless it is given here", key="vehicle_width_m"
@@ -132,7 +132,7 @@ def lanes(layout: LaneLayout, vehicle_width_m: float, side: float) -> tuple[Lane
 
 
 def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
-    """Return the points at which cones touch the edges of lanes: at both ends, and at most 5 m apart in between.
+    """Return the points where cones touch the edges of lanes: at both ends, and at most 5 m apart in between.
 
     By the standards the edges of a lane are tangents to the feet of its cones.
     """
@@ -199,7 +199,7 @@ def least_jerk(start_x_m: float, end_x_m: float, end_y_m: float, bounds: Sequenc
 
 
 def _bounded(a: Array, b: Array, g: Array, low: Array, high: Array) -> Array:
-    """Return the z that minimises |A z - b| for low <= G z <= high. A has full column rank (LSI, LDP)."""
+    """Return the z that minimises |A z - b| for low <= G z <= high, for A of full column rank (LSI, LDP)."""
     from scipy.linalg import solve_triangular  # noqa: PLC0415 - slow to import
     from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
 

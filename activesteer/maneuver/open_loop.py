@@ -101,7 +101,7 @@ class SensorOffsetTable:
 
 @dataclass(frozen=True)
 class WheelTorqueTable:
-    """Torques of each wheel over time. A missing column is zero."""
+    """Torques of each wheel over time, zero for a missing column."""
 
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
@@ -155,7 +155,7 @@ def _read(fills: str, columns: Sequence[str], file: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class OpenLoop(Maneuver, kind="open_loop"):
-    """Tables over time. The drive holds the speed, or the car coasts, or the wheel torques are given."""
+    """Tables over time, for a car at a held speed, a coasting car, or given wheel torques."""
 
     steering: SteeringTable = SteeringTable()
     """Steering wheel or rack. Default: straight ahead."""
@@ -237,7 +237,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
 
 
 def _interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:
-    """Interpolate linearly, constant outside. With plain floats because this runs every step."""
+    """Interpolate linearly, constant outside, with plain floats because this runs every step."""
     index = bisect_right(xs, x)
     if index == 0:
         return ys[0]

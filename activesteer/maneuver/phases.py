@@ -38,7 +38,7 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class Until:
-    """End of a phase: the first condition that holds. Signs are those of a manoeuvre to the left."""
+    """End of a phase: the first condition that holds, with signs of a manoeuvre to the left."""
 
     time_s: Annotated[float, Range(0.0, 3600.0)] | None = None
     """Time since the beginning of the phase [s]."""
@@ -96,7 +96,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Phase:
-    """One phase. What it leaves out stays as it is."""
+    """One phase, with None for what it leaves as it is."""
 
     name: str
     """Name, for the events in the recording."""
@@ -141,7 +141,7 @@ class Phase:
 
 @dataclass(frozen=True, kw_only=True)
 class Phases(Maneuver, kind="phases"):
-    """Phases in a row. The last one lasts to the end of the run."""
+    """Phases in a row, the last one to the end of the run."""
 
     phases: tuple[Phase, ...]
     """The phases."""
@@ -177,7 +177,7 @@ class Phases(Maneuver, kind="phases"):
         return PhaseSequence(self)
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Setpoint of phases that end by their times and inputs alone. A run uses `sequence`."""
+        """Setpoint of phases that end only by their times and inputs."""
         sequence, never = self.sequence(), (math.nan,) * len(Seen._fields)
         while True:
             setpoint = sequence.setpoint(time_s, never)
@@ -247,9 +247,9 @@ class PhaseSequence:
         return self.maneuver.phases[self._number % len(self.maneuver.phases)]
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the driver at a time [s] and a state of the car, in the order of `Seen`.
+        """Return the setpoint for the driver, after the step to the next phase if this one has ended.
 
-        Go on to the next phase if this one has ended.
+        It is the setpoint at a time [s] and a state of the car, in the order of `Seen`.
         """
         self.moved = False
         maneuver, until, elapsed_s = self.maneuver, self._phase.until, time_s - self._begin_s

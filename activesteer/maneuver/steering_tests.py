@@ -37,7 +37,7 @@ class StepInput:
     """Steady-state lateral acceleration of the car without control that the search reaches, left positive [m/s2]."""
 
     def __post_init__(self) -> None:
-        """Check that amplitude or lateral acceleration is given. With both, a search has found the amplitude."""
+        """Check that amplitude or lateral acceleration is given."""
         if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
             raise ManeuverError(
                 "steering_wheel_deg (the amplitude) or lateral_acceleration_g (which the car without control reaches) "
@@ -77,7 +77,7 @@ class StepSteer(Maneuver, kind="step_steer"):
         return steady_turn_search(self, self.steer, self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> StepSteer:
-        """Return the step with an amplitude [rad]. The lateral acceleration stays on record."""
+        """Return the step with an amplitude [rad], and with its lateral acceleration on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
 
@@ -99,7 +99,7 @@ Frequency = Annotated[float, Range(0.01, 50.0)]
 
 @dataclass(frozen=True)
 class Sweep:
-    """The sweep at the steering wheel. Its frequency rises by the same factor every second."""
+    """The sweep at the steering wheel, with a frequency that rises by the same factor every second."""
 
     start_s: Annotated[float, Range(0.0)] = 0.5
     """Time at which the sweep begins [s]."""
@@ -293,7 +293,7 @@ class DwellInput:
     """Amplitude as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the car without control [-]."""
 
     def __post_init__(self) -> None:
-        """Check the keys. If both amplitude and factor are given, a search has found the amplitude."""
+        """Check that amplitude or factor is given."""
         if self.steering_wheel_rad is None and self.amplitude_factor is None:
             raise ManeuverError(
                 "steering_wheel_deg (the amplitude) or amplitude_factor (the amplitude as a multiple of the steering "
@@ -302,13 +302,13 @@ class DwellInput:
 
     @property
     def completion_s(self) -> float:
-        """Time at which the steering wheel is straight again [s]."""
+        """Time when the steering wheel is straight again [s]."""
         return self.start_s + 1.0 / self.frequency_Hz + self.dwell_s
 
 
 @dataclass(frozen=True, kw_only=True)
 class SineWithDwell(Maneuver, kind="sine_with_dwell"):
-    """A sine with dwell. The drive holds the speed until the sine begins."""
+    """A sine with dwell, with the speed held until the sine begins."""
 
     steer: DwellInput
     """The sine."""
@@ -338,7 +338,7 @@ class SineWithDwell(Maneuver, kind="sine_with_dwell"):
         return reference_angle_search(self, lambda angle: self.with_amplitude(factor * angle))
 
     def with_amplitude(self, steering_wheel_rad: float) -> SineWithDwell:
-        """Return the manoeuvre with an amplitude [rad]. The factor stays on record."""
+        """Return the manoeuvre with an amplitude [rad], and with its factor on record."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
     def setpoint(self, time_s: float) -> Setpoint:

@@ -31,7 +31,7 @@ _RISE_MPS2: Final = 0.15
 
 
 class CircleValidation(NamedTuple):
-    """Result of the comparison with a measured circle; angles of the steering wheel [deg]."""
+    """Result of the comparison with a measured circle, with angles of the steering wheel [deg]."""
 
     file: MeasuredFile  # the checked file
     distributions: Sequence[Array]  # measured and predicted angles; second prediction at either end of all intervals

@@ -61,7 +61,7 @@ def understood(path: Path, what: str) -> Iterator[None]:
 
 
 def numbers(values: Any, name: str, path: Path) -> Array:
-    """Convert values to numbers, and instants to seconds since the first one."""
+    """Convert values to numbers, and times to seconds since the first one."""
     try:
         array = np.asarray(values)
         if array.dtype.kind in "mM":
@@ -169,7 +169,7 @@ def _first_numbers(lines: list[str], path: Path) -> tuple[int, str]:
 
 
 def _header(head: list[str], separator: str, count: int, path: Path) -> tuple[list[str], list[str]]:
-    """Return names and units. The last line before the numbers holds the names, or the units of the names before it."""
+    """Return names and units from the last lines before the numbers."""
     rows = [row for line in head if len(row := _cells(line.lstrip("#"), separator)) >= count]
     rows = [row for row in rows if sum(bool(cell) for cell in row) >= 2]
     names = [len(row) for line in head if sum(map(bool, row := _cells(line.lstrip("#"), separator))) >= 2]
@@ -202,7 +202,7 @@ def read_columns(path: Path) -> list[Column]:
 
 
 def _numbered(columns: list[Column]) -> list[Column]:
-    """Append a number to the second and further columns of a name. Files such as MDF may repeat names."""
+    """Append a number to the second and further columns of a name, which files such as MDF may repeat."""
     seen: dict[str, int] = {}
     found = []
     for column in columns:
@@ -252,7 +252,7 @@ def _in_child(path: Path) -> list[Column]:
 
 
 def make_answerer() -> Callable[[bytes], bytes]:
-    """Return the function by which the child process answers."""
+    """Return the function that answers in the child process."""
     # A request is JSON: the path of a file that is opened, or the number of a column that is read. An answer is a line
     # of JSON, then values and times of a column as 64-bit floating-point numbers.
     opened: list[Column] = []

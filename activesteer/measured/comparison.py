@@ -70,7 +70,7 @@ def _pairs(measured: Recording, simulated: Recording, names: tuple[str, ...]) ->
 
 
 def _alike(pairs: list[tuple[Array, Array]], least: int) -> Array:
-    """Return the normalised cross-correlation over all shifts; -1 where fewer than `least` samples overlap."""
+    """Return the normalised cross-correlation over all shifts, -1 where fewer than `least` samples overlap."""
     from scipy.signal import correlate  # noqa: PLC0415 - slow to import
 
     product, first, second = 0.0, 0.0, 0.0

@@ -90,7 +90,7 @@ def without_effect(slopes: Sequence[Array]) -> list[int]:
 
 
 def told_apart(slopes: Sequence[Array]) -> list[int]:
-    """Return parameters of which a combination has no effect, or empty if all can be separated."""
+    """Return parameters with a combination that has no effect, or empty if all can be separated."""
     _, sizes, combinations = np.linalg.svd(np.concatenate(slopes) / _effects(slopes), full_matrices=False)
     if sizes[-1] > _SAME:
         return []

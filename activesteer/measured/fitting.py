@@ -218,7 +218,7 @@ def fit(
     scheduler: str | None = None,
     progress: FitProgress = lambda *_: None,
 ) -> Fit:
-    """Find values of factors for which the car, driven by recorded inputs, matches recordings best."""
+    """Find values of factors that match the car, driven by recorded inputs, best to recordings."""
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, problem.settings)
@@ -349,7 +349,7 @@ class _Problem:
 def drive(
     settings: Settings, recording: int, overrides: dict[str, Any], times: dict[str, Array]
 ) -> dict[str, Array] | str:
-    """Drive once. Return channels at their times in a recording, or the reason of a failure."""
+    """Drive once, and return channels at their times in a recording, or the reason of a failure."""
     try:
         scenario = scenario_of(settings, recording, 0, overrides)
         run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)

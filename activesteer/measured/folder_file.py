@@ -48,7 +48,7 @@ class RunTable:
 
 @dataclass(frozen=True)
 class QuantityTable:
-    """A compared channel. The numbers have the unit of its key."""
+    """A compared channel, with numbers in the unit of its key."""
 
     noise: Annotated[float, Range(1e-12)] | None = None
     """Standard deviation of its noise, its weight in fits. By default the channel is not used in fits."""
@@ -161,7 +161,7 @@ class MeasuredFile:
         return {key: getattr(self.table.circle, key) for key in CIRCLE_KEYS} | self.table.overrides
 
     def changed(self, case: dict[str, Any], *changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a case with overrides. A number that varies is changed by its difference from the files."""
+        """Return a case with overrides, a varying number changed by its difference from the files."""
         for change in changes:
             numbers = {key: self.nominal[key] for key in change if key in self.nominal}
             added = {key: case.get(key, own) + (change[key] - own) for key, own in numbers.items()}
@@ -215,7 +215,7 @@ def _with_runs(file: MeasuredFile) -> MeasuredFile:
 
 
 def _with_circle(file: MeasuredFile, circle: CircleTable) -> MeasuredFile:
-    """Check circle and intervals. The ends of a key become overrides."""
+    """Check circle and intervals, and turn the ends of a key into overrides."""
     table, source = file.table, file.source
     if set(file.tolerances) != {STEERING}:
         raise source.fail(("quantities",), "a circle compares steering_wheel_deg alone", list(table.quantities))
@@ -305,7 +305,7 @@ def _quantities(
 
 
 def _value(vehicle: str, key: str, source: Source, where: tuple[str, ...], overrides: Mapping[str, Any]) -> Any:
-    """Return the value of a key of the car or of a repeated measurement. Without a key, check the overrides only."""
+    """Return the value of a key of the car or of a repeated measurement, or check only the overrides without a key."""
     steering = {"time_s": [0.0, 1.0], "steering_wheel_rad": [0.0, 0.1]}
     inputs = {"kind": "open_loop", "name": "inputs", "duration_s": 1.0, "speed_mps": 20.0, "steering": steering}
     try:
@@ -329,7 +329,7 @@ def measured_folder(name: str) -> Path:
 
 
 def is_measured(name: str) -> bool:
-    """Return whether a name is that of a folder of measured runs."""
+    """Return whether a name belongs to a folder of measured runs."""
     return is_file(_folder(name) / NAME)
 
 

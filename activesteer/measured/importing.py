@@ -234,7 +234,7 @@ def _shared_times(files: _Files, chosen: MeasurementMap, lacking: list[Path]) ->
 
 
 def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, named: bool) -> Array:
-    """Return the times of a file [s]. Of several files, `time` of the map may name the column of some."""
+    """Return the times of a file [s], from the column that `time` of the map names or from its only time column."""
     if chosen.time and named:
         column = find(columns, chosen.time, path)
     else:
@@ -252,7 +252,7 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
 
 
 def known_time_unit(name: str) -> str:
-    """Return the unit in the name of a time column; s by default."""
+    """Return the unit in the name of a time column, by default s."""
     ending = name.rstrip("])").replace("[", " ").replace("(", " ").replace("_", " ").split()
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 
@@ -294,7 +294,7 @@ def _plausible(values: Array, column: str, path: Path) -> Array:
 
 
 def _grid(sampled: Mapping[str, signals.Samples], chosen: MeasurementMap, path: Path) -> tuple[Array, float]:
-    """Return times of the file at which all signals exist, and their step: that of the fastest signal."""
+    """Return times of the file when all signals exist, and their step, the step of the fastest signal."""
     times = [time_s for time_s, _ in sampled.values()]
     start, end = max(float(time_s[0]) for time_s in times), min(float(time_s[-1]) for time_s in times)
     step = chosen.step_s or min(float(np.median(np.diff(time_s))) for time_s in times)

@@ -240,7 +240,7 @@ def _distributions(result: CircleValidation) -> Picture:
 
 
 def write_fit(found: Fit, name: str, folder: Path) -> list[Path]:
-    """Write `fit.json`, `overrides.toml` and `fit.html`, and return their paths. Existing files are replaced."""
+    """Write `fit.json`, `overrides.toml` and `fit.html` over existing files, and return their paths."""
     make_folder(folder, StudyError)
     texts = {
         "fit.json": json_text(found.to_json()) + "\n",

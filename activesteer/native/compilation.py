@@ -119,7 +119,7 @@ _ADDRESSES: Final[dict[Any, int]] = {}
 
 
 def address_of(call: Any) -> int:
-    """Return the address of a `compiled_call`, at which `call_at` calls it, or 0 where numba is switched off."""
+    """Return the address of a `compiled_call` for `call_at`, or 0 where numba is switched off."""
     return _ADDRESSES.get(call, 0)
 
 
@@ -249,7 +249,7 @@ def _content(file: Path) -> bytes:
 
 @functools.cache
 def _imported(file: Path, package: Path) -> tuple[Path, ...]:
-    """Return the files of the package that a file imports from, and the table beside it with its name."""
+    """Return the files of the package that a file imports from, and the table next to it with its name."""
     if file.suffix != ".py":
         return ()
     table = file.with_suffix(".txt")

@@ -97,7 +97,7 @@ _TYPES: Final = {0: _IGNORED, 1: types.float64}
 
 
 def native_type(message: type[Any]) -> types.Tuple:
-    """The type by which compiled code takes a message from Python.
+    """The type of a message from Python in compiled code.
 
     Every number is converted to float64. Check class and length of a message first: one that is too short ends the
     process.
@@ -152,7 +152,7 @@ call_law: Final = call_at(types.void, *CALL)
 
 
 def law_address(controller: Any) -> int:
-    """Return the address of the compiled law of a controller; 0 if it has none, or if somebody watches its `step`."""
+    """Return the address of the compiled law of a controller, or 0 if it has none or its `step` is watched."""
     if not isinstance(controller, NativeBlock) or controller.is_watched:
         return 0
     kind = type(controller)

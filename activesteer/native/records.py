@@ -49,13 +49,13 @@ class NativeBlock:
 
     @property
     def is_watched(self) -> bool:
-        """True if somebody has replaced the method `step`, for example to watch it. Compiled code then stays away."""
+        """True if the method `step` is replaced, for example to watch it, so that compiled code stays away."""
         kind: Any = type(self)
         return "step" in vars(self) or kind.step is not kind._written_step
 
 
 def table(numbers: Table) -> Table:
-    """Return a block's numbers. Compiled code makes an array of the record of their memory (`native.memory`)."""
+    """Return a block's numbers, whose memory compiled code reads as a record (`native.memory`)."""
     return numbers
 
 
@@ -81,7 +81,7 @@ def record_type(kind: type[NativeBlock]) -> np.dtype[Any]:
 
 
 def values(block: NativeBlock) -> tuple[Any, ...]:
-    """Return the attributes of a block as its record takes them; the block owns the memory of its arrays."""
+    """Return the attributes of a block as its record takes them, in memory that the block owns."""
     found: list[Any] = []
     for name in _members(type(block)):
         value = getattr(block, name)

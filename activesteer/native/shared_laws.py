@@ -1,4 +1,6 @@
-"""Mark of the functions that Python and compiled code share. `compilation` makes compiled code know them.
+"""Mark of the functions that Python and compiled code share.
+
+`compilation` registers them for compiled code.
 
 The mark needs no compiler, so that lists of controllers and the help do without one.
 """
@@ -15,7 +17,9 @@ MARKED: Final[list[Callable[..., Any]]] = []
 
 
 def shared(function: _Function) -> _Function:
-    """Decorator: let compiled code call a Python function, which then becomes part of it. Python still calls it as is.
+    """Decorator: let compiled code call a Python function, which then becomes part of it.
+
+    Python still calls it as is.
 
     The function is the law of a block. Its first argument is the block itself in Python, and a record of the block's
     attributes in compiled code; see `native.records`.
@@ -25,7 +29,7 @@ def shared(function: _Function) -> _Function:
 
 
 def law_of(kind: type[Any]) -> Callable[[_Function], _Function]:
-    """Decorator: make a function of block, command and measurement the shared law of a kind of controller.
+    """Decorator: declare a function of block, command and measurement the shared law of a kind of controller.
 
     It returns the first fields of an `ActuatorCommand`, and compiled code then carries the controller out.
     """

@@ -29,7 +29,7 @@ def render_page(page: Page) -> str:
 
 
 def write_page(page: Page, path: Path) -> Path:
-    """Write a page as HTML and return its path. An existing file is replaced."""
+    """Write a page as HTML over an existing file and return its path."""
     make_folder(path.parent, ParameterError)
     return write_text(path, render_page(page), ParameterError)
 

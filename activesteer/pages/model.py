@@ -164,7 +164,7 @@ class Table(NamedTuple):
         return frozenset(found.union(range(len(self.columns) - self.numbers, len(self.columns))))
 
     def lines(self) -> Iterator[str]:
-        """Yield the table as aligned text. `!` marks rows that break a limit, `~` rows that nothing is asked of."""
+        """Yield the table as aligned text, with `!` for rows that break a limit, `~` for rows without one."""
         rows = [[_plain(cell) for cell in row] for row in (self.columns, *self.rows)]
         places = range(-1, len(self.rows))
         marks = ["! " if place in self.outside else "~ " if place in self.quiet else "  " for place in places]
@@ -174,7 +174,9 @@ class Table(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A section. Its parts follow each other in the order of the attributes.
+    """A section.
+
+    Its parts follow each other in the order of the attributes.
 
     Attributes:
         title: Its heading; empty for none.

@@ -213,7 +213,7 @@ def send_car(stream: rr.RecordingStream, run: ReplayedRun, *, cutaway: bool = Fa
 
 
 def body_path(run: ReplayedRun, body: str) -> str:
-    """Return the entity of a body. Entities below it move with the body."""
+    """Return the entity of a body, which moves all entities below it."""
     return f"{run.scene}/car/{body}"
 
 
@@ -238,7 +238,7 @@ def ghost_path(run: ReplayedRun, beside: ReplayedRun) -> str:
 
 
 def _apart(run: ReplayedRun, other: ReplayedRun, time_s: Array) -> Array:
-    """Return the distance between the chassis of two runs [m]. A run that has ended keeps its last position."""
+    """Return the distance between the chassis of two runs [m], after the end of a run from its last position."""
     at = []
     for each in (run, other):
         poses = each.recording.poses

@@ -207,7 +207,7 @@ def _plane(low_x: float, high_x: float, low_y: float, high_y: float, z: float, c
 
 
 def _quadrangles(corners: Array, z: float, colour: tuple[int, int, int]) -> Any:
-    """Return quadrangles at a height as one mesh; corners of shape (n, 4, 2)."""
+    """Return quadrangles, with corners of shape (n, 4, 2), at a height as one mesh."""
     flat = corners.reshape(-1, 2)
     triangles = 4 * np.arange(len(corners))[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
     return rr.Mesh3D(

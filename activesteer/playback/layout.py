@@ -123,7 +123,7 @@ def _limits(run: ReplayedRun) -> Iterator[Event]:
 
 
 def _spans(active: np.ndarray, time_s: np.ndarray) -> tuple[list[float], list[float]]:
-    """Return the times at which a flag rises and falls, with short gaps closed."""
+    """Return the times when a flag rises and falls, with short gaps closed."""
     edges = np.diff(np.concatenate(([False], active)).astype(np.int8))
     begins, ends = list(time_s[edges > 0]), list(time_s[edges < 0])
     kept_begins, kept_ends = begins[:1], []

@@ -117,7 +117,7 @@ def _range(plot: Panel, runs: Sequence[ReplayedRun], beside: int) -> tuple[float
 
 
 def axis_range(low: float, high: float, least: float, most: float) -> tuple[float, float]:
-    """Return a range that contains zero and in which the viewer draws at least three tick labels.
+    """Return a range with zero and with at least three tick labels in the viewer.
 
     The viewer labels multiples of one power of ten if they are at least 22 points apart.
     """
@@ -143,7 +143,7 @@ def axis_range(low: float, high: float, least: float, most: float) -> tuple[floa
 
 
 def views_by_corner(plot: Panel, runs: Sequence[ReplayedRun]) -> list[rrb.TimeSeriesView]:
-    """Return a view for each wheel of a wheel plot. Each run's lines have the colour of the run."""
+    """Return a view for each wheel of a wheel plot, with each run's lines in the colour of the run."""
     shown = []
     for line in plot.lines:
         present = [run for run in runs if run.has(line.channel)]

@@ -86,7 +86,9 @@ class ReplayedRun(NamedTuple):
 
 
 def runs_of(recordings: Mapping[str, Recording]) -> list[ReplayedRun]:
-    """Return the runs in the paper's order. The three systems always have the same colours.
+    """Return the runs in the paper's order.
+
+    The three systems always have the same colours.
 
     Args:
         recordings: Name, such as the name of the controller, to recording.

@@ -194,7 +194,7 @@ def _run_viewer(
     ready: Callable[[], object] | None = None,
     port: int | None = None,
 ) -> None:
-    """Run the viewer on a temporary file. Call `ready` once the viewer answers at the port."""
+    """Run the viewer on a temporary file, and call `ready` once it answers at the port."""
     binary = viewer_binary()
     with tempfile.TemporaryDirectory(prefix="activesteer-") as folder:
         file, log = Path(folder) / "runs.rrd", Path(folder) / "viewer.log"
@@ -222,7 +222,7 @@ def _run_viewer(
 
 
 def viewer_binary() -> Path:
-    """Return the viewer that rerun-sdk installs. The command `rerun` may be another version or not be on the path."""
+    """Return the viewer that rerun-sdk installs, whatever the command `rerun` on the path is."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is not None and spec.origin is not None:
         binary = Path(spec.origin).with_name("rerun.exe" if os.name == "nt" else "rerun")

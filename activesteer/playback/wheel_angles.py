@@ -1,4 +1,4 @@
-"""Enlarged steer angles of the wheels: wedges beside the car in the 3D view, and a plan view of all cars."""
+"""Enlarged steer angles of the wheels: wedges next to the car in the 3D view, and a plan view of all cars."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def send_wheel_angles(stream: rr.RecordingStream, run: ReplayedRun, runs: Sequen
 
 
 def wedges_path(run: ReplayedRun) -> str:
-    """Return the entity of the wedges beside the car of a run."""
+    """Return the entity of the wedges next to the car of a run."""
     return f"{run.name}/car_frame/wheel_angles"
 
 

@@ -45,7 +45,7 @@ def plain_axis(axis: Axes) -> None:
 
 
 def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:
-    """Write a figure and return its path. The first file fixes the layout, which other formats keep."""
+    """Write a figure in all formats, with the layout of the first file, and return its path."""
     with atomic_write(path, error) as part:
         try:
             figure.savefig(part, dpi=DOTS_PER_INCH)
@@ -175,7 +175,7 @@ def _set_axes(axis: Axes, panel: Panel) -> None:
 
 
 def _add_abscissa(axis: Axes, label: str, first: Array, second: Array) -> None:
-    """Draw a second abscissa above a panel, whose values grow with those of the first one."""
+    """Draw a second abscissa above a panel, with values that grow with the values of the first one."""
 
     def to_second(x: ArrayLike) -> ArrayLike:
         return np.interp(np.asarray(x), first, second)

@@ -127,7 +127,7 @@ class Heat(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """Panels beside and below each other.
+    """Panels next to and below each other.
 
     Attributes:
         title: Title of the picture.

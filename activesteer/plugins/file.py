@@ -84,7 +84,7 @@ def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, byt
 
 
 def is_user_module(name: str) -> bool:
-    """Return whether a module was loaded from a user's file, or from beside it."""
+    """Return whether a module was loaded from a user's file, or from next to it."""
     return isinstance(getattr(getattr(sys.modules.get(name), "__spec__", None), "loader", None), _Uncached)
 
 
@@ -96,13 +96,13 @@ class _Uncached(SourceFileLoader):
 
 
 class _Neighbours:
-    """Finder of the modules beside users' files: folder -> names of the modules that are imported from it."""
+    """Finder of the modules next to users' files: folder -> names of the modules that are imported from it."""
 
     folders: ClassVar[dict[str, frozenset[str]]] = {}
 
     @classmethod
     def find_spec(cls, name: str, path: Sequence[str] | None = None, _target: object = None) -> ModuleSpec | None:
-        """Find a module. The folder of the file loaded last comes first."""
+        """Find a module, first in the folder of the file loaded last."""
         top = name.partition(".")[0]
         folder = next((folder for folder, names in reversed(cls.folders.items()) if top in names), None)
         spec = None if folder is None else PathFinder.find_spec(name, [folder] if path is None else path)
@@ -113,7 +113,7 @@ class _Neighbours:
     @classmethod
     @contextmanager
     def first(cls, folder: Path, files: Iterable[str]) -> Iterator[None]:
-        """Load modules anew, and those of a folder first. Afterwards they are found if there is no other."""
+        """Load modules anew, those of a folder first, and afterwards only where there is no other."""
         names = frozenset(Path(file).parts[0].removesuffix(".py") for file in files)
         loaded = [name for name in sys.modules if name.partition(".")[0] in names]
         others = {name: sys.modules[name] for name in loaded if not is_user_module(name)}
@@ -132,7 +132,7 @@ class _Neighbours:
 
 
 def source_of(text: str) -> dict[str, bytes]:
-    """Read the file that a text names, and the modules beside it that it imports, without running them."""
+    """Read the file that a text names, and the modules next to it that it imports, without running them."""
     form = _FORM.fullmatch(text)
     return {} if form is None else _with_neighbours(user_path(form["path"], ParameterError), ParameterError)
 
@@ -174,7 +174,7 @@ def _imported_from(folder: Path, source: bytes) -> list[Path]:
 
 
 def parse_parameters(text: str, fail: Any) -> dict[str, Any]:
-    """Parse `gain=2&side="left"`. The text is split only where a name follows, so that a value can contain `&`."""
+    """Parse `gain=2&side="left"`, split only where a name follows, so that a value can contain `&`."""
     parameters: dict[str, Any] = {}
     for part in re.split(r"&(?=[A-Za-z_]\w*=)", text) if text else ():
         pair = _PARAMETER.fullmatch(part)

@@ -172,7 +172,7 @@ def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
 
 
 def _words(error: BaseException) -> str:
-    """Return class and text of an error. The text is made by foreign code, which may fail, too."""
+    """Return class and text of an error, although the text comes from foreign code that may fail too."""
     name = type(error).__name__
     try:
         return f"{name}: {error}".removesuffix(": ")
@@ -183,7 +183,7 @@ def _words(error: BaseException) -> str:
 
 
 def _nearest_attributes(given: Any, name: str) -> str:
-    """Return words for the attributes closest to a wrong name, those of inner dataclasses included."""
+    """Return words for the attributes closest to a wrong name, including attributes of inner dataclasses."""
     known = _attributes(given)
     last = {path.rpartition(".")[2]: path for path in sorted(known, key=lambda path: -path.count("."))}
     close = difflib.get_close_matches(name, last, n=3, cutoff=0.6)
@@ -191,7 +191,7 @@ def _nearest_attributes(given: Any, name: str) -> str:
 
 
 def _attributes(given: Any) -> list[str]:
-    """Return the public values of an object, and with a dot those of its dataclasses."""
+    """Return the public values of an object, and with a dot the values of its dataclasses."""
     names = [*getattr(given, "_fields", ()), *vars(type(given)), *getattr(given, "__dict__", ())]
     found = [name for name in dict.fromkeys(names) if name[0] != "_" and not callable(getattr(given, name, None))]
     for name in tuple(found):

@@ -125,7 +125,7 @@ def _parts(annotation: Any) -> tuple[Any, ...]:
 
 
 def _hint(hint: Any, default: Any) -> Any:
-    """Return the type of an annotation that can be checked, else that of the default, else `Any`."""
+    """Return the type of an annotation if it can be checked, else the type of the default, else `Any`."""
     if hint is _EMPTY:
         kind = type(default)
         return float | int if kind in (float, int) else kind if kind in (bool, str) else Any
@@ -165,7 +165,7 @@ class Plugin:
 
     @property
     def uses_truth(self) -> bool:
-        """Flag by which a block requests the truth: its attribute of this name."""
+        """Flag of a block that requests the truth: its attribute of this name."""
         return bool(getattr(self.origin, "uses_truth", False))
 
     @property
@@ -176,7 +176,9 @@ class Plugin:
 
     @functools.cached_property
     def declared(self) -> dict[str, Declared]:
-        """Parameters of a user's block: name -> declaration. An object has none, because it is made already.
+        """Parameters of a user's block: name -> declaration.
+
+        An object has none, because it exists already.
 
         Raises:
             ActiveSteerError: of the kind's type: the declaration is wrong.
@@ -227,7 +229,7 @@ class Plugin:
         return value / factor if factor != 1.0 else value
 
     def parameters_with(self, own: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-        """Return the values of all parameters as far as a recording can hold them, those of a user with defaults.
+        """Return the values of all parameters as far as a recording can hold them, with a user's defaults.
 
         Args:
             own: Overrides: class -> name -> value.

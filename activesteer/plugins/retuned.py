@@ -67,7 +67,7 @@ def _kept_parts(
 
 
 def _state(block: Any) -> dict[str, Any]:
-    """Return the attributes of a block. Of one that is copied by its state, without views of it."""
+    """Return the attributes of a block, or its own state if it has `__setstate__`."""
     if hasattr(block, "__setstate__"):
         return block.__getstate__()
     return {name: getattr(block, name) for name in _attributes(block)}

@@ -25,7 +25,7 @@ _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 
 
 def message_record(channel_id: int, message: FixedMessage) -> FixedMessage:
-    """Frame a message as an MCAP record. Its first runs are the sequence number and the two times [ns]."""
+    """Frame a message as an MCAP record that starts with the sequence number and the two times [ns]."""
     record = FixedMessage()
     record.constant(struct.pack("<BQH", Opcode.MESSAGE, MESSAGE_HEAD + len(message), channel_id))
     return record.block("<u4", 1).block("<u8", 2).append(message)
@@ -130,7 +130,7 @@ class BlockEncoder:
         positions_m: NDArray[np.float64],
         quaternions: NDArray[np.float64],
     ) -> ChunkData:
-        """Encode a block. The arguments are those of `McapWriter.write`, with times in nanoseconds."""
+        """Encode a block from the arguments of `McapWriter.write`, with times in nanoseconds."""
         rows, poses = len(row_ns), len(pose_ns)
         self._encode_rows(row_ns, values)
         self._encode_poses(pose_ns, positions_m, quaternions)
@@ -282,7 +282,7 @@ class BlockDecoder:
         return Block(row_ns, columns, times[:, 0], positions, quaternions, others)
 
     def _starts(self, data: bytes) -> tuple[dict[int, list[int]], dict[int, list[bytes]]]:
-        """Find the messages of our topics, and those of other topics."""
+        """Find the messages of our topics and of other topics."""
         starts: dict[int, list[int]] = {number: [] for number in self._lengths}
         others: dict[int, list[bytes]] = {}
         foreign = 0

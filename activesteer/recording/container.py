@@ -75,7 +75,7 @@ class McapFile:
         self._put_record(Header(profile="", library=library))
 
     def add_topic(self, topic: str, schema_name: str, schema: bytes, metadata: Mapping[str, str]) -> int:
-        """Write a protobuf schema and the channel that uses it. Return the channel id."""
+        """Write a protobuf schema and the channel that uses it, and return the channel id."""
         number = len(self._channels) + 1
         self._schemas.append(Schema(id=number, data=schema, encoding=SchemaEncoding.Protobuf, name=schema_name))
         self._channels.append(

@@ -264,7 +264,7 @@ LIBRARY = "activesteer "
 
 
 def is_recording_start(data: bytes) -> bool:
-    """Return whether a file with this beginning is ours, even if damaged or left empty by a full disk."""
+    """Return whether a file with this start is ours, even if damaged or left empty by a full disk."""
     # Magic, opcode, length of the record, then two texts with their lengths: profile and library.
     start = len(MCAP0_MAGIC) + 9
     head = MCAP0_MAGIC + bytes([Opcode.HEADER])
@@ -334,7 +334,9 @@ class Primitive(NamedTuple):
 
 
 class Link(NamedTuple):
-    """Straight part through points of bodies, such as a suspension link. The poses of the bodies move it.
+    """Straight part through points of bodies, such as a suspension link.
+
+    The poses of the bodies move it.
 
     Attributes:
         name: Name of the part.

@@ -1,4 +1,4 @@
-"""Reader of MCAP files: whole, cut or damaged. All sizes that a file declares are limited."""
+"""Reader of MCAP files, whole, cut or damaged, with limits for all sizes that a file declares."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Records:
 
 
 def opened(path: Path) -> int:
-    """Open a regular file and return its descriptor. A device or pipe may never end."""
+    """Open a regular file, not a device or pipe that may never end, and return its descriptor."""
     with reading(path, RecordingError):
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
@@ -172,7 +172,9 @@ _END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
 def read_mcap(path: Path) -> tuple[dict[str, Any], str]:
-    """Read a file written by `McapWriter`. Return the arguments of `Recording`, and the description of a damage.
+    """Read a file written by `McapWriter`.
+
+    Return the arguments of `Recording`, and the description of a damage.
 
     A file that ends too early, as after a killed process, gives all its complete blocks. A damaged file gives the part
     before the damage. The values of a long recording are its rows, still in the file; its poses are then None.
@@ -261,7 +263,7 @@ class _Rows:
         self._last_ns = [-1, -1]
 
     def add(self, place: Place, data: bytes, decoder: BlockDecoder) -> Block:
-        """Check a chunk and keep its contents. `place` has no rows yet."""
+        """Check a chunk, and keep its contents at `place`."""
         block = decoder.decode(data)
         for kind, time_ns in enumerate((block.row_ns, block.pose_ns)):
             if not len(time_ns):

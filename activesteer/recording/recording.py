@@ -71,7 +71,9 @@ class Recording:
         attachments: Mapping[str, bytes] | None = None,
         scene: Iterable[ScenePart] = (),
     ) -> None:
-        """Create a recording from arrays. Float arrays are not copied, and must not change afterwards.
+        """Create a recording from arrays.
+
+        Float arrays are not copied, and must not change afterwards.
 
         Args:
             channels: Channels in the order of the columns of `values`.
@@ -134,7 +136,9 @@ class Recording:
             raise RecordingError(f"{path}: {error}", value=error.value, allowed=error.allowed) from None
 
     def save(self, path: str | Path, *, overwrite: bool = True) -> None:
-        """Write the recording to an MCAP file. Channels with `single` are stored with 32 bit, all others exactly.
+        """Write the recording to an MCAP file.
+
+        Channels with `single` are stored with 32 bit, all others exactly.
 
         Args:
             path: The file.
@@ -180,7 +184,9 @@ class Recording:
         return frame
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write a line of names and a line per row: `time_s`, then the channels. An existing file is replaced.
+        """Write a line of names and a line per row: `time_s`, then the channels.
+
+        An existing file is replaced.
 
         Numbers have enough digits to restore the same values; channels with `single` have 32 bit.
 
@@ -198,7 +204,9 @@ class Recording:
         return _written(path, write)
 
     def to_parquet(self, path: str | os.PathLike[str]) -> Path:
-        """Write `time_s` and the channels as columns. An existing file is replaced.
+        """Write `time_s` and the channels as columns.
+
+        An existing file is replaced.
 
         Channels with `single` have 32 bit. Each field carries `unit` and `meaning`, the schema `metadata` and `metrics`
         as JSON texts.
@@ -211,7 +219,9 @@ class Recording:
         return _written(path, lambda target: parquet.write_table(_table(self), target, compression="zstd"))
 
     def to_mat(self, path: str | os.PathLike[str]) -> Path:
-        """Write a MATLAB file of version 5, which every MATLAB and Octave can load. An existing file is replaced.
+        """Write a MATLAB file of version 5, which every MATLAB and Octave can load.
+
+        An existing file is replaced.
 
         `time_s` and every channel is a column of doubles, since single precision would spread to all results.
         Structs `units`, `meanings` and `metrics` have a field for each name; `metadata` is JSON text, for `jsondecode`.
@@ -265,7 +275,7 @@ class Recording:
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """All channel values, shape (n, number of channels), read-only. A long recording takes much memory."""
+        """All channel values, shape (n, number of channels), read-only and large for a long recording."""
         return _frozen(self._values.values()) if isinstance(self._values, FileRows) else self._values
 
     def at(self, rows: NDArray[np.intp]) -> Recording:
@@ -277,7 +287,7 @@ class Recording:
         )  # fmt: skip
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """Return a channel over time, shape (n,), read-only. Raise `RecordingError` if there is none."""
+        """Return a channel over time, shape (n,), read-only, or raise `RecordingError` if there is none."""
         column = self._channels.index(name)
         if isinstance(self._values, FileRows):
             return _frozen(self._values.channel(column))

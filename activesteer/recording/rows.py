@@ -90,7 +90,7 @@ def read_bytes(descriptor: int, start: int, length: int) -> bytes:
 
 
 def messages_of(content: bytes) -> tuple[bytes, int]:
-    """Decompress a chunk. Return its messages and their checksum. The declared size is an upper limit."""
+    """Decompress a chunk up to its declared size, and return its messages and their checksum."""
     try:
         chunk = Chunk.read(ReadDataStream(BytesIO(content)))
         size, packed = chunk.uncompressed_size, len(chunk.data)
@@ -147,7 +147,7 @@ def poses_of(blocks: Iterable[Block], sets: int, body_names: tuple[str, ...]) ->
 
 
 class FileRows:
-    """Rows of an open file. The file may be replaced or deleted meanwhile. A changed file raises an error."""
+    """Rows of an open file, also after it is replaced or deleted, but not after it is changed."""
 
     def __init__(
         self, descriptor: int, decoder: BlockDecoder, channels: Sequence[Channel], places: list[Place]

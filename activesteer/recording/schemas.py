@@ -99,7 +99,7 @@ class FixedMessage:
         return self.raw(dtype)
 
     def raw(self, dtype: str) -> FixedMessage:
-        """Append an untagged number. Extend the last run if the distance is the same."""
+        """Append an untagged number, to the last run if the distance is the same."""
         offset = len(self.template)
         if self.runs:
             last = self.runs[-1]
@@ -231,7 +231,7 @@ _FOXGLOVE_ENUMS = {
 
 
 def _define(package: str, name: str, fields: str, enum: Sequence[str] = ()) -> DescriptorProto:
-    """Return the descriptor of a message; `fields` in the notation of a .proto file, `enum` its nested `Type`."""
+    """Return the descriptor of a message with `fields` in the notation of .proto and `enum` as nested `Type`."""
     message = DescriptorProto(name=name)
     for repeated, kind, field_name, number in _FIELD.findall(fields):
         # An explicit JSON name separates names that differ in case only (`a_n`, `a_N`).
@@ -396,7 +396,7 @@ class ChannelTable:
         return columns
 
     def __getitem__(self, name: str) -> Channel:
-        """Return a channel by its name. Raise `RecordingError` if there is none."""
+        """Return a channel by its name, or raise `RecordingError` if there is none."""
         return self._channels[self.index(name)]
 
     def __iter__(self) -> Iterator[Channel]:

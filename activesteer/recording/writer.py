@@ -58,7 +58,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Check that a recording can be written, without changing anything. Only a recording may be replaced."""
+    """Check without changes that a recording can be written, at most over another recording."""
     path = Path(path)
     if not path.parent.is_dir():
         raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
@@ -224,7 +224,9 @@ class McapWriter:
         positions_m: ArrayLike = (),
         quaternions: ArrayLike = (),
     ) -> None:
-        """Write a block, best of about one simulated second. The arrays may be reused after the call.
+        """Write a block, best of about one simulated second.
+
+        The arrays may be reused after the call.
 
         A value above `limits.MAX_NUMBER` is written as infinity of its sign.
 
@@ -285,7 +287,9 @@ class McapWriter:
             raise self._failure(error) from error
 
     def flush(self) -> Path:
-        """Wait until all blocks are in the file. Return its path.
+        """Wait until all blocks are in the file.
+
+        Return its path.
 
         Raises:
             RecordingError: a block could not be written.
@@ -294,7 +298,9 @@ class McapWriter:
         return self.path
 
     def close(self, metadata: Mapping[str, object] | None = None) -> None:
-        """Write what is known after the run, and end the file. A second call does nothing.
+        """Write what is known after the run, and end the file.
+
+        A second call does nothing.
 
         Args:
             metadata: Further metadata, such as how the run ended; the key `metrics` holds the metrics by name.
@@ -340,7 +346,7 @@ class McapWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Close the file; after an exception, mark it as incomplete."""
+        """Close the file, and mark it as incomplete after an exception."""
         if error is None:
             self.close()
             return
@@ -352,7 +358,7 @@ class McapWriter:
             error.add_note(f"The recording could not be ended properly either: {second}")
 
     def _await(self, maximum: int) -> None:
-        """Wait until at most `maximum` blocks are being written. Raise an error of their writing."""
+        """Wait until at most `maximum` blocks are being written, and raise an error of their writing."""
         while len(self._pending) > maximum:
             end_ns, future = self._pending[0]
             try:

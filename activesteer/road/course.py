@@ -62,15 +62,15 @@ class Course:
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
 
     def on_lane_side(self) -> NDArray[np.bool_]:
-        """Return which cones stand on the side of a lane; shape (number of cones,)."""
+        """Return which cones stand on the side of a lane, shape (number of cones,)."""
         return self._outward() != 0.0
 
     def cone_centres_m(self) -> Array:
-        """Return world x and y of the cones' bases [m], shape (n, 2). They stand outside the lane that they mark."""
+        """Return world x and y [m] of the cones' bases outside the lane that they mark, shape (n, 2)."""
         return np.column_stack([self.cones_m[:, 0], self.cones_m[:, 1] + CONE_RADIUS_M * self._outward()])
 
     def _outward(self) -> Array:
-        """Return 1 for a cone on the left side of a lane, -1 on the right, 0 elsewhere; shape (number of cones,)."""
+        """Return 1 for each cone on the left of a lane, -1 on the right, 0 elsewhere, shape (number of cones,)."""
         x, y = self.cones_m.T
         outward = np.zeros(len(x))
         for lane in self.lanes:
@@ -80,7 +80,7 @@ class Course:
         return outward
 
     def to_table(self) -> dict[str, Any]:
-        """Return the course as plain tables, ready for JSON. A recording keeps it as `course`."""
+        """Return the course as plain tables, which a recording keeps as `course` in JSON."""
         return {
             "path": {"x_m": self.path.x_m.tolist(), "y_m": self.path.y_m.tolist()},
             "lanes": [lane._asdict() for lane in self.lanes],
@@ -91,7 +91,7 @@ class Course:
 
     @classmethod
     def from_table(cls, table: object) -> Course:
-        """Build the course that `to_table` describes. Differences between its points give heading and curvature."""
+        """Build the course that `to_table` describes, with heading and curvature by differences between its points."""
         course = table_of(table, "course")
         path = table_of(course.get("path"), "course.path")
         x_m, y_m = (numbers(path.get(key), f"course.path.{key}") for key in ("x_m", "y_m"))
@@ -136,7 +136,7 @@ _RANGE_M: Final = (0.01, 100.0)
 
 
 class Footprint(NamedTuple):
-    """Dimensions of a car, with the widths of front and rear tyres. The defaults are usual ones, for drawing."""
+    """Dimensions of a car, with the widths of front and rear tyres, by default usual ones for drawing."""
 
     width_m: float = 1.8
     wheelbase_m: float = 2.7
@@ -175,7 +175,9 @@ _HIGHEST_M: Final = 1000.0
 
 @dataclass(frozen=True)
 class ProfileTable:
-    """Heights over the distance. Keys of the table [road.heights], which a CSV of `road.profile` fills.
+    """Heights over the distance.
+
+    Keys of the table [road.heights], which a CSV of `road.profile` fills.
 
     The road runs smoothly through the points, without overshoot (monotone cubics), and linearly from track to track. It
     is even across outside the tracks.

@@ -46,14 +46,14 @@ _ZERO, _KEEP_LAST = 1, 2
 
 
 class CrgRoad(NamedTuple):
-    """Heights from the beginning of the reference line on, and that line, from the origin along x, if it is curved."""
+    """Heights from the start of the reference line on, and that line, from the origin along x, if it is curved."""
 
     grid: Grid
     line: Path | None
 
 
 def packed(files: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Return files as texts that a recording keeps. The first file is that of the road."""
+    """Return files, the road's file first, as texts that a recording keeps."""
     content = b"".join(f"{name}\0{len(text)}\0".encode() + text for name, text in files.items())
     text = base64.b64encode(zlib.compress(content, 9)).decode()
     return tuple(text[start : start + _PIECE] for start in range(0, len(text), _PIECE))
@@ -242,12 +242,12 @@ def _places(head: dict[str, float], names: list[str]) -> Array:
 
 
 def _channel(along: Mapping[str, Array], name: str, constant: float, rows: int) -> Array:
-    """Return slope or banking at each row. Missing values are 0."""
+    """Return slope or banking at each row, 0 for missing values."""
     return np.nan_to_num(along[name]) if name in along else np.full(rows, constant)
 
 
 def _filled(heights: Array, mode: int, offset: float) -> Array:
-    """Fill missing heights at the sides. A hole between heights is an error."""
+    """Fill missing heights at the sides, but raise for a hole between heights."""
     missing = np.isnan(heights)
     if not missing.any():
         return heights
@@ -266,7 +266,7 @@ def _filled(heights: Array, mode: int, offset: float) -> Array:
 
 
 def _evenly(places: Array, heights: Array) -> tuple[Array, float, float]:
-    """Return heights at even distances across, first distance and step [m]. Exact where all places are multiples."""
+    """Return heights at even distances across, exact at multiples, with the first distance and the step [m]."""
     step = float(np.diff(places).min())
     count = max(2, round((places[-1] - places[0]) / step) + 1)
     if heights.shape[0] * count > limits.MAX_CRG_POINTS:

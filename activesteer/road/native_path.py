@@ -20,7 +20,7 @@ from activesteer.native.compilation import compiled
 
 
 class PathSearch:
-    """Positions along a path, also before its start and beyond its end. `line` holds the arguments of the kernels."""
+    """Positions along a path and beyond its ends, with `line` as the arguments of the kernels."""
 
     def __init__(self, path: Path) -> None:
         """Prepare the arguments of the kernels."""
@@ -162,7 +162,7 @@ class PathGrid(NamedTuple):
 
 @compiled
 def _direction_at(points, at):
-    """Return the direction of the path at one of its points, a unit vector: that of its neighbours."""
+    """Return the direction of the path at one of its points, a unit vector between its neighbours."""
     before, after = max(at - 1, 0), min(at + 1, points.size // 2 - 1)
     x, y = points[2 * after] - points[2 * before], points[2 * after + 1] - points[2 * before + 1]
     length = math.sqrt(x * x + y * y)

@@ -48,7 +48,7 @@ class Grid(NamedTuple):
         return self.d_m + self.step_d_m * np.arange(self.z_m.shape[1])
 
     def knows(self, s_m: Array, d_m: Array) -> NDArray[np.bool_]:
-        """Return for each place whether it lies within the grid."""
+        """Return for each place whether it is within the grid."""
         along, across = (s_m - self.s_m) / self.step_s_m, (d_m - self.d_m) / self.step_d_m
         rows, columns = self.z_m.shape
         return (along >= 0.0) & (along <= rows - 1) & (across >= 0.0) & (across <= columns - 1)
@@ -89,7 +89,7 @@ OBSTACLE: Final = numbers_type(
 
 @dataclass(frozen=True)
 class Obstacle:
-    """An obstacle; keys of a table [[road.obstacle]]."""
+    """An obstacle, as a table [[road.obstacle]]."""
 
     kind: Kind
     """`cosine_bump`: h/2 (1 - cos(2 pi x/L)). `cleat`, `kerb`: a step of `height_m` with edges of `edge_m`. `pothole`:
@@ -180,7 +180,7 @@ _NUGGET: Final = 1e-10
 
 @dataclass(frozen=True)
 class Roughness:
-    """A random rough surface; keys of the table [road.roughness]."""
+    """A random rough surface, as the table [road.roughness]."""
 
     OVERRULED: ClassVar = {"class_": {"spectrum_m3": None}}
 

@@ -42,7 +42,7 @@ _SHOWN_BESIDE_M: Final = 4.0
 
 @dataclass(frozen=True)
 class RoadPatch:
-    """A stretch of the track with its own friction; keys of a table [[road.patches]]."""
+    """A stretch of the track with its own friction, as a table [[road.patches]]."""
 
     start_m: float
     """Start along x or along the path, see `along`; included [m]."""
@@ -65,7 +65,7 @@ class RoadPatch:
 
 @dataclass(frozen=True)
 class BankingTable:
-    """Bank over the distance. Keys of the table [road.banking]. It runs smoothly through its points."""
+    """Bank over the distance, smooth through its points, as the table [road.banking]."""
 
     s_m: tuple[float, ...]
     """Distances along x or along the path [m], increasing."""
@@ -120,7 +120,7 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Road:
-    """The road under the wheels; keys of the table [road] in a manoeuvre file."""
+    """The road under the wheels, as the table [road] of a manoeuvre file."""
 
     OVERRULED: ClassVar = {"mu": {"mu_left": None, "mu_right": None}}
     KEY_HINTS: ClassVar = {
@@ -257,13 +257,13 @@ class Road:
         return float(np.mean(~grid.knows(s, d) & (s >= self.start_m)))
 
     def areas(self) -> tuple[Area, ...]:
-        """Return the areas whose friction is not `mu`. Where areas overlap, the later one counts."""
+        """Return the areas with a friction other than `mu`, the later one where they overlap."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
         split = [Area(-math.inf, math.inf, *SIDES[side], mu) for side, mu in sides if mu is not None]
         return (*split, *(Area(it.start_m, it.end_m, *SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return quadrangles that show the areas within a rectangle of the world [m]; later ones hide earlier ones."""
+        """Return quadrangles that show the areas within a rectangle of the world [m], later ones on top."""
         shown = (area.clipped(start_m, end_m, right_m, left_m) for area in self.areas())
         return [
             piece
@@ -274,7 +274,7 @@ class Road:
 
 
 def _sliced(index: int, area: Area, slices: int, place: Callable[[Array, Array], tuple[Array, Array]]) -> list[Piece]:
-    """Cut an area into slices. `place` turns its x and y into those of the world."""
+    """Cut an area into slices, with `place` to turn its x and y into world coordinates."""
     stations = np.linspace(area.start_m, area.end_m, slices + 1)
     edges = [np.column_stack(place(stations, np.full(slices + 1, y))) for y in (area.right_m, area.left_m)]
     corners = np.stack([edges[0][:-1], edges[0][1:], edges[1][1:], edges[1][:-1]], axis=1)
@@ -297,7 +297,7 @@ class LaidRoad(Road):
     """The path of the course."""
 
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
-        """Return world x and y of places along and beside the path, straight beyond its end (see the base class)."""
+        """Return world x and y of places along and next to the path, straight beyond its end (see the base class)."""
         path = self.path
         x, y, heading = (np.interp(s_m, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
         beyond = np.maximum(s_m - path.length_m, 0.0) + np.minimum(s_m, 0.0)
@@ -305,7 +305,7 @@ class LaidRoad(Road):
         return x + beyond * cos - d_m * sin, y + beyond * sin + d_m * cos
 
     def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Return the places along and beside the nearest point of the path (see the base class)."""
+        """Return the places along and next to the nearest point of the path (see the base class)."""
         from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
 
         path = self.path
@@ -315,7 +315,7 @@ class LaidRoad(Road):
         return path.s_m[near] + dx * cos + dy * sin, dy * cos - dx * sin
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return quadrangles along the path. The rectangle does not matter. See the base class."""
+        """Return quadrangles along the path, whatever the rectangle (see the base class)."""
         path, found = self.path, []
         for index, area in enumerate(self.areas()):
             shown = area.clipped(0.0, path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
@@ -326,7 +326,7 @@ class LaidRoad(Road):
 
 
 def road_of(metadata: Mapping[str, Any]) -> Road:
-    """Return the road of a recorded run, laid along its course. A default road if it was not recorded."""
+    """Return the road of a recorded run along its course, or a default road if it was not recorded."""
     maneuver = table_of(metadata.get("maneuver", {}), "maneuver")
     table = table_of(maneuver.get("road", {}), "maneuver.road")
     road = build(Road, table, Source("the metadata of the recording", error=RecordingError), ("maneuver", "road"))

@@ -46,7 +46,7 @@ NEAR_M: Final = 1.0
 
 @compiled
 def _plateau_at(it, x, d):
-    """Return height and slopes along x and d of a step with its edges, x behind its beginning."""
+    """Return height and slopes along x and d of a step with its edges, x behind its start."""
     along = min(x, it.length_m - x)
     across = min(d - it.right_m, it.left_m - d)
     height, slope_x, slope_d = it.height_m, 0.0, 0.0
@@ -208,7 +208,7 @@ def rise_at(surface, numbers, s):
 
 @compiled
 def left_grid(surface, s, d):
-    """Return whether a place ahead of the start lies outside the grid."""
+    """Return whether a place ahead of the start is outside the grid."""
     if surface.rows == 0.0 or s < surface.start_m:
         return False
     along = (s - surface.grid_s_m) * surface.grid_per_s

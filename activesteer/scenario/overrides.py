@@ -67,7 +67,7 @@ def own_path(key: str) -> tuple[str, str] | None:
 
 
 def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
-    """Return users' controllers by the names that they have in keys. The same class may drive with other parameters."""
+    """Return users' controllers, also of one class with other parameters, by the names that they have in keys."""
     found: dict[str, list[Plugin]] = {}
     for plugin in map(controller_spec, controllers):
         if not plugin.is_builtin:
@@ -108,7 +108,7 @@ def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> di
 
 
 def read_by(overrides: Mapping[str, Any], controller: Any) -> dict[str, Any]:
-    """Return the overrides without those of the table [controllers] that only other controllers read."""
+    """Return the overrides without the entries of the table [controllers] that only other controllers read."""
     unread = unread_gains(overrides, [controller])
     return {key: value for key, value in overrides.items() if key not in unread}
 

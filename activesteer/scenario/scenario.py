@@ -237,7 +237,7 @@ def part_of(
 
 @functools.lru_cache(1024)
 def _holders(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
-    """Return the parts in which a key names a table, a value, or an entry of a list by its number."""
+    """Return the parts whose table, value or list entry (by its number) a key names."""
     dotted, of_part = key + ".", {"maneuver": key_paths(kind), "vehicle": key_paths(VehicleConfig)}
     return tuple(
         part
@@ -247,7 +247,7 @@ def _holders(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
 
 
 def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> Any:
-    """Return the value of a key of the manoeuvre, the vehicle or the driver; a number in the unit of the key.
+    """Return the value of a key of the manoeuvre, the vehicle or the driver, a number in the unit of the key.
 
     Keys and controllers are those of `resolve`.
     """
@@ -274,7 +274,7 @@ def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> A
 
 
 def describe(scenario: Scenario) -> dict[str, Any]:
-    """Return the resolved parameters as plain tables, from which the same scenario can be built again."""
+    """Return the resolved parameters as plain tables that describe the same scenario."""
     return {
         "maneuver": to_table(scenario.maneuver),
         "vehicle": to_table(scenario.car.config),

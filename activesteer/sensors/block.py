@@ -146,7 +146,7 @@ _MINUTE_S: Final = 60.0
 
 
 class SensorBlock:
-    """The sensors of one car: `CHAIN` records, and memory from which a run continues bit-identically.
+    """The sensors of one car: `CHAIN` records, and memory for a bit-identical continuation.
 
     `outputs` is a view of the memory: the members of `Measurement` without its time.
     """
@@ -175,7 +175,7 @@ class SensorBlock:
             own[LINE:] = value
 
     def say(self, measurement: Measurement) -> None:
-        """Replace the readings until the next step, for example by those of a faulty sensor."""
+        """Replace the readings until the next step, for example by the readings of a faulty sensor."""
         parts = (part if isinstance(part, tuple) else (part,) for part in measurement[1:])
         self.outputs[:] = [number for part in parts for number in part]
 
@@ -197,7 +197,7 @@ def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tupl
 
 
 def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float) -> tuple[float, ...]:
-    """Return a record of `CHAIN`. Each sensor has its own random stream, whatever the others are."""
+    """Return a record of `CHAIN`, with a random stream that does not depend on the other sensors."""
     period = max(1, round((sensor.sample_time_s or 0.0) / timestep_s))
     bandwidth_Hz = sensor.bandwidth_Hz or 0.0
     fraction = 1.0 - math.exp(-2.0 * math.pi * bandwidth_Hz * timestep_s) if bandwidth_Hz else 1.0

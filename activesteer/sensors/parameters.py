@@ -25,7 +25,7 @@ _Bandwidth = Annotated[float, Range(0.1, 1e4)]
 
 @dataclass(frozen=True)
 class Sensor:
-    """Keys that all sensors have; the other keys carry the unit of the measured quantity.
+    """Keys common to all sensors, without those in the unit of the measured quantity.
 
     `noise`: white noise of the samples, rms. `bias`: offset of a run, drawn from the seed, rms over seeds. `drift`:
     random walk of the offset, rms of its change within a minute. `quantum`: step of quantisation. `limit`: saturation
@@ -65,7 +65,9 @@ class RateSensor(Sensor):
 
 @dataclass(frozen=True)
 class WheelSpeedSensor(RateSensor):
-    """A sensor of the rotational speed of a wheel. All four are alike.
+    """A sensor of the rotational speed of a wheel.
+
+    All four are alike.
 
     With teeth, the sensor counts the edges of a pulse wheel that pass between two samples and measures their time. If
     no edge passes, the reading is at most the speed that the time since the last edge allows. The sign of rotation is
@@ -117,7 +119,7 @@ _KINDS: Final = {"radps": RateSensor, "mps2": AccelerationSensor, "rad": AngleSe
 
 @dataclass_transform(frozen_default=True)
 def _with_sensors(cls: type[_Class]) -> type[_Class]:
-    """Decorator: make a frozen dataclass with a field for each sensor, without errors by default."""
+    """Decorator: turn a class into a frozen dataclass with a field for each sensor, without errors by default."""
     for field, width in zip(Measurement._fields, widths_of(Measurement), strict=True):
         name, _, unit = field.rpartition("_")
         if unit in _KINDS:  # time and speed have none
@@ -129,7 +131,7 @@ def _with_sensors(cls: type[_Class]) -> type[_Class]:
 
 @_with_sensors
 class Sensors:
-    """Sensors between the car and its controllers; default `ideal`.
+    """Sensors between the car and its controllers, by default `ideal`.
 
     Each signal of a `Measurement` but time and speed has a sensor, whose table has the name of the signal without its
     unit: `yaw_rate`, `ay`, `wheel_speed`. The wheels share one table.
@@ -186,7 +188,7 @@ def _production() -> Sensors:
 
 
 def _filled(given: Any, preset: Any) -> Any:
-    """Return the given values, and those of the preset for missing ones."""
+    """Return the given values, or the preset's values where they are missing."""
     if not isinstance(preset, Sensor):
         return preset if given is None else given
     return replace(preset, **{key: value for key, value in vars(given).items() if value is not None})

@@ -91,7 +91,9 @@ class Batch(Copyable):
         timestep_s: float = DEFAULT_TIMESTEP_S,
         threads: int | None = None,
     ) -> None:
-        """Build the cars and let them settle. Cars with the same inputs settle once.
+        """Build the cars and let them settle.
+
+        Cars with the same inputs settle once.
 
         Args:
             maneuver: Name, path, or table of a manoeuvre; or a `Scenario`, which includes vehicle and driver.
@@ -134,7 +136,7 @@ class Batch(Copyable):
             return dict(zip(first, pool.map(call, first.values()), strict=True))
 
     def _build(self) -> None:
-        """Build the loops; of cars with the same scenario, only the first one settles."""
+        """Build the loops, and let only the first car of each scenario settle."""
 
         def settled(car: int) -> ClosedLoop:
             return ClosedLoop(self.scenarios[car], self._controller, self._timestep_s)
@@ -183,26 +185,26 @@ class Batch(Copyable):
 
     @property
     def measurement(self) -> Any:
-        """Present signals of the sensors, a `Measurement`. Each field has shape (n,), or (n, 4) for the wheels."""
+        """Current signals of the sensors, a `Measurement` with fields of shape (n,), or (n, 4) for the wheels."""
         return arrays_of(Measurement, self.rows(Measurement))
 
     @property
     def motion(self) -> Any:
-        """Present positions and motions as the drivers see them, a `Motion`. Each field has shape (n,)."""
+        """Current positions and motions as the drivers see them, a `Motion` with fields of shape (n,)."""
         return arrays_of(Motion, self.rows(Motion))
 
     @property
     def driver_command(self) -> Any:
-        """Last commands of the drivers, a `DriverCommand`. Each field has shape (n,)."""
+        """Last commands of the drivers, a `DriverCommand` with fields of shape (n,)."""
         return arrays_of(DriverCommand, self.rows(DriverCommand))
 
     @property
     def actuator_command(self) -> Any:
-        """Last commands of the controllers, an `ActuatorCommand`. Each field has shape (n,), for the wheels (n, 4)."""
+        """Last commands of the controllers, an `ActuatorCommand` with fields of shape (n,), for the wheels (n, 4)."""
         return arrays_of(ActuatorCommand, self.rows(ActuatorCommand))
 
     def rows(self, kind: type[Any], cars: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """Return the numbers of present messages, a copy of shape (cars, numbers) (see `signals.arrays_of`).
+        """Return the numbers of current messages, a copy of shape (cars, numbers) (see `signals.arrays_of`).
 
         Args:
             kind: `Measurement`, `Motion`, `DriverCommand` or `ActuatorCommand`.
@@ -297,7 +299,7 @@ class Batch(Copyable):
                     self.loops[car].change(key, values[car])
 
     def fail(self, fault: str | Fault, cars: ArrayLike | None = None) -> None:
-        """Set a fault in some cars, beside those that act already (see `Simulation.fail`).
+        """Set a fault in some cars, in addition to those that act already (see `Simulation.fail`).
 
         Args:
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.
@@ -313,7 +315,7 @@ class Batch(Copyable):
                     self.loops[car].add_fault(fault)
 
     def save_state(self, cars: ArrayLike | None = None) -> list[LoopState]:
-        """Return the states of some cars, from which they continue bit-identically.
+        """Return the states of some cars for a bit-identical continuation.
 
         Args:
             cars: Numbers of the cars, or a mask; by default all.

@@ -83,7 +83,7 @@ class NonReentrantLock:
 
 @dataclass(frozen=True)
 class LoopState:
-    """State from which a loop continues bit-identically. `inputs` describes the loops that it belongs to."""
+    """State for the bit-identical continuation of a loop, with the inputs of the loops that it belongs to."""
 
     inputs: tuple[Any, ...]
     engine: NDArray[np.float64]
@@ -207,7 +207,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def driver(self) -> Any:
-        """The driver. A new one takes over from the next step on."""
+        """The driver, who may be replaced from the next step on."""
         self._store()
         return self.blocks[0]
 
@@ -218,7 +218,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def controller(self) -> Any:
-        """The controller. A new one takes over from the next step on, with the control unit of the former one."""
+        """The controller, which may be replaced from the next step on and then keeps its control unit."""
         self._store()
         return self.blocks[1]
 
@@ -228,7 +228,7 @@ class ClosedLoop(Uncopyable):
         self.blocks = self.blocks[0], controller
 
     def replace_controller(self, controller: Any) -> None:
-        """Let another controller take over, with a control unit of its own (see `activesteer.plugins.find`).
+        """Let another controller take over, with a separate control unit (see `activesteer.plugins.find`).
 
         Raises:
             ControllerError: there is no such controller, or it cannot be created.
@@ -248,7 +248,7 @@ class ClosedLoop(Uncopyable):
         self._maneuver = maneuver
 
     def _setpoint_at(self, step: int) -> Setpoint:
-        """Return the setpoint of a step; with phases, of the present one only."""
+        """Return the setpoint of a step, in a manoeuvre of phases from the current phase."""
         if self.settling is not None:
             return self.settling
         time_s = step * self.vehicle.timestep_s
@@ -259,12 +259,12 @@ class ClosedLoop(Uncopyable):
 
     @property
     def measurement(self) -> Measurement:
-        """Present signals of the sensors."""
+        """Current signals of the sensors."""
         return new_message(Measurement, self._measured.item(0))
 
     @property
     def motion(self) -> Motion:
-        """Present position and motion of the car."""
+        """Current position and motion of the car."""
         return new_message(Motion, self._motion.item(0))
 
     @property
@@ -287,7 +287,7 @@ class ClosedLoop(Uncopyable):
         return round(self.maneuver.duration_s / self.vehicle.timestep_s)
 
     def fail(self, faults: Sequence[Fault], *, more: bool = False) -> None:
-        """Replace the faults by these, each of which acts at its time.
+        """Replace the faults by others, with their own times.
 
         Args:
             faults: The faults.
@@ -307,7 +307,7 @@ class ClosedLoop(Uncopyable):
         self._store()
 
     def add_fault(self, fault: str | Fault) -> str:
-        """Set a fault, beside those that act already, and return it in words (see `Simulation.fail`)."""
+        """Set a fault, in addition to those that act already, and return it in words (see `Simulation.fail`)."""
         now_s = self.step_count * self.vehicle.timestep_s
         given = fault_from(fault, now_s)
         self.fail([given], more=True)
@@ -398,7 +398,7 @@ class ClosedLoop(Uncopyable):
             recorder.make_room()
 
     def save_state(self) -> LoopState:
-        """Return the state from which the loop continues bit-identically."""
+        """Return the state for a bit-identical continuation of the loop."""
         self._store()
         return LoopState(
             self._inputs,
@@ -413,7 +413,7 @@ class ClosedLoop(Uncopyable):
         )
 
     def restore_state(self, state: LoopState) -> None:
-        """Go back to a saved state, from which the loop continues bit-identically.
+        """Go back to a saved state for a bit-identical continuation of the loop.
 
         Args:
             state: A state of this loop, or of another one with the same inputs.
@@ -538,7 +538,7 @@ class ClosedLoop(Uncopyable):
             record["path"][0] = spacing_m, (xs.ctypes.data, xs.size), (ys.ctypes.data, ys.size), headings
 
     def _prepare(self) -> None:
-        """Compute the gains of the driver for the present speed."""
+        """Compute the gains of the driver for the current speed."""
         speed_mps = float(self._record["motion"][0, _SPEED])
         self._record["driver"]["_path"]["_row_size"] = self.blocks[0].prepare(speed_mps)
 

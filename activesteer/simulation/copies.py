@@ -13,7 +13,7 @@ from activesteer.plugins import in_one_line, is_user_module
 
 
 class Copyable:
-    """Base of what is copied as its inputs and its state, from which the copy is built again."""
+    """Base of what is copied as its inputs and its state, and built again from them."""
 
     def _portable(self) -> Any:
         """Return inputs and state, without native memory."""

@@ -96,7 +96,7 @@ class Keys:
         self.faster = 1.0
 
     def __call__(self, code: int) -> None:
-        """Take a key, by the code of GLFW, which is the upper-case letter. Other keys are the viewer's own."""
+        """Take a key of ours, by the code of GLFW, which is the upper-case letter."""
         if code == ord(" "):
             self.paused = not self.paused
         elif code == ord("R"):
@@ -154,7 +154,7 @@ def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Any, pacer: FrameP
 
 
 class _Follow:
-    """Camera that moves with the car; the user chooses direction and distance."""
+    """Camera that moves with the car at the direction and distance that the user chooses."""
 
     def __init__(self, simulation: ClosedLoop) -> None:
         self._simulation = simulation
@@ -198,7 +198,7 @@ def _texts(simulation: ClosedLoop, time_s: float, speed: float, *, paused: bool)
 
 
 def check_display() -> None:
-    """Check that there is a display with OpenGL. Without one, the viewer would wait forever."""
+    """Check that there is a display with OpenGL, without which the viewer would wait forever."""
     import glfw  # noqa: PLC0415 - looks for its library when it is imported
 
     with warnings.catch_warnings(record=True) as caught:
@@ -218,7 +218,7 @@ def check_display() -> None:
 
 
 def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> None:
-    """Drive a scenario again and again in a window until it is closed. Nothing is recorded."""
+    """Drive a scenario again and again in a window until it is closed, without a recording."""
     import mujoco.viewer  # noqa: PLC0415 - needs a display
 
     simulation, keys = ClosedLoop(scenario, controller), Keys()
@@ -246,7 +246,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
 
 @contextmanager
 def _threads_joined() -> Iterator[None]:
-    """Wait for the thread of the viewer at the end; without it, the shutdown of Python crashes."""
+    """Wait for the thread of the viewer at the end, because the shutdown of Python otherwise crashes."""
     before = set(threading.enumerate())
     try:
         yield

@@ -98,7 +98,7 @@ def _begin(car, bindings):
 
 @inlined
 def _drive(car):
-    """Find the setpoint and let the driver act. Return a status."""
+    """Find the setpoint, let the driver act, and return a status."""
     if car.driver_given != 0:
         return DONE
     if car.driver_kind == PYTHON:
@@ -127,7 +127,7 @@ def _drive(car):
 
 @inlined
 def _control(car):
-    """Let the controller decide if it is its turn. Return a status."""
+    """Let the controller decide if it is its turn, and return a status."""
     if car.controller_given != 0 or car.calls % car.every != 0:
         return DONE
     seen = car.driver_command
@@ -145,7 +145,7 @@ def _control(car):
 
 @inlined
 def _pass_on(car):
-    """Put the held decision on the bus, and take the one that arrives."""
+    """Put the held decision on the bus, and take the arriving one."""
     length, bus = car.on_bus + 1, array_of(car.bus)
     newest, oldest = car.calls % length * N_HELD, (car.calls + 1) % length * N_HELD
     for place in range(N_HELD):
@@ -161,7 +161,7 @@ def _pass_on(car):
 
 @inlined
 def _advance(car, bindings, step_address):
-    """Step the car, which records its row. Return a status."""
+    """Step the car, which records its row, and return a status."""
     torques_set = car.torques_set != 0
     if torques_set:
         ctrl = f64_pointer(bindings.ctrl)

@@ -1,4 +1,4 @@
-"""Pace of a run by the clock: each step begins at its own instant, and how late it began is kept."""
+"""Pace of a run by the clock: each step begins at its own time, and how late it began is kept."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class RealtimePacer:
     """Clock of a run. `factor` is the number of simulated seconds per second."""
 
     def __init__(self, factor: float, timestep_s: float) -> None:
-        """Prepare the clock. It starts with the first step."""
+        """Prepare the clock, which starts with the first step."""
         self._factor = checked_number("realtime", factor, FACTOR)
         self._interval_s = timestep_s / self._factor
         self._start_s: float | None = None
@@ -28,7 +28,7 @@ class RealtimePacer:
         self._late_s = np.empty(4096)
 
     def await_step(self) -> None:
-        """Wait until the instant of the next step.
+        """Wait until the time of the next step.
 
         A step that begins after its instant is not skipped: later steps begin at once until the run has caught up.
         """

@@ -64,7 +64,7 @@ def folder() -> Path:
 
 
 def recall(key: str) -> float | None:
-    """Return a stored number, bit for bit, or None if there is none."""
+    """Return a stored number, bit-identical, or None if there is none."""
     if key not in _in_process:
         with contextlib.suppress(ActiveSteerError, RuntimeError, ValueError):
             text = read_bytes(folder() / f"{key}{_SUFFIX}", ActiveSteerError, _MAX_BYTES).decode("ascii")

@@ -31,7 +31,7 @@ _TAPE_ROWS: Final = 125
 
 @dataclass
 class _Kept:
-    """Rows and poses in memory. The first `referred_rows` are in use elsewhere and are never overwritten."""
+    """Rows and poses in memory, the first `referred_rows` of which are in use elsewhere and never overwritten."""
 
     values: NDArray[np.float64]
     positions_m: NDArray[np.float64]
@@ -104,7 +104,7 @@ class Recorder(Uncopyable):
 
     @property
     def rows(self) -> int:
-        """Number of recorded rows. A row holds the values at the start of its step."""
+        """Number of recorded rows, each with the values at the start of its step."""
         return int(self._tape["rows"][0])
 
     def make_room(self) -> None:
@@ -170,7 +170,7 @@ class Recorder(Uncopyable):
         return self._times(first, last), self._kept.values[: last - first], self._poses_between(first, last)
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> dict[str, float]:
-        """Return the values of all channels at the present instant, by name, without recording them."""
+        """Return the values of all channels at the current time, by name, without recording them."""
         self._take()
         for raw, now in zip(self._raw, self._vehicle.rows.present(driver_command, actuator_command), strict=True):
             raw[0] = now[0]

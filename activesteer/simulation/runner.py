@@ -65,7 +65,9 @@ def run_scenario(
     realtime: bool | float = False,
     link: Link | None = None,
 ) -> Recording:
-    """Run a scenario. If a path is given, write the recording during the run.
+    """Run a scenario.
+
+    If a path is given, write the recording during the run.
 
     Args:
         scenario: Scenario to run. An amplitude that is not known yet is searched for first.

@@ -44,7 +44,7 @@ _COARSE: Final = (
 
 
 class Link(Protocol):
-    """Another process that gives commands. `name` is the key of its `report` in the recording."""
+    """Another process that gives commands, with `name` as the key of its `report` in the recording."""
 
     name: str
     report: dict[str, int]
@@ -65,7 +65,7 @@ class Link(Protocol):
 
 @dataclass(frozen=True)
 class SavedState:
-    """State from which a simulation continues bit-identically, with the rows recorded so far."""
+    """State for the bit-identical continuation of a simulation, with the rows recorded so far."""
 
     metadata: dict[str, Any]
     loop: LoopState
@@ -171,12 +171,12 @@ class Simulation(Copyable):
 
     @property
     def measurement(self) -> Measurement:
-        """Present signals of the sensors: everything that a controller sees."""
+        """Current signals of the sensors: everything that a controller sees."""
         return self.loop.measurement
 
     @property
     def motion(self) -> Motion:
-        """Present position and motion of the car, as a driver sees them."""
+        """Current position and motion of the car, as a driver sees them."""
         return self.loop.motion
 
     @property
@@ -246,7 +246,7 @@ class Simulation(Copyable):
                     self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
 
     def _drive_by_the_clock(self, steps: int, given: Given) -> None:
-        """Drive steps one by one, each at its instant and with the commands that have arrived until then."""
+        """Drive steps one by one, each at its time and with the commands that have arrived until then."""
         pacer, link, loop = self._pacer, self._link, self.loop
         collects = gc.isenabled()
         gc.disable()  # a collection takes longer than a step
@@ -265,7 +265,9 @@ class Simulation(Copyable):
                 gc.enable()
 
     def set(self, key: str, value: Any) -> None:
-        """Change a key from the next step on. The recording keeps the change as an event.
+        """Change a key from the next step on.
+
+        The recording keeps the change as an event.
 
         The frictions of the road, the speed and the inputs of the manoeuvre, and the parameters of controller and
         driver can change. Controller and driver keep their memory.
@@ -293,7 +295,9 @@ class Simulation(Copyable):
             self._note("set", f"{key} = {json.dumps(value, default=str)}")
 
     def fail(self, fault: str | Fault) -> None:
-        """Set a fault, beside those that act already. The recording keeps it as an event.
+        """Set a fault, in addition to those that act already.
+
+        The recording keeps it as an event.
 
         Args:
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.
@@ -338,7 +342,7 @@ class Simulation(Copyable):
         self.advance(self.steps - self.loop.step_count)
 
     def save_state(self) -> SavedState:
-        """Return the state from which the simulation continues bit-identically, with the rows recorded so far.
+        """Return the state for a bit-identical continuation of the simulation, with the rows recorded so far.
 
         Raises:
             SimulationDiverged: a recorded value is not finite.
@@ -350,7 +354,7 @@ class Simulation(Copyable):
             return SavedState(self.context.metadata, self.loop.save_state(), rows, dict(self._given), self.events)
 
     def restore_state(self, state: SavedState) -> None:
-        """Go back to a saved state, from which the simulation continues bit-identically.
+        """Go back to a saved state for a bit-identical continuation of the simulation.
 
         The recording then holds the rows that led to this state. Recordings taken before are not changed.
 
@@ -434,7 +438,9 @@ class Simulation(Copyable):
 
     @contextmanager
     def recorded_to(self, path: Path) -> Iterator[None]:
-        """Write a file while the context lasts and the run proceeds; enter it before the first step.
+        """Write a file while the context lasts and the run proceeds.
+
+        Enter the context before the first step.
 
         Args:
             path: MCAP file to write. It is completed in every case, and marked as incomplete after an exception.
@@ -461,7 +467,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Note a failure, after which the states of the blocks do not match. The recorded rows are kept."""
+        """Note a failure, after which the states of the blocks do not match, and keep the recorded rows."""
         try:
             yield
         except BaseException as failure:

@@ -63,7 +63,7 @@ _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "s
 
 
 class Reached(NamedTuple):
-    """Time from the beginning of steer to a radius, and greatest force at the rim until then, or nan if not reached."""
+    """Time from the start of steer to a radius, and greatest force at the rim until then, or nan if not reached."""
 
     time_s: float
     effort_N: float
@@ -284,7 +284,7 @@ def circle(direction: str) -> dict[str, Any]:
 
 
 def fault_circles(runner: StandardRunner) -> list[dict[str, Any]]:
-    """Drive every usual fault in both circles. The runs are not kept."""
+    """Drive every usual fault in both circles, without keeping the runs."""
     faults = usual_faults(runner.controller)
     drive = functools.partial(fault_circle, runner.controller, runner.driver, runner.vehicle, runner.overrides, faults)
     done = in_parallel(
@@ -315,7 +315,7 @@ def fault_circle(
 
 
 class _Signals(NamedTuple):
-    """Evaluated signals of a run from the beginning of the fault, shape (n,) each."""
+    """Evaluated signals of a run from the start of the fault, shape (n,) each."""
 
     x_m: Array
     y_m: Array
@@ -365,7 +365,7 @@ class _FaultRuns:
         return self.again(fault, _HandsFixed(self._commands))
 
     def again(self, fault: Fault, driver: Any = None) -> _Signals:
-        """Return the motion with a fault; without a driver, that of the loop responds."""
+        """Return the motion with a fault, with the driver of the loop unless another one is given."""
         loop = self.loop
         loop.fail(())
         loop.restore_state(self._start)
@@ -406,7 +406,7 @@ def _judged(runs: _FaultRuns, fault: Fault) -> dict[str, Any]:
 
 
 def _offset_m(runs: _FaultRuns, motion: _Signals) -> float:
-    """Return the lateral offset from the path without the fault, one second after its beginning, left positive [m]."""
+    """Return the lateral offset from the path without the fault, one second after its start, left positive [m]."""
     row, good = round(OFFSET_AT_S / runs.timestep_s) - 1, runs.in_order
     yaw = good.yaw_rad[row]
     across = math.cos(yaw) * (motion.y_m[row] - good.y_m[row]) - math.sin(yaw) * (motion.x_m[row] - good.x_m[row])
@@ -414,7 +414,7 @@ def _offset_m(runs: _FaultRuns, motion: _Signals) -> float:
 
 
 def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
-    """Return the time from the beginning of the fault until a limit is exceeded [s], or None if none is."""
+    """Return the time from the start of the fault until a limit is exceeded [s], or None if none is."""
     good = runs.in_order
     broken = np.abs(motion.yaw_rate_radps - good.yaw_rate_radps) > YAW_RATE_RADPS
     broken |= np.abs(motion.ay_mps2 - good.ay_mps2) > AY_MPS2
@@ -424,7 +424,7 @@ def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
 
 
 def _tolerant_s(runs: _FaultRuns, fault: Fault, broken_s: float) -> float:
-    """Find the time by bisection, below the time at which the lasting fault exceeds a limit.
+    """Find the time by bisection, below the time when the lasting fault exceeds a limit.
 
     The search assumes that a longer fault has a larger effect. It returns the bound that keeps the limits.
     """

@@ -34,7 +34,7 @@ class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test
 
 @dataclass(frozen=True)
 class StandardRun:
-    """A finished run. The analysis reads it like a recording."""
+    """A finished run, which the analysis reads like a recording."""
 
     case: Mapping[str, Any]  # values in which it differs from the other runs of its series
     metrics: Mapping[str, float]  # its metrics; empty if it failed or could not be evaluated
@@ -193,7 +193,7 @@ def steering_wheel_at(runner: StandardRunner, speed_kmh: float, ay_mps2: float) 
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return a table of metrics with a column for each run. A run without a metric has an empty cell."""
+    """Return a table of metrics with a column for each run, an empty cell for a missing metric."""
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [
         [shown.label, shown.unit.name, *(shown.text(metrics.get(shown.name, math.nan)) for metrics in runs.values())]
@@ -209,7 +209,7 @@ def axis_label(name: str) -> str:
 
 
 def time_panels(runs: Mapping[str, StandardRun], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
-    """Return channels of runs over time, a panel each. Time counts from an instant, which is also given in words."""
+    """Return channels of runs, a panel each, versus the time from an event that is given in words."""
     return [
         Panel(
             f"time from {begin} [s]",

@@ -40,7 +40,7 @@ _PRODUCTION: Final = {"sensors.preset": "production"}
 
 
 def bench(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure one step at several stages; `docs/performance.md` explains the results."""
+    """Measure one step at several stages."""
     scenario, along_path = with_amplitude_found(resolve("step_steer")), resolve("slalom")
     sedan = with_amplitude_found(resolve("step_steer", "sedan"))
     sensed = with_amplitude_found(resolve("step_steer", overrides=_PRODUCTION))
@@ -130,7 +130,7 @@ class _KeptInputs:
             inputs[:] = self.vehicle.data.ctrl
 
     def replay_us(self) -> float:
-        """Return the time of the engine alone per step of the same drive [us], all in one native call."""
+        """Return the time of only the engine per step of the same drive [us], all in one native call."""
         self.vehicle.restore_state(self._start)
         return per_call_us(self.vehicle.replay, 1, self._inputs) / len(self._inputs)
 
@@ -143,7 +143,7 @@ class _Nothing:
 
 
 def _closed_loop(scenario: Scenario, controller: Any = _CONTROLLER, threads: int = 0) -> float:
-    """Return the time per step of a run, or of several together, each in a thread of its own [us]."""
+    """Return the time per step of a run, or of several together, each in a separate thread [us]."""
     loops = [ClosedLoop(scenario, controller) for _ in range(max(threads, 1))]
     recorders = [Recorder(loop.vehicle, loop.steps) for loop in loops]
 
@@ -219,7 +219,7 @@ _REAR_PER_YAW_RATE_S: Final = 0.05
 
 
 def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure batches of cars in the sine with dwell with ideal sensors. The best of some interleaved rounds counts."""
+    """Measure batches of cars in the sine with dwell with ideal sensors, best of several interleaved rounds."""
     found: dict[str, float] = {}
     for size in SIZES:
         before, threads = _memory_MB(), os.cpu_count() or 1

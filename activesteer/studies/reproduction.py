@@ -103,7 +103,9 @@ def reproduce(
 def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
 ) -> Iterator[tuple[str, str, str]]:
-    """Make all runs. Yield scenario, system, and the reason why the run ended early or an empty text, as each ends.
+    """Drive all runs.
+
+    Yield scenario, system, and the reason why the run ended early or an empty text, as each ends.
 
     A search is made once for all controllers.
     """
@@ -124,7 +126,7 @@ def drive(
 
 
 def _run(scenario: Scenario, system: str, path: Path) -> str:
-    """Make one run in a process of its own. Return the problem."""
+    """Drive one run in a separate process, and return the problem."""
     try:
         run_scenario(scenario, system, path=path)
     except ActiveSteerError as error:
@@ -133,7 +135,7 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
 
 
 def write_page(results: Iterable[Reproduction], folder: Path) -> Path | None:
-    """Write a page with all runs, including those that ended early. Return None if no run made a step."""
+    """Write a page with all runs, including those that ended early, or return None if no run made a step."""
     recordings: dict[str, Recording] = {}
     for result in results:
         for scenario, systems in result.paths.items():

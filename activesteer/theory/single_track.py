@@ -38,7 +38,7 @@ SOURCES: Final = ("file", IDENTIFY, IDENTIFIED)
 
 @dataclass(frozen=True)
 class SingleTrackParameters:
-    """Parameters of the single-track model; keys of the table [single_track] in a vehicle file."""
+    """Parameters of the single-track model, as the table [single_track] of a vehicle file."""
 
     mass_kg: _Positive
     """Mass m [kg]."""
@@ -78,7 +78,7 @@ class SingleTrackParameters:
 
 
 def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:
-    """Return the speed at which an understeering car reaches half the yaw rate of a neutral one, sqrt(l/EG).
+    """Return the speed where an understeering car reaches half the yaw rate of a neutral one, sqrt(l/EG).
 
     Args:
         wheelbase_m: l [m].
@@ -192,7 +192,7 @@ class SingleTrack(NativeBlock):
         )
 
     def matrices(self, speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return system and input matrix of eqs. 1 and 2, shape (2, 2) each; states yaw rate and sideslip angle."""
+        """Return system and input matrix of eqs. 1 and 2 for yaw rate and sideslip angle, shape (2, 2) each."""
         p, v = self.parameters, speed_mps
         cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m
         m, jz = p.mass_kg, p.yaw_inertia_kgm2

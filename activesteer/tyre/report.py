@@ -94,7 +94,7 @@ def _over_load(params: TyreParameters, loads: np.ndarray) -> dict[str, list[floa
 
 
 def size(params: TyreParameters) -> str | None:
-    """Return the size in words, such as 205/55 R16, or None if the file has no dimensions of its own."""
+    """Return the size in words, such as 205/55 R16, or None if the file has no dimensions."""
     if not {"WIDTH", "RIM_RADIUS", "ASPECT_RATIO"} <= params.given.keys():
         return None
     rim = 2.0 * params["RIM_RADIUS"] / _INCH_M
@@ -205,7 +205,7 @@ def _loads(params: TyreParameters) -> list[float]:
 
 
 def _side_force(formula: MagicFormula) -> Picture:
-    """Side force above, aligning moment below; loads on the left, cambers on the right."""
+    """Draw side force above, aligning moment below, for several loads on the left and cambers on the right."""
     params, nominal = formula.parameters, _nominal(formula.parameters)
     alpha = _within(params, "ALPMIN", "ALPMAX", _WIDEST_ANGLE_RAD)
     cambers = np.unique(
@@ -276,7 +276,7 @@ def _friction_ellipse(formula: MagicFormula) -> Picture:
 
 
 def _combined_slip(formula: MagicFormula) -> Picture:
-    """Forces over slip for slip angles, and forces against each other."""
+    """Forces versus slip for slip angles, and forces against each other."""
     params = formula.parameters
     nominal, kappa = _nominal(params), _within(params, "KPUMIN", "KPUMAX", _WIDEST_SLIP)
     angles = [math.radians(value) for value in (0, 2, 4, 8, 12)]

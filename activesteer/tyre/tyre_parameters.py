@@ -34,7 +34,7 @@ from activesteer.tyre.kernels.magic_formula import (
 
 @dataclass(frozen=True)
 class TyreConventions:
-    """Evaluation of a tyre's coefficients; keys of the table [tyres.conventions] in a vehicle file."""
+    """Evaluation of a tyre's coefficients, as the table [tyres.conventions] of a vehicle file."""
 
     camber: bool = True
     """Whether camber enters the formula. Without it, camber still acts by geometry: contact point and direction of
@@ -107,7 +107,7 @@ def is_finite(tyre: np.record) -> bool:
 
 
 def culprit(tyre: np.record, names: Iterable[str]) -> str | None:
-    """Return the enormous coefficient whose default makes the tyre finite, or the largest of several."""
+    """Return the enormous coefficient with a default that gives a finite tyre, or the largest of several."""
     enormous = (name for name in names if abs(tyre[name]) > _ENORMOUS)
     for name in sorted(enormous, key=lambda name: -abs(tyre[name])):
         tried = np.atleast_1d(tyre).copy()
@@ -188,7 +188,9 @@ _RANGES = (("PRESMIN", "PRESMAX"), ("FZMIN", "FZMAX"), ("KPUMIN", "KPUMAX"), ("A
 
 @dataclass(frozen=True)
 class TyreParameters(Mapping[str, float]):
-    """Coefficients of one tyre, in SI and radians. A read-only mapping from key to value, defaults included.
+    """Coefficients of one tyre, in SI and radians.
+
+    A read-only mapping from key to value, defaults included.
 
     Attributes:
         given: Values in the file, by key in upper case, in SI.

@@ -1,4 +1,4 @@
-"""The car in the engine: commands in, one step, measurements out. MuJoCo's arrays are bound once, by name."""
+"""The car in the engine: commands in, one step, measurements out."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ class Vehicle(Uncopyable):
         return sum(part * height for part, height in zip(fractions, self.wheels.heights_m().tolist(), strict=True))
 
     def rebase(self) -> None:
-        """Make the present position and heading the origin of the road, and the present instant the origin of time.
+        """Make the current position and heading the origin of the road, and the current time the origin of time.
 
         The motion continues unchanged. From here on the friction of the road's areas counts; before, the road's `mu`.
         """
@@ -244,7 +244,9 @@ class Vehicle(Uncopyable):
         return self._said()
 
     def record_on(self, tape: Tape | None) -> None:
-        """Record the following steps on a tape. None stops recording.
+        """Record the following steps on a tape.
+
+        None stops recording.
 
         Raises:
             ParameterError: `tape` is something else.
@@ -255,7 +257,7 @@ class Vehicle(Uncopyable):
 
     @property
     def address(self) -> int:
-        """Address of the record by which compiled code steps this car. The car must outlive it."""
+        """Address of the record for compiled code that steps this car, which must outlive it."""
         return self._address
 
     @property
@@ -264,7 +266,7 @@ class Vehicle(Uncopyable):
         return float(self._forces["gear"][0])
 
     def replay(self, inputs: NDArray[np.float64]) -> None:
-        """Advance the engine alone by several steps in one native call, without commands, checks or recording.
+        """Advance only the engine by several steps in one native call, without commands, checks or recording.
 
         Args:
             inputs: Inputs of all actuators in each step, as a run left them in `data.ctrl`; shape (steps, actuators).
@@ -375,7 +377,7 @@ class Vehicle(Uncopyable):
             _write_estimate(self._estimate_memory, estimate)
 
     def save_state(self) -> NDArray[np.float64]:
-        """Return the state of engine, brakes, motors, sensors and gear, from which a run continues bit-identically."""
+        """Return the state of engine, brakes, motors, sensors and gear for a bit-identical continuation."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
         return np.concatenate((state, *self._memory(), (self.gear,)))
@@ -398,7 +400,7 @@ class Vehicle(Uncopyable):
         native_step.engage(self._address, float(state[-1]))
 
     def _memory(self) -> list[NDArray[np.float64]]:
-        """Memory apart from the engine's state: brakes, motors, sensors, estimate, the engine's present sensor data."""
+        """Memory apart from the engine's state: brakes, motors, sensors, estimate, the engine's current sensor data."""
         sensors = [] if self.sensors is None else [self.sensors.memory]
         return [self._brake_row, self.electric.state, self.data.sensordata, self.rows.estimate, *sensors]
 
@@ -439,7 +441,7 @@ class Vehicle(Uncopyable):
                     raise ParameterError(f"belongs to another car: {name} has another size", key="model")
 
     def change_road(self, road: Road) -> None:
-        """Drive on with other frictions. The road has as many areas as before."""
+        """Drive on with other frictions of the same number of areas."""
         fb.section_of(self.model, "wheels")["mu"] = road.mu
         areas = fb.section_of(self.model, "areas")
         assert len(areas) == len(road.areas())

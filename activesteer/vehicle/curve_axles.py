@@ -219,7 +219,7 @@ def curve_axle_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDAr
 
 
 def _joints_of_model(model: mujoco.MjModel, corner: str) -> tuple[int, int]:
-    """Return the addresses of a corner's first coordinate and velocity. The others follow."""
+    """Return the addresses of a corner's first coordinate and velocity, which the others follow."""
     joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_{name}") for name in JOINTS]
     qpos, dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     if (np.diff(qpos) != 1).any() or (np.diff(dofs) != 1).any():
@@ -233,7 +233,7 @@ def _side(corner: str) -> float:
 
 
 def _mirror(side: float) -> NDArray[np.float64]:
-    """Return the signs that turn the coordinates of a wheel into those of the left one."""
+    """Return the signs that turn the coordinates of a wheel into coordinates of the left one."""
     return np.array([1.0, side, side, 1.0, side])
 
 
@@ -244,7 +244,7 @@ def _spline(points: tuple[float, ...], values: NDArray[np.float64]) -> CubicSpli
 
 
 def _slopes(axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the slopes of the five curves in the design position, over travel and over the rack."""
+    """Return the slopes of the five curves in the design position, versus travel and rack."""
     by_travel = _spline(axle.travel_m, axle.over_travel())(0.0, 1)[: len(COORDINATES)]
     by_rack = _spline(axle.rack_m, axle.over_rack())(0.0, 1) if axle.is_steered else np.zeros(len(COORDINATES))
     return by_travel, by_rack

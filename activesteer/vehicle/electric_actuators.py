@@ -101,7 +101,7 @@ class Motor:
 
 @dataclass(frozen=True)
 class Motors:
-    """Electric motors by their places. An axle has one motor, or one on each wheel. Default none."""
+    """Electric motors by their places, one on an axle or one on each wheel, by default none."""
 
     front: Motor | None = None
     """Motor of the front axle, with a differential."""
@@ -227,7 +227,7 @@ def motor_records(motors: Motors, timestep_s: float) -> NDArray[Any]:
 
 
 class ElectricDrive(NamedTuple):
-    """Memory of the electric drive of one car; no records and no numbers in `state` without motors.
+    """Memory of the electric drive of one car, without records and numbers in `state` if it has no motors.
 
     `state` is a `BATTERY_STATE` followed by a `MOTOR_STATE` for each motor, as numbers.
     """
@@ -258,7 +258,7 @@ STOP_BEYOND: Final = 1.03
 
 @dataclass(frozen=True)
 class ElectricActuator:
-    """A motor behind a gear. Defaults come from the preset. With the model's own actuator, keys have no effect."""
+    """A motor behind a gear, with defaults of the preset, and without effect with the model's own actuator."""
 
     TABLE: ClassVar[str]
     """Table of the vehicle file, and of the presets."""
@@ -364,7 +364,7 @@ def known(value: float | None) -> float:
 
 @dataclass(frozen=True)
 class RearActuator(ElectricActuator):
-    """The rear steering actuator. With `hinge` the other keys have no effect."""
+    """The rear steering actuator, whose keys have no effect with `hinge`."""
 
     TABLE: ClassVar = "rear_actuator"
     MODEL: ClassVar = "hinge"
@@ -399,7 +399,7 @@ _COLUMN: Final = "steering_column"
 
 @dataclass(frozen=True)
 class SuperpositionActuator(ElectricActuator):
-    """The superposition actuator. With `servo` the other keys have no effect."""
+    """The superposition actuator, whose keys have no effect with `servo`."""
 
     TABLE: ClassVar = "superposition_actuator"
     MODEL: ClassVar = "servo"

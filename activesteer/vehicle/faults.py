@@ -30,7 +30,7 @@ class Faults:
     """The faults of a run."""
 
     def __init__(self, vehicle: Vehicle, faults: Sequence[Fault] = ()) -> None:
-        """Look up the faulty parts. Nothing is changed yet, except that brakes use sensors that may fail."""
+        """Look up the faulty parts, and give the brakes sensors if a sensor may fail."""
         self._vehicle = vehicle
         self._acting: list[_Acting] = []
         vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
@@ -50,7 +50,7 @@ class Faults:
         vehicle.act_in_every_step(self._records)
 
     def next_change(self, step: int) -> int:
-        """Return the first step after this one at which a fault begins or ends."""
+        """Return the first step after this one when a fault begins or ends."""
         changes = (change for acting in self._acting for change in (acting.listens, acting.begins, acting.ends))
         return min((change for change in changes if change > step), default=_NEVER)
 
@@ -134,7 +134,7 @@ class _Acting:
         """Restore the part as built."""
 
     def recover(self) -> None:
-        """Do what the part needs when the fault ends. A motor returns to its demand with its lag and rate."""
+        """Do what the part needs when the fault ends, such as the return of a motor to its demand with lag and rate."""
 
 
 class _DemandFault(_Acting):
@@ -207,7 +207,7 @@ class _ActuatorFault(_DemandFault):
         self._set(native.WORKS)
 
     def recover(self) -> None:
-        """Start a servo that was free at its present angle (see `resume_part`)."""
+        """Start a servo that was free at its current angle (see `resume_part`)."""
         if self._kind == native.FLOAT:
             native.resume_of(self._part.ctypes.data, self._data.act.ctypes.data, self._data.qpos.ctypes.data)
 

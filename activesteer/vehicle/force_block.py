@@ -89,7 +89,7 @@ def _words(address: int, size_bytes: int) -> NDArray[np.uint64]:
 
 
 def _find(address: int, wanted: int, limit_bytes: int, what: str) -> int:
-    """Return the byte offset of the only word that equals `wanted`. The forward scan stops at the first match."""
+    """Return the byte offset of the only word that equals `wanted`, found by a scan to the first match."""
     words = _words(address, limit_bytes)
     block = 256
     for start in range(0, len(words), block):
@@ -292,7 +292,7 @@ def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> 
 
 
 def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
-    """Return one record, shape (1,), 0 where nothing is given. A row may be shorter than its field."""
+    """Return one record, shape (1,), 0 where nothing is given, also behind a row shorter than its field."""
     record = np.zeros(1, record_type)
     for name, value in values.items():
         if record[name].ndim > 1:
@@ -321,7 +321,7 @@ def with_trailer(block: NDArray[np.float64], start: int) -> NDArray[np.float64]:
 
 
 def header_of(model: mujoco.MjModel) -> NDArray[Any]:
-    """Return the header of one of our models, shape (1,): a view. A change acts from the next step on."""
+    """Return the header of one of our models, shape (1,), a view whose changes act from the next step on."""
     return _view(model, 0, HEADER, 1)
 
 

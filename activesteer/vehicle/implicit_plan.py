@@ -300,7 +300,7 @@ _options: Final = operator.attrgetter(*OPTIONS)
 
 
 def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Discard what the engine prepared for its own solution; otherwise it renews a part of it in every step."""
+    """Discard what the engine prepared for its own solution and would otherwise partly renew in every step."""
     integrator = model.opt.integrator
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_EULER)
     mujoco.mj_fwdPosition(model, data)
@@ -308,7 +308,7 @@ def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _sensed_body(model: mujoco.MjModel) -> int:
-    """Return the only body whose acceleration is sensed, if its parent is the world and no force is sensed; else 0."""
+    """Return the only body with sensed acceleration, if its parent is the world and no force is sensed, or else 0."""
     late = np.flatnonzero(model.sensor_needstage == int(mujoco.mjtStage.mjSTAGE_ACC))
     if (model.sensor_type[late] != int(mujoco.mjtSensor.mjSENS_ACCELEROMETER)).any():
         return 0
@@ -321,7 +321,7 @@ _structures: dict[bytes, tuple[list[NDArray[np.int32]], int]] = {}
 
 
 def _known_tables(model: mujoco.MjModel) -> tuple[list[NDArray[np.int32]], int]:
-    """Return the tables in the order of their names, and the size of the factor; found once for each structure."""
+    """Return the tables in the order of their names, and the size of the factor, cached by structure."""
     structure = b"|".join(getattr(model, name).tobytes() for name in _STRUCTURE)
     if structure not in _structures:
         if len(_structures) >= _MAX_STRUCTURES:

@@ -56,7 +56,7 @@ class LocalState:
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Take the present state of the vehicle, which rolls along the world's x axis, as the reference."""
+        """Take the current state of the vehicle, which rolls along the world's x axis, as the reference."""
         self.vehicle = vehicle
         model = vehicle.model
         if model.opt.gravity[1] != 0.0 or fb.header_of(model)["n_surfaces"][0] != 0.0:
@@ -123,7 +123,7 @@ class LocalState:
         data.act[self._activations] += difference[count + model.nv :]
 
     def _turn_home(self) -> None:
-        """Put the car at the origin of the road with heading 0 and unturned wheels. Its motion stays."""
+        """Put the car at the origin of the road with heading 0, unturned wheels and the same motion."""
         data = self.vehicle.data
         # The heading of the chassis' x axis (ISO 8855) does not change with a rotation about that axis.
         turn_chassis_back(data, 0.5 * float(yaw_of(data.qpos[3:7])))
@@ -244,7 +244,7 @@ def _part_of(state: str) -> str:
 
 
 def _sides(shape: NDArray[np.complex128], participation: NDArray[np.float64], states: tuple[str, ...]) -> str:
-    """Return ` parallel` or ` opposite` for a mode in which left and right wheels move alike or oppositely."""
+    """Return ` parallel` or ` opposite` for the motion of left and right wheels in a mode."""
     top = states[int(participation.argmax())]
     match = re.search(r"(?<![a-z])([fr])([lr])_", top)
     if match is None:

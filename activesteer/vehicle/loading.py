@@ -96,7 +96,7 @@ def _points(bare: mujoco.MjModel, load: Load) -> list[tuple[float, Array]]:
 
 
 def _scale_springs(spec: mujoco.MjSpec, bare: mujoco.MjModel, factors: Factors) -> None:
-    """Change the rates of springs and anti-roll bars. The force of a spring in the design position stays."""
+    """Change the rates of springs and anti-roll bars, and keep the force of a spring in the design position."""
     for tendon in spec.tendons:
         if tendon.name.endswith("_anti_roll_bar"):
             tendon.stiffness = factors.anti_roll_bar * np.asarray(tendon.stiffness)
@@ -182,7 +182,7 @@ def _compile(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Add to drive, brakes, friction and servos what MJCF lacks. Forces follow the activation at a step's end."""
+    """Add to drive, brakes, friction and servos what MJCF lacks, with forces by the activation at a step's end."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_USER

@@ -286,7 +286,7 @@ def _mechanical_power(motor, state, qvel, spins):
 
 @inlined
 def _use_battery(motors, states, battery, given, qvel, spins):
-    """Scale torques down where the battery is at a limit. Write the powers of motors and battery."""
+    """Scale torques down where the battery is at a limit, and write the powers of motors and battery."""
     total_W, driving_W, absorbing_W = battery.auxiliary_W, 0.0, 0.0
     for index in range(len(motors)):
         motor, state = motors[index], states[index]

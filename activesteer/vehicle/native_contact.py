@@ -121,7 +121,7 @@ def _cam_height(surface, numbers, obstacles, first, last, cam, reach, coarse, s,
 
 @compiled
 def _drop(cam, x):
-    """Return how far a cam lies above its lowest point at a distance [m]."""
+    """Return how far a cam is above its lowest point at a distance [m]."""
     place = x / _CAM_STEP_M
     index = int(place)
     if index >= CAM_POINTS - 1:
@@ -178,7 +178,7 @@ def contact_plane(
 
 @compiled
 def plane_axes(forward, sideways, heading_x, heading_y):
-    """Return normal and two axes of a plane, nine components in world axes. The first axis lies above world x."""
+    """Return normal and two axes of a plane, nine components in world axes, the first axis above world x."""
     slope_x = forward * heading_x - sideways * heading_y
     slope_y = forward * heading_y + sideways * heading_x
     nz = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)

@@ -164,7 +164,7 @@ def fail_part(part, block, gain, bias, healthy, kind, offset, held):
 
 @inlined
 def set_fault(part, block, gain, bias, healthy, kind, offset, held):
-    """Carry out `fail_part` by addresses; a negative kind saves the healthy numbers instead."""
+    """Carry out `fail_part` by addresses, or save the healthy numbers if the kind is negative."""
     own = carray(_part_pointer(part), (1,))[0]
     numbers = f64_pointer(block), f64_pointer(gain), f64_pointer(bias), f64_pointer(healthy)
     if kind < 0:
@@ -175,14 +175,14 @@ def set_fault(part, block, gain, bias, healthy, kind, offset, held):
 
 @inlined
 def resume_part(part, act, qpos):
-    """Start a servo that was free at its present angle. It returns to its demand with its own lag and rate."""
+    """Start a servo that was free at its current angle, from where it returns with its own lag and rate."""
     if part.seized == 0:
         act[part.act] = qpos[part.qpos]
 
 
 @inlined
 def change_fault(part, block, gain, bias, healthy, acting, kind, offset, ctrl, act, qpos):
-    """Replace the fault of a part, by addresses. `acting`: kind, offset, and the demand at which a brake sticks."""
+    """Replace the fault of a part, by addresses, with kind, offset and the demand of a stuck brake in `acting`."""
     own, before = carray(_part_pointer(part), (1,))[0], f64_pointer(acting)
     if before[0] == FLOAT and kind != FLOAT:
         resume_part(own, f64_pointer(act), f64_pointer(qpos))

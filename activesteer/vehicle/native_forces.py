@@ -84,7 +84,7 @@ def _interpolate(x, xs, ys, count):
 
 @inlined
 def _road_mu(block, header, mu, x, y):
-    """Return the friction of the road at a place on it [m]; `mu` outside all areas."""
+    """Return the friction of the road at a place on it [m], `mu` outside all areas."""
     if header.areas_felt == 0.0:
         return mu
     areas = _areas_at(block, header.areas, header.n_areas)
@@ -407,7 +407,7 @@ def _install() -> None:
 
 
 def remove_native_forces() -> None:
-    """Remove our callbacks from this process, for example to measure the bare engine. Those of others stay."""
+    """Remove only our callbacks from this process, for example to measure the bare engine."""
     for _, present, install in _SLOTS:
         if any(present() is ours for ours in _installed):
             install(None)
@@ -417,7 +417,9 @@ def remove_native_forces() -> None:
 
 @contextlib.contextmanager
 def engine_warnings_held() -> Iterator[None]:
-    """Leave the engine's warnings to `Vehicle.check`. By default it writes them to a file in the user's folder.
+    """Leave the engine's warnings to `Vehicle.check`.
+
+    By default it writes them to a file in the user's folder.
 
     A handler that another part of the program has installed stays in force.
     """

@@ -134,7 +134,7 @@ def _assemble(plan):
 
 @inlined
 def _factorise(plan):
-    """Factorise into unit upper triangular rows times diagonal, in place; store reciprocals of the diagonal."""
+    """Factorise in place into unit upper triangular rows times diagonal, and store the diagonal's reciprocals."""
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
     update = _indices(plan.update)
     target = 0
@@ -187,7 +187,7 @@ def _solve(plan):
 
 @inlined
 def _accelerate(plan):
-    """Find the accelerations that the sensors feel, gravity included. The engine does not compute them again."""
+    """Find the accelerations that the sensors feel, gravity included, which the engine does not compute again."""
     if plan.sensed_body == 0:
         _engine(plan.mj_rnePostConstraint, plan)
         return

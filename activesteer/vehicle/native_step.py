@@ -1,4 +1,4 @@
-"""One step of the engine in one native call: commands in; a row for the recorder, and the measurement, out.
+"""One step of the engine in one native call, from commands to a row for the recorder and the measurement.
 
 The call releases Python's lock. It finds everything through `STEP_BINDINGS`, addresses and indices that a vehicle looks
 up once, so the compiled code is the same for every car.

@@ -149,7 +149,7 @@ class Powertrain:
 
 @dataclass(frozen=True)
 class Steering:
-    """The overall steering ratio, with which driver and controllers relate steering wheel and road wheels."""
+    """The overall ratio of steering wheel and road wheels, for driver and controllers."""
 
     ratio: Positive
     """Steering wheel angle over mean road-wheel angle around straight ahead [-]."""
@@ -162,7 +162,7 @@ class Steering:
 
 @dataclass(frozen=True)
 class Aerodynamics:
-    """Drag. Lift is left out."""
+    """Drag, without lift."""
 
     drag_area_m2: NotNegative
     """Drag coefficient times frontal area [m2]."""
@@ -243,7 +243,7 @@ class Factors:
     """Factor on the lag of the model's servos of rear wheels and superposition. A screw and a motor have none."""
 
     def on_tyres(self, front: TyreParameters, rear: TyreParameters) -> tuple[TyreParameters, TyreParameters]:
-        """Return the tyres of both axles with their scale factors multiplied. Unchanged if all factors are 1."""
+        """Return the tyres of both axles with their scale factors multiplied, unchanged if all factors are 1."""
         axles = (
             (self.front_cornering_stiffness, self.front_tyre_friction),
             (self.rear_cornering_stiffness, self.rear_tyre_friction),
@@ -327,7 +327,7 @@ class VehicleParameters:
 
     @property
     def engine_fractions(self) -> tuple[float, float, float, float]:
-        """Fraction of the engine's torque at each wheel [-], order of `CORNERS`; all 0 without an engine."""
+        """Fraction of the engine's torque at each wheel [-], order of `CORNERS`, all 0 without an engine."""
         share = self.engine_share or 1.0
         front, _, rear, _ = self.powertrain.wheel_fractions
         front, rear = (0.0 if self.motors.on(ax) else part / share for ax, part in (("front", front), ("rear", rear)))
@@ -395,7 +395,7 @@ def engine_speed(fractions: Sequence[float], wheel_speeds_radps: Sequence[float]
 
 
 class PowertrainLimits:
-    """The drive as its driver knows it: its torque limits at the present speed of the wheels.
+    """The drive as its driver knows it: its torque limits at the current speed of the wheels.
 
     Attributes:
         fractions: Fraction of the torque that each wheel gets.

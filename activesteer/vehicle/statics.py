@@ -74,7 +74,7 @@ def move_by(model: mujoco.MjModel, data: mujoco.MjData, dofs: list[int] | NDArra
 def slopes(
     model: mujoco.MjModel, data: mujoco.MjData, dofs: Iterable[int], present: Array, value: Callable[[], Array]
 ) -> Array:
-    """Return the change of a vector along each degree of freedom, by finite differences; shape (present, dofs)."""
+    """Return the change of a vector along each degree of freedom by finite differences, shape (present, dofs)."""
     start, columns = data.qpos.copy(), []
     for dof in dofs:
         move_by(model, data, [dof], _DIFFERENCE)
@@ -127,7 +127,7 @@ YAW_DOF: Final = 5
 
 
 def turn_chassis_back(data: mujoco.MjData, half_rad: float) -> None:
-    """Turn orientation and velocity of the chassis about the world's z axis. Its position stays."""
+    """Turn orientation and velocity of the chassis about the world's z axis at its position."""
     turned = np.empty(4)
     mujoco.mju_mulQuat(turned, np.array([math.cos(half_rad), 0.0, 0.0, -math.sin(half_rad)]), data.qpos[3:7])
     data.qpos[3:7] = turned

@@ -74,7 +74,7 @@ TAPE: Final = numbers_type(words=("room", "row", "row_bytes", "rows", "pose_ever
 
 
 class Tape:
-    """Memory that steps are recorded in; it owns what its `TAPE` record, shape (1,), points to.
+    """Memory that steps are recorded in, and owner of what its `TAPE` record, shape (1,), points to.
 
     `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row. `rows`, `pose_every`: rows
     recorded so far, and rows between two poses. `position`, `quaternion`: addresses of the next poses.
@@ -148,7 +148,7 @@ def read_through(bindings: NDArray[Any], sensors: SensorBlock | None) -> None:
 
 
 def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
-    """Numbers of a row, in the order in which `write_commands` stores them."""
+    """Numbers of a row, in the order of `write_commands`."""
     count = Counter(field for message in messages.values() for field in message._fields)
     return {
         f"{sender}_{number.name}" if count[number.field] > 1 else number.name: number
@@ -254,7 +254,7 @@ class RecordedArrays:
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> RawRows:
-        """Return one row as a step fills it, for the present instant and the present inputs. Change nothing."""
+        """Return one row as a step fills it, for the current time and inputs, without any change."""
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)
@@ -335,7 +335,7 @@ class WheelSet:
         return self._data.xpos[self._bodies, 2]
 
     def effective_radii_m(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
-        """Return the rolling radii under the present loads. With fitted sensors, the car stands still."""
+        """Return the rolling radii under the current loads."""
         loads_N = fb.wheel_outputs(self._data, len(CORNERS))["fz_N"]
         return [
             float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)
@@ -361,7 +361,7 @@ def torque_numbers(torques: WheelTorques) -> tuple[float, ...]:
 
 
 class ActuatorRecords:
-    """Views of the records of a compiled car. A change acts from the next step on."""
+    """Views of the records of a compiled car, whose changes act from the next step on."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         """Find the block."""
@@ -375,7 +375,7 @@ class ActuatorRecords:
         return self._actuators[actuator : actuator + 1]
 
     def screw(self, actuator: int) -> tuple[NDArray[Any], ...]:
-        """Return the records of link and screw of an actuator, of its motor alone if no link follows, or nothing."""
+        """Return the records of link and screw of an actuator, only of its motor if no link follows, or nothing."""
         record = self.of(actuator)
         place = int(record["record"][0])
         if record["kind"] == fb.KIND_SCREW:

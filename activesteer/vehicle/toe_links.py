@@ -134,7 +134,7 @@ class _Corner:
         return missing
 
     def angles(self, travels_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the steer angles at several lengths [rad]. Each search starts from the previous solution."""
+        """Return the steer angles at several lengths [rad], by searches from the previous solution."""
         middle = len(travels_m) // 2
         outwards = [self._along(travels_m[middle:]), self._along(travels_m[middle::-1])]
         return np.concatenate([outwards[1][:0:-1], outwards[0]])

@@ -154,7 +154,7 @@ def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None)
 
 
 def _drive(folder: Path, car: CarDesign, trimmed: Trimmed) -> list[str]:
-    """Drive the standing car, and write its two-track properties. Return why that is impossible."""
+    """Drive the standing car, and write its two-track properties, or return why that is impossible."""
     file = folder / f"{car.name}.toml"
     try:
         found = two_track_of(file, run_scenario)
@@ -165,7 +165,7 @@ def _drive(folder: Path, car: CarDesign, trimmed: Trimmed) -> list[str]:
 
 
 def _write(folder: Path, car: CarDesign, trimmed: Trimmed, *, final: bool = False) -> Path:
-    """Write MJCF and vehicle file. Only the final file holds the single-track model of the car itself."""
+    """Write MJCF and vehicle file, the final one with the single-track model of the car itself."""
     for name, text in mjcf_files(car, trimmed).items():
         (folder / name).write_text(text, encoding="utf-8")
     model = compiled_model(folder / f"{car.name}.xml") if final else None

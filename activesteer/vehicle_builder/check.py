@@ -108,7 +108,7 @@ class CheckReport:
 
 @dataclass(frozen=True)
 class Usual:
-    """Usual and possible range of a value. Keys of a table in usual.toml, which has the sources."""
+    """Usual and possible range of a value, with the keys of a table in usual.toml, which has the sources."""
 
     topic: str
     words: str  # name in the report
@@ -121,7 +121,7 @@ class Usual:
     name: str = ""  # axle and name of a metric of the rig
 
     def judged(self, value: float, unit: str = "", **words: str) -> Finding:
-        """Return the finding about a value. Nan counts as a warning."""
+        """Return the finding about a value, a warning for nan."""
         unit = (self.unit or unit).removesuffix("-")
         level: Level = "warning"
         if not math.isnan(value):

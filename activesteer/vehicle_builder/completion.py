@@ -26,7 +26,7 @@ from activesteer.vehicle_builder.table import AxleTable, CarTable, LinkTable, To
 
 
 def rack_sign(front: Axle) -> float:
-    """Return the sign of the rack's y when the left wheel steers left; default: that of tie rods behind the axle."""
+    """Return the sign of the rack's y when the left wheel steers left, by default for tie rods behind the axle."""
     if front.kind.guided:
         return -1.0
     return math.copysign(1.0, _rack_per_steer(front))
@@ -299,7 +299,7 @@ def _solid(
     where: str,
     log: Log,
 ) -> Solid:
-    """Return the mass properties of one part; a missing inertia scales with the mass."""
+    """Return the mass properties of one part, with a missing inertia in proportion to the mass."""
     key = f"{axle}.{part}"
     cg, inertia = (getattr(table, f"{part}_{name}") for name in ("cg", "inertia_kgm2"))
     kg = log.take(axle, table, f"{part}_mass_kg", default_kg, "a part of this kind in the compact's class")

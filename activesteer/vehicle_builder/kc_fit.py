@@ -130,7 +130,7 @@ def _start(forces: Array, wanted: Array, weight: Array) -> Array:
 
 
 def _wanted(load: Load) -> Array:
-    """Return the motion without the motion of the compliance in series, or nan if not measured; shape (n, 5)."""
+    """Return the motion, shape (n, 5), without the compliance in series, or nan if not measured."""
     moved = [np.full(len(load.x), np.nan) if (row := load.moved[name]) is None else row for name in COORDINATES]
     return np.stack(moved, axis=1) - np.outer(load.x, load.direction) @ load.beside.T
 
@@ -161,7 +161,7 @@ _DIGITS: Final = 7
 
 @dataclass(frozen=True)
 class MeasuredAxle:
-    """Measurements of an axle, for one wheel. None stands for what was not measured."""
+    """Measurements of an axle, for one wheel, None for what was not measured."""
 
     curves: AxleCurves  # measured curves, and the stiffness
     wheel_load_N: tuple[float, ...] | None  # over `curves.travel_m`, relative to the standing car
@@ -234,7 +234,7 @@ def _curve(samples: Samples, values: Array | None, at: Array, name: str, rough: 
 
 
 def _wheel_paths(samples: Samples, radius_m: float) -> tuple[Array | None, Array | None]:
-    """Return the path of the wheel centre outwards and forwards; default: from the path of the contact point."""
+    """Return the path of the wheel centre outwards and forwards, by default from the path of the contact point."""
     outwards, forward = samples.moved("centre_outwards"), samples.moved("centre_forward")
     contact = samples.moved("contact_outwards")
     if outwards is None and contact is not None:

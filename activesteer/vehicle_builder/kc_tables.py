@@ -89,7 +89,7 @@ def smoothed(x: Array, y: Array, at: Array) -> Array:
 
 @dataclass(frozen=True)
 class KcTables:
-    """All tests of a car: axle -> test -> samples; and the ratio of its steering if measured."""
+    """All tests of a car (axle -> test -> samples), and the ratio of its steering if measured."""
 
     tests: dict[str, dict[str, Samples]] = field(default_factory=dict)
     rack_per_steering_wheel_m: float | None = None  # rack travel per angle of the steering wheel [m/rad]
@@ -232,7 +232,7 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
 
 
 def _complete_rack(columns: dict[str, Array], file: Path) -> float | None:
-    """Return the rack travel per steering wheel angle; without a rack in the file, 7.5 mm/rad by definition."""
+    """Return the rack travel per steering wheel angle, without a rack in the file 7.5 mm/rad by definition."""
     if "steering_wheel" not in columns:
         if "rack" not in columns:
             raise ParameterError("neither rack nor steering_wheel was measured", file=file.name)

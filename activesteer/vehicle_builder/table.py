@@ -33,7 +33,7 @@ UNITS: Final = ("m", "mm")
 
 @dataclass(frozen=True)
 class LinkTable:
-    """Keys of a link; one of `stiffness_Npm`, `bushings_Npm` and `bushing`."""
+    """Keys of a link, with one of `stiffness_Npm`, `bushings_Npm` and `bushing`."""
 
     stiffness_Npm: Positive | None = None
     """Rod and both bushings in series [N/m]."""
@@ -65,7 +65,7 @@ class TopMountTable:
 
 @dataclass(frozen=True)
 class AxleTable:
-    """Keys of an axle; points of its left side."""
+    """Keys of an axle, with points of its left side."""
 
     type: str | None = None
     """Kind of suspension."""
@@ -143,7 +143,7 @@ class AxleTable:
 
 @dataclass(frozen=True)
 class MassTable:
-    """Masses of the whole standing car with driver, or of the chassis alone."""
+    """Masses of the whole standing car with driver, or of only the chassis."""
 
     total_kg: Positive | None = None
     """Mass of the whole car [kg]."""
@@ -181,7 +181,7 @@ class SteeringTable:
 
 @dataclass(frozen=True)
 class RearSteeringTable:
-    """The hinge between rear knuckle and carrier. Every car of the package has one, steered or not."""
+    """The hinge between rear knuckle and carrier, which every car of the package has, steered or not."""
 
     axis_lower: Point | None = None
     """A point of the steering axis on the left side, in the table's units."""

@@ -55,7 +55,7 @@ def vehicle_text(
 def _table(
     car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None
 ) -> dict[str, Any]:
-    """Return the vehicle file as a table. Tables in the form of a vehicle file are copied with all keys."""
+    """Return the vehicle file as a table, with all keys of tables in the form of a vehicle file."""
     compact, _ = read_toml(find_vehicle("compact"))
     lines = two_track_lines(two_track) if two_track is not None else {}
     limit_rad = 0.99 * car.rack_limit_m / trimmed.pinion_radius_m
@@ -178,7 +178,7 @@ class _Corner(NamedTuple):
 
 
 def mjcf_files(car: CarDesign, trimmed: Trimmed) -> dict[str, str]:
-    """Return the files of the model as name to text. The keyframe is empty."""
+    """Return the files of the model as name to text, with an empty keyframe."""
     front, corners = car.front, _corners(*car.axles)
     half_width_m = 0.5 * float(front.tyre_parameters["WIDTH"])
     main = {"car": car, "front": front, "corners": corners, "trimmed": trimmed, "half_width_m": half_width_m}
@@ -233,7 +233,7 @@ def _axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
 
 
 def _in_design(axle: Axle, point: Array) -> Array:
-    """Return a point of the knuckle at zero joints. In the standing car curves turn it by the static angles."""
+    """Return a point of the knuckle at zero joints, before curves turn it by the static angles."""
     if axle.measured is None:
         return point
     curves = axle.measured.curves

@@ -39,7 +39,7 @@ from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, chas
 
 @dataclass
 class TrimmedAxle:
-    """One axle; values of the left side."""
+    """One axle, with values of the left side."""
 
     spring_rate_Npm: float = 25000.0
     spring_force_N: float = 4000.0  # spring force in the design position [N]
@@ -81,7 +81,7 @@ _CASTER: Final = 0.02
 
 
 def match_travel(axles: tuple[Axle, ...], trimmed: dict[str, TrimmedAxle], held: HeldCar) -> float:
-    """Correct the curves over travel of all guided axles, and return the largest correction [m, rad]."""
+    """Correct the curves versus travel of all guided axles, and return the largest correction [m, rad]."""
     heights = np.zeros((len(_measured_curves(axles[0]).travel_m), 4))
     for axle in axles:
         heights[:, _wheels(axle)] = np.array(_measured_curves(axle).travel_m)[:, None]
@@ -147,7 +147,7 @@ def _wheels(axle: Axle) -> list[int]:
 def _swept(
     held: HeldCar, cases: list[Case], order: Array, rack: Array | None = None
 ) -> tuple[Array, Array, Array, Array]:
-    """Return poses (n, 4, 6) and loads (n, 4) of a sweep, from its middle outwards, and those of the standing car.
+    """Return poses (n, 4, 6) and loads (n, 4) of a sweep, from its middle outwards, and of the standing car.
 
     `rack` is filled with the travel of the rack [m].
     """
@@ -167,7 +167,7 @@ def _swept(
 
 
 def _poses(held: HeldCar) -> Array:
-    """Return forwards, left, camber, caster, toe, upwards of each wheel, with the signs of the rig; shape (4, 6)."""
+    """Return forwards, left, camber, caster, toe, upwards of each wheel, shape (4, 6), with the signs of the rig."""
     rows = []
     for corner in range(4):
         pose = held.wheel(corner)

@@ -1,4 +1,4 @@
-"""Films of recordings: cameras behind the car, above it or beside a wheel, and files as MP4."""
+"""Films of recordings: cameras behind the car, above it or next to a wheel, and files as MP4."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _SIDE_LIMIT: Final = 8192
 
 
 def aim(camera: mujoco.MjvCamera, name: str, tracks: Sequence[Track], time_s: float, corner: str = CORNERS[0]) -> None:
-    """Aim a camera at the cars at an instant [s]. It does not roll or heave with the first car, which it follows."""
+    """Aim a camera at the cars at a time [s], without the roll and heave of the first car, which it follows."""
     track = tracks[0]
     places = np.array([each.middle(time_s) for each in tracks])
     # All cars stay in the picture, unless they are so far apart that the first one could hardly be seen.
@@ -105,7 +105,7 @@ class Settings:
 
 
 class Film:
-    """Scenes and cameras for some recordings. Use it in a `with` block."""
+    """Scenes and cameras for some recordings, as the context of a `with` block."""
 
     def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
         """Build the scenes."""
@@ -144,14 +144,14 @@ class Film:
             canvas.close()
 
     def times(self) -> NDArray[np.float64]:
-        """Return the instants of the frames [s], from the first pose of any car to the last."""
+        """Return the times of the frames [s], from the first pose of any car to the last."""
         start = min(track.start_s for track in self._tracks)
         end = max(track.end_s for track in self._tracks)
         step = self.settings.speed / self.settings.rate_hz
         return np.asarray(start + step * np.arange(int((end - start) / step + 1e-9) + 1), np.float64)
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
-        """Return the frame of an instant, shape (height, width, 3)."""
+        """Return the frame of a time, shape (height, width, 3)."""
         drawn = [pane.picture(canvas, time_s) for pane, canvas in zip(self._panes, self._canvases, strict=True)]
         return self._gauges.draw(np.hstack(drawn), time_s)
 
@@ -190,7 +190,7 @@ class _Pane:
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
 
     def picture(self, canvas: Offscreen, time_s: float) -> NDArray[np.uint8]:
-        """Return the picture of an instant without gauges."""
+        """Return the frame of a time, without gauges."""
         for number, track in enumerate(self._tracks):
             self.scene.place(number, *track.poses(time_s))
         self.scene.update()
@@ -229,7 +229,7 @@ def ffmpeg() -> str:
 
 @contextmanager
 def encoder(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
-    """Yield a function that appends a frame. The file appears when the context ends without an error."""
+    """Yield a function that appends a frame, and create the file if the context ends without an error."""
     with atomic_write(path, PlaybackError) as part, tempfile.TemporaryFile() as log:
         part.open("wb").close()  # a folder that cannot be written is an error before anything is drawn
         command = [
@@ -274,7 +274,7 @@ def make_film(
     settings: Settings | None = None,
     progress: Callable[[float], Any] | None = None,
 ) -> int:
-    """Draw a film of recordings and write it to a file. Return the number of its frames."""
+    """Draw a film of recordings, write it to a file, and return the number of its frames."""
     settings = settings or Settings()
     check(path, settings.size)
     with Film(recordings, settings) as film, encoder(path, settings.size, settings.rate_hz) as write:

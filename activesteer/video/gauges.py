@@ -47,7 +47,7 @@ class Dials(NamedTuple):
     colour: str  # colour of its car, `#rrggbb`
 
     def value(self, channel: str, time_s: float) -> float:
-        """Return a channel at an instant, or nan if it is not recorded or has no meaning."""
+        """Return a channel at a time, or nan if it is not recorded or has no meaning."""
         if channel not in self.recording or (channel == "sideslip_rad" and not self._moves(time_s)):
             return math.nan
         return float(np.interp(time_s, self.recording.time_s, self.recording[channel]))
@@ -74,7 +74,7 @@ class Gauges:
             self._readings.pop()
 
     def _largest_scale(self) -> float:
-        """Set the sizes for the largest scale at which rows fit into panes, and texts into their share. Return it."""
+        """Set and return the largest scale with room for rows in panes, and for texts in their share."""
         width, high = self._size[0] / len(self._panes), self._size[1] / 480.0
         scale = max(min(high, math.sqrt(width / 640.0 * high)), _LEGIBLE)
         most = LARGEST_SHARE * self._size[0] * self._size[1]
@@ -83,7 +83,7 @@ class Gauges:
         return scale
 
     def _fit(self, scale: float) -> float:
-        """Set the sizes for a scale. Return the area that the texts cover [pixels]."""
+        """Set the sizes for a scale, and return the area that the texts cover [pixels]."""
         self._row, self._gap = max(1, round(_ROW * scale)), _GAP * scale
         self._text, self._small = _font(_TEXT * scale), _font(_SMALL * scale)
         places = [max(self._text.getlength(dial.label) for dial in self._every) + 2.5 * self._gap]

@@ -104,13 +104,13 @@ class Offscreen:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def prepare(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> mujoco.MjvScene:
-        """Prepare the scene of the next frame, to which more geometry can be added."""
+        """Prepare the scene of the next frame, ready for more geometry."""
         every = int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self._model, data, self._look, None, camera, every, self._scene)
         return self._scene
 
     def draw(self) -> NDArray[np.uint8]:
-        """Render the prepared scene, top row first, shape (height, width, 3); the next frame overwrites the pixels."""
+        """Render the prepared scene, top row first, shape (height, width, 3), until the next frame overwrites it."""
         self._context.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._drawer)
         mujoco.mjr_readPixels(self._pixels, None, self._rect, self._drawer)

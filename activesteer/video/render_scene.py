@@ -82,7 +82,7 @@ class RenderScene:
         drawn: DrawnSurface | None = None,
         paths: Sequence[Array] = (),
     ) -> None:
-        """Build the scene. A straight road has edges beside the paths of the cars [m]."""
+        """Build the scene, with edges next to the paths of the cars [m] on a straight road."""
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
             add_road(spec, road or Road(), drawn)
@@ -117,7 +117,7 @@ class RenderScene:
         return int(self.model.body_mocapid[self.model.body(body).id])
 
     def place(self, car: int, positions_m: Array, quaternions: Array) -> None:
-        """Place a car. Call `update` to apply it."""
+        """Place a car, before `update` applies it."""
         data, chassis = self.data, self._chassis[car]
         data.mocap_pos[self._mocap[car]] = positions_m
         data.mocap_quat[self._mocap[car]] = quaternions
@@ -126,7 +126,7 @@ class RenderScene:
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 
     def update(self) -> None:
-        """Update everything that is attached to the bodies; a ghost fades out near the car that it accompanies."""
+        """Update everything that is attached to the bodies, and fade out a ghost near the car that it accompanies."""
         chassis = [self.data.mocap_pos[mocap[index]] for mocap, index in zip(self._mocap, self._chassis, strict=True)]
         for ghost, geoms, tendons in self._ghosts:
             apart = min(float(np.linalg.norm(chassis[ghost] - chassis[other])) for other in range(ghost))

@@ -51,7 +51,7 @@ _MAX_PIECES, _MAX_LANES, _MAX_CONES, _MAX_DASHES = 1000, 1000, 1000, 5000
 
 
 def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None) -> None:
-    """Add the surface. Lower friction makes it bluer."""
+    """Add the surface, bluer for lower friction."""
     colour = np.array(_colour(road.mu))
     spec.add_texture(
         name=_TEXTURE,
@@ -101,7 +101,7 @@ def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray
 
 
 def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
-    """Add the patches of other friction; later ones hide earlier ones."""
+    """Add the patches of other friction, the later on top of the earlier."""
     for piece in road.pieces(-_FAR_M, _FAR_M, -_FAR_M, _FAR_M)[:_MAX_PIECES]:
         right, left = piece.corners_m[[0, 1]], piece.corners_m[[3, 2]]
         width, middle = np.linalg.norm(left.mean(axis=0) - right.mean(axis=0)), 0.5 * (left + right)

@@ -1,4 +1,4 @@
-"""Poses of a car at any instant, its traces on the road, and the markings beside it: wheel angles and tyre forces."""
+"""Poses of a car at any time, its traces on the road, and the markings next to it: wheel angles and tyre forces."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Track:
     """Poses of a car over time, from the first usable one at `start_s` to the last at `end_s`."""
 
     def __init__(self, recording: Recording, name: str) -> None:
-        """Read the poses that can be drawn. A run that diverged ends with poses that cannot."""
+        """Read the poses that can be drawn, without those at the end of a run that diverged."""
         poses = recording.poses
         self.bodies = poses.names
         whole = poses.usable()
@@ -62,7 +62,7 @@ class Track:
         self._direction_rad = direction_of_motion(self._time_s, middle_m, self._heading_rad)
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
-        """Return positions [m] and orientations w x y z of the bodies. Outside the recording, its end poses."""
+        """Return positions [m] and orientations w x y z of the bodies, outside the recording its end poses."""
         last = len(self._time_s) - 1
         after = min(max(int(np.searchsorted(self._time_s, time_s, side="right")), min(1, last)), last)
         before = max(after - 1, 0)
@@ -76,11 +76,11 @@ class Track:
         return positions, turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
     def heading(self, time_s: float) -> float:
-        """Return the continuous heading of the chassis at an instant [rad], left positive."""
+        """Return the continuous heading of the chassis at a time [rad], left positive."""
         return float(np.interp(time_s, self._time_s, self._heading_rad))
 
     def direction(self, time_s: float) -> float:
-        """Return the averaged direction of motion at an instant [rad] (see `drawing.cars`)."""
+        """Return the averaged direction of motion at a time [rad] (see `drawing.cars`)."""
         return float(np.interp(time_s, self._time_s, self._direction_rad))
 
     def chassis(self, time_s: float) -> Array:
@@ -97,11 +97,11 @@ class Track:
         return self.chassis(time_s) + self.turn(time_s) @ (self._middle_m, 0.0, 0.0)
 
     def path(self) -> tuple[Array, Array]:
-        """Return all instants [s], and the midpoints of the axles at the height of the chassis [m], shape (k, 3)."""
+        """Return all times [s], and the midpoints of the axles at the height of the chassis [m], shape (k, 3)."""
         return self._time_s, self._middles_m
 
     def wheel_centre(self, corner: str, time_s: float) -> Array:
-        """Return where the centre of a wheel is at an instant [m], if it does not move relative to the chassis."""
+        """Return where the centre of a wheel is at a time [m], if it does not move relative to the chassis."""
         body = f"{corner}_wheel"
         if body not in self.bodies:
             raise PlaybackError(
@@ -142,7 +142,7 @@ class Traces:
             self._skids.append((0.8 * width_m, _pieces(recording.time_s, np.column_stack([x_m, y_m, z_m]), slides)))
 
     def add(self, scene: mujoco.MjvScene, time_s: float) -> None:
-        """Add the traces up to an instant to a scene."""
+        """Add the traces up to a time to a scene."""
         for width_m, (times, pieces), rgba in (
             (_WIDTH_M, self._path, self._rgba),
             *((width_m, made, _SKID_RGBA) for width_m, made in self._skids),
@@ -171,7 +171,7 @@ def _strip(scene: mujoco.MjvScene, start: Array, stop: Array, width_m: float, rg
 
 
 class Markings:
-    """Wheel angles and tyre forces of one car. `notes` give their scales in words."""
+    """Wheel angles and tyre forces of one car, with `notes` that give their scales in words."""
 
     def __init__(self, recording: Recording, track: Track, colour: str, shown_with: Sequence[Recording]) -> None:
         """Prepare the markings."""
@@ -187,7 +187,7 @@ class Markings:
             self.notes.append(f"force arrows: 1 m = {scale_NpM / 1000.0:.2g} kN")
 
     def add(self, scene: mujoco.MjvScene, time_s: float) -> None:
-        """Add the markings at an instant [s] to a scene."""
+        """Add the markings at a time [s] to a scene."""
         if wheel_angles.CHANNELS[0] in self._recording:
             angles = wheel_angles.angles_at(self._recording, time_s)
             origin, turn = self._track.chassis(time_s), self._track.turn(time_s)

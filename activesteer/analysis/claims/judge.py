@@ -160,7 +160,7 @@ def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance:
 
 
 def _is_cut_short(recording: RecordingLike) -> bool:
-    """Return whether a run ended before its manoeuvre. The last row of a whole run lies one step before the end."""
+    """Return whether a run ended before its manoeuvre, whose last row is one step before the end."""
     maneuver: Any = recording.metadata.get("maneuver")
     duration_s = maneuver.get("duration_s") if isinstance(maneuver, Mapping) else None
     time_s = recording.time_s
@@ -191,7 +191,7 @@ def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> 
 
 
 def straight_ahead(recording: RecordingLike) -> slice:
-    """Return the rows before the steering wheel is first turned, or none if it is turned from the beginning."""
+    """Return the rows before the steering wheel is first turned, or none if it is turned from the start."""
     turned = np.abs(recording["steering_wheel_rad"]) > AHEAD_RAD
     return slice(0, int(np.argmax(turned)) if turned.any() else len(turned))
 
@@ -235,7 +235,7 @@ def _step_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics, whole: bool) -> RunMetrics:
-    """Return the added angles, and the times at which the signals reach the common level, from half the steering angle.
+    """Return the added angles, and the times when the signals reach the common level, from half the steering angle.
 
     A time is nan if its run is incomplete or stays below the level.
     """
@@ -256,7 +256,7 @@ def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics,
 
 
 def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool) -> RunMetrics:
-    """Compare the demanded rear and superposed angle, without the give of the hinges, since the beginning of steer."""
+    """Compare the demanded rear and superposed angle, without the give of the hinges, since the start of steer."""
     if not whole:
         return {TOGETHER: {"added_angles_common_s": 0.0}}
     ars, afs = recordings["ars"], recordings["afs"]
@@ -304,7 +304,7 @@ def _slippery_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 class _Limit(float):
-    """Number of a criterion. `{:%}` writes a share with its percent sign apart."""
+    """Number of a criterion, which `{:%}` writes with a space before the percent sign."""
 
     def __format__(self, spec: str) -> str:
         return f"{100.0 * self:.0f} %" if spec == "%" else f"{float(self):g}"

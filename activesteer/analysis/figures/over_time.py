@@ -65,7 +65,7 @@ class DrawnRun(NamedTuple):
 
 
 def drawn_runs(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
-    """Return the runs in the paper's order. The three systems always have the same colours."""
+    """Return the runs in the paper's order, with the same colours of the three systems everywhere."""
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
     return [DrawnRun(recordings[name], look) for name, look in run_looks(recordings).items()]
@@ -85,7 +85,7 @@ def draw(
 
 
 def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width: float = LINE_PT) -> None:
-    """Draw the lines of a run. Those after the first are dotted."""
+    """Draw the lines of a run, all but the first dotted."""
     lines = panel.lines_in(FIGURE)
     # A panel of one line needs it; of several, a run has some.
     shown = lines if len(lines) == 1 else [line for line in lines if line.of(curve.recording) is not None]
@@ -95,7 +95,7 @@ def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width
 
 
 def friction_label(low: float, high: float) -> str:
-    """Return the label of places with another friction, which keeps them out of the legend of their own axis."""
+    """Return the label of places with another friction, which keeps them out of the legend of their axis."""
     return f"_friction {low:.2g}" + (f" to {high:.2g}" if f"{low:.2g}" != f"{high:.2g}" else "")
 
 
@@ -123,7 +123,7 @@ def plain(axis: Axes, title: str = "") -> None:
 
 
 def note(axis: Axes, text: str, at: tuple[float, float], offset_pt: tuple[float, float], **look: Any) -> None:
-    """Write a small grey text beside a point."""
+    """Write a small grey text next to a point."""
     look = {"color": "#555555", **look}
     axis.annotate(text, at, offset_pt, textcoords="offset points", fontsize=TEXT_PT, **look)
 
@@ -181,7 +181,7 @@ _AFTER: Final = 0.2
 
 
 def fill_panels(axes: Sequence[Axes], drawn: Sequence[DrawnRun], panels: Sequence[Panel]) -> None:
-    """Draw panels over one time axis that shows the transient; the curves of the first panel carry the labels."""
+    """Draw panels over one time axis that shows the transient, with the labels in the first panel."""
     for row, (axis, panel) in enumerate(zip(axes, panels, strict=True)):
         for curve in drawn:
             label = curve.look.label if row == 0 else ""
@@ -208,7 +208,9 @@ def finish_time(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
-    """Return the time from before the first motion to after the last run has settled [s]. Runs that spin do not count.
+    """Return the time from before the first motion to after the last run has settled [s].
+
+    Runs that spin do not count.
 
     If no run settles, this is the whole time.
     """
@@ -303,7 +305,7 @@ def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Shade the times at which a wheel stands on another friction than at the start. One shade for each run."""
+    """Shade the times when a wheel stands on another friction than at the start, once for each run."""
     for curve in drawn:
         try:
             mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])
@@ -322,7 +324,7 @@ def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE)) -> Figure:
-    """Draw panels over one time axis, as wide as a column, with phases or instants of a standard's criterion."""
+    """Draw panels over one time axis, as wide as a column, with phases or times of a standard's criterion."""
     drawn = drawn_runs(recordings)
     shown = present(panels, drawn)
     figure = new_figure(width_in=COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))

@@ -34,7 +34,7 @@ TRACK_ASPECT: Final = 0.35
 
 
 def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """Draw the course: path, lanes with their sizes, cones. The axis names the factor that stretches y."""
+    """Draw the course (path, lanes with their sizes, cones) on an axis that gives the factor that stretches y."""
     course = read_course(drawn_runs(recordings)[0].recording)
     figure = new_figure(width_in=PAGE_IN, height_in=0.65 + _axis_height_in(course, COURSE_ASPECT))
     axis: Axes = figure.subplots()
@@ -48,7 +48,7 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """Draw tracks of the front axle centre along the course. The axis names the factor that stretches y."""
+    """Draw tracks of the front axle centre along the course, on an axis that gives the factor that stretches y."""
     drawn = drawn_runs(recordings)
     course = read_course(drawn[0].recording)
     figure = new_figure(width_in=PAGE_IN, height_in=0.95 + _axis_height_in(course, TRACK_ASPECT))

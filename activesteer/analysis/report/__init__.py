@@ -1,4 +1,6 @@
-"""The report of runs: one HTML page with scorecard, plots to zoom into, metrics, parameters. It works offline.
+"""The report of runs: one HTML page with scorecard, plots to zoom into, metrics and parameters.
+
+It works offline.
 
 uPlot (https://github.com/leeoniya/uPlot, MIT) draws the plots in the browser; a copy of it is in
 `activesteer/pages/templates`.

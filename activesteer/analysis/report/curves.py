@@ -72,7 +72,7 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
 
 
 def time_grid(times_s: Sequence[Array]) -> Array:
-    """Return the instants of all plots: thinned samples of the first run, to the end of the longest run [s]."""
+    """Return the times of all plots: thinned samples of the first run, to the end of the longest run [s]."""
     first = times_s[0]
     start = min(float(time_s[0]) for time_s in times_s)
     end = max(float(time_s[-1]) for time_s in times_s)
@@ -100,12 +100,12 @@ def _panel(panel: Panel, view: str, runs: Sequence[ReportedRun], grid: Array) ->
 
 
 def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
-    """Return the values at the instants of the grid, or nan before and after the run."""
+    """Return the values at the times of the grid, or nan before and after the run."""
     return np.interp(grid, time_s, values, left=math.nan, right=math.nan)
 
 
 def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
-    """Return the values of a curve. For a run too long for samples, the extremes, so that no peak is lost."""
+    """Return the values of a curve, of a long run its extremes, so that no peak is lost."""
     # Each pair of instants takes the least and the greatest value up to the next pair.
     if len(grid) < 2 or grid[1] - grid[0] <= MAX_STEP_S:
         return _sampled(time_s, values, grid)

@@ -27,7 +27,7 @@ from activesteer.recording.recording import run_names
 
 
 def judge(group: Group) -> Scorecard:
-    """Check the paper's claims about the runs of a group. Without claims the scorecard is empty, and says why."""
+    """Check the paper's claims about the runs of a group, or say in an empty scorecard why there are none."""
     # The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
     recordings = {run.name: run.recording for run in group.runs}
     check = claims_for(group.runs[0].recording)
@@ -80,7 +80,7 @@ class Group(NamedTuple):
 
 
 def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
-    """Open recordings, by path; of an incomplete or damaged file, the readable part."""
+    """Open recordings by path, incomplete or damaged ones as far as they are readable."""
     recordings: dict[str, Recording] = {}
     for path in paths:
         if str(path) in recordings:
@@ -90,7 +90,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
 
 
 def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
-    """Return the runs by manoeuvre: first the paper's manoeuvres in its order, then the others; its setting apart."""
+    """Return the runs by manoeuvre, the paper's manoeuvres first in its order, and the paper's setting apart."""
     if not 1 <= len(recordings) <= MAX_RUNS:
         raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}", allowed=MAX_RUNS)
     by_maneuver: dict[tuple[str, bool], dict[str, Recording]] = {}

@@ -48,7 +48,9 @@ _MOST_EVENTS: Final = 20
 
 
 def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[str]) -> Path:
-    """Write the report of runs and return its path. An existing file is replaced.
+    """Write the report of runs and return its path.
+
+    An existing file is replaced.
 
     Args:
         recordings: Recordings by their origin, such as the names of their files.
@@ -62,7 +64,7 @@ def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[st
 
 
 def report_page(recordings: Mapping[str, Recording], made: date | None = None) -> str:
-    """Return the report of runs as HTML. The same recordings and date give the same page."""
+    """Return the report of runs as HTML, the same for the same recordings and date."""
     groups = groups_of(recordings)
     anchors = {f"group-{number}": group for number, group in enumerate(groups, start=1)}
     cards, several = [judge(group) for group in groups], len(groups) > 1
@@ -212,7 +214,7 @@ def _claim(item: Judged, anchor: str) -> Markup:
 
 
 def parameter_table(title: str, found: Sequence[Row], names: Sequence[str], *, folded: bool = False) -> Table:
-    """Return the table of parameters. Rows in which the runs differ are marked."""
+    """Return the table of parameters, with marked rows where the runs differ."""
     outside = frozenset(number for number, row in enumerate(found) if row.differs)
     columns = names if outside else ["Value"]
     rows = [
@@ -282,7 +284,7 @@ class Row(NamedTuple):
 
 
 def parameters(recordings: Sequence[Recording], *tables: str) -> list[Row]:
-    """Return the entries of tables of the metadata: those of the first run in its order, then those of later runs."""
+    """Return the entries of tables of the metadata: of the first run in its order, then of later runs."""
     flat = []
     for run in recordings:
         chosen = {key: run.metadata[key] for key in tables if key in run.metadata}

@@ -71,7 +71,7 @@ _LICENSES: Final = (
 
 
 class Export(NamedTuple):
-    """A car in the form in which it is exported."""
+    """A car in the form of an export."""
 
     name: str  # of the vehicle
     variables: list[Variable]  # its variables; the value reference is the place
@@ -303,7 +303,7 @@ def _plain(values: Any) -> list[int | float]:
 
 
 def _renamed_engine(path: Path, token: str) -> tuple[str, bytes]:
-    """Return the engine's library under a name of its own.
+    """Return the engine's library under a unique name.
 
     MuJoCo has its callbacks once per loaded library. Under its own name the engine of an exported car is another
     library than that of a program that uses MuJoCo too, or of another exported car.

@@ -66,7 +66,7 @@ _MEANINGS: Final = {
 
 
 def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
-    """Return the inputs. Those of the native step come first, in the order of `CARRIED_OUT`."""
+    """Return the inputs, first the inputs of the native step in the order of `CARRIED_OUT`."""
     driver, actuator = loop.commands
     starts = dict(zip(COMMANDS, (*numbers_in(driver), *numbers_in(actuator)), strict=True))
     numbers = {number.name: number for command in (driver, actuator) for number in numbers_of(type(command))}

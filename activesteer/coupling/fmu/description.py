@@ -209,7 +209,7 @@ def _variable(variable: Any, description: Any) -> Variable | None:
 
 
 def _number(text: Any, default: Any = None) -> Any:
-    """Return the number in an attribute. True is 1."""
+    """Return the number in an attribute, 1 for True."""
     first = str(text).split()[0] if text is not None and str(text).split() else None
     try:
         return default if first is None else float({"true": "1", "false": "0"}.get(first, first))

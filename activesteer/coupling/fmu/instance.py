@@ -1,4 +1,4 @@
-"""An instance of an FMU, called by function pointers, in this process or in one of its own.
+"""An instance of an FMU, called by function pointers, in this process or in a separate one.
 
 This file imports no library, because every isolated instance waits for the start of its process.
 """
@@ -253,7 +253,7 @@ _GOOD, _BAD = b"0", b"E"
 
 
 class IsolatedInstance:
-    """An instance in a process of its own, which may crash or hang without harm to this one."""
+    """An instance in a separate process, which may crash or hang without harm to this one."""
 
     def __init__(self, spec: Spec, limit_s: float) -> None:
         """Start the process, and initialise the FMU in it."""

@@ -232,7 +232,7 @@ class FmuBlock:
         return self._held
 
     def _when(self) -> str:
-        """The time of the present step, in words."""
+        """The time of the current step, in words."""
         return f", {(self._steps - 1) // self._every * self._step_s:g} s after its initialisation"
 
     def _unread(self, messages: Sequence[Any]) -> Exception:
@@ -347,7 +347,10 @@ _MAX_KEPT_BYTES: Final = 4_000_000
 
 
 class Fmu:
-    """An FMU from which a driver or controller can be made for any car; `PARAMETERS` as in `activesteer.plugins`."""
+    """An FMU that can become a driver or controller of any car.
+
+    `PARAMETERS` is as in `activesteer.plugins`.
+    """
 
     checks_itself = True
     reads = ()
@@ -468,7 +471,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
 
 def isolated(given: Any, limit_s: float) -> Any:
-    """Return an FMU in its own process. Other blocks are returned unchanged."""
+    """Return an FMU in its own process, or any other block unchanged."""
     text = os.fspath(given) if isinstance(given, (str, os.PathLike)) else ""
     if not text.partition("?")[0].lower().endswith(".fmu"):
         return given

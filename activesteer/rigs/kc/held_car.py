@@ -61,7 +61,7 @@ class WheelPose(NamedTuple):
 
 @dataclass
 class Case:
-    """Loads and positions that the rig imposes at one point of a sweep; arrays by corner."""
+    """Loads and positions, in arrays by corner, that the rig imposes at one point of a sweep."""
 
     hold: Hold = "centre"  # what the pads hold: heights of the wheel centres, heights of the contact points, or nothing
     # Height above the height in the standing car [m], shape (4,)
@@ -145,7 +145,7 @@ class HeldCar:
         mujoco.mj_fwdPosition(self.model, self.data)
 
     def wheel(self, corner: int) -> WheelPose:
-        """Return the pose of a wheel. Its contact point is the lowest point of the rigid circle."""
+        """Return the pose of a wheel, with the lowest point of the rigid circle as its contact point."""
         body = self._wheels[corner]
         centre = self.data.xpos[body].copy()
         return WheelPose(centre, self.data.xmat[body].reshape(3, 3).copy(), centre + self._down(corner))
@@ -158,7 +158,7 @@ class HeldCar:
         return np.array([scale * x * z, scale * y * z, -self._radii[corner] * across])
 
     def equilibrium(self, case: Case) -> None:
-        """Move the car from its present position into equilibrium."""
+        """Move the car from its current position into equilibrium."""
         self._command(case)
         residual = self._residual(case)
         size = np.abs(residual).max()
@@ -228,7 +228,7 @@ class HeldCar:
         self.load_N += step[-4:]
 
     def _renew(self, case: Case, residual: Array) -> None:
-        """Compute and invert the stiffness of the car with its pads, at the present position."""
+        """Compute and invert the stiffness of the car with its pads, at the current position."""
         data, count = self.data, self._free.size
         matrix = np.empty((count + 4, count + 4))
         start, load = data.qpos.copy(), self.load_N.copy()

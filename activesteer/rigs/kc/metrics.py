@@ -32,7 +32,7 @@ _SMALL: Final = {
 
 
 class Axle(NamedTuple):
-    """One axle of the measured car. Arrays of its wheels are in the order left, right."""
+    """One axle of the measured car, with arrays of its wheels in the order left, right."""
 
     name: str
     measured: Measured
@@ -121,7 +121,7 @@ def _damper_ratio(axle: Axle) -> float:
 
 
 def _contact(axle: Axle, end: int) -> float:
-    """Travel at which a damper's length reaches one end of the range in which its stops are slack [mm]."""
+    """Travel where a damper's length reaches one end of the slack range of its stops [mm]."""
     model = axle.measured.vehicle.model
     limit = float(model.tendon_lengthspring[model.tendon(f"{axle.name[0]}l_damper").id, end])
     sweep = axle.sweep("parallel_travel")

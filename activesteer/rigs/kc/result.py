@@ -84,7 +84,7 @@ class KcResult:
         return tuple(entry for entry in self.metrics if entry.inside is False)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the metrics as JSON values: name, axle, value, unit, band, inside, source. A missing value is null."""
+        """Return the metrics as JSON values (name, axle, value, unit, band, inside, source), null if missing."""
         names = ("name", "axle", "value", "unit", "band", "inside", "source")
         return {"metrics": [{name: getattr(entry, name) for name in names} for entry in self.metrics]}
 

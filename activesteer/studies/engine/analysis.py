@@ -109,7 +109,7 @@ Point = tuple[Any, ...]
 
 
 def without_effect(plan: Plan, rows: Iterable[Row]) -> list[str]:
-    """Return the factors without effect: changing one of them alone leaves every metric the same to the last bit.
+    """Return the factors without effect: a change of one of them leaves every metric bit-identical.
 
     Rows that differ in one factor only are compared. If there are none for a factor, as in a random sample, the first
     sample is driven again with the ends of the factor's range.

@@ -115,7 +115,7 @@ def cases(given: Iterable[Mapping[str, Any]]) -> Samples:
 
 
 def read_cases(path: Path) -> Samples:
-    """Read a list of cases from a CSV file. Its header holds the keys. An empty cell leaves a key unchanged."""
+    """Read a list of cases from a CSV file with keys in its header, where an empty cell leaves a key unchanged."""
 
     def fail(problem: str, line: int, key: str | None = None) -> StudyError:
         return StudyError(problem, file=path.name, line=line, key=key)

@@ -16,7 +16,7 @@ from activesteer.studies.engine.study_file import StudyFile, label_of
 
 
 class FactorValues:
-    """Conversion of sample values to overrides. Each pair of manoeuvre and vehicle is resolved once."""
+    """Conversion of sample values to overrides, which resolves each pair of manoeuvre and vehicle once."""
 
     def __init__(self, study: StudyFile) -> None:
         """Prepare the conversion for a study."""
@@ -48,7 +48,7 @@ class FactorValues:
                     raise study.source.fail(place, f"is no other range; {nearest_names(other, ranges)}", other)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the overrides of a run for the keys that vary in its manoeuvre. None keeps the value of the files."""
+        """Return the overrides of a run for the keys that vary in its manoeuvre, None for the value of the files."""
         label = label_of(self.study.maneuvers[maneuver])
         found = {}
         # In the order of the file, in which a factor follows the one to which it is relative.
@@ -112,7 +112,7 @@ class Prior:
     """
 
     def __init__(self, study: StudyFile) -> None:
-        """Find the nominal values: those of the files, and no change for factors that are relative to them."""
+        """Find the nominal values: from the files, and no change for factors that are relative to them."""
         self._searched = [factor for factor in study.factors if not factor.values]
         self.nominal: dict[str, Any] = {}
         for factor in study.factors:

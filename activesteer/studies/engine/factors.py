@@ -52,7 +52,7 @@ class FactorTable:
 
 @dataclass(frozen=True)
 class Factor(FactorTable):
-    """A factor: a key and its checked table, in which a normal distribution has its ends."""
+    """A factor: a key and its checked table, with the ends of a normal distribution."""
 
     key: str = ""  # dotted key, as for `--set`
 

@@ -90,7 +90,7 @@ class Plan:
         return self.request_with(run, sample, (maneuver, vehicle, controller), samples[sample])
 
     def request_with(self, run: int, sample: int, place: tuple[int, int, int], factors: dict[str, Any]) -> Request:
-        """Return a run with values of its own."""
+        """Return a run with its own values."""
         overrides = self.study.overrides | self._values.overrides(*place[:2], factors)
         return Request(run, sample, *place, factors, overrides)
 

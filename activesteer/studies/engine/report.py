@@ -144,7 +144,7 @@ def _shown_rows(table: pa.Table) -> Places:
 
 
 def _acting(study: StudyFile, key: str, rows: pa.Table) -> list[Any]:
-    """Return the values of a factor, None in manoeuvres in which it does not vary."""
+    """Return the values of a factor, None in manoeuvres where it does not vary."""
     named = [factor.maneuvers for factor in study.factors if factor.key == key]
     values, maneuvers = rows[key].to_pylist(), rows["maneuver"].to_pylist()
     if not all(named):
@@ -171,7 +171,7 @@ def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, An
 
 
 def _label(study: StudyFile, key: str) -> tuple[str, str]:
-    """Return label and unit of a factor; those of a user's controller or driver as its code declares them."""
+    """Return label and unit of a factor, from the code of a user's controller or driver where it declares them."""
     words, unit = parameter_label(key)
     with contextlib.suppress(ActiveSteerError):  # the code may be elsewhere by now
         for plugin in (*map(controller_spec, study.controllers), driver_spec(study.driver)):

@@ -62,7 +62,7 @@ def _of_bytes(value: object) -> str:
 
 @functools.cache
 def source_digest() -> str:
-    """Return the hash of the sources that results depend on. The version number does not change with every edit."""
+    """Return the hash of the sources that results depend on, which changes with every edit."""
     package = Path(__file__).parents[2]
     found = {}
     for part in _DECIDING:
@@ -117,7 +117,7 @@ _VERSION: Final = "version of "
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that all runs of a study share; small, because every task carries them."""
+    """Settings that all runs of a study share, small because every task carries them."""
 
     study: StudyFile  # the study without its cases and searches
     maneuvers: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each manoeuvre
@@ -196,7 +196,7 @@ def prepare(workers: Workers, settings: Settings) -> None:
 
 
 def prepare_worker(settings: Settings) -> str:
-    """Compile the native code. Return in words why this machine cannot make the runs, or an empty text."""
+    """Compile the native code, and return in words why this machine cannot drive the runs, or an empty text."""
     if problem := differences(settings):
         return problem
     install_native_forces()
@@ -217,7 +217,7 @@ def run_command(
     overrides: Mapping[str, Any],
     driver: Any = DEFAULT_DRIVER,
 ) -> str:
-    """Return the `activesteer run` that repeats a run to the last bit.
+    """Return the `activesteer run` that repeats a run bit for bit.
 
     A manoeuvre or vehicle given as a table appears as its name. The override `driver` replaces the driver.
     """
@@ -277,7 +277,7 @@ def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.
 
 
 def _give_memory_back() -> None:
-    """Return free memory to the system. The C library would keep it in pieces, and a worker would use more and more."""
+    """Return free memory to the system, because the C library would keep it in ever more pieces."""
     with contextlib.suppress(OSError, AttributeError, TypeError):  # other C libraries have no such function
         ctypes.CDLL(None).malloc_trim(0)
 
@@ -322,7 +322,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
 
 
 def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, controller: str) -> Recording | None:
-    """Make one run and fill its row. Return the recording of a complete run."""
+    """Make one run, fill its row, and return the recording of a complete run."""
     path = _recording_path(settings, request)
     every = settings.study.recordings
     keeps = every == "all" or (isinstance(every, int) and request.sample % every == 0)

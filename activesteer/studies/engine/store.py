@@ -56,7 +56,7 @@ def table_of(rows: Sequence[Row], factors: Sequence[str]) -> pa.Table:
 
 
 def _factor_column(values: Sequence[Any]) -> pa.Array:
-    """Return a column of numbers, texts or truth values. Anything else is written as JSON."""
+    """Return a column of numbers, texts or truth values, or of anything else as JSON."""
     try:
         numbers = any(isinstance(value, float) for value in values)
         plain = [float(value) if numbers and value is not None else value for value in values]
@@ -68,7 +68,7 @@ def _factor_column(values: Sequence[Any]) -> pa.Array:
 
 
 def joined(tables: Sequence[pa.Table]) -> pa.Table:
-    """Return the rows of all parts. A factor with texts in some parts and numbers in others becomes a text."""
+    """Return the rows of all parts, with a factor as text if it is a number only in some parts."""
     kinds: dict[str, set[pa.DataType]] = {}
     for field in (field for table in tables for field in table.schema if not pa.types.is_null(field.type)):
         kinds.setdefault(field.name, set()).add(field.type)
@@ -107,7 +107,7 @@ class Store:
     """A study's folder, held by one process at a time."""
 
     def __init__(self, folder: Path, factors: Sequence[str]) -> None:
-        """Prepare the store. `opened` opens it."""
+        """Prepare the store, which `opened` opens."""
         self.folder = folder
         self._factors = tuple(factors)
         self._parts = folder / "parts"
@@ -240,7 +240,7 @@ def _tables(paths: Iterable[Path], columns: list[str] | None = None) -> Iterator
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Lock the folder of this file while it is in use. On a file system without locks, do nothing."""
+    """Lock the folder of this file while it is in use, unless the file system has no locks."""
     with writing(path, StudyError):
         file = path.open("w")
     with file:

@@ -134,7 +134,7 @@ class Judge:
     """
 
     def __init__(self, plan: Plan, table: TuneTable, examined: str = "") -> None:
-        """Read the expressions of a table. `controller` stands for the examined controller."""
+        """Read the expressions of a table, with `controller` for the examined controller."""
         study, shared, self._examined = plan.study, plan.settings, examined
         controllers, maneuvers = ([label for label, _ in items] for items in (shared.controllers, shared.maneuvers))
         claims = {claim: (f"{DISTANCE}{claim}", name) for claim, name in SCENARIO_OF.items() if name in maneuvers}
@@ -177,7 +177,7 @@ class Judge:
         return Judgement(objectives, margins, constraints) if all(map(math.isfinite, objectives)) else None
 
     def _runs(self, rows: Sequence[Row]) -> list[Runs]:
-        """Return the metrics of the runs for each vehicle. Those of a failed run are not defined."""
+        """Return the metrics of the runs for each vehicle, undefined for a failed run."""
         names: dict[str, dict[str, None]] = {}
         for row in rows:
             own = names.setdefault(row["maneuver"], {})

@@ -136,7 +136,9 @@ def tune(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> list[Tuning]:
-    """Search the ranges of a study's factors. Every set is driven in all manoeuvres with all controllers.
+    """Search the ranges of a study's factors.
+
+    Every set is driven in all manoeuvres with all controllers.
 
     There is one search, or one for each controller in each manoeuvre if a requirement shall be violated; `controllers`
     and `maneuvers` choose them, by default those of the file. Each has a folder below the output then. A search found
@@ -153,7 +155,7 @@ def tune(
 
 
 def read_tuning(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Tuning:
-    """Return the search of a study in a folder as far as it is. It may be of another version of the package."""
+    """Return the search of a study in a folder as far as it is, also of another version of the package."""
     (search,) = _searches(read_study(study_file, TABLE), Path(folder), None, None)
     return search.result(search.stored())
 
@@ -205,7 +207,7 @@ class _Search:
     def __init__(
         self, study: StudyFile, table: TuneTable, folder: Path, examined: str = "", maneuver: str = ""
     ) -> None:
-        """Check the study. `examined` and `maneuver` are those of a search for a violation."""
+        """Check the study, with `examined` and `maneuver` for a search for a violation."""
         self.plan, self.table, self.folder, self.goal = Plan(study), table, folder, table.goal
         self.examined, self.maneuver = examined, maneuver
         self.judge = Judge(self.plan, table, examined)
@@ -288,7 +290,7 @@ class _Search:
         return [self.plan.request_with(run, number, place, values) for run, place in enumerate(self._places)]
 
     def _seeds(self) -> list[dict[str, Any]]:
-        """Return the sets to try first: those of the file; a whole grid; the nominal values to satisfy statements."""
+        """Return the sets to try first: from the file, a whole grid, or nominal values to satisfy statements."""
         factors, prior, seeds = self.plan.study.factors, self.judge.prior, self.table.seeds
         # Optuna's own samplers of grids end the search when they are through, which fails outside of its loop.
         if self.table.sampler == "grid":
@@ -303,7 +305,7 @@ class _Search:
         return [nominal, *({**nominal, **seed} for seed in seeds)]
 
     def _sampler(self, made: Any, total: int) -> Any:
-        """Return the sampler of Optuna. Its seed differs when a search is resumed."""
+        """Return the sampler of Optuna, with another seed when a search is resumed."""
         optuna, seed = _optuna(), self.plan.study.seed + len(made.trials)
         best: list[Any] = []
         name = self.table.sampler

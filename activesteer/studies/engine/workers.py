@@ -1,4 +1,4 @@
-"""Workers behind one interface: this process, processes of this machine, or a Dask cluster; and their tasks.
+"""Workers with their tasks behind one interface: this process, processes of this machine, or a Dask cluster.
 
 `TaskQueue` distributes tasks and returns their results as they arrive. If a worker dies, only its own tasks are lost
 and repeated. A task that kills its worker every time is given up.
@@ -28,7 +28,9 @@ _MOST_JOBS: Final = 16
 
 
 class Workers:
-    """This process, which does every task immediately. Others override its methods.
+    """This process, which does every task immediately.
+
+    Others override its methods.
 
     Attributes:
         in_flight: Number of tasks to submit at a time, so that no worker waits.
@@ -37,7 +39,7 @@ class Workers:
     in_flight = 1
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Start a task. The function and its arguments must be picklable."""
+        """Start a task with a picklable function and arguments."""
         future: Future[Any] = Future()
         try:
             future.set_result(function(*arguments))
@@ -53,11 +55,11 @@ class Workers:
         """Replace dead workers."""
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """Call a function once on every machine before its workers start. Return the first objection."""
+        """Call a function once on every machine before its workers start, and return the first objection."""
         return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:
-        """End the workers; if abandoned, without waiting for their tasks."""
+        """End the workers, without waiting for their tasks if abandoned."""
 
 
 class LocalProcesses(Workers):
@@ -147,7 +149,7 @@ class DaskCluster(Workers):
     """
 
     def __init__(self, client: Any) -> None:
-        """Check the cluster. The client still belongs to the caller."""
+        """Check the cluster, whose client still belongs to the caller."""
         self._client = client
         self._executor = client.get_executor(pure=False)
         try:
@@ -171,7 +173,7 @@ class DaskCluster(Workers):
         return type(error).__name__ == "KilledWorker" or isinstance(error, CancelledError)
 
     def replace(self) -> None:
-        """Check that the scheduler still exists. The cluster replaces its workers itself."""
+        """Check that the scheduler still exists, while the cluster replaces its workers itself."""
         try:
             self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except Exception as reason:
@@ -181,7 +183,7 @@ class DaskCluster(Workers):
         self._count()
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """See `Workers`. One worker of each machine goes first, so that kernels are compiled once."""
+        """Start a task as `Workers` does, on one worker of each machine first, so that kernels are compiled once."""
         hosts: dict[str, list[str]] = {}
         for address in self._client.nthreads():
             hosts.setdefault(address.rpartition(":")[0], []).append(address)
@@ -227,7 +229,7 @@ def connected(scheduler: str) -> Iterator[Any]:
 
 
 def _compare_versions(found: dict[str, Any]) -> None:
-    """Check that client, scheduler and workers have the same versions. Ask the workers for that of activesteer."""
+    """Check that client, scheduler and workers have the same versions, also of activesteer."""
     here = found["client"]
     others = {"the scheduler": found["scheduler"]} | {f"worker {key}": value for key, value in found["workers"].items()}
     for who, theirs in others.items():
@@ -247,7 +249,9 @@ def _line(reason: BaseException) -> str:
 
 @contextlib.contextmanager
 def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str | None = None) -> Iterator[Workers]:
-    """Yield this machine's processes, by default one per processor, or a Dask cluster. Abandon tasks if the body fails.
+    """Yield this machine's processes, by default one per processor, or a Dask cluster.
+
+    Abandon tasks if the body fails.
 
     With one job, this process does the work. The scheduler is given by its address or its file.
     """
@@ -323,11 +327,11 @@ class TaskQueue:
         self._waiting.append(_Task(key, function, arguments))
 
     def add_alone(self, key: Any, function: Callable[..., Any], *arguments: Any) -> None:
-        """Append a task that may kill its worker: it is tried once, with no other task beside it."""
+        """Append a task that may kill its worker: it is tried once, without other tasks at the same time."""
         self._suspects.append(_Task(key, function, arguments, _ATTEMPTS - 1))
 
     def outcomes(self, more: Iterator[tuple[Any, ...]] | None = None) -> Iterator[Outcome]:
-        """Do the tasks and yield their outcomes, in the order in which they end.
+        """Do the tasks and yield their outcomes, in the order of completion.
 
         The caller may add tasks while iterating.
         """

@@ -129,7 +129,7 @@ class DriverLoop:
 
     @cached_property
     def response(self) -> NDArray[np.complexfloating]:
-        """Return the return ratio at `FREQUENCIES_RADPS`, complex; -1 is the limit of stability."""
+        """Return the complex return ratio at `FREQUENCIES_RADPS`, with -1 as the limit of stability."""
         from scipy.linalg import schur, solve_triangular  # noqa: PLC0415 - slow to import
 
         steps = len(self.c)
@@ -146,7 +146,7 @@ class DriverLoop:
         return np.asarray(-np.mean(z[:, :steps].conj() * answers, axis=1), dtype=np.complex128)
 
     def crossover(self) -> tuple[float, float]:
-        """Return crossover frequency [rad/s] and phase margin [rad]; the smallest margin of several crossovers.
+        """Return crossover frequency [rad/s] and phase margin [rad], the smallest margin of several crossovers.
 
         Both are nan if the gain never crosses 1.
         """
@@ -350,7 +350,7 @@ _FROM_RUNS: Final = ("damping_in_step", "damping_in_run")
 
 
 def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture) -> Page:
-    """Return the page of a loop. Columns in which nothing oscillates are left out."""
+    """Return the page of a loop, without columns where nothing oscillates."""
     heads = {key: head for key, head in _HEADS.items() if key not in _FROM_RUNS or any(row[key] < 1.0 for row in rows)}
     cells = [
         [
@@ -371,7 +371,7 @@ def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture)
 
 
 def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[str, Any]]) -> Picture:
-    """Return Bode diagrams and a step of the path at the middle speed, and the damping over speed."""
+    """Return Bode diagrams and a step of the path at the middle speed, and the damping versus speed."""
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))

@@ -67,7 +67,7 @@ class Identification:
         return {"single_track": single_track_lines(self.single_track), "two_track": two_track_lines(self.two_track)}
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values: `metrics` with name, test, value, unit; both models in SI."""
+        """Return JSON values in SI: `metrics` with name, test, value and unit, and both models."""
         metrics = [
             {"name": name.rpartition("_")[0], "test": test, "value": value * unit.factor, "unit": unit.name}
             for test, handling in self.tests.items()

@@ -176,7 +176,7 @@ class LinearCar:
     actuators: Array
 
     def modes(self) -> list[Mode]:
-        """Return all modes by natural frequency; of a conjugate pair, the mode with positive imaginary part."""
+        """Return all modes by natural frequency, of a conjugate pair the one with positive imaginary part."""
         return find_modes(self.a, self.states, self.timestep_s)
 
     def state_space(self, cut_off_Hz: float = CUT_OFF_HZ) -> control.StateSpace:
@@ -290,7 +290,7 @@ def linear_car(
     overrides: Mapping[str, Any] | None = None,
     controllers: Sequence[Any] = (),
 ) -> LinearCar:
-    """Return the car before reduction, with all modes. Overrides may set parameters of controllers."""
+    """Return the car before reduction, with all modes, for overrides that may include controllers."""
     speed_mps = float(speed_mps)
     if not MIN_SPEED_MPS <= speed_mps < math.inf:
         raise ParameterError(
@@ -373,7 +373,7 @@ def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, 
 
 
 def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture) -> Page:
-    """Return the page of a linear car: its modes, its response to the steering wheel, and its poles over speed."""
+    """Return the page of a linear car: its modes, its response to the steering wheel, and its poles versus speed."""
     rows = [[cell.replace("+-", "\N{PLUS-MINUS SIGN}") for cell in row] for row in _mode_rows(modes, CUT_OFF_HZ)]
     table = Table("", _MODE_COLUMNS, rows)
     sections = [
@@ -389,7 +389,7 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
 
 
 def _conclusion(modes: Sequence[Mode]) -> list[Text]:
-    """Return in words whether the car is stable, and its least damped mode; of yaw and sideslip too."""
+    """Return in words the stability and the least damped mode of the car, and of yaw and sideslip."""
     shown = [mode for mode in modes if mode.natural_frequency_Hz <= CUT_OFF_HZ]
     growing = ", ".join(dict.fromkeys(mode.name for mode in shown if mode.eigenvalue_1ps.real > 0.0))
     swinging = sorted((mode for mode in shown if mode.eigenvalue_1ps.imag), key=lambda mode: mode.damping_ratio)
@@ -438,7 +438,7 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
 
 
 def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequence[float]) -> Picture:
-    """Return the named poles of a car over its speed, with rays of equal damping. The systems are in modal form."""
+    """Return the named poles of a car versus its speed, from systems in modal form, with rays of equal damping."""
     limit, angle = 2.0 * math.pi * LOCUS_LIMIT_Hz, np.linspace(math.pi / 2.0, math.pi, 60)
     curves, notes = [], []
     for frequency_Hz in range(1, math.ceil(LOCUS_LIMIT_Hz)):

@@ -108,7 +108,7 @@ def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) ->
 
 
 def weakest(margins: Sequence[Margins]) -> Margins:
-    """Return the smallest of each margin. If one loop is unstable, there are none."""
+    """Return the smallest of each margin, or none if a loop is unstable."""
     if unstable := [each for each in margins if each.disk == 0.0]:
         return unstable[0]
     return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
@@ -121,7 +121,7 @@ def _least(values: Array) -> float:
 def round_trip(
     car: LinearCar, answer: Callable[[Array], Response], scenario: Scenario, unit_s: float, frequencies_radps: Array
 ) -> Response:
-    """Return the return ratio M of the demands. The closed loop is u = M u."""
+    """Return the return ratio M of the demands, with the closed loop u = M u."""
     h, config = car.timestep_s, scenario.car.config
     back = np.exp(-1j * frequencies_radps * h)  # one step
     states = np.linalg.solve(
@@ -146,7 +146,7 @@ def _held(steps: int, back: Response) -> Response:
 
 
 def _calls(sensor: Sensor, unit_s: float) -> int:
-    """Return the number of calls of the control unit for which a sample is held."""
+    """Return the number of calls of the control unit that hold one sample."""
     return max(1, round((sensor.sample_time_s or 0.0) / unit_s))
 
 
@@ -158,7 +158,7 @@ def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Respon
 
 
 def opened(returned: Response, loop: str) -> Response:
-    """Return the loop gain L opened at one demand with the other closed; 1 + L = 0 is the limit of stability."""
+    """Return the loop gain L opened at one demand with the other closed, where 1 + L = 0 is the limit of stability."""
     own = LOOPS.index(loop)
     other = 1 - own
     through = returned[:, own, other] * returned[:, other, own] / (1.0 - returned[:, other, other])
@@ -216,7 +216,9 @@ def loop_margins(
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
 ) -> list[LoopMargins]:
-    """Return the margins of every loop of every controller at every speed. An unused actuator has none.
+    """Return the margins of every loop of every controller at every speed.
+
+    An unused actuator has none.
 
     If a controller uses both actuators, the margins of both together come last.
     """

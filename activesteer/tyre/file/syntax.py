@@ -45,7 +45,7 @@ class Entry:
 
 
 def read_text(path: Path) -> str:
-    """Read a file of limited size as Latin-1, in which every byte is a character."""
+    """Read a file of limited size as Latin-1, which has a character for every byte."""
     raw = read_bytes(path, TyreFileError, limits.MAX_TYRE_BYTES)
     return raw.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
 
@@ -146,7 +146,7 @@ def si_factor(quantity: str, units: Mapping[str, float]) -> float:
 
 
 class Coefficient(NamedTuple):
-    """One key of a .tir file. A default of None means that another quantity replaces it."""
+    """One key of a .tir file, with a default of None if another quantity replaces it."""
 
     name: str
     section: str

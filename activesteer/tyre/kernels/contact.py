@@ -196,7 +196,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
 
 @compiled
 def _load(p, deflection, spin, pressure_Pa, damping_N, fx, fy, gamma):
-    """Return the load [N] under horizontal forces. The damper adds or removes at most the force of the spring."""
+    """Return the load [N] under horizontal forces, which the damper changes by at most the force of the spring."""
     elastic = vertical_force_loaded(p, deflection, spin, pressure_Pa, fx, fy, gamma)
     elastic += bottoming_force(p, deflection, spin)
     # The load is continuous when the tyre touches down or lifts off, and the road never pulls.

@@ -57,7 +57,9 @@ class Limit(IntFlag):
 
 @compiled
 def limit_flags(p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float, pressure_Pa: float) -> int:
-    """Return the sum of the `Limit` values that apply. A load of zero is a lifted wheel and not a violation.
+    """Return the sum of the `Limit` values that apply.
+
+    A load of zero is a lifted wheel and not a violation.
 
     Args:
         p: Record of the tyre.
@@ -227,7 +229,7 @@ def relative_pressure(p, pressure_Pa: float) -> float:
 def steady_state(
     p, fz: float, kappa: float, alpha: float, gamma: float, pressure: float, vx: float, mu: float, turn_slip: float
 ):
-    """Evaluate the formula once. Return a `SteadyState`."""
+    """Evaluate the formula once, as a `SteadyState`."""
     if not fz > 0.0:
         return SteadyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     load = clamp(fz, p.FZMIN, p.FZMAX)
@@ -326,7 +328,9 @@ def magic_formula(
 
 @compiled
 def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Return the slopes of the forces at zero slip. The friction of the road does not affect them.
+    """Return the slopes of the forces at zero slip.
+
+    The friction of the road does not affect them.
 
     Args:
         p: Record of the tyre.

@@ -32,7 +32,7 @@ MF52 = 52.0
 
 @compiled
 def guarded(x: float) -> float:
-    """Move a denominator away from zero, in the direction of its own sign."""
+    """Move a denominator away from zero, in the direction of its sign."""
     return x + EPSILON if x >= 0.0 else x - EPSILON
 
 
@@ -150,7 +150,7 @@ def lateral_weight(p, dfz: float, kappa: float, alpha_s: float, gamma_s: float) 
 def slip_induced_side_force(
     p, dfz: float, kappa: float, alpha_s: float, gamma_s: float, mu_fz: float, z2: float
 ) -> float:
-    """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67). Mu_fz is mu_y F_z [N]."""
+    """S_Vykappa: the lateral force [N] that longitudinal slip induces (4.E66, 4.E67), with mu_fz = mu_y F_z [N]."""
     d = mu_fz * (p.RVY1 + p.RVY2 * dfz + p.RVY3 * gamma_s) * math.cos(math.atan(p.RVY4 * alpha_s)) * z2
     return d * math.sin(p.RVY5 * math.atan(p.RVY6 * kappa)) * p.LVYKA
 
@@ -255,7 +255,7 @@ MIN_RELAXATION_LENGTH_M: Final = 0.02
 
 @compiled
 def rolling_relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Return the relaxation lengths of a rolling tyre as the contact uses them [m]; arguments as `relaxation_lengths`.
+    """Return the relaxation lengths of a rolling tyre [m] as the contact uses them.
 
     A tyre whose file or vehicle says that slip builds up at once has those of a tread block.
     """

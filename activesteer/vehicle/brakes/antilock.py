@@ -101,13 +101,13 @@ def _resume(setup, state, wheel, slow):
 
 @inlined
 def _largest_slip(setup, state, wheel, fed_Pa):
-    """Slip that releases a wheel in any case; more for a front wheel that a controller brakes."""
+    """Slip that releases a wheel in any case, larger for a front wheel that a controller brakes."""
     return setup.intervention_slip if wheel < 2 and state.demand_Pa[wheel] > fed_Pa else setup.largest_slip
 
 
 @inlined
 def _least_slip(setup, state, wheel, car_mps2):
-    """Least slip with which a deceleration releases a wheel."""
+    """Least slip for the release of a wheel by its deceleration."""
     phase = state.phase[wheel]
     minimum = setup.first_slip if phase == OFF else setup.min_slip - setup.min_slip_gain_s2pm * car_mps2
     if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:
@@ -147,7 +147,7 @@ def _rolls_slowly(setup, state, wheel, locking, gain):
 
 @inlined
 def _recover(setup, state, wheel, gain, regains, slow, locking):
-    """Advance a wheel that regains speed; a slow one first rolls until its tyre has followed."""
+    """Advance a wheel that regains speed, and let a slow wheel roll until its tyre has followed."""
     state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
     state.regained_mps2[wheel] = max(state.regained_mps2[wheel], gain)
     if slow and state.phase_s[wheel] < _TYRE_LAG_M / state.reference_mps:

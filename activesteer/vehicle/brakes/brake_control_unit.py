@@ -22,7 +22,7 @@ def pedal_pressure(setup, pedal):
 
 @compiled
 def ask(setup, state, pedal, asked_Nm):
-    """Add the pressures that driver and controller demand, between 0 and the highest. Write `demand_Pa`."""
+    """Write into `demand_Pa` the sum of the driver's and the controller's pressures, from 0 to the highest."""
     highest, fed = setup.full_pedal_pressure_Pa, pedal_pressure(setup, pedal)
     for wheel in range(4):
         pressure = fed
@@ -33,7 +33,9 @@ def ask(setup, state, pedal, asked_Nm):
 
 @compiled
 def flow(setup, state, pedal):
-    """Advance the pressures by one step. Up to its pressure the pedal feeds a brake, beyond it the pump does.
+    """Advance the pressures by one step.
+
+    Up to its pressure the pedal feeds a brake, beyond it the pump does.
 
     The torque of a brake is its torque per pressure, 2 mu_pad A_piston r_effective, times the pressure.
     """

@@ -24,7 +24,7 @@ Fraction = Annotated[float, Range(0.0, 1.0)]
 
 @dataclass(frozen=True)
 class Hydraulics:
-    """Pedal travel and pressures of the wheel brakes; all of them are assumptions, see docs."""
+    """Pedal travel and pressures of the wheel brakes, all of them assumptions."""
 
     full_pedal_pressure_Pa: Annotated[float, Range(1e6, 3e7)] = 10e6
     """Pressure at full pedal, and the pump's highest pressure [Pa]."""
@@ -43,7 +43,7 @@ class Hydraulics:
 
 @dataclass(frozen=True)
 class Antilock:
-    """Anti-lock control by wheel deceleration and slip; see `antilock`."""
+    """Parameters of `antilock`, which acts by wheel deceleration and slip."""
 
     select_low: bool = True
     """Whether both rear wheels get the pressure of the wheel with less grip."""
@@ -98,7 +98,7 @@ class Antilock:
 
 @dataclass(frozen=True)
 class TractionControl:
-    """Limits of the driven wheels' slip, by the engine and by the brakes; see `control_unit`."""
+    """Limits of the driven wheels' slip, which `control_unit` keeps by the engine and the brakes."""
 
     slip: Annotated[float, Range(0.005, 0.5)] = 0.05
     """Allowed slip, relative to the speed of the wheels that are not driven."""
@@ -200,7 +200,7 @@ def brake_setup(
     inertia_kgm2: Sequence[float],
     differential: Sequence[bool],
 ) -> NDArray[Any]:
-    """Return the constants of a car's brakes, a `BRAKE_SETUP` of shape (1,). Rows are in the order of `CORNERS`."""
+    """Return the constants of a car's brakes, a `BRAKE_SETUP` of shape (1,), with rows in the order of `CORNERS`."""
     setup = np.zeros(1, BRAKE_SETUP)
     for part, names in ((brakes.hydraulics, _HYDRAULICS), (brakes.antilock, _ANTILOCK), (brakes.traction, _TRACTION)):
         for name in names:

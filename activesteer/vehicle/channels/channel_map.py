@@ -103,7 +103,7 @@ class ChannelMap:
         self._late = np.array([place for place, *_ in (*self._motion, *self._computed)], np.intp)
 
     def signals(self) -> list[Signal]:
-        """Return the channels with their rules, without those of the motion that `CarMotion` computes."""
+        """Return the channels with their rules, without the motion that `CarMotion` computes."""
         channels = (channel for channel in MOTION_CHANNELS if channel.name in self._motion_copied)
         return [*(Signal(channel, self._motion_copied[channel.name]) for channel in channels), *self._signals]
 
@@ -134,7 +134,7 @@ class ChannelMap:
         return within(out, self._late, MAX_VALUE)
 
     def evaluate(self, rows: RawRows) -> Array:
-        """Return all channels of n raw rows, shape (n, len(channels)). The first yaw angle is within half a turn."""
+        """Return all channels of n raw rows, shape (n, len(channels)), with the first yaw angle within half a turn."""
         count = len(rows.sensordata)
         out, inputs = np.empty((count, len(self.channels)), order="F"), self.inputs(count)
         self.take(rows, out, inputs)

@@ -315,7 +315,7 @@ def axial_force(model: mujoco.MjModel, tendon: int) -> AxialForce:
 
 
 def _force(model: mujoco.MjModel, tendon: int) -> Values:
-    """Return the axial force of a tendon. A screw in the link adds the force of its actuator."""
+    """Return the axial force of a tendon, with the actuator force of a screw in the link."""
     law = axial_force(model, tendon)
     along = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
     screws = np.flatnonzero(along & (model.actuator_trnid[:, 0] == tendon) & (model.actuator_gainprm[:, 0] > 0.0))

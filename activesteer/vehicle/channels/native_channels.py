@@ -22,7 +22,7 @@ from activesteer.vehicle.force_block import sensor_columns
 
 
 class RawRows(NamedTuple):
-    """Copies of the engine's arrays and the commands, one row a step, all of the same instant."""
+    """Copies of the engine's arrays and the commands, one row a step, all of the same time."""
 
     sensordata: Array
     userdata: Array
@@ -71,7 +71,9 @@ class AxialForce(NamedTuple):
 
 
 class Actuator(NamedTuple):
-    """Limits of an actuator that follows a command with a lag. Torques are infinite if there is no limit.
+    """Limits of an actuator that follows a command with a lag.
+
+    Torques are infinite if there is no limit.
 
     `control`: its place among the commands and the forces; `activation`: among the activations.
     """
